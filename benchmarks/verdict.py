@@ -12,12 +12,12 @@ model is sound if
     no level is missing or invented: nowhere does a patch lie 0.5 m or more above, below or beside
     the truth that is 2 m2 and 2 % of the outline large and 1 m wide.
 
-Without a footprint nothing tells that a building goes on where it has no points, so the truth ends
-with them. Printed by density, area, source and defect: cases; the share of sound models; how many
-are called good, fair and poor, and the share of sound ones among each; and how many of the sound
-ones are called good. `--wrong` names cases that are called good and are not sound. `--keep` keeps
-models and points in a folder; with these a changed rule of evaluate/verdict.py is judged in
-seconds. Its limits were chosen on even buildings.
+Without a footprint nothing tells that a building goes on where it has no points. There the model
+may end; what it draws there is compared with the truth. Printed by density, area, source and
+defect: cases; the share of sound models; how many are called good, fair and poor, and the share of
+sound ones among each; and how many of the sound ones are called good. `--wrong` names cases that
+are called good and are not sound. `--keep` keeps models and points in a folder; with these a
+changed rule of evaluate/verdict.py is judged in seconds. Its limits were chosen on even buildings.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def compared(case: Case, building: Building) -> tuple[float, int]:
     """RMSE (m) between the true and the model's surface; how many levels are missing or wrong."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
-    area = shapely.transform(case.truth_area, lambda xy: xy - origin[:2])
+    area, seen = shapely.transform([case.truth_area, case.seen_area], lambda xy: xy - origin[:2])
     everywhere = shapely.union_all([area, *map(plan_of, polygons_of(model, (ROOF,)))])
     step = max(RASTER_M, float(np.sqrt(everywhere.area / MOST_PLACES)))
     west, south, east, north = everywhere.bounds
@@ -146,7 +146,8 @@ def compared(case: Case, building: Building) -> tuple[float, int]:
         heights(polygons_of(true, (ROOF,)), xy),
         heights(polygons_of(model, (ROOF,)), xy),
     )
-    z_true[~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
+    may_end = np.isnan(z_model) & ~shapely.contains_xy(seen, xy[:, 0], xy[:, 1])
+    z_true[may_end | ~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
     gaps = [
         point_surface_distances(
             np.column_stack([xy, z])[np.isfinite(z)], polygons_of(other, (ROOF, WALL))

@@ -40,7 +40,7 @@ CLUTTERED = replace(SCANNER, chimney=0.5, antenna=0.2, tree=0.3)
 @dataclass(frozen=True)
 class Case:
     """A building to model: `solids` are its truth, within `truth_area` where the footprint asks for
-    a part of it alone.
+    a part of it alone. `seen_area` is what of that has points; with a footprint it is all of it.
     """
 
     source: str
@@ -49,6 +49,7 @@ class Case:
     defect: str
     solids: tuple[Solid, ...]
     truth_area: shapely.Geometry
+    seen_area: shapely.Geometry
     footprint: shapely.Polygon | None
     points: np.ndarray
 
@@ -263,6 +264,7 @@ def cases(
             density,
             defect,
             tuple(building.solids.values()),
+            scene.asked,
             scene.asked if with_footprints else where_seen(scene, density),
             scene.footprint if with_footprints else None,
             scene.points,
