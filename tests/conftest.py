@@ -4,6 +4,7 @@ import warnings
 
 import pytest
 
+import pages
 import planted
 from hiproof import log, masking
 from hiproof.city import run as city_run
@@ -51,3 +52,15 @@ def undisturbed(town_files, tmp_path_factory):
         patch.setattr(city_run, "solve_tile", planted.solve_quickly)
         reconstruct_area(Request((town_files[0],), out, town_files[1]))
     return out
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Debian's Chromium without a window."""
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="no playwright here; pip install playwright"
+    )
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=pages.BROWSER, args=pages.FLAGS)
+        yield browser
+        browser.close()

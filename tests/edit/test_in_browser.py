@@ -1,12 +1,13 @@
 """The page in a real browser, by clicks and keys: from wrong types to a rebuilt, valid CityGML."""
 
-import shutil
 import threading
 import time
 
+import numpy as np
 import pytest
 
 import hiproof
+import pages
 from flat_town import request_over
 from hiproof.city.overrides import read_overrides
 from hiproof.compose import check_solid
@@ -14,33 +15,12 @@ from hiproof.edit.desk import Desk
 from hiproof.edit.edits import FILE
 from hiproof.edit.server import Server, Service
 from hiproof.read.solids import read_solids
+from pages import at_every_size, complaints, is_too_wide, needs_browser, places_on_canvas
 from run_records import by_id
 
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-FLAGS = [
-    "--no-sandbox",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--enable-unsafe-swiftshader",
-]
 WAIT_S = 60
 
-pytestmark = pytest.mark.skipif(
-    BROWSER is None, reason="no Chromium here; apt-get install chromium"
-)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason="no playwright here; pip install playwright"
-    )
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
-        yield browser
-        browser.close()
+pytestmark = needs_browser
 
 
 @pytest.fixture
@@ -323,3 +303,80 @@ def test_two_windows_and_one_building(browser, served, page):
     wait_for(page, "house-2: flat")
     assert other.faults == []
     other.context.close()
+
+
+@at_every_size
+def test_axe_finds_nothing_and_the_whole_building_is_shown(browser, served, size):
+    with pages.opened(browser, served.address, size) as page:
+        wait_for(page, "house-")
+        places = places_on_canvas(page, "viewer", "viewer.corners")
+        low, high = np.min(places, axis=0), np.max(places, axis=0)
+        assert (low >= 0).all() and (high <= 1).all() and (high - low).max() > 0.4
+        assert complaints(page) == [] and not is_too_wide(page)
+        for letter in "a", "s":
+            key(page, letter)
+        page.evaluate("() => inTurn(tryTypes)")
+        assert page.locator("[data-try]").count() > 5
+        assert complaints(page) == [] and not is_too_wide(page)
+
+
+def test_the_tag_of_a_building_stands_in_its_own_row(page):
+    choose(page, "house-0")
+    key(page, "a")
+    choose(page, "house-1")
+    key(page, "s")
+    for id, text in (("house-0", "accepted"), ("house-1", "changed")):
+        row, tag = page.locator(f"[data-id={id}]"), page.locator(f"[data-id={id}] .tag")
+        assert tag.inner_text() == text
+        outer, inner = row.bounding_box(), tag.bounding_box()
+        assert outer["y"] <= inner["y"]
+        assert inner["y"] + inner["height"] <= outer["y"] + outer["height"]
+        assert inner["x"] + inner["width"] <= outer["x"] + outer["width"]
+    assert page.locator(".tag:visible").count() == 2
+
+
+def focused(page):
+    return page.evaluate(
+        "() => ({ id: document.activeElement.id, ...document.activeElement.dataset })"
+    )
+
+
+def test_a_building_is_edited_by_keys_alone(page):
+    first, second, *_ = page.evaluate("() => rows.map(row => row.id)")
+    assert pages.tab_stops(page, 2)[0] == "find"
+    assert focused(page)["open"] == first
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    wait_for(page, second)
+    assert focused(page)["open"] == second
+    assert page.get_attribute(f"[data-open={second}]", "aria-current") == "true"
+    key(page, "s")
+    page.focus("[data-part='1']")
+    page.keyboard.press("Enter")
+    assert page.get_attribute("[data-part='1']", "class") == "part current"
+    assert focused(page)["part"] == "1"
+    page.focus("#type")
+    page.keyboard.press("ArrowDown")
+    until(page, "now.model.parts[1].type !== now.model.parts[0].type")
+    page.evaluate("() => queue")
+    assert focused(page)["id"] == "type"
+    page.focus("[data-name=width]")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("Tab")
+    page.evaluate("() => queue")
+    assert focused(page)["name"] == "length"
+    page.focus("#refit")
+    page.keyboard.press("Enter")
+    page.evaluate("() => queue")
+    assert focused(page)["id"] == "refit"
+
+
+def test_letter_keys_can_be_turned_off(page):
+    choose(page, "house-0")
+    page.focus("#letter-keys")
+    page.keyboard.press("Space")
+    key(page, "s")
+    assert page.locator("[data-part]").count() == 1
+    page.keyboard.press("Space")
+    key(page, "s")
+    assert page.locator("[data-part]").count() == 2

@@ -5,7 +5,6 @@ dumps what came of it.
 import base64
 import json
 import re
-import shutil
 import subprocess
 from dataclasses import replace
 
@@ -18,22 +17,14 @@ from hiproof.errors import HiproofError
 from hiproof.evaluate.report import embedded, report_html, worst_indices
 from hiproof.evaluate.report_data import report_data
 from hiproof.evaluate.report_pictures import (
-    RESIDUAL_STOPS,
     building_pictures,
     histogram,
     residual_bins,
 )
 from hiproof.evaluate.run import evaluate_run
-from hiproof.write.colours import type_colour
+from hiproof.write.colours import RESIDUAL_STOPS, type_colour
+from pages import BROWSER, needs_browser
 from sample_models import sample_points, two_parts, write_sample_run
-
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-
-needs_browser = pytest.mark.skipif(
-    BROWSER is None, reason="no Chromium here; apt-get install chromium"
-)
 
 LISTEN = """<script>
 const faults = [];
@@ -173,7 +164,7 @@ def test_roofs_are_coloured_by_their_parts(run):
     solid, parts = two_parts().solid, two_parts().part_types
     model = replace(run.models[0], solid=solid, part_types=parts)
     data = report_data(replace(run, models=(model, *run.models[1:])), [None] * len(run.models))
-    types = list(data["colours"]["type"])
+    types = data["types"]
     assert types == ["flat", "gable", "hip", "unknown"]
     owner = np.frombuffer(base64.b64decode(data["mesh"]["owner"]), "<u4")
     roof = np.frombuffer(base64.b64decode(data["mesh"]["roof"]), "u1")

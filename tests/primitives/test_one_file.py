@@ -18,7 +18,7 @@ from hiproof.primitives import CATALOGUE
 from hiproof.segment import combine
 from hiproof.simulate import ScanSettings, random_building, scan, training_sample
 from hiproof.write.citygml.roof_codes import roof_type_code
-from hiproof.write.colours import type_colour
+from hiproof.write.colours import ROOF_COLOURS, type_colour
 from hiproof.write.osm_tags import osm_shape
 from hiproof.write.parameters import building_record
 
@@ -112,7 +112,7 @@ def test_it_is_edited_and_refitted(house, scanned):
 
 def test_it_is_drawn_written_and_weighed(curb):
     assert all(f">{name}" in primitive_svg(NAME) for name in curb.parameters)
-    assert type_colour(NAME) == curb.colour and osm_shape(NAME) == curb.osm_shape
+    assert type_colour(NAME) == ROOF_COLOURS[curb.legend] and osm_shape(NAME) == curb.osm_shape
     assert (
         roof_type_code([NAME]) == curb.citygml_code
         and roof_type_code([NAME], "adv") == curb.adv_code

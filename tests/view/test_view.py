@@ -24,14 +24,8 @@ from hiproof.view.server import Handler, page_of, server_of
 from hiproof.write import files
 from hiproof.write.meshes.tiles import write_models
 from hiproof.write.meshes.viewed import ViewedModel
+from pages import BROWSER, needs_browser
 from sample_models import ORIGIN, SOLIDS, two_parts, write_sample_run
-
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-)
-needs_browser = pytest.mark.skipif(
-    BROWSER is None, reason="no Chromium here; apt-get install chromium"
-)
 
 WAIT = """<script>
 // Painting by hand: a page that nobody looks at is asked for no frame while the machine is busy.

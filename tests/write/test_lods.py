@@ -1,6 +1,7 @@
 """Levels of detail, building parts and what GIS programs see of the files."""
 
 import json
+import re
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -33,6 +34,7 @@ from hiproof.write import (
 from hiproof.write.citygml.roof_codes import CODE_SPACES
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter
 from hiproof.write.citygml.version3 import CityGML3Writer
+from hiproof.write.colours import ROOF_COLOURS, legend_of, type_colour
 from hiproof.write.tables.postgis import polyhedral_wkt
 from hiproof.write.tables.styles import STYLES, TABLE
 
@@ -280,8 +282,12 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
     assert [style.layer for style in STYLES if style.is_default] == list(layers)
     for (name, _, _, qml), style in zip(styles, STYLES, strict=True):
         renderer = etree.fromstring(qml.encode()).find("renderer-v2")
-        assert renderer.get("attr") in pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"]
+        columns = set(re.findall('"([^"]+)"', renderer.get("attr"))) or {renderer.get("attr")}
+        assert columns <= set(pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"])
         assert len(renderer.findall("symbols/symbol")) == len(style.colours)
+    with sqlite3.connect(tmp_path / "a.gpkg") as file:
+        kind, entry = file.execute(f"select type, {STYLES[1].expression} from parts").fetchone()
+    assert entry == legend_of(kind) and ROOF_COLOURS[entry] == type_colour(kind)
 
 
 @pytest.mark.parametrize(

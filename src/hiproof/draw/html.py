@@ -13,7 +13,7 @@ import numpy as np
 
 from ..model import Building
 from ..write.attribute_list import ANGLES
-from .view import TILT_DEG, colours_of, lightness, seen_faces, shaded, turn_of
+from .view import TILT_DEG, colours_of, lightness, seen_faces, shaded, sphere_of, turn_of
 
 SIZE = (360, 260)  # pixels, width and height: beside a notebook's table
 MARGIN = 12  # pixels left free on each side
@@ -34,8 +34,9 @@ def html_of(building: Building) -> str:
 def view_of(building: Building) -> str:
     """The solid as SVG, and the script that turns it."""
     solid, colours, turn = building.solid, colours_of(building), turn_of(building)
-    corners = np.round(solid.vertices - solid.vertices.mean(axis=0), MM)
-    scale = (min(SIZE) - 2 * MARGIN) / max(float(np.ptp(corners, axis=0).max()), 1e-6)
+    middle, radius = sphere_of(solid)
+    corners = np.round(solid.vertices - middle, MM)
+    scale = (min(SIZE) / 2 - MARGIN) / max(radius, 1e-6)  # so that it fits whichever way it turns
     faces = [
         {"r": [list(ring) for ring in face.rings], "c": shaded(colour, lightness(solid, face))}
         for face, colour in zip(solid.faces, colours, strict=True)
@@ -53,8 +54,9 @@ def view_of(building: Building) -> str:
     script = (files("hiproof.draw") / "turn.js").read_text(encoding="utf-8")
     return (
         f'<svg id="{name}" width="{SIZE[0]}" height="{SIZE[1]}" viewBox="{box}" '
-        'style="cursor:grab;touch-action:none" '
-        f'role="img" aria-label="model of {escape(building.id, quote=True)}">{polygons}</svg>'
+        'style="cursor:grab;touch-action:none" tabindex="0" role="application" '
+        f'aria-label="model of {escape(building.id, quote=True)}; arrow keys turn it">'
+        f"{polygons}</svg>"
         f'<script>({script.strip()})("{name}",{data.replace("<", chr(92) + "u003c")})</script>'
     )
 

@@ -9,9 +9,11 @@ import numpy as np
 from ..extras import needed
 from ..log import counted
 from ..model import Building, as_xyz
+from ..write.colours import RESIDUAL_STOPS
 from .view import TILT_DEG, colours_of, lightness, shaded, turn_of
 
 NEAR_M = 0.2  # m; within it a point counts as explained, as in share_within_20cm
+NEAR_COLOUR, FAR_COLOUR = RESIDUAL_STOPS[0][1], RESIDUAL_STOPS[-1][1]
 MOST_POINTS = 5000  # points drawn; more make a black patch
 
 
@@ -48,8 +50,8 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
         gap = local[:, 2] - model.roof.height_at(local[:, :2])
         near = np.abs(gap) <= NEAR_M
         for chosen, colour, label in (
-            (near, "#1f5fbf", "within 0.2 m"),
-            (~near, "#c8321e", "further"),
+            (near, NEAR_COLOUR, "within 0.2 m"),
+            (~near, FAR_COLOUR, "further"),
         ):
             ax.scatter(
                 *local[chosen].T,

@@ -15,7 +15,7 @@ import numpy as np
 from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
-from .view import SeenFace, colours_of, projected, seen_faces, shaded
+from .view import SeenFace, colours_of, projected, seen_faces, shaded, sphere_of
 
 WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
 # degrees; a view from the front left in which no side hides a parameter
@@ -107,7 +107,7 @@ def primitive_svg(kind: str) -> str:
     """The figure of a roof type."""
     building = typical_building(kind)
     colours = colours_of(building)
-    centre = building.solid.vertices.mean(axis=0)
+    centre, _ = sphere_of(building.solid)
     lines = measures(kind)
     page = {
         id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None]

@@ -27,11 +27,21 @@ function (name, model) {
   }
   svg.onpointerdown = event => { from = [event.clientX, event.clientY]; svg.setPointerCapture(event.pointerId); };
   svg.onpointerup = () => { from = null; };
+  function turnBy(right, down) {
+    turn += right;
+    tilt = Math.max(5, Math.min(90, tilt + down));
+    show();
+  }
   svg.onpointermove = event => {
     if (!from) return;
-    turn += (event.clientX - from[0]) * 0.6;
-    tilt = Math.max(5, Math.min(90, tilt + (event.clientY - from[1]) * 0.4));
+    turnBy((event.clientX - from[0]) * 0.6, (event.clientY - from[1]) * 0.4);
     from = [event.clientX, event.clientY];
-    show();
+  };
+  svg.onkeydown = event => {
+    const steps = { ArrowLeft: [-6, 0], ArrowRight: [6, 0], ArrowUp: [0, -6], ArrowDown: [0, 6] };
+    const step = steps[event.key];
+    if (!step) return;
+    event.preventDefault();
+    turnBy(...step);
   };
 }

@@ -39,6 +39,13 @@ def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
     )
 
 
+def sphere_of(solid: Solid) -> tuple[np.ndarray, float]:
+    """Return the middle (3,) of a solid and the largest distance (m) of a corner from it."""
+    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    middle = (low + high) / 2
+    return middle, float(np.linalg.norm(solid.vertices - middle, axis=1).max())
+
+
 def turn_of(building: Building) -> float:
     """Degrees to turn a building by, so that it is seen from a corner whichever way its main part
     stands.
@@ -56,7 +63,7 @@ def seen_faces(
     solid: Solid, colours: list[str], turn_deg: float = TURN_DEG, tilt_deg: float = TILT_DEG
 ) -> list[SeenFace]:
     """The faces that look towards the eye, the farthest first."""
-    page = projected(solid.vertices - solid.vertices.mean(axis=0), turn_deg, tilt_deg)
+    page = projected(solid.vertices - sphere_of(solid)[0], turn_deg, tilt_deg)
     seen = []
     for face, colour in zip(solid.faces, colours, strict=True):
         outer = page[list(face.rings[0])]

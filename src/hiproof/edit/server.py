@@ -15,11 +15,10 @@ from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
 from ..errors import HiproofError, InputError, OutputError
-from ..evaluate.report_pictures import RESIDUAL_STOPS
 from ..log import LOGGER
 from ..loopback import HTML, LOOPBACK, Answer, Headers, LoopbackHandler, LoopbackServer, refusal
 from ..primitives.catalogue import CATALOGUE
-from ..write.colours import WALL_COLOUR, type_colour
+from ..write.colours import page_colours
 from .desk import Desk, drawing
 from .edits import OtherVersion
 
@@ -31,6 +30,7 @@ JSON, SCRIPT, STYLE, SVG = (
 )
 ASSETS = {
     "": ("hiproof.edit", "assets/edit.html", HTML),
+    "page.css": ("hiproof.evaluate", "assets/page.css", STYLE),
     "edit.css": ("hiproof.edit", "assets/edit.css", STYLE),
     "edit.js": ("hiproof.edit", "assets/edit.js", SCRIPT),
     "handles.js": ("hiproof.edit", "assets/handles.js", SCRIPT),
@@ -131,14 +131,11 @@ class Service:
 
 def started(desk: Desk) -> dict[str, Any]:
     """What the page knows from the start."""
-    colours = {name: type_colour(name) for name in CATALOGUE}
     return {
         "folder": str(desk.run.folder),
         "who": desk.who,
         "types": list(CATALOGUE),
-        "colours": colours,
-        "wall": WALL_COLOUR,
-        "stops": [list(stop) for stop in RESIDUAL_STOPS],
+        "colours": page_colours(),
         "missing": desk.points.missing,
     }
 

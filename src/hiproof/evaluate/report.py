@@ -64,14 +64,14 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
     record = json.dumps(masked_values(run.record), indent=1, ensure_ascii=False)
     sections = {
         "title": escape(title),
-        "style": asset("report.css"),
+        "style": asset("page.css") + asset("report.css"),
         "lead": lead(run, len(shown)),
         "statuses": status_table(run),
         "qualities": grade_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
         "worst": worst_buildings(run, worst, shown),
-        "record": f"<pre>{escape(record)}</pre>",
+        "record": f'<pre tabindex="0" role="region" aria-label="run.json">{escape(record)}</pre>',
         "data": embedded(report_data(places, places_on_map(places))),
         "script": asset("viewer.js") + asset("report.js"),
     }
@@ -114,7 +114,7 @@ def status_table(run: EvaluatedRun) -> str:
         f"<tr><td>{count}</td><td>{escape(sentence(code))}</td></tr>"
         for code, count in counts.most_common()
     )
-    return f"<table><tr><th>buildings</th><th>outcome</th></tr>{rows}</table>"
+    return f"<table>{head_row('buildings', 'outcome')}{rows}</table>"
 
 
 def grade_table(run: EvaluatedRun) -> str:
@@ -125,7 +125,12 @@ def grade_table(run: EvaluatedRun) -> str:
         for grade in Grade
         if counts[grade.code]
     )
-    return f"<table><tr><th>models</th><th>quality</th></tr>{rows}</table>" if rows else ""
+    return f"<table>{head_row('models', 'quality')}{rows}</table>" if rows else ""
+
+
+def head_row(*names: str) -> str:
+    cells = "".join(f'<th scope="col">{name}</th>' for name in names)
+    return f"<thead><tr>{cells}</tr></thead>"
 
 
 def sentence(code: str) -> str:
@@ -135,15 +140,16 @@ def sentence(code: str) -> str:
 
 def figure_table(run: EvaluatedRun) -> str:
     """Mean figures by roof type."""
-    head = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in TABLE)
+    head = head_row("type", "buildings", *(name.replace("_", " ") for name in TABLE))
     rows = ""
     for kind, figures in summarise(run.figures).items():
         cells = "".join(
             f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>"
             for name in TABLE
         )
-        rows += f"<tr><td>{escape(kind)}</td><td>{figures['buildings']}</td>{cells}</tr>"
-    return f"<table><tr><th>type</th><th>buildings</th>{head}</tr>{rows}</table>"
+        head_cell = f'<th scope="row">{escape(kind)}</th>'
+        rows += f"<tr>{head_cell}<td>{figures['buildings']}</td>{cells}</tr>"
+    return f"<table>{head}{rows}</table>"
 
 
 def distributions(run: EvaluatedRun) -> str:
@@ -195,12 +201,10 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
         model.solid.moved(-origin), points - origin, psd(model.solid, points), model.part_types
     )
     text = (
-        f"<b>{escape(model.id)}</b> {escape(model.grade)} {escape(model.roof_type)}, "
+        f"{escape(model.grade)} {escape(model.roof_type)}, "
         f"{100 * quality.share_within_20cm:.0f} % of the points "
         "inside the outline within 0.2 m of the roof; RMSE of all, facades included, "
         f"{quality.rmse:.2f} m"
     )
-    return (
-        '<figure class="worst" '
-        f'data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'
-    )
+    button = f'<button type="button" data-select="{place}">{escape(model.id)}</button>'
+    return f'<figure class="worst">{pictures}<figcaption>{button} {text}</figcaption></figure>'

@@ -9,22 +9,15 @@ import numpy as np
 import shapely
 
 from ..status import Status
-from ..write.colours import GRADE_COLOURS, UNKNOWN_COLOUR, WALL_COLOUR, type_colour
+from ..write.colours import GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, page_colours
 from ..write.meshes.page_mesh import packed, solid_mesh
 from .evaluation import TEXTS
 from .metrics import plan_outline, psd
 from .models import BuildingModel
-from .report_pictures import RESIDUAL_STOPS
 from .run import EvaluatedRun
 
 POINTS_PER_BUILDING = 150  # points drawn of a building; enough to see where a roof is wrong
 MOST_POINTS = 600_000  # points in the page, 7 MB: what a browser still opens at once
-STATUS_COLOURS = {
-    "modelled": "#2a9d5c",
-    "simplified": "#e6b800",
-    "flat_fallback": "#7b3fa0",
-    "internal_error": "#000000",
-}
 
 
 def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
@@ -37,16 +30,10 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     types = sorted(
         {name for model in run.models for name in (model.roof_type, *model.part_types.values())}
     )
-    statuses = sorted({model.status for model in run.models})
     return {
         "buildings": buildings,
-        "colours": {
-            "wall": WALL_COLOUR,
-            "type": {name: type_colour(name) for name in types},
-            "status": {name: STATUS_COLOURS.get(name, UNKNOWN_COLOUR) for name in statuses},
-            "quality": GRADE_COLOURS,
-            "residual": [list(stop) for stop in RESIDUAL_STOPS],
-        },
+        "colours": page_colours() | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS},
+        "types": types,
         "mesh": mesh_data(run, types, origin),
         "points": point_data(run, origin),
     }
@@ -77,7 +64,7 @@ def building_data(
     return {
         "id": model.id,
         "type": model.roof_type,
-        "status": model.status,
+        "status": model.status if model.status in STATUS_COLOURS else NO_MODEL,
         "quality": model.grade,
         "outcome": status.value if status else model.status,
         "residual": finite(residual),

@@ -9,18 +9,8 @@ import numpy as np
 
 from ..geometry.rings import ring_normal
 from ..model import GROUND, ROOF, Solid
+from ..write.colours import RESIDUAL_STOPS
 from ..write.meshes.viewed import look_of
-
-RESIDUAL_STOPS = (
-    (0.0, "#2c7bb6"),
-    (0.05, "#7fc4a5"),
-    (0.1, "#d9e68b"),
-    (0.2, "#fdae61"),
-    (0.4, "#d7191c"),
-)
-"""Colour from each distance in metres upwards, blue near and red far; the same on map, models and
-points.
-"""
 
 MOST_POINTS = 400  # dots in a small picture; more would cover the model
 WIDTH, HEIGHT = 300, 210  # pixels; three pictures stand side by side on a laptop
@@ -67,7 +57,10 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
         f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, mean '
         f"{short(values.mean())}</text>"
     )
-    body = f'<svg viewBox="0 -4 {WIDTH} {HEIGHT}" class="histogram" role="img">{bars}{axis}</svg>'
+    body = (
+        f'<svg viewBox="0 -4 {WIDTH} {HEIGHT}" class="histogram" role="img" '
+        f'aria-label="{escape(heading, quote=True)}">{bars}{axis}</svg>'
+    )
     return f"<figure>{body}<figcaption>{escape(heading)}</figcaption></figure>"
 
 
@@ -95,7 +88,11 @@ def building_pictures(
         0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)],
     )
     side = (across, np.array([0.0, 0.0, 1.0]))
-    return "".join(projection(solid, colours, points, distances, *view) for view in (above, side))
+    seen = (("from above", above), ("from the side", side))
+    return "".join(
+        projection(solid, colours, points, distances, right, up, label)
+        for label, (right, up) in seen
+    )
 
 
 def slope_direction(solid: Solid) -> np.ndarray:
@@ -120,9 +117,10 @@ def projection(
     distances: np.ndarray,
     right: np.ndarray,
     up: np.ndarray,
+    label: str,
 ) -> str:
     """An SVG of faces, each in its colour, and points seen along one direction, `right` and `up`
-    (3,) being the picture's axes.
+    (3,) being the picture's axes. Screen readers read its `label`.
     """
     axes = np.column_stack([right, -up])
     corners, dots = solid.vertices @ axes, points @ axes
@@ -153,7 +151,8 @@ def projection(
         for i, (_, stop) in enumerate(RESIDUAL_STOPS)
     )
     return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" class="model" role="img"><g '
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" class="model" role="img" '
+        f'aria-label="{label}"><g '
         f'class="faces">{shapes}</g>'
         f'<g class="dots">{cloud}</g></svg>'
     )

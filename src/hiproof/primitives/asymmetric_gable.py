@@ -94,7 +94,7 @@ PRIMITIVE = Primitive(
     citygml_code="1030",
     adv_code="3100",
     osm_shape="gabled_height_moved",
-    colour="#f08a4b",
+    legend="gable",
     measures={
         "width": 2 * V,
         "length": 2 * U,

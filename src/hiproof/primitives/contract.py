@@ -127,7 +127,7 @@ class Primitive:
     of_member    a member of the family with planes on the same sides -> q of the shape with its
                  front's and right's slopes
     osm_shape    the nearest value of OpenStreetMap's roof:shape
-    colour       of its roofs in pictures, #rrggbb
+    legend       entry of legends that lists the type; its colour stands in write/colours.py
     """
 
     name: str
@@ -151,7 +151,7 @@ class Primitive:
     draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
     of_member: Callable[[Sides], tuple[float, ...]] | None = None
     osm_shape: str | None = None
-    colour: str = "#b5b5b5"
+    legend: str = "other"
 
     @property
     def parameters(self) -> tuple[str, ...]:

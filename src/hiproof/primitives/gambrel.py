@@ -61,7 +61,7 @@ PRIMITIVE = Primitive(
     citygml_code="1060",
     adv_code="3400",
     osm_shape="gambrel",
-    colour="#93c54b",
+    legend="mansard",
     measures={
         "width": 2 * V,
         "length": 2 * U,

@@ -71,7 +71,7 @@ PRIMITIVE = Primitive(
     citygml_code="1050",
     adv_code="3300",
     osm_shape="half-hipped",
-    colour="#5fc3e4",
+    legend="half hip",
     measures={
         "width": 2 * V,
         "length": 2 * U,

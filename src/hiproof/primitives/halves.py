@@ -103,7 +103,7 @@ SIDE_HIP = half_of(  # a gable of which one end slopes too
     ALONG,
     name="side_hip",
     osm_shape="side_hipped",
-    colour="#4fa3c7",
+    legend="hip",
     starts=(
         *at_quarters("gable", (q0, q1, 1.0), (0, 2)),
         *at_quarters("hip", (q0, q1, q2), (0, 2)),
@@ -114,7 +114,7 @@ SIDE_HALF_HIP = half_of(  # a gable of which a small hip cuts one end
     ALONG,
     name="side_half_hip",
     osm_shape="side_half-hipped",
-    colour="#8fd6ee",
+    legend="half hip",
     starts=at_quarters("gable", (q0, q1, 1.0, 0.5), (0, 2)),
 )
 HALF_MANSARD = half_of(  # one slope up to a level top
@@ -122,7 +122,7 @@ HALF_MANSARD = half_of(  # one slope up to a level top
     ACROSS,
     name="half_mansard",
     osm_shape="saltbox",
-    colour="#6fbf8f",
+    legend="mansard",
     starts=(
         DerivedStart("monopitch", (q0 + 0.2 * q1 * V, q1, 0.6)),
         *at_quarters("flat", (q0, 1.0, 0.15)),
@@ -133,7 +133,7 @@ SIDE_MANSARD = half_of(  # three slopes up to a level top that reaches to the fo
     ALONG,
     name="side_mansard",
     osm_shape="mansard",
-    colour="#35a866",
+    legend="mansard",
     starts=(
         *at_quarters("gable", (q0 - 0.4 * q1 * V, q1, 1.0, 0.6), (0, 2)),
         *at_quarters("flat", (q0, 1.0, 1.0, 0.25)),
@@ -145,7 +145,7 @@ CORNER_MANSARD = half_of(
     ACROSS,
     name="corner_mansard",
     osm_shape="mansard",
-    colour="#1e7a46",
+    legend="mansard",
     starts=(
         DerivedStart("corner", (q0 + q1 * V, q1, q2, 0.5)),
         *at_quarters("flat", (q0, 1.0, 1.0, 0.15)),

@@ -78,7 +78,7 @@ PRIMITIVE = Primitive(
     citygml_code="1040",
     adv_code="3200",
     osm_shape="hipped",
-    colour="#2e86ab",
+    legend="hip",
     measures={
         "width": 2 * V,
         "length": 2 * U,

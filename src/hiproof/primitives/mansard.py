@@ -83,7 +83,7 @@ PRIMITIVE = Primitive(
     citygml_code="1060",
     adv_code="3400",
     osm_shape="quadruple_saltbox",
-    colour="#2a9d5c",
+    legend="mansard",
     measures={
         "width": 2 * V,
         "length": 2 * U,

@@ -42,7 +42,7 @@ def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
         citygml_code="1100",
         adv_code="3800",
         osm_shape="sawtooth",
-        colour="#c98bdb",
+        legend="monopitch",
         measures={
             "width": 2 * V,
             "length": 2 * U,

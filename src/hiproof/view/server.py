@@ -14,7 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from ..loopback import HTML, SAFE, Answer, LoopbackHandler, LoopbackServer
-from ..write.colours import type_colours
+from ..write.colours import page_colours
 
 # Of a file or folder of tiles: no drive, no way up, nothing hidden.
 NAME = re.compile(r"[\w-][\w.-]{0,200}", re.ASCII)
@@ -22,6 +22,7 @@ NO_SOURCE = "'none'"
 KINDS = {".json": "application/json", ".glb": "model/gltf-binary"}
 
 ASSETS = {
+    "common": ("hiproof.evaluate", "page.css"),
     "style": ("hiproof.view", "view.css"),
     "viewer": ("hiproof.evaluate", "viewer.js"),
     "tiles": ("hiproof.view", "tiles.js"),
@@ -46,8 +47,8 @@ def page_of(title: str) -> str:
     }
     content = {
         "title": escape(title),
-        "style": texts["style"],
-        "colours": json.dumps(type_colours()),
+        "style": texts["common"] + texts["style"],
+        "colours": json.dumps(page_colours()),
         "script": texts["viewer"] + texts["tiles"] + texts["page"],
     }
     page = texts["html"]

@@ -1,34 +1,88 @@
-"""One colour a roof type, the same in pictures, reports and converted models (chosen to be told
-apart by most eyes).
+"""Colours of roofs, models and distances, the same in pictures, pages, styles and converted models.
+
+A legend has at most eight colours. People with any colour vision deficiency can distinguish them:
+two of a legend differ by at least 25 (residuals: 20) in CIELAB, as everyone sees them.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..primitives.catalogue import CATALOGUE
 
-UNKNOWN_COLOUR = "#b5b5b5"
-NO_TYPES = {"free": "#a3785f", "unknown": UNKNOWN_COLOUR}
+OTHER = "other"
+ROOF_COLOURS = {
+    "flat": "#7a8069",
+    "monopitch": "#dfba20",
+    "gable": "#b84f0c",
+    "hip": "#05429b",
+    "half hip": "#4e8cff",
+    "mansard": "#29d874",
+    "pyramid": "#f47ccb",
+    OTHER: "#7a4372",
+}
+"""Colour of each entry of a legend of roof types; "other" holds free shapes and unknown types."""
+
 WALL_COLOUR = "#e8e2d6"
 GROUND_COLOUR = "#8c8c84"
-GRADE_COLOURS = {"good": "#2a9d5c", "fair": "#e6b800", "poor": "#d1495b"}
+MARK_COLOUR = "#1d1d1d"  # of what is selected
+UNKNOWN_COLOUR = "#b5b5b5"  # of values that are not known
+GRADE_COLOURS = {"good": "#05429b", "fair": "#dfba20", "poor": "#b84f0c"}
+NO_MODEL = "no model"
+STATUS_COLOURS = {
+    "modelled": "#05429b",
+    "simplified": "#dfba20",
+    "flat_fallback": "#b84f0c",
+    "internal_error": "#1d1d1d",
+    NO_MODEL: UNKNOWN_COLOUR,
+}
+RESIDUAL_STOPS = (
+    (0.0, "#2c7bb6"),
+    (0.05, "#9bd0e8"),
+    (0.1, "#ffee80"),
+    (0.2, "#f58a3c"),
+    (0.4, "#a01428"),
+)
+"""Colour from each distance in metres upwards, blue near and red far."""
+
+
+def legend_of(kind: str | None) -> str:
+    """Return the entry of a legend that lists a roof type.
+
+    >>> legend_of("side_mansard"), legend_of("free")
+    ('mansard', 'other')
+    """
+    return CATALOGUE[kind].legend if kind in CATALOGUE else OTHER
+
+
+def type_colour(kind: str | None) -> str:
+    """Return the colour (#rrggbb) of a roof type, which is that of its legend entry.
+
+    >>> type_colour("gable")
+    '#b84f0c'
+    """
+    return ROOF_COLOURS[legend_of(kind)]
 
 
 def type_colours() -> dict[str, str]:
-    """The colour (#rrggbb) of every roof type, of "free" and of "unknown".
-
-    >>> type_colours()["gable"]
-    '#d1495b'
-    """
-    return {name: shape.colour for name, shape in CATALOGUE.items()} | NO_TYPES
+    """Return the colour (#rrggbb) of every roof type, of "free" and of "unknown"."""
+    return {kind: type_colour(kind) for kind in (*CATALOGUE, "free", "unknown")}
 
 
-def type_colour(name: str | None) -> str:
-    """The colour (#rrggbb) of a roof type; that of unknown ones of any other name."""
-    return type_colours().get(name or "unknown", UNKNOWN_COLOUR)
+def page_colours() -> dict[str, Any]:
+    """Return what a page needs to colour models and to draw its legend."""
+    return {
+        "legends": {kind: legend_of(kind) for kind in CATALOGUE},
+        "type": ROOF_COLOURS,
+        "wall": WALL_COLOUR,
+        "mark": MARK_COLOUR,
+        "unknown": UNKNOWN_COLOUR,
+        "residual": [list(stop) for stop in RESIDUAL_STOPS],
+    }
 
 
 def linear_rgb(colour: str) -> tuple[float, float, float]:
-    """Linear red, green, blue in 0..1 of a `#rrggbb` sRGB colour, as glTF wants them.
+    """Return linear red, green, blue in 0..1 of a `#rrggbb` sRGB colour, as glTF wants them.
 
     >>> linear_rgb("#ff0000")
     (1.0, 0.0, 0.0)
@@ -40,6 +94,6 @@ def linear_rgb(colour: str) -> tuple[float, float, float]:
 
 
 def srgb(colour: str) -> tuple[float, float, float]:
-    """Red, green, blue in 0..1 of a `#rrggbb` colour as displayed."""
+    """Return red, green, blue in 0..1 of a `#rrggbb` colour as displayed."""
     red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return red, green, blue

@@ -3,7 +3,7 @@
 // before for undo. Edits go one after the other, in the order of keys and clicks.
 
 const $ = id => document.getElementById(id);
-let start = { types: [], colours: {}, stops: [[0, "#000000"]], wall: "#cccccc" };
+let start = { types: [], colours: {} };
 let rows = [], drafts = new Map(), now = null, clicked = null, merging = false, queue = Promise.resolve();
 
 class Refused extends Error { constructor(answer, code) { super(answer.error || `the server answered ${code}`); this.answer = answer; this.code = code; } }
@@ -37,22 +37,43 @@ async function list() {
 }
 
 function showList() {
-  $("list").replaceChildren(...rows.map(row => {
-    const item = document.createElement("li"), small = document.createElement("small");
-    small.textContent = row.reasons.join(", ") || (row.share === null ? "no points" : `${Math.round(100 * row.share)} % within 0.2 m`);
-    item.append(`${row.id} ${row.type || "no model"}`, small);
-    item.dataset.id = row.id;
-    item.addEventListener("click", () => inTurn(() => open(row.id)));
-    row.item = item;
+  keepFocus(() => $("list").replaceChildren(...rows.map(row => {
+    const item = document.createElement("li"), button = document.createElement("button");
+    row.item = item; row.button = button;
+    row.tag = element("span", "tag");
+    const name = element("span", "name", `${row.id} ${row.type || "no model"}`);
+    button.append(name, row.tag, element("small", "", reasonOf(row)));
+    button.dataset.open = row.id;
+    button.addEventListener("click", () => inTurn(() => open(row.id)));
+    item.dataset.id = row.id; item.append(button);
     mark(row);
     return item;
-  }));
+  })));
   seeCurrent();
 }
 
-// What is said of a building by the look of its row.
+const reasonOf = row => row.reasons.join(", ")
+  || (row.share === null ? "no points" : `${Math.round(100 * row.share)} % within 0.2 m`);
+const element = (name, className, textContent = "") =>
+  Object.assign(document.createElement(name), { className, textContent });
+
+// Run `rebuild`, which replaces controls, and give the focus back to the control that had it.
+function keepFocus(rebuild) {
+  const { id, dataset } = document.activeElement, [name] = Object.keys(dataset);
+  rebuild();
+  if (document.activeElement !== document.body || !(id || name)) return;
+  const same = `[data-${name}="${CSS.escape(dataset[name])}"]`;
+  (id ? $(id) : document.querySelector(same))?.focus({ preventScroll: true });
+}
+
+// What is said of a building by its row: whether it is shown, changed or accepted.
 function mark(row) {
-  row.item.className = [now && row.id === now.id ? "current" : "", drafts.get(row.id)?.dirty ? "draft" : row.is_accepted ? "accepted" : ""].join(" ");
+  const isCurrent = Boolean(now && row.id === now.id), isDraft = drafts.get(row.id)?.dirty;
+  const state = isDraft ? "draft" : row.is_accepted ? "accepted" : "";
+  row.item.className = [isCurrent ? "current" : "", state].join(" ");
+  row.button.setAttribute("aria-current", isCurrent);
+  row.tag.textContent = isDraft ? "changed" : state;
+  row.tag.hidden = !row.tag.textContent;
 }
 const markCurrent = () => rows.filter(row => row.id === now.id).forEach(mark);
 const seeCurrent = () => $("list").querySelector(".current")?.scrollIntoView({ block: "nearest" });
@@ -120,15 +141,16 @@ function showFigures() {
   for (const [name, title, text] of FIGURES) {
     const value = now.model.figures?.[name], was = now.first?.[name];
     if (value === null || value === undefined) continue;
-    const row = $("figures").insertRow();
-    row.insertCell().textContent = title;
-    const cell = row.insertCell(); cell.textContent = text(value); cell.dataset.figure = name; cell.dataset.value = value;
-    row.insertCell().textContent = was !== null && was !== undefined && was !== value ? `was ${text(was)}` : "";
+    const isNew = was !== null && was !== undefined && was !== value;
+    const row = headedRow(title, text(value), isNew ? `was ${text(was)}` : "");
+    Object.assign(row.cells[1].dataset, { figure: name, value });
+    $("figures").append(row);
   }
 }
 
 // ---- the view
 
+const FADED = 0.45;  // of the colour of parts that are not chosen
 const viewer = new Viewer($("scene"), new Float32Array(0), new Int32Array(0));
 const handles = new Handles(viewer, $("handles"));
 if (!viewer.gl) say("this browser offers no WebGL, so there is no 3D view; numbers and keys work");
@@ -139,12 +161,14 @@ function draw(home) {
   if (!mesh || now.left) { viewer.setMesh(new Float32Array(0), new Int32Array(0)); handles.show([]); drawCloud(); viewer.draw(); return; }
   const corners = unpacked(mesh.corners, Float32Array), owner = unpacked(mesh.part, Int32Array), edges = unpacked(mesh.edges, Float32Array);
   viewer.setMesh(corners, owner);
-  const colours = now.model.parts.map(part => rgb(start.colours[part.type] || "#b5b5b5")), wall = rgb(start.wall);
-  const colourAt = t => owner[t] < 0 ? wall : owner[t] === now.part ? [255, 120, 160] : colours[owner[t]] || wall;
+  const colours = now.model.parts.map(part => rgb(typeColour(start.colours, part.type)));
+  const faded = colours.map(colour => colour.map(part => 255 - FADED * (255 - part)));
+  const wall = rgb(start.colours.wall);
+  const colourAt = t => (owner[t] === now.part ? colours : faded)[owner[t]] || wall;
   if ($("show-roof").checked) viewer.addLayer("TRIANGLES", corners, shadedColours(lightOf(corners), colourAt));
   viewer.addLayer("LINES", edges, new Uint8Array(edges.length / 3 * 4).map((_, i) => i % 4 === 3 ? 255 : 60));
   drawCloud();
-  if (home) { viewer.home(); viewer.distance *= 1.25; }
+  if (home) viewer.home();
   handles.show(handlesOf(now.model.handles[now.part], now.model.parts[now.part], now.model.origin[2]));
   viewer.draw();
 }
@@ -153,7 +177,8 @@ function drawCloud() {
   const gaps = now.model.gaps ? unpacked(now.model.gaps, Float32Array) : [];
   if (!now.cloud?.places || !$("show-points").checked) return;
   const places = unpacked(now.cloud.places, Float32Array), colours = new Uint8Array(places.length / 3 * 4).fill(255);
-  gaps.forEach((gap, i) => colours.set(rgb(colourByStops(start.stops, Math.abs(gap))), 4 * i));
+  const stops = start.colours.residual;
+  gaps.forEach((gap, i) => colours.set(rgb(colourByStops(stops, Math.abs(gap))), 4 * i));
   viewer.addLayer("POINTS", places, colours);
 }
 
@@ -311,25 +336,35 @@ function conflict(error) {
 
 function showParts() {
   const parts = now.model.parts || [];
-  $("parts").replaceChildren(...parts.map((part, index) => {
-    const row = document.createElement("div"), swatch = document.createElement("i");
-    swatch.style.background = start.colours[part.type] || "#b5b5b5";
-    row.className = `part${index === now.part ? " current" : ""}`; row.dataset.part = index;
-    row.append(swatch, `${index} ${part.type}`);
-    row.addEventListener("click", () => { clicked = null; if (merging) inTurn(() => mergeWith(index)); else choose(index); });
-    return row;
-  }));
-  showNumbers(parts[now.part], now.model.handles?.[now.part]);
+  keepFocus(() => {
+    $("parts").replaceChildren(...parts.map((part, index) => {
+      const row = element("button", `part${index === now.part ? " current" : ""}`);
+      const swatch = document.createElement("i");
+      swatch.style.background = typeColour(start.colours, part.type);
+      row.dataset.part = index; row.setAttribute("aria-current", index === now.part);
+      row.append(swatch, `${index} ${part.type}`);
+      row.addEventListener("click", () => {
+        clicked = null;
+        if (merging) inTurn(() => mergeWith(index)); else choose(index);
+      });
+      return row;
+    }));
+    showNumbers(parts[now.part], now.model.handles?.[now.part]);
+  });
 }
 
 function showNumbers(part, handle) {
-  $("numbers").replaceChildren(); $("part-title").textContent = part ? `Part ${now.part}` : "";
-  $("drawing").hidden = !part;
+  $("numbers").replaceChildren(); $("part-title").textContent = `Part ${now.part}`;
+  $("drawing").hidden = $("part-title").hidden = !part;
   if (!part) return;
   if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?${new URLSearchParams({ type: part.type })}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
   const select = document.createElement("select");
   select.id = "type"; select.append(...start.types.map(type => new Option(type, type, false, type === part.type)));
-  select.addEventListener("change", () => { select.blur(); setType(select.value); });
+  // Letters are shortcuts again after a choice by the mouse; by keys, more choices may follow.
+  let isByKey = false;
+  select.addEventListener("keydown", () => { isByKey = true; });
+  select.addEventListener("pointerdown", () => { isByKey = false; });
+  select.addEventListener("change", () => { if (!isByKey) select.blur(); setType(select.value); });
   numberRow("type", select);
   const z = now.model.origin[2], sigma = part.sigma || {};
   if (handle?.place) {
@@ -354,15 +389,17 @@ function input(name, value, changed) {
 
 // A row: name, field, unit, standard deviation, and a pin where a refit may change the number.
 function numberRow(title, field, unit = "", sigma = undefined, pinned = null) {
-  const row = $("numbers").insertRow();
-  row.insertCell().textContent = title; row.insertCell().append(field); row.insertCell().textContent = unit;
-  row.insertCell().textContent = sigma === undefined ? "" : `± ${sigma.toFixed(3)}`;
-  const cell = row.insertCell();
+  const row = headedRow(title, "", unit, sigma === undefined ? "" : `± ${sigma.toFixed(3)}`, "");
+  field.setAttribute("aria-label", title);
+  row.cells[1].append(field); $("numbers").append(row);
   if (!pinned) return;
   const label = document.createElement("label"), box = document.createElement("input"), index = now.part;
   box.type = "checkbox"; box.checked = (now.held[index] || []).includes(pinned); box.dataset.pin = pinned;
-  box.addEventListener("change", () => { box.blur(); if (box.checked) pin(index, [pinned]); else unpin(index, pinned); });
-  label.title = "a refit keeps it"; label.append(box, "pin"); cell.append(label);
+  box.setAttribute("aria-label", `pin ${title}`);
+  box.addEventListener("change", () => {
+    if (box.checked) pin(index, [pinned]); else unpin(index, pinned);
+  });
+  label.title = "a refit keeps it"; label.append(box, "pin"); row.cells[4].append(label);
 }
 
 // ---- clicks and keys
@@ -372,11 +409,20 @@ const tryNow = () => inTurn(tryTypes), across = () => split("length"), along = (
 const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: across, "split-width": along, merge, dormer, recess, remove, try: tryNow, "leave-out": leaveOut };
 const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: across, m: merge, d: dormer, e: recess, Delete: remove, t: tryNow, o: leaveOut, Escape: leave };
 const act = action => now || action === next || action === previous ? action() : say("no building is chosen");
-for (const [id, action] of Object.entries(BUTTONS)) $(id).addEventListener("click", event => { event.currentTarget.blur(); act(action); });
+for (const [id, action] of Object.entries(BUTTONS)) {
+  $(id).addEventListener("click", () => act(action));
+}
 $("ground").addEventListener("change", event => { const height = event.target.valueAsNumber; event.target.blur(); if (Number.isFinite(height)) setGround(height); else showWhole(); });
+const isTyping = ({ tagName, type }) =>
+  tagName === "SELECT" || (tagName === "INPUT" && type !== "checkbox");
 document.addEventListener("keydown", event => {
   if ((event.ctrlKey || event.metaKey) && event.key === "z") { event.preventDefault(); act(undo); return; }
-  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) { if (event.key === "Escape" || (event.key === "Enter" && event.target.id === "note")) event.target.blur(); return; }
+  if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) {
+    const isDone = event.key === "Escape" || (event.key === "Enter" && event.target.id === "note");
+    if (isDone) event.target.blur();
+    return;
+  }
+  if (!$("letter-keys").checked) return;
   if (/^[1-9]$/.test(event.key) && now?.model.parts?.length >= Number(event.key)) choose(Number(event.key) - 1);
   else if (KEYS[event.key]) { event.preventDefault(); act(KEYS[event.key]); }
 });
@@ -384,4 +430,10 @@ $("find").addEventListener("change", () => inTurn(list));
 for (const id of ["show-points", "show-roof"]) $(id).addEventListener("change", () => { if (now) draw(false); });
 addEventListener("beforeunload", event => { if ([...drafts.values()].some(draft => draft.dirty)) event.preventDefault(); });
 
-inTurn(async () => { start = await ask("start"); await list(); if (rows.length) await open(rows[0].id); if (start.missing) say(start.missing); });
+inTurn(async () => {
+  start = await ask("start");
+  showMark(start.colours);
+  await list();
+  if (rows.length) await open(rows[0].id);
+  if (start.missing) say(start.missing);
+});

@@ -6,21 +6,27 @@ const mesh = {
   roof: unpacked(data.mesh.roof, Uint8Array), edges: unpacked(data.mesh.edges, Float32Array),
 };
 const places = unpacked(data.points.places, Float32Array), distances = unpacked(data.points.distances, Float32Array);
-const unknown = "#b5b5b5";
 let mode = "type", selected = -1;
 
-function residualColour(value) { return value === null ? unknown : colourByStops(data.colours.residual, value); }
+function residualColour(value) {
+  return value === null ? data.colours.unknown : colourByStops(data.colours.residual, value);
+}
 
 function colourOf(building) {
-  return mode === "residual" ? residualColour(building.residual) : data.colours[mode][building[mode]] || unknown;
+  if (mode === "residual") return residualColour(building.residual);
+  if (mode === "type") return typeColour(data.colours, building.type);
+  return data.colours[mode][building[mode]] || data.colours.unknown;
 }
 
 const light = lightOf(mesh.corners);
 
 function meshColours() {
-  const buildings = data.buildings.map(building => rgb(colourOf(building))), types = Object.values(data.colours.type).map(rgb);
-  const wall = rgb(data.colours.wall), roof = t => mode === "type" ? types[mesh.roof[t] - 1] : buildings[mesh.owner[t]];
-  return shadedColours(light, t => !mesh.roof[t] ? wall : mesh.owner[t] === selected ? [255, 45, 111] : roof(t));
+  const buildings = data.buildings.map(building => rgb(colourOf(building)));
+  const types = data.types.map(type => rgb(typeColour(data.colours, type)));
+  const wall = rgb(data.colours.wall), mark = rgb(data.colours.mark);
+  const roof = t => mode === "type" ? types[mesh.roof[t] - 1] : buildings[mesh.owner[t]];
+  const colourAt = t => !mesh.roof[t] ? wall : mesh.owner[t] === selected ? mark : roof(t);
+  return shadedColours(light, colourAt);
 }
 
 const viewer = new Viewer(document.getElementById("scene"), mesh.corners, mesh.owner);
@@ -65,12 +71,27 @@ function fitMap() {
 }
 function showMap() { map.setAttribute("viewBox", view.join(" ")); }
 function mapScale() { return Math.max(view[2] / map.clientWidth, view[3] / map.clientHeight); }
+// Zoom about a place of the map, in pixels from its middle.
+function zoomMap(k, right = 0, down = 0) {
+  const s = mapScale(), x = view[0] + view[2] / 2 + right * s, y = view[1] + view[3] / 2 + down * s;
+  view = [x + (view[0] - x) * k, y + (view[1] - y) * k, view[2] * k, view[3] * k]; showMap();
+}
 map.addEventListener("wheel", event => {
   event.preventDefault();
-  const k = Math.exp(event.deltaY * 0.001), s = mapScale(), box = map.getBoundingClientRect();
-  const x = view[0] + view[2] / 2 + (event.clientX - box.left - box.width / 2) * s, y = view[1] + view[3] / 2 + (event.clientY - box.top - box.height / 2) * s;
-  view = [x + (view[0] - x) * k, y + (view[1] - y) * k, view[2] * k, view[3] * k]; showMap();
+  const { left, top, width, height } = map.getBoundingClientRect();
+  const right = event.clientX - left - width / 2, down = event.clientY - top - height / 2;
+  zoomMap(Math.exp(event.deltaY * 0.001), right, down);
 }, { passive: false });
+map.addEventListener("keydown", event => {
+  const count = data.buildings.length, step = ARROWS[event.key]?.reduce((a, b) => a + b);
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (step && count) show((Math.max(selected, step < 0 ? 0 : -1) + step + count) % count);
+  else if (event.key === "+" || event.key === "=") zoomMap(1 / ZOOM_STEP);
+  else if (event.key === "-") zoomMap(ZOOM_STEP);
+  else if (event.key === "Home") fitMap();
+  else return;
+  event.preventDefault();
+});
 map.addEventListener("pointerdown", () => { dragged = false; });
 map.addEventListener("pointermove", event => {
   if (!(event.buttons & 1)) return;
@@ -81,13 +102,18 @@ map.addEventListener("pointermove", event => {
 function recolour() {
   marks.forEach((element, i) => { if (element.tagName === "path") element.setAttribute("fill", colourOf(data.buildings[i])); });
   viewer.recolour(solids, meshColours());
-  const entries = mode === "residual"
-    ? data.colours.residual.map(([from, colour]) => [`from ${from} m`, colour]) : Object.entries(data.colours[mode]);
-  const legend = document.getElementById("legend");
-  legend.replaceChildren(...entries.map(([name, colour]) => {
-    const item = document.createElement("span"), swatch = document.createElement("i");
-    swatch.style.background = colour; item.append(swatch, name); return item;
-  }));
+  showLegend(entries());
+}
+
+// What the legend lists: colours that some building has.
+function entries() {
+  const { colours, types, buildings } = data;
+  if (mode === "residual") {
+    return colours.residual.map(([from, colour]) => [`from ${from} m`, colour]);
+  }
+  const names = mode === "type" ? types.map(type => entryOf(colours, type))
+    : buildings.map(building => building[mode]);
+  return Object.entries(colours[mode]).filter(([name]) => names.includes(name));
 }
 
 function select(index) {
@@ -98,18 +124,16 @@ function select(index) {
   const rows = [["id", building.id], ["type", building.type], ["outcome", building.outcome],
     ...Object.entries(building.measured), ...Object.entries(building.attributes)];
   const table = document.createElement("table");
-  for (const [name, value] of rows) {
-    const row = table.insertRow();
-    row.insertCell().textContent = name; row.insertCell().textContent = String(value);
-  }
+  table.append(...rows.map(([name, value]) => headedRow(name, String(value))));
   details.replaceChildren(table);
   viewer.recolour(solids, meshColours());
 }
 
-function approach(index) {
-  let n = 0; const sum = [0, 0, 0];
-  for (let t = 0; t < mesh.owner.length; t++) if (mesh.owner[t] === index) for (let k = 0; k < 9; k++) { sum[k % 3] += mesh.corners[9 * t + k]; n++; }
-  if (n) viewer.lookAt(sum.map(v => 3 * v / n), 45);
+// Show a building from where all of it is seen.
+function show(index) {
+  select(index);
+  const corners = mesh.corners.filter((_, i) => mesh.owner[Math.floor(i / 9)] === index);
+  if (corners.length) viewer.frame(sphereOf(corners));
 }
 
 viewer.onpick = select;
@@ -117,12 +141,14 @@ document.getElementById("mode").addEventListener("change", event => { mode = eve
 document.getElementById("show-points").addEventListener("change", event => { cloud.visible = event.target.checked; viewer.draw(); });
 document.getElementById("find").addEventListener("change", event => {
   const id = event.target.value.trim(), found = data.buildings.findIndex(building => building.id === id);
-  if (found >= 0) { select(found); approach(found); }
+  if (found >= 0) show(found);
   event.target.setCustomValidity(id && found < 0 ? "no building of this id" : ""); event.target.reportValidity();
 });
-for (const card of document.querySelectorAll("[data-select]")) card.addEventListener("click", () => {
-  select(Number(card.dataset.select)); approach(Number(card.dataset.select)); scrollTo({ top: 0, behavior: "smooth" });
-});
+for (const button of document.querySelectorAll("[data-select]")) {
+  button.addEventListener("click", () => {
+    show(Number(button.dataset.select)); scrollTo({ top: 0, behavior: "smooth" });
+  });
+}
 const unplaced = data.buildings.filter(building => !building.rings.length).length;
 if (unplaced) document.getElementById("unplaced").prepend(`${unplaced} without a place on the map: `);
-fitMap(); recolour(); viewer.draw();
+showMark(data.colours); fitMap(); recolour(); viewer.draw();

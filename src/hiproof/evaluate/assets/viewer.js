@@ -2,6 +2,12 @@
 // A small WebGL view of triangles, lines and points: orbit, pan, zoom and picking, all data in typed arrays. Shared by all our
 // pages.
 
+const HALF_VIEW = 0.4;  // radians between the middle of the view and its upper edge
+const LEAST_DISTANCE = 8;  // metres; an empty scene has no size
+const MARGIN = 1.05;  // of the scene's radius, so that nothing touches the edge of the canvas
+const TURN_STEP = 0.1, MOVE_STEP = 40, ZOOM_STEP = 1.2;  // of a key: radians, pixels, times
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
 const VERTEX = `
 attribute vec3 place; attribute vec4 colour; uniform mat4 matrix; uniform float size; varying vec4 tint;
 void main() { gl_Position = matrix * vec4(place, 1.0); gl_PointSize = size; tint = colour; }`;
@@ -12,12 +18,12 @@ class Viewer {
   constructor(canvas, corners, owner) {
     this.canvas = canvas; this.setMesh(corners, owner);
     this.gl = canvas.getContext("webgl", { antialias: true });
-    this.layers = []; this.onpick = () => {}; this.onpaint = () => {}; this.frame = 0;
+    this.layers = []; this.onpick = () => {}; this.onpaint = () => {}; this.request = 0;
     this.home();
     if (!this.gl) return;
     this.program = link(this.gl);
     this.listen();
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    new ResizeObserver(() => this.resize()).observe(canvas);
   }
 
   // What is picked from; drawn are the layers.
@@ -28,21 +34,24 @@ class Viewer {
     this.layers = [];
   }
 
-  home() {
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    for (let i = 0; i < this.corners.length; i++) {
-      low[i % 3] = Math.min(low[i % 3], this.corners[i]); high[i % 3] = Math.max(high[i % 3], this.corners[i]);
-    }
-    const empty = !isFinite(low[0]);
-    this.target = empty ? [0, 0, 0] : low.map((v, k) => (v + high[k]) / 2);
-    this.distance = this.showing(empty ? 0 : Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2);
-    this.azimuth = -0.6; this.elevation = 0.75;
+  home() { this.azimuth = -0.6; this.elevation = 0.75; this.frame(sphereOf(this.corners)); }
+
+  // Look at a sphere from where all of it is seen, until the view is moved or zoomed.
+  frame({ middle, radius }) {
+    this.target = middle.slice(); this.framed = radius; this.distance = this.framing(radius);
+    this.draw();
   }
 
-  // How far off a scene of this radius fills the canvas: seen aslant it is lower than wide, so a narrow canvas needs more.
-  showing(radius) {
+  // How far off a sphere of this radius fits into the view, upright and across.
+  framing(radius) {
     const aspect = (this.canvas.clientWidth || 1) / (this.canvas.clientHeight || 1);
-    return Math.max(8, radius * Math.max(1.8, 2.3 / aspect));
+    const half = Math.min(HALF_VIEW, Math.atan(Math.tan(HALF_VIEW) * aspect));
+    return Math.max(LEAST_DISTANCE, MARGIN * radius / Math.sin(half));
+  }
+
+  resize() {
+    if (this.framed !== null) this.distance = this.framing(this.framed);
+    this.draw();
   }
 
   // kind: "TRIANGLES", "LINES" or "POINTS"; colours: Uint8Array, four a vertex; the layer returned can be recoloured.
@@ -60,7 +69,22 @@ class Viewer {
     this.draw();
   }
 
-  lookAt(place, distance) { this.target = place.slice(); this.distance = distance; this.draw(); }
+  turn(right, down) {
+    this.azimuth -= right;
+    this.elevation = Math.min(1.55, Math.max(-0.1, this.elevation + down));
+    this.draw();
+  }
+
+  // Move the scene by pixels of the canvas.
+  move(x, y) {
+    const { right, up } = this.axes();
+    const step = 2 * Math.tan(HALF_VIEW) * this.distance / this.canvas.clientHeight;
+    this.target = this.target.map((t, k) => t - step * (x * right[k] - y * up[k]));
+    this.framed = null;
+    this.draw();
+  }
+
+  zoom(factor) { this.distance *= factor; this.framed = null; this.draw(); }
 
   axes() {
     const ce = Math.cos(this.elevation), se = Math.sin(this.elevation), ca = Math.cos(this.azimuth), sa = Math.sin(this.azimuth);
@@ -69,7 +93,7 @@ class Viewer {
 
   matrix() {
     const { back, right, up } = this.axes(), eye = this.eye();
-    const near = this.distance / 50, far = this.distance * 60, f = 1 / Math.tan(0.4);
+    const near = this.distance / 50, far = this.distance * 60, f = 1 / Math.tan(HALF_VIEW);
     const aspect = this.canvas.width / Math.max(1, this.canvas.height);
     const rows = [right.map(v => v * f / aspect), up.map(v => v * f), back];
     const shift = rows.map(row => -(row[0] * eye[0] + row[1] * eye[1] + row[2] * eye[2]));
@@ -81,8 +105,8 @@ class Viewer {
   }
 
   draw() {
-    if (!this.gl || this.frame) return;
-    this.frame = requestAnimationFrame(() => { this.frame = 0; this.paint(); });
+    if (!this.gl || this.request) return;
+    this.request = requestAnimationFrame(() => { this.request = 0; this.paint(); });
   }
 
   paint() {
@@ -115,22 +139,36 @@ class Viewer {
     canvas.addEventListener("pointermove", event => {
       if (!held) return;
       moved += Math.abs(event.movementX) + Math.abs(event.movementY);
-      if (held === "turn") {
-        this.azimuth -= event.movementX * 0.008;
-        this.elevation = Math.min(1.55, Math.max(-0.1, this.elevation + event.movementY * 0.008));
-      } else {
-        const { right, up } = this.axes(), step = this.distance * 0.85 / canvas.clientHeight;
-        this.target = this.target.map((t, k) => t - step * (event.movementX * right[k] - event.movementY * up[k]));
-      }
-      this.draw();
+      if (held === "turn") this.turn(event.movementX * 0.008, event.movementY * 0.008);
+      else this.move(event.movementX, event.movementY);
     });
     canvas.addEventListener("pointerup", event => {
-      if (held && moved < 5) { const found = this.pick(event.offsetX, event.offsetY); if (found !== null) this.onpick(found, event.offsetX, event.offsetY); }
+      if (held && moved < 5) this.pickAt(event.offsetX, event.offsetY);
       held = null;
     });
     canvas.addEventListener("wheel", event => {
-      event.preventDefault(); this.distance *= Math.exp(event.deltaY * 0.001); this.draw();
+      event.preventDefault(); this.zoom(Math.exp(event.deltaY * 0.001));
     }, { passive: false });
+    canvas.addEventListener("keydown", event => this.press(event));
+  }
+
+  // What the mouse does, by keys.
+  press(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const arrow = ARROWS[event.key], { clientWidth, clientHeight } = this.canvas;
+    if (arrow && event.shiftKey) this.move(...arrow.map(step => -MOVE_STEP * step));
+    else if (arrow) this.turn(...arrow.map(step => TURN_STEP * step));
+    else if (event.key === "+" || event.key === "=") this.zoom(1 / ZOOM_STEP);
+    else if (event.key === "-") this.zoom(ZOOM_STEP);
+    else if (event.key === "Home") this.home();
+    else if (event.key === "Enter") this.pickAt(clientWidth / 2, clientHeight / 2);
+    else return;
+    event.preventDefault();
+  }
+
+  pickAt(x, y) {
+    const found = this.pick(x, y);
+    if (found !== null) this.onpick(found, x, y);
   }
 
   // Building under a place of the canvas (CSS pixels), null for none.
@@ -141,7 +179,7 @@ class Viewer {
 
   // The ray from the eye through a place of the canvas.
   ray(x, y) {
-    const { back, right, up } = this.axes(), half = Math.tan(0.4);
+    const { back, right, up } = this.axes(), half = Math.tan(HALF_VIEW);
     const u = (2 * x / this.canvas.clientWidth - 1) * half * this.canvas.clientWidth / this.canvas.clientHeight;
     const v = (1 - 2 * y / this.canvas.clientHeight) * half;
     return { eye: this.eye(), way: back.map((b, k) => -b + u * right[k] + v * up[k]) };
@@ -160,6 +198,21 @@ class Viewer {
     const m = this.matrix(), at = k => m[k] * place[0] + m[4 + k] * place[1] + m[8 + k] * place[2] + m[12 + k];
     return [(at(0) / at(3) + 1) / 2 * this.canvas.clientWidth, (1 - at(1) / at(3)) / 2 * this.canvas.clientHeight];
   }
+}
+
+// The sphere about the middle of all corners; one of no size where there are none.
+function sphereOf(corners) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  if (!corners.length) return { middle: [0, 0, 0], radius: 0 };
+  corners.forEach((v, i) => {
+    low[i % 3] = Math.min(low[i % 3], v); high[i % 3] = Math.max(high[i % 3], v);
+  });
+  const [x, y, z] = low.map((v, k) => (v + high[k]) / 2);
+  let radius = 0;
+  for (let i = 0; i < corners.length; i += 3) {
+    radius = Math.max(radius, Math.hypot(corners[i] - x, corners[i + 1] - y, corners[i + 2] - z));
+  }
+  return { middle: [x, y, z], radius };
 }
 
 // The triangle that a ray meets first, and how far along; -1 for none (Moller and Trumbore).
@@ -212,6 +265,31 @@ function unpacked(text, Kind) { return new Kind(Uint8Array.from(atob(text), lett
 
 // [red, green, blue] of "#rrggbb".
 function rgb(colour) { return [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2), 16)); }
+
+// The entry of the legend that lists a roof type, and its colour.
+function entryOf(colours, type) { return colours.legends[type] || "other"; }
+function typeColour(colours, type) { return colours.type[entryOf(colours, type)]; }
+
+// Let the styles know the colour of what is selected.
+function showMark(colours) { document.documentElement.style.setProperty("--mark", colours.mark); }
+
+// A list of [name, colour].
+function showLegend(entries) {
+  document.getElementById("legend").replaceChildren(...entries.map(([name, colour]) => {
+    const item = document.createElement("li"), swatch = document.createElement("i");
+    swatch.style.background = colour; item.append(swatch, name);
+    return item;
+  }));
+}
+
+// A row of a table whose first cell heads the others.
+function headedRow(name, ...values) {
+  const row = document.createElement("tr");
+  const cell = (kind, textContent) => Object.assign(document.createElement(kind), { textContent });
+  row.append(cell("th", name), ...values.map(value => cell("td", value)));
+  row.firstChild.scope = "row";
+  return row;
+}
 
 // The colour of a distance: `stops` are [from, colour] upwards.
 function colourByStops(stops, value) {

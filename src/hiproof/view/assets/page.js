@@ -1,6 +1,7 @@
 // The page: what lies under a click, and which roof types are in view.
 
-const colours = JSON.parse(document.getElementById("colours").textContent), types = new Map();
+const colours = JSON.parse(document.getElementById("colours").textContent);
+const types = new Map();  // the number of parts by entry of the legend
 const hint = document.getElementById("hint");
 let scene = null;
 
@@ -13,10 +14,7 @@ function show(found) {
 }
 
 function line({ name, told, value }) {
-  const cells = [name, value].map(text => Object.assign(document.createElement("td"), { textContent: text }));
-  const made = Object.assign(document.createElement("tr"), { title: told });
-  made.append(...cells);
-  return made;
+  return Object.assign(headedRow(name, value), { title: told });
 }
 
 // The parts of a roof that a row tells of; null where it tells of something else, as the input's own of that name does.
@@ -37,26 +35,24 @@ function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
 function legend(tile) {
   for (let row = 0; row < tile.table.count; row++) {
     const told = tile.table.row(row), whole = [{ type: told.find(({ name }) => name === "type").value }];
-    for (const { type } of told.map(partsOf).find(Boolean) || whole) types.set(type, (types.get(type) || 0) + 1);
+    for (const { type } of told.map(partsOf).find(Boolean) || whole) {
+      const entry = entryOf(colours, type);
+      types.set(entry, (types.get(entry) || 0) + 1);
+    }
   }
-  document.getElementById("legend").replaceChildren(...[...types].sort((a, b) => b[1] - a[1]).map(([type]) => {
-    const mark = document.createElement("span"), square = document.createElement("i");
-    square.style.background = colours[type] || colours.unknown;
-    mark.append(square, type || "unknown");
-    return mark;
-  }));
+  showLegend([...types].sort((a, b) => b[1] - a[1]).map(([entry]) => [entry, colours.type[entry]]));
 }
 
 async function begin() {
   const answer = await fetch("tileset.json").catch(() => null), tileset = answer?.ok ? await answer.json().catch(() => null) : null;
   if (!tileset?.root) return fail("The tiles cannot be read: is hiproof view still running, and the folder still there?");
-  scene = new TileScene(document.getElementById("scene"), tileset, "");
+  scene = new TileScene(document.getElementById("scene"), tileset, "", rgb(colours.mark));
   if (!scene.gl) return fail("This browser offers no WebGL, so there is no 3D view.");
   scene.onload = legend;
   scene.onfail = reason => fail(`Some tiles cannot be read (${reason}); load the page again, or make them anew.`);
   scene.onpick = show;
   document.addEventListener("keydown", event => {
-    if (event.key === "Home") { scene.home(); scene.draw(); }
+    if (event.key === "Home") scene.home();
     if (event.key === "Escape") show(null);
   });
   scene.draw();

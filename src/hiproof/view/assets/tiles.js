@@ -1,21 +1,23 @@
 "use strict";
 // 3D Tiles as hiproof writes them, in a Viewer: tiles come and go with the view, and a click reads a tile's table.
 
-const PIXELS = 16, AT_ONCE = 6, MOST_TRIANGLES = 4e6, SELECTED = [255, 45, 111];
+const PIXELS = 16, AT_ONCE = 6, MOST_TRIANGLES = 4e6;
 const METADATA = "EXT_structural_metadata";
 
 class TileScene extends Viewer {
-  constructor(canvas, tileset, base) {
+  // `mark` is the colour of the building selected, [red, green, blue].
+  constructor(canvas, tileset, base, mark) {
     super(canvas, new Float32Array(0), new Uint32Array(0));
-    this.root = tileset.root; this.base = base; this.loading = 0; this.time = 0; this.selected = null;
+    this.root = tileset.root; this.base = base; this.mark = mark;
+    this.loading = 0; this.time = 0; this.selected = null;
     this.onload = () => {}; this.onfail = () => {};
     this.home();
   }
 
   home() {
     if (!this.root) return super.home();
-    const { middle, radius } = sphere(this.root);
-    Object.assign(this, { target: middle, distance: this.showing(radius), azimuth: -0.6, elevation: 0.75 });
+    this.azimuth = -0.6; this.elevation = 0.75;
+    this.frame(sphere(this.root));
   }
 
   paint() { this.choose(); super.paint(); }
@@ -27,7 +29,8 @@ class TileScene extends Viewer {
       const away = this.away(tile, view);
       if (away === null) return;
       if (tile.content) wanted.push({ tile, away });
-      const pixels = tile.geometricError * this.canvas.clientHeight / (2 * Math.max(away, 1e-3) * Math.tan(0.4));
+      const height = 2 * Math.max(away, 1e-3) * Math.tan(HALF_VIEW);  // metres of the view
+      const pixels = tile.geometricError * this.canvas.clientHeight / height;
       if (pixels > PIXELS) for (const child of tile.children || []) visit(child);
     };
     visit(this.root);
@@ -41,7 +44,8 @@ class TileScene extends Viewer {
 
   // Metres from the eye to a tile, null where it lies outside the view.
   away(tile, { eye, back, right, up }) {
-    const { middle, radius } = sphere(tile), to = middle.map((v, k) => v - eye[k]), half = Math.tan(0.4);
+    const { middle, radius } = sphere(tile), half = Math.tan(HALF_VIEW);
+    const to = middle.map((v, k) => v - eye[k]);
     const along = axis => to[0] * axis[0] + to[1] * axis[1] + to[2] * axis[2];
     const ahead = Math.max(0, -along(back)) * half, wide = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
     const outside = -along(back) < -radius || Math.abs(along(up)) > ahead + 1.1 * radius
@@ -95,7 +99,7 @@ class TileScene extends Viewer {
       if (one === found || (found && found.tile === one.tile)) {
         for (let t = 0; t < owner.length; t++) if (owner[t] === found.row) for (let v = 0; v < 3; v++) {
           const own = colours.subarray(12 * t + 4 * v, 12 * t + 4 * v + 3), light = Math.max(...own) / 255;
-          own.set(SELECTED.map(part => part * light));
+          own.set(this.mark.map(part => part * light));
         }
       }
       this.recolour(one.tile.layer, colours);

@@ -57,7 +57,7 @@ def look_of(face: Face, part_types: Mapping[int, str]) -> Look:
     """The look of a face: a roof's is that of its part's type.
 
     >>> look_of(Face(((0, 1, 2),), ROOF, part=1), {0: "gable", 1: "hip"})
-    Look(name='roof hip', colour='#2e86ab')
+    Look(name='roof hip', colour='#05429b')
     """
     if face.kind != ROOF:
         return Look(face.kind, WALL_COLOUR if face.kind == WALL else GROUND_COLOUR)

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ...primitives.catalogue import CATALOGUE
 from ..attribute_list import OWN
-from ..colours import GRADE_COLOURS, UNKNOWN_COLOUR, type_colours
+from ..colours import GRADE_COLOURS, ROOF_COLOURS, UNKNOWN_COLOUR, legend_of
 from ..xml_text import xml_attribute
 
 TABLE = "layer_styles"
@@ -15,23 +16,41 @@ LINE = "50,50,50,255"
 
 
 class Style(NamedTuple):
-    """A colour (#rrggbb) for each value of a layer's column, that of "unknown" for all others;
+    """A colour (#rrggbb) for each value of an expression over a layer's columns. The last colour is
+    that of all other values.
 
     `alpha` lets surfaces below show.
     """
 
     layer: str
     name: str
-    column: str
+    expression: str
     colours: dict[str, str]
     alpha: float
     is_default: bool = True
 
 
+def legend_expression(column: str) -> str:
+    """Return the expression that gives the legend entry of the roof type in a column.
+
+    >>> print(legend_expression("type")[:42])
+    CASE WHEN "type" IN ('flat') THEN 'flat' W
+    """
+    kinds: dict[str, list[str]] = {}
+    for kind in CATALOGUE:
+        kinds.setdefault(legend_of(kind), []).append(f"'{kind}'")
+    cases = (f"WHEN \"{column}\" IN ({','.join(of)}) THEN '{to}'" for to, of in kinds.items())
+    return f"CASE {' '.join(cases)} END"
+
+
+def type_style(layer: str, column: str, alpha: float) -> Style:
+    return Style(layer, "roof types", legend_expression(column), ROOF_COLOURS, alpha)
+
+
 STYLES = (
-    Style("buildings", "roof types", f"{OWN}roof_type", type_colours(), 0.35),
-    Style("parts", "roof types", "type", type_colours(), 0.5),
-    Style("roof_surfaces", "roof types", "type", type_colours(), 1.0),
+    type_style("buildings", f"{OWN}roof_type", 0.35),
+    type_style("parts", "type", 0.5),
+    type_style("roof_surfaces", "type", 1.0),
     Style(
         "buildings",
         "quality",
@@ -69,24 +88,24 @@ def style_rows() -> list[dict[str, Any]]:
 def style_qml(style: Style) -> str:
     """A style in QGIS' own form.
 
-    >>> style_qml(STYLES[1]).count("<category ") == len(type_colours())
+    >>> style_qml(STYLES[1]).count("<category ") == len(ROOF_COLOURS)
     True
     """
-    kinds = [*(name for name in style.colours if name != "unknown"), "unknown"]
+    *named, _ = style.colours
     categories = "".join(
-        f'<category symbol="{k}" value="{"" if name == "unknown" else xml_attribute(name)}" '
+        f'<category symbol="{k}" value="{xml_attribute(name) if name in named else ""}" '
         f'label="{xml_attribute(name)}"'
         ' render="true"/>'
-        for k, name in enumerate(kinds)
+        for k, name in enumerate(style.colours)
     )
     symbols = "".join(
-        fill_symbol(k, style.colours[name], style.alpha) for k, name in enumerate(kinds)
+        fill_symbol(k, colour, style.alpha) for k, colour in enumerate(style.colours.values())
     )
     return (
         "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>"
         '<qgis version="3.22.0" styleCategories="Symbology">'
-        f'<renderer-v2 type="categorizedSymbol" attr="{style.column}" symbollevels="0" '
-        'forceraster="0">'
+        f'<renderer-v2 type="categorizedSymbol" attr="{xml_attribute(style.expression)}" '
+        'symbollevels="0" forceraster="0">'
         f"<categories>{categories}</categories><symbols>{symbols}</symbols></renderer-v2></qgis>"
     )
 
