@@ -73,12 +73,12 @@ def move_edges(volumes, scene, k, value, reach):
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
                 least[q] += scene.evidence * BASE_COST
         while True:
-            q = np.argmin(least)
-            t, trial = places[q], least[q]
+            cheapest = np.argmin(least)
+            t, trial = places[cheapest], least[cheapest]
             if trial >= best:
                 break
-            least[q] = np.inf
-            if is_repeated(places, q):
+            least[cheapest] = np.inf
+            if is_repeated(places, cheapest):
                 continue
             if not is_charged:
                 is_charged = True
