@@ -18,6 +18,7 @@ import shapely
 from ..errors import InputWarning, is_interrupt
 from ..fit.registration import FARTHEST_M, Registration, register
 from ..frames import Units
+from ..geometry.grid import number_cells
 from ..masking import masked
 from ..model import Footprint, PointCloud
 from ..read.las import is_copc
@@ -158,10 +159,10 @@ def points_by_cell(
 
 def split_by_cell(xy: np.ndarray, wanted: set[Cell]) -> Iterator[tuple[Cell, np.ndarray]]:
     """The points (n, 2) of each wanted cell among `xy`."""
-    places, number = np.unique(np.floor(xy / CELL_M).astype(np.int64), axis=0, return_inverse=True)
+    places, number = number_cells(np.floor(xy / CELL_M))
     for k, (i, j) in enumerate(places.tolist()):
         if (i, j) in wanted:
-            yield (i, j), xy[number.ravel() == k]
+            yield (i, j), xy[number == k]
 
 
 def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[PointCloud]:

@@ -20,6 +20,7 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
+from ..geometry.grid import count_cells
 from ..geometry.rings import counterclockwise, ring_edges
 from .outline.cost import cost_at_depth
 from .outline.lines import lines_through
@@ -129,7 +130,7 @@ def is_alone(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
     """Whether points cover no more square metres than the roof over the footprint may with the
     largest overhang.
     """
-    covered = len(np.unique(np.floor(xy), axis=0))
+    covered = count_cells(np.floor(xy))
     return bool(
         covered
         <= shapely.area(shapely.buffer(footprint, OVERHANGS_M[-1] + 0.5, join_style="mitre"))

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from ..geometry.grid import count_cells
 from .direction import main_direction
 
 NODE_M, MOST_NODES = 0.5, 200
@@ -100,10 +101,7 @@ def find_bare_ground(
         if len(ground)
         else np.zeros(0, bool)
     )
-    if (
-        len(np.unique(np.floor(ground[seen, :2]), axis=0)) < LEAST_SEEN * LEAST_AREA_M2 / 2
-        or len(roof) == 0
-    ):
+    if count_cells(np.floor(ground[seen, :2])) < LEAST_SEEN * LEAST_AREA_M2 / 2 or len(roof) == 0:
         return None
     angle = main_direction(outline)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
@@ -231,7 +229,7 @@ def first_dense(sorted_along: np.ndarray, spacing: float, fewest: float) -> floa
 
 def typical_spacing(roof: np.ndarray) -> float:
     """Distance (m) between roof points, were they even: from the square metres that hold any."""
-    cells = len(np.unique(np.floor(roof), axis=0))
+    cells = count_cells(np.floor(roof))
     return math.sqrt(max(cells, 1) / len(roof))
 
 

@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..geometry.grid import number_cells
+
 FARTHEST_M = 4.8
 """Longest common shift (m) that is looked for.
 
@@ -251,11 +253,11 @@ def cell_of(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
     shape = (np.ceil(xy.max(axis=0) / PITCH_M) + MARGIN - low).astype(int) + 1
     inside = blur(rasterise(polygons, low, shape), BLUR_M / PITCH_M)
     i, j = (np.rint(xy / PITCH_M) - low).astype(int).T
-    _, squares = np.unique(np.floor(xy / SQUARE_M), axis=0, return_inverse=True)
+    _, squares = number_cells(np.floor(xy / SQUARE_M))
     costs = -np.log(STRAY + (1.0 - STRAY) * inside)
     return Cell(
         (float(low[0]), float(low[1])),
-        squares.ravel(),
+        squares,
         i * shape[1] + j,
         costs.ravel(),
         int(shape[1]),

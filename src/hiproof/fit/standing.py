@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from ..geometry.grid import number_cells
+
 RINGS_M = (1.5, 4.0, 7.0)
 """Distances (m) from the outline at which the ground around it is asked for; city runs know it up
 to 10 m.
@@ -86,9 +88,8 @@ def cover(points: np.ndarray, is_high: np.ndarray) -> float:
     extent = np.maximum(np.ptp(points[:, :2], axis=0), 0.1)
     side = float(np.sqrt(extent.prod() * CELL_POINTS / len(points)))
     cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / side)
-    _, index = np.unique(cells, axis=0, return_inverse=True)
-    counts = np.bincount(index.ravel())
-    return float((2 * np.bincount(index.ravel(), is_high) >= counts).mean())
+    _, index = number_cells(cells)
+    return float((2 * np.bincount(index, is_high) >= np.bincount(index)).mean())
 
 
 def ground_plane(

@@ -3,6 +3,7 @@
 rings               polygons repaired and oriented, edges and area vectors of rings
 point_in_polygon    whether a point lies in rings, compiled
 components          which members of a set are connected by links
+grid                cells of a grid in plan, numbered
 alpha_shape         the outline of a set of points
 area_vectors        area vectors and enclosed volumes, compiled
 """
