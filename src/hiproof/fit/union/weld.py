@@ -111,6 +111,11 @@ class Drawing(NamedTuple):
     parts: list[Part]
     plans: list[DrawnPlan | None]
 
+    @property
+    def corners(self) -> float:
+        """How many corners the plans have, infinitely many where one is None."""
+        return sum(math.inf if plan is None else plan.corners for plan in self.plans)
+
 
 def weld(
     volumes: np.ndarray,
@@ -178,6 +183,7 @@ def after_a_round(
     most = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
     changed: list[shapely.Polygon] = []
     window, price, after_drawing = whole, None, None
+    before: Drawing | None = drawing
     quads = quads_of(state, problem) if area > WINDOW_M2 else []
     beyond = owners_beyond(drawn, whole.box)
     for repair in find_repairs(drawn, problem.volumes, state.sides, problem.plan, problem.scene):
@@ -187,27 +193,30 @@ def after_a_round(
         if any(shapely.intersects(box, other) for other in changed):
             continue
         if window.box is not box and not window.box.equals(box):
-            window, price = window_of(box, quads, problem), None
+            window, before, price = window_of(box, quads, problem), None, None
             beyond = owners_beyond(drawn, box)
         after = repaired(state, repair, window, problem)
         if after is None:
             continue
         tried.add(repair.key)
-        if price is None:
-            before = drawing if window is whole else draw(state, window, problem)
-            price = price_of(state, before, beyond, window, problem)
-        if price is None:
+        before = before or draw(state, window, problem)
+        if before.corners == math.inf:
             continue
         trial = draw(after, window, problem)
+        if trial.corners >= before.corners:
+            continue
+        price = price or price_of(state, before, beyond, window, problem)
         if is_cheaper(price_of(after, trial, beyond, window, problem), price):
             state, after_drawing = after, trial if window is whole else None
             changed.append(box)
     return state, after_drawing
 
 
-def is_cheaper(now: tuple[float, int] | None, was: tuple[float, int]) -> bool:
+def is_cheaper(now: tuple[float, int] | None, was: tuple[float, int] | None) -> bool:
     """Tell whether a window costs less than it did, and has fewer corners."""
-    return now is not None and now[0] < was[0] and now[1] < was[1]
+    if now is None or was is None:
+        return False
+    return now[0] < was[0] and now[1] < was[1]
 
 
 def owners_beyond(drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
