@@ -32,7 +32,6 @@ $(VENV)/docs: $(VENV)/core
 	touch $@
 
 demo: $(VENV)/core
-	$(BIN)/hiproof warm
 	$(BIN)/hiproof demo demo
 	$(BIN)/hiproof check demo/buildings.city.jsonl
 	@echo "The models lie in demo/: buildings.gml (CityGML), buildings.city.jsonl (CityJSON), parameters.jsonl, buildings.gpkg"

@@ -1,0 +1,109 @@
+"""Where the CPU time of a whole run goes: milliseconds a building by stage, on Delft.
+
+    python -m benchmarks.budget [--data ../shared/data/delft]
+
+One process runs Delft twice. The second run is measured, so that imports and loaded code do not
+count. Every stage is timed without the stages inside it; "other" is the rest of the run. The table
+ends with the total, measured around the run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import tempfile
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from hiproof.city.run import Request, Summary, reconstruct_area
+
+DELFT = Path(__file__).parents[1].parent / "shared" / "data" / "delft"
+STAGES = {
+    "find the common shift of footprints": ("city.prepare", "jobs_from_footprints"),
+    "make the rest of the plan": ("city.resume", "make_plan"),
+    "sort points into tiles": ("city.sort", "sort_cloud"),
+    "load the points of a tile": ("city.solve", "load_points"),
+    "move rows of footprints": ("city.solve", "Surroundings.moved"),
+    "gather the points of a building": ("city.solve", "Surroundings.roof_of"),
+    "use the points inside the footprint": ("stages", "usable"),
+    "look at the ground inside the footprint": ("stages", "look_at_ground"),
+    "fit": ("stages", "fit"),
+    "find the ground around": ("stages", "find_ground"),
+    "compose the solid": ("stages", "solid_or_simpler"),
+    "judge": ("stages", "judge"),
+    "look at points of other classes": ("city.solve", "Surroundings.looked_at"),
+    "make the texts of all files": ("city.solve", "fragments"),
+    "keep the texts of a tile": ("city.solve", "save_fragments"),
+    "join the files": ("city.run", "merge"),
+}
+
+
+class Clock:
+    """CPU seconds by stage, each without the stages that it calls."""
+
+    def __init__(self) -> None:
+        self.seconds: Counter[str] = Counter()
+        self.inside = 0.0
+
+    def timed(self, stage: str, function: Callable) -> Callable:
+        @functools.wraps(function)
+        def run(*args: Any, **kwargs: Any) -> Any:
+            before, self.inside, start = self.inside, 0.0, time.process_time()
+            try:
+                return function(*args, **kwargs)
+            finally:
+                spent = time.process_time() - start
+                self.seconds[stage] += spent - self.inside
+                self.inside = before + spent
+
+        return run
+
+
+def measure(run: Callable[[], Summary]) -> tuple[Clock, float, int]:
+    """CPU seconds of a run by stage and in total, and its number of buildings."""
+    clock = Clock()
+    for stage, (module, path) in STAGES.items():
+        owner: Any = import_module(f"hiproof.{module}")
+        *classes, name = path.split(".")
+        for part in classes:
+            owner = getattr(owner, part)
+        setattr(owner, name, clock.timed(stage, getattr(owner, name)))
+    start = time.process_time()
+    summary = run()
+    return clock, time.process_time() - start, summary.buildings
+
+
+def print_table(clock: Clock, total: float, buildings: int) -> None:
+    rows = [(stage, clock.seconds[stage]) for stage in STAGES]
+    rows += [("other", total - sum(clock.seconds.values())), ("total", total)]
+    print("| Stage | CPU, ms a building | Share |\n| --- | --- | --- |")
+    for stage, seconds in rows:
+        print(f"| {stage} | {1000 * seconds / buildings:.2f} | {100 * seconds / total:.1f} % |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="accepted; the run is short anyway")
+    parser.add_argument("--data", type=Path, default=DELFT, help="folder with Delft's files")
+    data = parser.parse_args().data
+    if not data.is_dir():
+        raise SystemExit(
+            f"Expected Delft's files in {data}, found no such folder. Name it with --data."
+        )
+    clouds = tuple(sorted(map(str, data.glob("*.laz"))))
+    warnings.simplefilter("ignore")
+    with tempfile.TemporaryDirectory() as out:
+        request = Request(
+            clouds, Path(out), str(data / "footprints.gpkg"), restart=True, processes=1
+        )
+        reconstruct_area(request)
+        print_table(*measure(lambda: reconstruct_area(request)))
+
+
+if __name__ == "__main__":
+    main()
