@@ -117,6 +117,7 @@ def test_every_text_is_known_to_name_files_or_not():
     named = {
         "settings.read.crs",
         "settings.read.override_columns",
+        "settings.read.overture_catalogue",
         "settings.fit.types",
         "settings.write.out_crs",
     }
