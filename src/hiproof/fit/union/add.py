@@ -10,7 +10,7 @@ from ...compiled import compiled
 from .candidates import best_rectangles
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
 from .improve import improve
-from .nearby import MOST_NEAR, box_around, places_near, scattered, scene_near, volumes_near
+from .nearby import look_around, put_back
 from .objective import costs, objective
 from .refit import refit
 from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, roof_heights
@@ -154,17 +154,14 @@ def inserted(volumes, value, joined, scene, limit):
 
     Their objective is infinite where it is not below `limit`; `value` is that of `volumes`.
     """
-    last = len(joined) - 1
-    direction, box = int(joined[last, DIRECTION]), box_around(joined, last)
-    new, n, m = places_near(scene, direction, box)
-    if m > MOST_NEAR * len(new):
+    numbers, near = look_around(joined, scene, len(joined) - 1)
+    if len(near.z) == len(scene.z):
         return settle_new(joined, scene, limit)
-    numbers, near = volumes_near(joined, scene.turn, direction, box), scene_near(scene, direction, box, new, n, m)
     before = objective(volumes[numbers[:-1]], near, np.inf)
     rows, found = settle_new(joined[numbers], near, before + limit - value)
     if found == np.inf:
         return joined, found
-    trial = scattered(joined, numbers, rows)
+    trial = put_back(joined, numbers, rows)
     return trial, objective(trial, scene, limit - LEAST_GAIN)
 
 

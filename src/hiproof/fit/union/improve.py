@@ -23,7 +23,7 @@ from .moves import (
     refitted,
     without,
 )
-from .nearby import MOST_NEAR, box_around, places_near, scattered, scene_near, volumes_near
+from .nearby import look_around, put_back
 from .objective import objective
 from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1
 
@@ -65,16 +65,14 @@ def improve(volumes, scene, value, slopes, rounds):
 @compiled
 def change_nearby(volumes, scene, value, k, slopes):
     """Change the structure of volume k by what lies around it; it counts where the whole roof is cheaper."""
-    direction, box = int(volumes[k, DIRECTION]), box_around(volumes, k)
-    new, n, m = places_near(scene, direction, box)
-    if m > MOST_NEAR * len(new):
+    numbers, near = look_around(volumes, scene, k)
+    if len(near.z) == len(scene.z):
         return change_structure(volumes, scene, value, k, slopes)
-    numbers, near = volumes_near(volumes, scene.turn, direction, box), scene_near(scene, direction, box, new, n, m)
     rows = volumes[numbers]
     before = objective(rows, near, np.inf)
     rows, found = change_structure(rows, near, before, np.searchsorted(numbers, k), slopes)
     if found < before - LEAST_GAIN:
-        trial = scattered(volumes, numbers, rows)
+        trial = put_back(volumes, numbers, rows)
         found = objective(trial, scene, value - LEAST_GAIN)
         if found < np.inf:
             return trial, found
