@@ -44,7 +44,8 @@ def price(state, problem, box=None):
     window = weld.window_of(box, weld.quads_of(state, problem), problem)
     whole = weld.window_of(weld.whole_box(problem), weld.quads_of(state, problem), problem)
     beyond = weld.owners_beyond(weld.draw(state, whole, problem).plans[0], box)
-    return weld.price_of(state, weld.draw(state, window, problem), beyond, window, problem)
+    drawing = weld.draw(state, window, problem)
+    return weld.price_of(state, drawing, beyond, window, problem), drawing.corners
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("L", 1), ("dormered", 2), ("two_level", 3), ("T", 4)])

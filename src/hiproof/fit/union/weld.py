@@ -10,7 +10,8 @@ no repair pays. The outline never moves.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -169,6 +170,43 @@ def draw(state: State, window: Window, problem: Problem) -> Drawing:
     return Drawing(regions, [part for part, _ in drawn], plans)
 
 
+@dataclass
+class Comparison:
+    """A window of a roof as it is in a `state`, with which repairs in it are compared.
+
+    `plan` is that of the whole roof. The window is drawn when a repair asks for it, unless its
+    drawing is `known`.
+    """
+
+    state: State
+    window: Window
+    plan: DrawnPlan
+    problem: Problem
+    known: Drawing | None = None
+
+    @cached_property
+    def drawing(self) -> Drawing:
+        return self.known or draw(self.state, self.window, self.problem)
+
+    @cached_property
+    def beyond(self) -> set[tuple[int, int]]:
+        return owners_beyond(self.plan, self.window.box)
+
+    @cached_property
+    def price(self) -> float:
+        return price_of(self.state, self.drawing, self.beyond, self.window, self.problem)
+
+    def draw_if_cheaper(self, after: State) -> Drawing | None:
+        """Draw the window after a repair; None where it costs as much or has as many corners."""
+        if self.drawing.corners == math.inf:
+            return None
+        trial = draw(after, self.window, self.problem)
+        if trial.corners >= self.drawing.corners:
+            return None
+        price = price_of(after, trial, self.beyond, self.window, self.problem)
+        return trial if price < self.price else None
+
+
 def after_a_round(
     state: State, drawing: Drawing, whole: Window, tried: set[tuple], problem: Problem
 ) -> tuple[State, Drawing | None]:
@@ -176,47 +214,32 @@ def after_a_round(
 
     Its drawing comes with it where it is known.
     """
-    drawn = drawing.plans[0]
-    if drawn is None:
+    plan = drawing.plans[0]
+    if plan is None:
         return state, drawing
     area = problem.outline.area
     most = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
     changed: list[shapely.Polygon] = []
-    window, price, after_drawing = whole, None, None
-    before: Drawing | None = drawing
+    after_drawing = None
     quads = quads_of(state, problem) if area > WINDOW_M2 else []
-    beyond = owners_beyond(drawn, whole.box)
-    for repair in find_repairs(drawn, problem.volumes, state.sides, problem.plan, problem.scene):
+    present = Comparison(state, whole, plan, problem, drawing)
+    for repair in find_repairs(plan, problem.volumes, state.sides, problem.plan, problem.scene):
         if repair.key in tried or len(tried) >= most:
             continue
         box = box_of(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
             continue
-        if window.box is not box and not window.box.equals(box):
-            window, before, price = window_of(box, quads, problem), None, None
-            beyond = owners_beyond(drawn, box)
-        after = repaired(state, repair, window, problem)
+        if present.window.box is not box and not present.window.box.equals(box):
+            present = Comparison(state, window_of(box, quads, problem), plan, problem)
+        after = repaired(state, repair, present.window, problem)
         if after is None:
             continue
         tried.add(repair.key)
-        before = before or draw(state, window, problem)
-        if before.corners == math.inf:
-            continue
-        trial = draw(after, window, problem)
-        if trial.corners >= before.corners:
-            continue
-        price = price or price_of(state, before, beyond, window, problem)
-        if is_cheaper(price_of(after, trial, beyond, window, problem), price):
-            state, after_drawing = after, trial if window is whole else None
+        trial = present.draw_if_cheaper(after)
+        if trial is not None:
+            state, after_drawing = after, trial if present.window is whole else None
             changed.append(box)
     return state, after_drawing
-
-
-def is_cheaper(now: tuple[float, int] | None, was: tuple[float, int] | None) -> bool:
-    """Tell whether a window costs less than it did, and has fewer corners."""
-    if now is None or was is None:
-        return False
-    return now[0] < was[0] and now[1] < was[1]
 
 
 def owners_beyond(drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
@@ -284,25 +307,22 @@ def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Probl
 
 def price_of(
     state: State, drawing: Drawing, beyond: set[tuple[int, int]], window: Window, problem: Problem
-) -> tuple[float, int] | None:
-    """What a window of a roof costs (points), with the parameters that show in it or `beyond`, and
-    its corners.
-
-    None where no plan comes out.
+) -> float:
+    """What a window of a roof costs (points), with the parameters that show in it or `beyond`;
+    infinite where no plan comes out.
     """
     scene, numbers = problem.scene, window.numbers
-    shown, corners = set(beyond), 0
+    shown = set(beyond)
     for drawn in drawing.plans:
         if drawn is None:
-            return None
-        corners += drawn.corners
+            return math.inf
         shown |= {(int(numbers[k]), p) for k, p in drawn.owner[drawn.shown].tolist()}
     rows = np.array([state.planes[k].rows[p] for k, p in sorted(shown)])
     turns = scene.turn[problem.volumes[[k for k, _ in sorted(shown)], DIRECTION].astype(int)]
     height, _ = highest_of(drawing.parts, window.xy)
     misfit = window.weight * float(misfits(window.z, height, scene).sum())
-    units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * corners
-    return misfit + scene.evidence * units, corners
+    units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * drawing.corners
+    return misfit + scene.evidence * units
 
 
 def repaired(state: State, repair: Repair, window: Window, problem: Problem) -> State | None:
@@ -365,10 +385,9 @@ def with_line_moved(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: 
 
 def on_one_line(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> list[tuple[int, int]]:
     """The sides, as (volume, edge), on the line of side `edge` of volume k and off the outline."""
-    was, at = sides[k][edge], sides[k][edge].at
+    was = sides[k][edge]
     alike = (np.flatnonzero(volumes[1:, DIRECTION] == volumes[k, DIRECTION]) + 1).tolist()
-    every = [(j, e) for j in alike for e in (edge & 2, edge | 1) if abs(sides[j][e].at - at) < ONE_LINE_M]
-    return [(j, e) for j, e in every if is_one_line(sides[j][e], was)]
+    return [(j, e) for j in alike for e in (edge & 2, edge | 1) if is_one_line(sides[j][e], was)]
 
 
 def is_one_line(one: Side, other: Side) -> bool:
