@@ -14,7 +14,7 @@ from urllib.parse import urljoin, urlsplit
 import shapely
 
 from ..errors import InputError
-from ..extras import needed
+from .geoparquet import import_fsspec
 from .remote import options_of
 
 TRIES = 3  # of a document: of hundreds of requests a server closes one now and then
@@ -41,7 +41,7 @@ class Document:
 
 def read_document(address: str) -> Document:
     """The document at an address or a path. Raises InputError where none can be read there."""
-    fsspec = needed("fsspec", "parquet", "GeoParquet by address")
+    fsspec = import_fsspec()
     for left in reversed(range(TRIES)):
         try:
             files, path = fsspec.core.url_to_fs(address, **options_of(address))
