@@ -16,48 +16,53 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from importlib import import_module
+from contextlib import ExitStack
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
+from unittest.mock import patch
 
 from hiproof.city.run import Request, Summary, reconstruct_area
 
 DELFT = Path(__file__).parents[1].parent / "shared" / "data" / "delft"
 STAGES = {
-    "find the common shift of footprints": ("city.prepare", "jobs_from_footprints"),
-    "make the rest of the plan": ("city.resume", "make_plan"),
-    "sort points into tiles": ("city.sort", "sort_cloud"),
-    "load the points of a tile": ("city.solve", "load_points"),
-    "move rows of footprints": ("city.solve", "Surroundings.moved"),
-    "gather the points of a building": ("city.solve", "Surroundings.roof_of"),
-    "use the points inside the footprint": ("stages", "usable"),
-    "look at the ground inside the footprint": ("stages", "look_at_ground"),
-    "fit": ("stages", "fit"),
-    "find the ground around": ("stages", "find_ground"),
-    "compose the solid": ("stages", "solid_or_simpler"),
-    "judge": ("stages", "judge"),
-    "look at points of other classes": ("city.solve", "Surroundings.looked_at"),
-    "make the texts of all files": ("city.solve", "fragments"),
-    "keep the texts of a tile": ("city.solve", "save_fragments"),
-    "join the files": ("city.run", "merge"),
+    "find the common shift of footprints": "hiproof.city.prepare.jobs_from_footprints",
+    "make the rest of the plan": "hiproof.city.resume.make_plan",
+    "sort points into tiles": "hiproof.city.sort.sort_cloud",
+    "load the points of a tile": "hiproof.city.solve.load_points",
+    "move rows of footprints": "hiproof.city.solve.Surroundings.moved",
+    "gather the points of a building": "hiproof.city.solve.Surroundings.roof_of",
+    "use the points inside the footprint": "hiproof.stages.usable",
+    "look at the ground inside the footprint": "hiproof.stages.look_at_ground",
+    "fit": "hiproof.stages.fit",
+    "find the ground around": "hiproof.stages.find_ground",
+    "compose the solid": "hiproof.stages.solid_or_simpler",
+    "judge": "hiproof.stages.judge",
+    "look at points of other classes": "hiproof.city.solve.Surroundings.looked_at",
+    "make the texts of all files": "hiproof.city.solve.fragments",
+    "keep the texts of a tile": "hiproof.city.solve.save_fragments",
+    "join the files": "hiproof.city.run.merge",
 }
 
 
 class Clock:
-    """CPU seconds by stage, each without the stages that it calls."""
+    """Seconds by stage, each without the stages that it calls; `read` tells the time (s)."""
 
-    def __init__(self) -> None:
+    def __init__(self, read: Callable[[], float] = time.process_time) -> None:
+        self.read = read
         self.seconds: Counter[str] = Counter()
         self.inside = 0.0
 
-    def timed(self, stage: str, function: Callable) -> Callable:
+    def time_stage(self, stage: str, function: Callable) -> Callable:
+        """Return `function` as it is, but that its seconds count for a stage."""
+
         @functools.wraps(function)
         def run(*args: Any, **kwargs: Any) -> Any:
-            before, self.inside, start = self.inside, 0.0, time.process_time()
+            before, self.inside, start = self.inside, 0.0, self.read()
             try:
                 return function(*args, **kwargs)
             finally:
-                spent = time.process_time() - start
+                spent = self.read() - start
                 self.seconds[stage] += spent - self.inside
                 self.inside = before + spent
 
@@ -67,15 +72,13 @@ class Clock:
 def measure(run: Callable[[], Summary]) -> tuple[Clock, float, int]:
     """CPU seconds of a run by stage and in total, and its number of buildings."""
     clock = Clock()
-    for stage, (module, path) in STAGES.items():
-        owner: Any = import_module(f"hiproof.{module}")
-        *classes, name = path.split(".")
-        for part in classes:
-            owner = getattr(owner, part)
-        setattr(owner, name, clock.timed(stage, getattr(owner, name)))
-    start = time.process_time()
-    summary = run()
-    return clock, time.process_time() - start, summary.buildings
+    with ExitStack() as patched:
+        for stage, place in STAGES.items():
+            timed = clock.time_stage(stage, resolve_name(place))
+            patched.enter_context(patch(place, timed))
+        start = time.process_time()
+        summary = run()
+        return clock, time.process_time() - start, summary.buildings
 
 
 def print_table(clock: Clock, total: float, buildings: int) -> None:

@@ -41,6 +41,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from unittest.mock import patch
 
 import laspy
 import numpy as np
@@ -121,17 +122,14 @@ def judge_run(name: str, request: Request) -> Findings:
 @contextlib.contextmanager
 def collect_tracebacks() -> Iterator[dict[str, str]]:
     """Collect the tracebacks of internal errors inside the block, by building."""
-    original, errors = solve.failed, {}
+    record, errors = solve.failed, {}
 
     def failed(plan, job, detail):
         errors[job.id] = job.error.trace if job.error else traceback.format_exc()
-        return original(plan, job, detail)
+        return record(plan, job, detail)
 
-    solve.failed = failed
-    try:
+    with patch.object(solve, "failed", failed):
         yield errors
-    finally:
-        solve.failed = original
 
 
 def judge_files(name: str, out: Path, found: Findings) -> None:

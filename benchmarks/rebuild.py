@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 from hiproof.city import solve
 from hiproof.city.overrides import read_overrides
@@ -80,18 +81,15 @@ def overridden(request: Request, work: Path) -> str:
     chosen = list(before)[:: max(1, len(before) // OVERRIDES)][:OVERRIDES]
     path = work / "known.jsonl"
     path.write_text("".join(json.dumps({"id": id, "block_height": 7.5}) + "\n" for id in chosen))
-    solved, original = [], solve.solve_one
+    solved, solve_one = [], solve.solve_one
 
     def counting(plan, job, *rest):
         solved.append(job.id)
-        return original(plan, job, *rest)
+        return solve_one(plan, job, *rest)
 
-    solve.solve_one = counting
     start, cpu = time.perf_counter(), time.process_time()
-    try:
+    with patch.object(solve, "solve_one", counting):
         reconstruct_area(replace(request, overrides=str(path)))
-    finally:
-        solve.solve_one = original
     seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
     after = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
     same = sum(after[id] == before[id] for id in before if id not in chosen)

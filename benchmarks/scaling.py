@@ -76,13 +76,19 @@ def measure(area_m2: float, density: float) -> str:
     except HiproofError as error:
         outcome = str(error)
     done = time.process_time()
-    a_part = 1e5 / outline.area
+    per_100_m2 = 1e5 / outline.area  # ms for a second
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return (
-        f"{outline.area:8.0f} m2  {len(points):8d} points  fit {a_part * (fitted - started):6.1f}"
-        f"  compose {a_part * (done - fitted):5.1f} ms per 100 m2  within {NEAR_M} m"
-        f" {1.0 - fit.unexplained:.4f}  parts {len(fit.roof_parts):5d}  {memory:5.0f} MB  {outcome}"
+    figures = (
+        f"{outline.area:8.0f} m2",
+        f"{len(points):8d} points",
+        f"fit {per_100_m2 * (fitted - started):6.1f}",
+        f"compose {per_100_m2 * (done - fitted):5.1f} ms per 100 m2",
+        f"within {NEAR_M} m {1.0 - fit.unexplained:.4f}",
+        f"parts {len(fit.roof_parts):5d}",
+        f"{memory:5.0f} MB",
+        outcome,
     )
+    return "  ".join(figures)
 
 
 def main() -> None:

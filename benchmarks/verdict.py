@@ -33,6 +33,7 @@ from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import shapely
@@ -173,17 +174,14 @@ def patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
 @contextmanager
 def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
     """Collect what verdicts are asked by inside the block."""
-    original, asked = verdict.verdict_of, []
+    judge, asked = verdict.verdict_of, []
 
     def verdict_of(model: Model, points: np.ndarray, unused: np.ndarray) -> verdict.Verdict:
         asked.append((model, points, unused))
-        return original(model, points, unused)
+        return judge(model, points, unused)
 
-    verdict.verdict_of = verdict_of
-    try:
+    with patch.object(verdict, "verdict_of", verdict_of):
         yield asked
-    finally:
-        verdict.verdict_of = original
 
 
 def outcomes(block: Block, folder: Path | None = None) -> list[Outcome]:
