@@ -38,6 +38,7 @@ from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run
 from hiproof.model import ROOF, Face, Part, Piece, Solid
 from hiproof.parametric.record import building_of
+from hiproof.read.damage import LeftOut
 from hiproof.write.colours import type_colour
 
 SETS = Path(__file__).resolve().parents[1].parent / "shared" / "data"
@@ -128,7 +129,9 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
             "run again"
         )
     roofs = {r["id"]: building_of(r)[1] for r in read_parameters(folder / "parameters.jsonl")}
-    true_solids = {model.id: model.solid for model in read_models(truth)} if truth else {}
+    # a true model with an invalid solid is not drawn; the others are
+    true_models = read_models(truth, damaged=LeftOut()) if truth else ()
+    true_solids = {model.id: model.solid for model in true_models}
     found = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
         if model.solid is not None and len(points):
