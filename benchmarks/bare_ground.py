@@ -37,7 +37,7 @@ from hiproof.simulate.scene import (
     SOURCE_WALL,
     Body,
     Defects,
-    scene_of,
+    make_scene,
 )
 from hiproof.simulate.shapes import box
 
@@ -204,7 +204,7 @@ def with_ground_under(site: Site, area: shapely.Geometry, share: float) -> Site:
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
-        seen = scan.chosen(above & (rng.random(len(scan)) < share))
+        seen = scan.select(above & (rng.random(len(scan)) < share))
         xy = seen.points[:, :2] + rng.normal(0, 0.3, (len(seen), 2))
         points = np.column_stack([xy, site.slope.height_at(xy) + rng.normal(0, 0.03, len(xy))])
         source = np.concatenate([scan.source, np.full(len(seen), SOURCE_GROUND, np.int8)])
@@ -351,7 +351,7 @@ GONE = {
 
 def scanned(site: Site, density: float, rng: np.random.Generator) -> Scan:
     settings = ScanSettings(density=density, margin_m=0.0, defects=site.defects)
-    scene = scene_of(site.bodies, site.crowns, site.slope)
+    scene = make_scene(site.bodies, site.crowns, site.slope)
     scan = scan_scene(scene, site.footprint.buffer(AROUND_M, quad_segs=2), 3.0, rng, settings)
     return site.change(rng, scan) if site.change else scan
 

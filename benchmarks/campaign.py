@@ -122,13 +122,13 @@ def judge_run(name: str, request: Request) -> Findings:
 @contextlib.contextmanager
 def collect_tracebacks() -> Iterator[dict[str, str]]:
     """Collect the tracebacks of internal errors inside the block, by building."""
-    record, errors = solve.failed, {}
+    record, errors = solve.record_failure, {}
 
     def failed(plan, job, detail):
         errors[job.id] = job.error.trace if job.error else traceback.format_exc()
         return record(plan, job, detail)
 
-    with patch.object(solve, "failed", failed):
+    with patch.object(solve, "record_failure", failed):
         yield errors
 
 

@@ -28,7 +28,7 @@ from hiproof.simulate import (
     random_compound,
     scan,
 )
-from hiproof.simulate.compounds import Layout, houses_in_a_row
+from hiproof.simulate.compounds import CompoundLayout, houses_in_a_row
 from hiproof.simulate.roofs import assemble
 from hiproof.simulate.shapes import make_part
 
@@ -144,7 +144,7 @@ def draw_city_block(rng: np.random.Generator, place: np.ndarray) -> SimBuilding:
     half = rng.uniform((11.0, 11.0), (16.0, 16.0))
     parts = []
     for side in range(int(rng.integers(2, 5))):
-        row = houses_in_a_row(rng, Layout(0.0))
+        row = houses_in_a_row(rng, CompoundLayout(0.0))
         turn, out = side * math.pi / 2, half[side % 2]
         c, s = math.cos(kappa + turn), math.sin(kappa + turn)
         for part in row:

@@ -26,9 +26,9 @@ import laspy
 import numpy as np
 
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.classify import BUILDING, GROUND, classify
+from hiproof.classify import BUILDING, GROUND_CLASS, classify
 from hiproof.classify.cells import SquareCells
-from hiproof.classify.ground import GroundGrid, filled, ground_grid
+from hiproof.classify.ground import GroundGrid, fill_gaps, ground_grid
 from hiproof.model import PointCloud
 from hiproof.read import read_points
 
@@ -71,13 +71,13 @@ def ground_differences(cloud: PointCloud) -> np.ndarray:
     """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold
     points of class 6.
     """
-    cells, is_ground = SquareCells(cloud.xyz, 1.0), cloud.classification == GROUND
+    cells, is_ground = SquareCells(cloud.xyz, 1.0), cloud.classification == GROUND_CLASS
     count = cells.count(is_ground)
     total = np.bincount(cells.index[is_ground], cloud.xyz[is_ground, 2], count.size).reshape(
         count.shape
     )
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-    true = GroundGrid(np.array(cells.first, float), filled(mean), 1.0)
+    true = GroundGrid(np.array(cells.first, float), fill_gaps(mean), 1.0)
     under = (
         np.argwhere(cells.count(cloud.classification == BUILDING) > 0) + np.array(cells.first) + 0.5
     )

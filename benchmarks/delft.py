@@ -35,7 +35,7 @@ from hiproof.errors import HiproofError
 from hiproof.frames import LocalFrame
 from hiproof.model import ROOF, Building, Footprint, Model, Roof
 from hiproof.read import read_footprints, read_points
-from hiproof.read.assign import points_of_footprints
+from hiproof.read.assign import assign_points
 from hiproof.settings import Settings
 from hiproof.status import Status
 from hiproof.write import write_cityjson
@@ -85,14 +85,16 @@ def model(
         }
     figures["compose"] = time.process_time() - done
     top = np.unique(
-        np.concatenate([np.concatenate(face.rings) for face in solid.of_kind(ROOF)]).astype(int)
+        np.concatenate([np.concatenate(face.rings) for face in solid.select_faces(ROOF)]).astype(
+            int
+        )
     )
     z = solid.vertices[top, 2]
-    figures["faces"] = len(solid.of_kind(ROOF))
+    figures["faces"] = len(solid.select_faces(ROOF))
     figures["beyond"] = max(z.max() - local[:, 2].max(), local[:, 2].min() - z.min())
     figures["bad"] = float(len(check_solid(solid)) > 0)
     return Building(
-        footprint.id, Status.MODELLED, built=Model(roof, solid.moved(frame.origin))
+        footprint.id, Status.MODELLED, built=Model(roof, solid.move(frame.origin))
     ), figures
 
 
@@ -123,7 +125,7 @@ def asked_of(
     footprints = asked_footprints(data / (SETS | EPOCHS)[name], parity)
     clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
     cloud = thinned(clouds, share)
-    indices = points_of_footprints(cloud, footprints)
+    indices = assign_points(cloud, footprints)
     return Asked(
         footprints,
         clouds,

@@ -20,7 +20,7 @@ import numpy as np
 import shapely
 
 from hiproof import reconstruct
-from hiproof.evaluate.layers import FEWEST_POINTS, two_surfaces, unseen_share
+from hiproof.evaluate.layers import FEWEST_LAYER_POINTS, find_second_surface, unseen_share
 from hiproof.evaluate.verdict import MOST_UNSEEN
 from hiproof.settings import Settings
 
@@ -65,10 +65,10 @@ def told(cases: Iterable[Case], change: Callable[[Case], np.ndarray]) -> str:
         points = change(case)
         building = reconstruct(points, case[2], settings=SETTINGS)
         inside = points[shapely.intersects_xy(case[2], *points[:, :2].T)]
-        if building.built is None or len(inside) < FEWEST_POINTS:
+        if building.built is None or len(inside) < FEWEST_LAYER_POINTS:
             continue
         local = building.roof.frame.to_local(inside)
-        share, apart_m = two_surfaces(local, building.roof)
+        share, apart_m = find_second_surface(local, building.roof)
         count, surfaces = count + 1, surfaces + (share > 0)
         apart += [apart_m] if share else []
         unseen += unseen_share(local, building.roof.outline) > MOST_UNSEEN

@@ -35,11 +35,11 @@ from scipy.spatial import cKDTree
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
-from hiproof.edit.edits import FILE
+from hiproof.edit.edits import EDITS_FILE
 from hiproof.edit.server import Server, Service
 from hiproof.evaluate.metrics import FACADE_M
 from hiproof.evaluate.run import run_record
-from hiproof.geometry.rings import GRID_M
+from hiproof.geometry.rings import OVERLAY_GRID_M
 from hiproof.parametric.file import read_parameters
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
@@ -197,7 +197,7 @@ def crowds(
     places = np.frombuffer(base64.b64decode(cloud["places"]), "<f4").reshape(-1, 3).astype(float)
     gaps = np.frombuffer(base64.b64decode(model["gaps"]), "<f4")
     outlines = [shapely.Polygon(o[0]) for part in model["parts"] for o in part["outlines"]]
-    roofed = shapely.union_all(shapely.make_valid(outlines), grid_size=GRID_M)
+    roofed = shapely.union_all(shapely.make_valid(outlines), grid_size=OVERLAY_GRID_M)
     counts = shapely.intersects_xy(shapely.buffer(roofed, -FACADE_M), *places[:, :2].T)
     off = places[(gaps > heights[0]) & (gaps < heights[1]) & counts]
     if not len(off):
@@ -307,7 +307,7 @@ def run_again(folder: Path) -> None:
         inputs["footprints"],
         inputs["terrain"],
         settings=settings,
-        overrides=str(folder / FILE),
+        overrides=str(folder / EDITS_FILE),
     )
     reconstruct_area(again)
 
@@ -350,7 +350,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--browser", action="store_true")
     asked = parser.parse_args()
-    (asked.run / FILE).unlink(missing_ok=True)
+    (asked.run / EDITS_FILE).unlink(missing_ok=True)
     window = Window(asked.run)
     rows = [
         row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None

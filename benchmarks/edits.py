@@ -16,13 +16,13 @@ import numpy as np
 
 from hiproof.compose import check_solid
 from hiproof.compose.settle import settled_roof
-from hiproof.edit.actions import edited
+from hiproof.edit.actions import apply_edit
 from hiproof.errors import HiproofError
 from hiproof.model import Building
 from hiproof.parametric.building import with_model
 from hiproof.settings import Settings
 from hiproof.simulate import random_building, random_compound
-from hiproof.simulate.edits import KINDS, random_edit
+from hiproof.simulate.edits import EDIT_KINDS, random_edit
 from hiproof.status import Status
 from hiproof.write.parameters import building_record
 
@@ -62,7 +62,7 @@ def one_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[
     """A random edit's kind, and what does it."""
     if rng.random() < PRESSED:
         asked = random_press(rng, house)
-        return asked["action"], lambda: edited(
+        return asked["action"], lambda: apply_edit(
             building_record(house), asked, np.zeros((0, 3)), Settings(), False
         )
     kind, index, change = random_edit(rng, house)
@@ -77,7 +77,7 @@ def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, 
     building.
     """
     rng, houses = np.random.default_rng(seed), generated(buildings)
-    outcomes = {kind: Counter() for kind in (*KINDS, *PRESSES)}
+    outcomes = {kind: Counter() for kind in (*EDIT_KINDS, *PRESSES)}
     sentences: Counter = Counter()
     seconds = []
     for number in range(edits):

@@ -22,7 +22,7 @@ import numpy as np
 import shapely
 
 from hiproof import read_points
-from hiproof.classify.houses import told_apart
+from hiproof.classify.houses import separate_houses
 from hiproof.classify.split import split_buildings
 from hiproof.read import read_footprints
 from hiproof.simulate import (
@@ -52,7 +52,7 @@ def areas_of(points: np.ndarray) -> list[shapely.Geometry]:
     """The areas of the houses told apart among points (n, 3)."""
     box = shapely.box(*points[:, :2].min(axis=0) - 0.5, *points[:, :2].max(axis=0) + 0.5)
     around = shapely.MultiPoint(points[:, :2]).buffer(GAP_M).buffer(0.5 - GAP_M)
-    return told_apart(points, shapely.intersection(around, box), GAP_M)
+    return separate_houses(points, shapely.intersection(around, box), GAP_M)
 
 
 def shows(one: shapely.Polygon, other: shapely.Polygon, row: SimBuilding) -> bool:

@@ -22,8 +22,8 @@ import numpy as np
 
 from hiproof import read_footprints, read_points, reconstruct
 from hiproof.model import Building, Footprint, Part, Roof
-from hiproof.read.assign import points_of_footprints
-from hiproof.simulate import SimBuilding, building_of, demo_files
+from hiproof.read.assign import assign_points
+from hiproof.simulate import SimBuilding, demo_files, read_truth
 
 from .compounds import compared
 from .judging import SHARED
@@ -41,10 +41,10 @@ def demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
     points = cloud.xyz[cloud.classification == BUILDING_CLASS]
     footprints = list(read_footprints(files["footprints"]))
     truth = {
-        record["id"]: building_of(record)
+        record["id"]: read_truth(record)
         for record in json.loads(files["truth"].read_text())["buildings"]
     }
-    own = points_of_footprints(points, footprints)
+    own = assign_points(points, footprints)
     return [(truth[f.id], points[index], f) for index, f in zip(own, footprints, strict=True)]
 
 
@@ -55,7 +55,7 @@ def parts_in(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
         dataclasses.replace(
             part,
             translation=part.translation + shift,
-            pieces=tuple(piece.moved(shift) for piece in part.pieces),
+            pieces=tuple(piece.move(shift) for piece in part.pieces),
         )
         for part in roof.parts
     )

@@ -85,7 +85,7 @@ def found_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarra
     """What a run moves a row by (2,): nothing where the evidence is not clear."""
     outline = row_outline(row)
     origin = np.floor(outline.bounds[:2])
-    near = distinct(points[grid.within(outline, AROUND_M)])
+    near = distinct(points[grid.find_within(outline, AROUND_M)])
     shift = find_shift(near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin))
     return shift.xy if shift.is_clear else np.zeros(2)
 

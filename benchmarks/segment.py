@@ -213,7 +213,7 @@ def is_true_to_code(shape: Shape) -> bool:
     are level, some "hipped" have a flat top, some pyramids are halved by a wall.
     """
     areas, normals = [], []
-    for face in shape.solid.of_kind(ROOF):
+    for face in shape.solid.select_faces(ROOF):
         ring = shape.solid.vertices[list(face.rings[0])]
         normal = ring_normal(ring)
         areas.append(np.linalg.norm(normal))
@@ -282,7 +282,9 @@ def roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) ->
     solid = reconstruct(cloud, settings=settings).solid
     if solid is None:
         return 1.0
-    rings = [[solid.vertices[list(ring)] for ring in face.rings] for face in solid.of_kind(ROOF)]
+    rings = [
+        [solid.vertices[list(ring)] for ring in face.rings] for face in solid.select_faces(ROOF)
+    ]
     return float(point_surface_distances(cloud[is_roof], rings).mean())
 
 

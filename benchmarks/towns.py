@@ -122,7 +122,8 @@ def nearest(ground: shapely.Geometry, outlines: list[shapely.Polygon]) -> int:
 
 def ground_of(solid: Solid) -> shapely.Geometry:
     rings = [
-        [solid.vertices[list(ring), :2] for ring in face.rings] for face in solid.of_kind(GROUND)
+        [solid.vertices[list(ring), :2] for ring in face.rings]
+        for face in solid.select_faces(GROUND)
     ]
     return shapely.union_all(
         [shapely.make_valid(shapely.Polygon(outer, holes)) for outer, *holes in rings]
@@ -220,16 +221,16 @@ def composed(building: TrueBuilding) -> Building:
     frame = LocalFrame(
         np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0)
     )
-    solids = [solid.moved(-frame.origin) for solid in building.solids.values()]
+    solids = [solid.move(-frame.origin) for solid in building.solids.values()]
     parts = tuple(Part("free", (piece,)) for solid in solids for piece in roof_pieces(solid))
     roof = Roof(parts, shapely.transform(building.footprint, frame.to_local), frame)
     solid = compose(roof, min(float(solid.vertices[:, 2].min()) for solid in solids))
-    return Building(building.id, Status.MODELLED, built=Model(roof, solid.moved(frame.origin)))
+    return Building(building.id, Status.MODELLED, built=Model(roof, solid.move(frame.origin)))
 
 
 def roof_pieces(solid: Solid) -> Iterator[Piece]:
     """A piece for each polygon of the roof's faces; those that stand upright are none."""
-    for face in solid.of_kind(ROOF):
+    for face in solid.select_faces(ROOF):
         ring = solid.vertices[list(face.rings[0])]
         centre = ring.mean(axis=0)
         normal = ring_normal(ring)

@@ -89,7 +89,7 @@ class Outcome:
 
     @cached_property
     def grade(self) -> Grade:
-        return verdict.verdict_of(*self.evidence).grade
+        return verdict.judge_model(*self.evidence).grade
 
     @property
     def is_sound(self) -> bool:
@@ -132,7 +132,7 @@ def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 def compared(case: Case, building: Building) -> tuple[float, int]:
     """RMSE (m) between the true and the model's surface; how many levels are missing or wrong."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
-    true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
+    true, model = [solid.move(-origin) for solid in case.solids], [building.solid.move(-origin)]
     area, seen = shapely.transform([case.truth_area, case.seen_area], lambda xy: xy - origin[:2])
     everywhere = shapely.union_all([area, *map(plan_of, polygons_of(model, (ROOF,)))])
     step = max(RASTER_M, float(np.sqrt(everywhere.area / MOST_PLACES)))
@@ -174,13 +174,13 @@ def patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
 @contextmanager
 def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
     """Collect what verdicts are asked by inside the block."""
-    judge, asked = verdict.verdict_of, []
+    judge, asked = verdict.judge_model, []
 
-    def verdict_of(model: Model, points: np.ndarray, unused: np.ndarray) -> verdict.Verdict:
+    def judge_model(model: Model, points: np.ndarray, unused: np.ndarray) -> verdict.Verdict:
         asked.append((model, points, unused))
         return judge(model, points, unused)
 
-    with patch.object(verdict, "verdict_of", verdict_of):
+    with patch.object(verdict, "judge_model", judge_model):
         yield asked
 
 

@@ -195,7 +195,7 @@ def compound(
         return cloud.points[cloud.source != SOURCES.index("ground")]
 
     origin = building.roof.frame.origin
-    return TrueBuilding(f"compound-{seed}", {"a": solid.moved(origin)}, building.footprint), scanned
+    return TrueBuilding(f"compound-{seed}", {"a": solid.move(origin)}, building.footprint), scanned
 
 
 def of_town(building: TrueBuilding) -> Callable[[np.random.Generator, ScanSettings], np.ndarray]:

@@ -64,7 +64,7 @@ def report(name: str, outcomes: list[tuple[Building, float]], splitting: float) 
         f"  distance median {np.median([b.quality.psd_mean for b in buildings]):.3f} m"
         f"  parts {np.mean([len(b.parts) for b in buildings]):.2f} "
         f"({sum(len(b.parts) for b in buildings)})"
-        f"  faces {np.mean([len(b.solid.of_kind(ROOF)) for b in buildings]):.2f}"
+        f"  faces {np.mean([len(b.solid.select_faces(ROOF)) for b in buildings]):.2f}"
         f"  named {named_share(buildings):.3f}  ms median {np.median(ms):.1f} mean {ms.mean():.1f} "
         f"max {ms.max():.0f}, splitting {splitting:.1f} s\n"
         "  " + ", ".join(f"{type} {area / areas.total():.1%}" for type, area in areas.items())

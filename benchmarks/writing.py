@@ -45,7 +45,7 @@ def generated(seed=0):
     for type in ROOF_TYPES:
         made = random_building(rng, type)
         origin = made.roof.frame.origin
-        solid = compose(made.roof, 0.0).moved(origin)
+        solid = compose(made.roof, 0.0).move(origin)
         quality = Quality(300, 5.0, 0.05, 0.04, 0.06, 0.1, 0.99, 0.95, 0.02, 0.0)
         yield Building(
             type,

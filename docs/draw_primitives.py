@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hiproof.draw.primitives import primitive_svg
 from hiproof.primitives import CATALOGUE
-from hiproof.primitives.parameters import names_of
+from hiproof.primitives.parameters import list_parameters
 
 FOLDER = Path(__file__).parent / "primitives"
 
@@ -30,7 +30,7 @@ HEAD = """# Roof types and their parameters
 def document() -> str:
     """docs/primitives.md."""
     sections = [
-        f"## {name}\n\n{', '.join(f'`{p}`' for p in names_of(name))}\n\n"
+        f"## {name}\n\n{', '.join(f'`{p}`' for p in list_parameters(name))}\n\n"
         f"![{name}](primitives/{name}.svg)\n"
         for name in CATALOGUE
     ]

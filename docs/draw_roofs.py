@@ -37,8 +37,8 @@ from hiproof.errors import HiproofError, InputError
 from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run
 from hiproof.model import ROOF, Face, Part, Piece, Solid
-from hiproof.parametric.record import building_of
-from hiproof.read.damage import LeftOut
+from hiproof.parametric.record import read_building
+from hiproof.read.damage import SkippedBuildings
 from hiproof.write.colours import type_colour
 
 SETS = Path(__file__).resolve().parents[1].parent / "shared" / "data"
@@ -128,9 +128,9 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
             f"expected the clouds of the run in {folder} where run.json says, got none; make the "
             "run again"
         )
-    roofs = {r["id"]: building_of(r)[1] for r in read_parameters(folder / "parameters.jsonl")}
+    roofs = {r["id"]: read_building(r)[1] for r in read_parameters(folder / "parameters.jsonl")}
     # a true model with an invalid solid is not drawn; the others are
-    true_models = read_models(truth, damaged=LeftOut()) if truth else ()
+    true_models = read_models(truth, damaged=SkippedBuildings()) if truth else ()
     true_solids = {model.id: model.solid for model in true_models}
     found = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
@@ -149,7 +149,7 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
 
 def drawn_part(part: Part, shift: np.ndarray) -> DrawnPart:
     """A part in world coordinates, its polygons made valid."""
-    pieces = (piece.moved(shift) for piece in part.pieces)
+    pieces = (piece.move(shift) for piece in part.pieces)
     return DrawnPart(
         part.type, tuple(Piece(shapely.make_valid(piece.outline), piece.planes) for piece in pieces)
     )
@@ -160,7 +160,7 @@ def gaps(solid: Solid, points: np.ndarray) -> np.ndarray:
     is none.
     """
     nearest = np.full(len(points), np.nan)
-    for face in solid.of_kind(ROOF):
+    for face in solid.select_faces(ROOF):
         a, b, c = plane_of(solid.vertices, face)
         inside = shapely.intersects_xy(outline_of(solid.vertices, face), points[:, 0], points[:, 1])
         gap = points[inside, 2] - (points[inside, :2] @ (a, b) + c)
@@ -196,7 +196,7 @@ def edges(face: Face) -> list[tuple[int, int]]:
 
 def roof_lines(solid: Solid) -> list[tuple[str, np.ndarray]]:
     """(kind, ends (2, 2) in plan) of every edge of a roof face; kinds are those of LINES."""
-    faces = solid.of_kind(ROOF)
+    faces = solid.select_faces(ROOF)
     owner = {edge: face for face in faces for edge in edges(face)}
     border = shapely.union_all([outline_of(solid.vertices, face) for face in faces]).boundary
     lines = []
@@ -244,7 +244,7 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
                 linewidth=0.8,
                 linestyle="--",
             )
-    for face in building.truth.of_kind(ROOF) if building.truth else ():
+    for face in building.truth.select_faces(ROOF) if building.truth else ():
         for ring in face.rings:
             corners = building.truth.vertices[[*ring, ring[0]], :2] - origin
             axes.plot(*corners.T, color="#00a651", linewidth=1.3, linestyle=(0, (4, 2)), zorder=4)
@@ -332,7 +332,7 @@ def with_low_walls(solid: Solid) -> Solid:
     """The solid cut off a little below its lowest eave, so that the view shows roofs."""
     vertices = solid.vertices.copy()
     roof = np.unique(
-        [index for face in solid.of_kind(ROOF) for ring in face.rings for index in ring]
+        [index for face in solid.select_faces(ROOF) for ring in face.rings for index in ring]
     )
     vertices[:, 2] = np.maximum(vertices[:, 2], vertices[roof, 2].min() - WALL_M)
     return Solid(vertices, solid.faces)
@@ -391,7 +391,7 @@ def sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
     for (plan, view), building in zip(axes.reshape(-1, 2), buildings, strict=False):
         draw_plan(plan, building, colour)
         draw_view(view, building)
-        faces = len(building.solid.of_kind(ROOF))
+        faces = len(building.solid.select_faces(ROOF))
         status = "" if building.status == "modelled" else f", {building.status}"
         plan.set_title(
             f"{building.id[-18:]}: {building.share:.3f} within 0.2 m, {len(building.points)} "

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 import matplotlib
@@ -82,10 +83,19 @@ def draw_models(axes, models: Path, origin: np.ndarray) -> None:
     )
 
 
-def draw(run: Path, path: Path) -> None:
-    clouds = [read_points(file) for file in sorted(DELFT.glob("*.laz"))]
+def draw(
+    run: Path,
+    path: Path,
+    clouds: Iterable[Path],
+    shown_part: tuple[float, float, float, float],
+    dpi: int = 100,
+) -> None:
+    """Draw the points of `clouds` beside the models of `run`, as far as they lie in a part of the
+    picture: left, right, bottom and top as shares of its size.
+    """
+    clouds = [read_points(file) for file in sorted(clouds)]
     xyz = np.concatenate([cloud.xyz for cloud in clouds])
-    classes = np.concatenate([cloud.classification for cloud in clouds])
+    classes = np.concatenate([cloud.classes for cloud in clouds])
     corners = np.concatenate(
         [model.solid.vertices for model in read_models(run / "buildings.city.jsonl")]
     )
@@ -98,14 +108,14 @@ def draw(run: Path, path: Path) -> None:
     draw_models(both[1], run / "buildings.city.jsonl", origin)
     places, _ = project(corners - origin)
     start, size = places.min(axis=0), np.ptp(places, axis=0)
-    limits = [start[k // 2] + share * size[k // 2] for k, share in enumerate(SHOWN)]
+    limits = [start[k // 2] + share * size[k // 2] for k, share in enumerate(shown_part)]
     for axes in both:
         left, right, bottom, top = limits
         axes.set(xlim=(left, right), ylim=(bottom, top))
         axes.set_aspect("equal")
         axes.set_axis_off()
     figure.subplots_adjust(0, 0, 1, 1, wspace=0.02)
-    figure.savefig(path, dpi=100, bbox_inches="tight", pad_inches=0.05)
+    figure.savefig(path, dpi=dpi, bbox_inches="tight", pad_inches=0.05)
     with Image.open(path) as picture:  # a palette is a third of the size
         small = picture.convert("RGB").quantize(COLOURS)
     small.save(path, optimize=True)
@@ -114,11 +124,11 @@ def draw(run: Path, path: Path) -> None:
 def main(arguments: list[str]) -> None:
     path = Path(arguments[1]) if len(arguments) > 1 else Path(__file__).with_name("picture.png")
     if arguments:
-        return draw(Path(arguments[0]), path)
+        return draw(Path(arguments[0]), path, DELFT.glob("*.laz"), SHOWN)
     with tempfile.TemporaryDirectory() as folder:
         clouds = tuple(str(file) for file in sorted(DELFT.glob("*.laz")))
         reconstruct_area(Request(clouds, Path(folder) / "run", str(DELFT / "footprints.gpkg")))
-        draw(Path(folder) / "run", path)
+        draw(Path(folder) / "run", path, DELFT.glob("*.laz"), SHOWN)
 
 
 if __name__ == "__main__":

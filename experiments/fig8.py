@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hiproof.primitives import CATALOGUE
-from hiproof.primitives.contract import placed
+from hiproof.primitives.contract import place_vertices
 from hiproof.simulate import SimBuilding, random_building, uniform_points
 
 from .methods import fit_model, in_parallel
@@ -141,7 +141,7 @@ def true_faces(building: SimBuilding) -> list[np.ndarray]:
     """The roof surfaces (m, 3) in world metres."""
     part = building.roof.parts[0]
     primitive = CATALOGUE[part.type]
-    vertices = placed(
+    vertices = place_vertices(
         primitive.vertices(part.parameters),
         part.kappa,
         part.translation + building.roof.frame.origin,

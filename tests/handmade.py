@@ -116,7 +116,7 @@ def modelled(
         "attributes": {"bouwjaar": 1930, "naam": "Café <&>"},
     }
     roof = Roof(parts, outline, LocalFrame(np.asarray(origin, float)))
-    return Building(id, Status.MODELLED, "", Model(roof, solid.moved(origin)), **(values | changes))
+    return Building(id, Status.MODELLED, "", Model(roof, solid.move(origin)), **(values | changes))
 
 
 def unmodelled(id: str = "lost", **changes) -> Building:

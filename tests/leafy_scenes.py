@@ -6,12 +6,12 @@ import numpy as np
 import shapely
 
 from hiproof.simulate import ScanSettings
-from hiproof.simulate.flight import beams_of, joined, random_swaths
+from hiproof.simulate.flight import join_beams, make_beams, random_swaths
 from hiproof.simulate.neighbourhood import neighbourhood
 from hiproof.simulate.relief import Plane
 from hiproof.simulate.roofs import random_building
 from hiproof.simulate.scanner import Scan, returns, scan_scene
-from hiproof.simulate.scene import SOURCE_GROUND, SOURCE_TREE, Defects, building_bodies, scene_of
+from hiproof.simulate.scene import SOURCE_GROUND, SOURCE_TREE, Defects, building_bodies, make_scene
 from hiproof.simulate.survey import Flight, survey
 
 GROUND, TREE = SOURCE_GROUND, SOURCE_TREE
@@ -45,7 +45,7 @@ def crowns_over(rng: np.random.Generator, side_m: float, apart_m: float = 5.0) -
 
 def forest(rng: np.random.Generator, side_m: float = 60.0, density: float = 8.0) -> Scan:
     """Trees on a gentle slope and nothing else."""
-    scene = scene_of([], crowns_over(rng, side_m), Plane(0.05, 0.02, 0.0))
+    scene = make_scene([], crowns_over(rng, side_m), Plane(0.05, 0.02, 0.0))
     area = shapely.box(*[-side_m / 2] * 2, *[side_m / 2] * 2)
     return scan_scene(scene, area, 8.0, rng, ScanSettings(density=density, defects=Defects.none()))
 
@@ -65,10 +65,10 @@ def house_under_a_tree(rng: np.random.Generator, share: float, density: float = 
         & (crowns[:, 1] > y0 - 5)
         & (crowns[:, 1] < y1 + 5)
     )
-    scene = scene_of(building_bodies(building), crowns[near])
+    scene = make_scene(building_bodies(building), crowns[near])
     area = shapely.box(x0 - 20, y0 - 20, x1 + 20, y1 + 20)
     cloud = scan_scene(scene, area, 6.0, rng, ScanSettings(density=density, defects=Defects.none()))
-    return cloud.moved(building.roof.frame.origin), building
+    return cloud.move(building.roof.frame.origin), building
 
 
 def drone(rng: np.random.Generator, type: str = "gable", density: float = 300.0):
@@ -78,12 +78,12 @@ def drone(rng: np.random.Generator, type: str = "gable", density: float = 300.0)
     building = random_building(rng, type)
     x0, y0, x1, y1 = building.outline.bounds
     swaths = random_swaths(rng, density, 0.9, 0.0, 0.0, 30.0)
-    beams = joined([beams_of(rng, swath, np.zeros(2), 30.0, 4.0) for swath in swaths])
+    beams = join_beams([make_beams(rng, swath, np.zeros(2), 30.0, 4.0) for swath in swaths])
     settings = ScanSettings(
         density=density, range_noise_m=0.015, horizontal_noise_m=0.015, beam_radius_m=0.02
     )
-    cloud = returns(scene_of(building_bodies(building)), beams, rng, settings)
+    cloud = returns(make_scene(building_bodies(building)), beams, rng, settings)
     inside = shapely.contains_xy(
         shapely.box(x0 - 8, y0 - 8, x1 + 8, y1 + 8), *cloud.points[:, :2].T
     )
-    return cloud.chosen(inside).moved(building.roof.frame.origin), building
+    return cloud.select(inside).move(building.roof.frame.origin), building

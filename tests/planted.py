@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hiproof.city import solve
-from hiproof.city.plan import jobs_of_footprints
+from hiproof.city.plan import make_jobs
 from hiproof.compiled import news
 from hiproof.model import Building, Quality
 from hiproof.read.footprints import read_footprints
@@ -89,7 +89,7 @@ def jobs_of(path):
     """A stand-in for reading footprints that takes those of `path`, whatever address is
     asked for.
     """
-    return lambda *_: (jobs_of_footprints(read_footprints(path)), (), None)
+    return lambda *_: (make_jobs(read_footprints(path)), (), None)
 
 
 def solve_without_compiling(folder, tile, terrain=None, avoid=()):

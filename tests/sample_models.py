@@ -56,7 +56,7 @@ def two_parts(id="pair"):
 
 SOLIDS = {
     "house-1": ("gable", gable_solid()),
-    "block 2": ("flat", courtyard_solid().moved(np.array([30.0, 0, 0]))),
+    "block 2": ("flat", courtyard_solid().move(np.array([30.0, 0, 0]))),
 }
 
 
@@ -84,7 +84,7 @@ def write_sample_run(folder):
         "counts": {"modelled": 2, "no_points": 1},
     }
     (folder / "run.json").write_text(json.dumps(run))
-    return {id: solid.moved(ORIGIN) for id, (_, solid) in SOLIDS.items()}
+    return {id: solid.move(ORIGIN) for id, (_, solid) in SOLIDS.items()}
 
 
 def feature(id, kind, solid):

@@ -11,12 +11,12 @@ import shapely
 import typer
 from typer.testing import CliRunner
 
-from hiproof.city.plan import jobs_of_footprints
+from hiproof.city.plan import make_jobs
 from hiproof.city.prepare import make_plan
 from hiproof.city.request import Request
 from hiproof.cli.app import app
 from hiproof.cli.options import declared_settings
-from hiproof.cli.reconstruct import settings_beside
+from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
@@ -56,10 +56,12 @@ def test_options_and_settings_are_told_once():
 
 def test_a_settings_file_beside_the_data_is_found_and_named(tmp_path, caplog):
     (tmp_path / "hiproof.toml").write_text('[fit]\nobjective = "paper"\n')
-    assert settings_beside(str(tmp_path / "a.laz"), None) == tmp_path / "hiproof.toml"
+    assert find_settings_file(str(tmp_path / "a.laz"), None) == tmp_path / "hiproof.toml"
     assert str(tmp_path / "hiproof.toml") in caplog.text
-    assert settings_beside(str(tmp_path), "https://example.org/b.gpkg") == tmp_path / "hiproof.toml"
-    assert settings_beside(str(tmp_path / "other" / "a.laz"), None) is None
+    assert (
+        find_settings_file(str(tmp_path), "https://example.org/b.gpkg") == tmp_path / "hiproof.toml"
+    )
+    assert find_settings_file(str(tmp_path / "other" / "a.laz"), None) is None
 
 
 def test_two_settings_files_beside_the_data_are_one_too_many(tmp_path):
@@ -67,7 +69,7 @@ def test_two_settings_files_beside_the_data_are_one_too_many(tmp_path):
         (tmp_path / name).mkdir()
         (tmp_path / name / "hiproof.toml").touch()
     with pytest.raises(SettingsError, match=r"expected one hiproof\.toml .*--config"):
-        settings_beside(str(tmp_path / "clouds"), str(tmp_path / "footprints" / "b.gpkg"))
+        find_settings_file(str(tmp_path / "clouds"), str(tmp_path / "footprints" / "b.gpkg"))
 
 
 @pytest.mark.parametrize(
@@ -173,5 +175,5 @@ def test_a_plan_holds_the_footprints_chosen(town_files, tmp_path):
         if f.id in ("house-1", "house-3")
     ]
     assert [job.id for job in make_plan(request).jobs] == [
-        job.id for job in jobs_of_footprints(tuple(expected))
+        job.id for job in make_jobs(tuple(expected))
     ]

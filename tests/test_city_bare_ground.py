@@ -10,7 +10,7 @@ import hiproof
 from hiproof import read_parameters
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
-from hiproof.edit.doubt import doubt_of
+from hiproof.edit.doubt import measure_doubt
 from hiproof.errors import InputWarning
 from hiproof.settings import Settings
 from hiproof.status import Doubt, Status
@@ -94,7 +94,7 @@ def test_where_a_cloud_without_classes_holds_ground_alone_there_is_no_building(t
         record["status"] == "no_building" and not record["parts"] and "ground" in record["detail"]
     )
     assert summary.exit_code == 0 and summary.by_status == {"no_building": 1}
-    amount, reasons = vars(doubt_of(record)).values()
+    amount, reasons = vars(measure_doubt(record)).values()
     assert amount >= 0.5 and reasons == ("nothing stands on the footprint",)
     with pytest.warns(InputWarning):
         asked, _ = run(

@@ -21,14 +21,14 @@ from tiny_town import make_town, write_cloud, write_town
 
 HOUSES = 20
 STAGES = (
-    (solve.Surroundings, "roof_of"),
-    (solve.Surroundings, "terrain_of"),
-    (solve.Surroundings, "doubt_of_terrain"),
-    (solve.Surroundings, "looked_at"),
+    (solve.Surroundings, "select_roof_points"),
+    (solve.Surroundings, "choose_terrain"),
+    (solve.Surroundings, "remark_terrain"),
+    (solve.Surroundings, "inspect"),
     (solve, "without_repeats"),
     (solve, "thin_to_count"),
     (solve, "reconstruct"),
-    (stages, "aligned"),
+    (stages, "align_footprint"),
     (stages, "usable"),
     (stages, "recognise"),
     (stages, "fit"),
@@ -37,7 +37,7 @@ STAGES = (
     (stages, "judge"),
 )
 WRITERS = (
-    (run_files, "measured"),
+    (run_files, "measure_or_drop_solid"),
     (run_files, "building_attributes"),
     *((module, "fragment") for module in (parameters, features, version2)),
 )
@@ -121,7 +121,7 @@ def test_a_failed_building_keeps_the_largest_polygon_of_its_area():
     small, large = shapely.box(0, 0, 1, 1), shapely.box(5, 0, 9, 4)
     job = solve.Job(0, "a", shapely.MultiPolygon([small, large]), None)
     plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
-    building, texts = solve.failed(plan, job, "KeyError: (False, 0, 0)")
+    building, texts = solve.record_failure(plan, job, "KeyError: (False, 0, 0)")
     assert building.status is Status.INTERNAL_ERROR
     assert building.footprint.equals(large)
     assert b"[9.0,4.0]" in texts["parameters"].text.replace(b" ", b"")
@@ -137,7 +137,7 @@ def test_an_outline_that_cannot_be_written_leaves_the_id_and_the_message(monkeyp
         0, "a", shapely.box(0, 0, 4, 4), Footprint("a", shapely.box(0, 0, 4, 4), {"year": 1950})
     )
     plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
-    building, texts = solve.failed(plan, job, "ValueError: first")
+    building, texts = solve.record_failure(plan, job, "ValueError: first")
     assert (building.id, building.detail, building.footprint) == ("a", "ValueError: first", None)
     assert b"ValueError: first" in texts["parameters"].text
 
@@ -163,7 +163,7 @@ def repeat_failure(out, id):
     return result.exit_code, result.output
 
 
-@pytest.mark.parametrize("stage", ["told_apart", "cell_area"])
+@pytest.mark.parametrize("stage", ["separate_houses", "cell_area"])
 def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(
     small_town, stage, tmp_path, monkeypatch
 ):
@@ -183,7 +183,7 @@ def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(
         "ZeroDivisionError: division by zero (test_city_failures.py:"
     )
     trace = (tmp_path / "disturbed/failures" / folder_name(victim) / "traceback.txt").read_text()
-    assert "in houses_of" in trace
+    assert "in find_houses" in trace
     assert code == 1
     assert "ZeroDivisionError" in output
     code, output = repeat_failure(tmp_path / "disturbed", victim)
@@ -202,7 +202,7 @@ def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkey
     fail_at(
         monkeypatch,
         buildings,
-        "classes_of_square",
+        "classify_square",
         np.array([border + 60.0, scene.xyz[:, 1].mean()]),
     )
     summary = run([cloud], tmp_path / "disturbed", with_footprints=False)

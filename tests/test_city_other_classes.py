@@ -7,9 +7,9 @@ import shapely
 from hiproof import read_parameters
 from hiproof.city.other_classes import (
     OtherPoints,
+    explain_missing_points,
     ground_under_roof,
-    roof_of_other_classes,
-    why_no_points,
+    remark_other_classes,
 )
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.settings import Settings
@@ -134,15 +134,17 @@ def test_leaves_over_bare_ground_are_no_roof(shift):
         shapely.box(*shift[:2], shift[0] + 10, shift[1] + 10),
     )
     level = Level(shift[2])
-    assert "lies bare" in why_no_points(OtherPoints.inside(area, cells, crown, level), (6,))
-    assert "class 6 or 67 inside" in why_no_points(
+    assert "lies bare" in explain_missing_points(
+        OtherPoints.inside(area, cells, crown, level), (6,)
+    )
+    assert "class 6 or 67 inside" in explain_missing_points(
         OtherPoints.inside(area, cells[:30], crown, level), (6, 67)
     )
     unknown = OtherPoints.inside(area, cells[:30], crown, Level(np.nan))
-    assert why_no_points(unknown, (6,)) == roof_of_other_classes(unknown, cells[:0]) == ""
+    assert explain_missing_points(unknown, (6,)) == remark_other_classes(unknown, cells[:0]) == ""
 
 
 @pytest.mark.parametrize("classified, told", [(100, False), (85, False), (70, True)])
 def test_what_stands_beside_a_roof_of_its_class_is_told_of_where_it_is_much(classified, told):
     points = OtherPoints.inside(SQUARE, ALL_OVER[:0], ALL_OVER + [0, 0, 8.0], Level(0.0))
-    assert bool(roof_of_other_classes(points, ALL_OVER[:classified])) == told
+    assert bool(remark_other_classes(points, ALL_OVER[:classified])) == told

@@ -22,8 +22,8 @@ import hiproof
 import planted
 from handmade import courtyard, gable_house, modelled, unmodelled
 from hiproof.city import run as city_run
-from hiproof.city.lock import held
-from hiproof.city.marks import choice_of, file_stamps, inputs_of, mark_of
+from hiproof.city.lock import hold_folder
+from hiproof.city.marks import compute_mark, describe_inputs, describe_selection, file_stamps
 from hiproof.city.outputs import broken_claims, claims
 from hiproof.city.plan import Job, WorkPlan
 from hiproof.city.request import Request
@@ -68,7 +68,9 @@ def other(value):
 
 
 def mark(request):
-    return mark_of(inputs_of(request), "salt"), mark_of(choice_of(request), "salt")
+    return compute_mark(describe_inputs(request), "salt"), compute_mark(
+        describe_selection(request), "salt"
+    )
 
 
 @pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(Request)])
@@ -91,9 +93,9 @@ def test_every_setting_is_in_the_mark(section):
             values, **{declared.name: other(getattr(values, declared.name))}
         )
         settings = dataclasses.replace(Settings(), **{section: changed})
-        assert inputs_of(dataclasses.replace(REQUEST, settings=settings)) != inputs_of(REQUEST), (
-            declared.name
-        )
+        assert describe_inputs(dataclasses.replace(REQUEST, settings=settings)) != describe_inputs(
+            REQUEST
+        ), declared.name
 
 
 def leaves(value, name=""):
@@ -191,24 +193,25 @@ def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tm
 
 
 def test_a_lock_holds_across_processes_and_ends_with_kill_9(tmp_path):
-    code = "import sys, time\nfrom pathlib import Path\nfrom hiproof.city.lock import held\n"
-    code += "with held(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)"
+    code = "import sys, time\nfrom pathlib import Path\nfrom hiproof.city.lock import hold_folder\n"
+    code += "with hold_folder(Path(sys.argv[1])):\n    print('held', flush=True)\n"
+    code += "    time.sleep(60)"
     path = {**os.environ, "PYTHONPATH": str(Path(hiproof.__file__).parents[1])}
     with subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, env=path
     ) as other:
         assert other.stdout.readline() == b"held\n"
-        with pytest.raises(OutputError, match="wait for its end"), held(tmp_path):
+        with pytest.raises(OutputError, match="wait for its end"), hold_folder(tmp_path):
             pass
         other.send_signal(signal.SIGKILL)
         other.wait(timeout=30)
-        with held(tmp_path):
+        with hold_folder(tmp_path):
             pass
 
 
 def test_a_folder_that_cannot_be_locked_says_so(tmp_path):
     (tmp_path / "lock.sqlite").mkdir()
-    with pytest.raises(OutputError, match="to lock"), held(tmp_path):
+    with pytest.raises(OutputError, match="to lock"), hold_folder(tmp_path):
         pass
 
 

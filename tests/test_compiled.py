@@ -85,10 +85,10 @@ def forget():
     for name in [name for name in sys.modules if name.split(".")[0] == "town"]:
         del sys.modules[name]
     for cached in (
-        stamp.stamp_of,
-        stamp.imported,
-        stamp.text_of,
-        stamp.digest_of,
+        stamp.compute_stamp,
+        stamp.list_imports,
+        stamp.read_text,
+        stamp.digest_file,
         kept.place_to_write,
         kept.warn_not_kept,
     ):
@@ -188,9 +188,9 @@ def test_code_for_a_kind_of_processors_is_loaded_on_each_of_them(town, monkeypat
     script = """
 import llvmlite.binding
 llvmlite.binding.get_host_cpu_name = lambda: {host!r}
-from hiproof.city.warm import mark, own_processor
+from hiproof.city.warm import mark, read_processor
 from town.outer import answer
-print(mark("solid", "stamp", own_processor()), answer(10), bool(answer._cache_hits))
+print(mark("solid", "stamp", read_processor()), answer(10), bool(answer._cache_hits))
 """
     here, there = (run(town, "-c", script.format(host=host)).split() for host in ("here", "there"))
     assert here[1:] == ["61", "False"] and there[1:] == ["61", "True"]
@@ -404,7 +404,7 @@ def test_the_stamp_follows_every_import_at_the_top(source):
         }
     assert {
         file for file in found if file.is_file() and file.is_relative_to(PACKAGE)
-    } <= stamp.imported(source)
+    } <= stamp.list_imports(source)
 
 
 def test_a_stamp_does_not_change_with_what_is_imported_inside_functions(tmp_path):
@@ -426,14 +426,14 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
 
     def stamps():
         forget()
-        return {name: stamp.stamp_of(file) for name, file in files.items()}
+        return {name: stamp.compute_stamp(file) for name, file in files.items()}
 
     before = stamps()
     files["middle"].write_text(MIDDLE + "\n# a word more\n")
     after = stamps()
     assert after["inner"] == before["inner"]
     assert after["middle"] != before["middle"] and after["outer"] != before["outer"]
-    monkeypatch.setattr(stamp, "version_of", lambda library: "another")
+    monkeypatch.setattr(stamp, "read_version", lambda library: "another")
     assert not set(stamps().values()) & set(after.values())
 
 
@@ -445,7 +445,7 @@ def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypa
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "kept",))
     kept.remove_outdated.cache_clear()
     for stamped in ("a", "a", "b", "b"):
-        monkeypatch.setattr(warm, "stamp_of_all", lambda stamped=stamped: stamped)
+        monkeypatch.setattr(warm, "compute_common_stamp", lambda stamped=stamped: stamped)
         warm.make_ready(["solid"])
     warm.make_ready(["solid", "single"])
     assert runs == ["solid", "solid", "single"]
@@ -479,8 +479,8 @@ def test_what_came_in_a_wheel_is_compiled_only_when_asked_for_or_on_other_proces
         warm, "compiled_pieces", lambda left: (piece for piece in left if not asked.append(piece))
     )
     monkeypatch.setattr(warm, "runs_kind", lambda: runs)
-    monkeypatch.setattr(warm, "own_processor", lambda: "mine")
-    monkeypatch.setattr(warm, "stamp_of_all", lambda: "stamp")
+    monkeypatch.setattr(warm, "read_processor", lambda: "mine")
+    monkeypatch.setattr(warm, "compute_common_stamp", lambda: "stamp")
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path,))
     (tmp_path / warm.mark("solid", "stamp", kinds.KIND)).touch()
     warm.make_ready(["solid"])
@@ -636,7 +636,7 @@ def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
     script = f"""
 import sys
 from pathlib import Path
-from hiproof.city.run import Request, pieces_of, reconstruct_area
+from hiproof.city.run import Request, list_compiled_pieces, reconstruct_area
 from hiproof.city.warm_pieces import PIECES
 from hiproof.settings import Settings
 from hiproof.compiled import kept
@@ -654,7 +654,7 @@ settings = Settings().replace({{"fit": {{"parts": "one"}}}})
 one = dict(footprints=files["footprints"], settings=settings, **few)
 for given in (with_footprints, few, one):
     request = Request((files["cloud"],), Path({str(tmp_path)!r}), restart=True, **given)
-    for piece in pieces_of(request):
+    for piece in list_compiled_pieces(request):
         PIECES[piece]()
     beforehand = set(asked)
     assert reconstruct_area(request).buildings > 3

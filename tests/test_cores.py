@@ -5,7 +5,7 @@ import os
 import pytest
 
 from hiproof.city import cores, run
-from hiproof.city.cores import BUILDINGS_A_PROCESS, as_many_as_pay, one_thread_each
+from hiproof.city.cores import BUILDINGS_A_PROCESS, as_many_as_pay, limit_threads
 from hiproof.city.executors import InProcess, Processes
 from hiproof.city.request import Request
 
@@ -60,7 +60,7 @@ def test_linear_algebra_of_workers_takes_one_thread_unless_the_user_said_otherwi
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     before = dict(os.environ)
-    with one_thread_each():
+    with limit_threads():
         assert (os.environ["OMP_NUM_THREADS"], os.environ["OPENBLAS_NUM_THREADS"]) == ("3", "1")
     assert dict(os.environ) == before
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hiproof
-from hiproof.draw.view import colours_of, projected, seen_faces, turn_of
+from hiproof.draw.view import choose_turn, list_colours, project_points, select_seen_faces
 from hiproof.errors import InputError
 from hiproof.status import Status
 from parametric_house import gable_house
@@ -33,18 +33,22 @@ def test_a_building_without_a_model_says_why():
 
 
 def test_faces_seen_are_those_that_look_here(house):
-    from_above = seen_faces(house.solid, colours_of(house), tilt_deg=90.0)
+    from_above = select_seen_faces(house.solid, list_colours(house), tilt_deg=90.0)
     assert [face.is_roof for face in from_above] == [True, True]
-    assert len(seen_faces(house.solid, colours_of(house))) == 4  # two slopes, one wall each way
+    assert (
+        len(select_seen_faces(house.solid, list_colours(house))) == 4
+    )  # two slopes, one wall each way
 
 
 @pytest.mark.parametrize("rotation", [0.0, 37.0, 125.0, -80.0])
 def test_a_building_is_seen_from_the_same_corner_whichever_way_it_stands(house, rotation):
     turned = gable_house(rotation)
-    assert turn_of(turned) == pytest.approx(turn_of(house) - rotation)
+    assert choose_turn(turned) == pytest.approx(choose_turn(house) - rotation)
     pages = [
         np.sort(
-            projected(b.solid.vertices - b.solid.vertices.mean(axis=0), turn_of(b), 35.0)[:, :2],
+            project_points(b.solid.vertices - b.solid.vertices.mean(axis=0), choose_turn(b), 35.0)[
+                :, :2
+            ],
             axis=0,
         )
         for b in (house, turned)
@@ -53,7 +57,7 @@ def test_a_building_is_seen_from_the_same_corner_whichever_way_it_stands(house, 
 
 
 def test_north_is_up_from_above():
-    page = projected(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), 0.0, 90.0)
+    page = project_points(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), 0.0, 90.0)
     assert np.allclose(page[:, :2], [[0.0, -1.0], [1.0, 0.0]])
 
 

@@ -8,9 +8,14 @@ import re
 import numpy as np
 import pytest
 
-from hiproof.draw.primitives import measures, primitive_svg, typical_building, typical_parameters
+from hiproof.draw.primitives import (
+    make_typical_building,
+    measures,
+    primitive_svg,
+    typical_parameters,
+)
 from hiproof.primitives import CATALOGUE
-from hiproof.primitives.parameters import names_of
+from hiproof.primitives.parameters import list_parameters
 
 draw = importlib.import_module("docs.draw_primitives")
 LEVEL = 1e-9
@@ -19,7 +24,7 @@ LEVEL = 1e-9
 @pytest.mark.parametrize("kind", CATALOGUE)
 def test_every_parameter_is_drawn_as_long_as_it_is(kind):
     parameters, found = typical_parameters(kind), measures(kind)
-    assert [m.name for m in found] == list(names_of(kind)) == list(parameters)
+    assert [m.name for m in found] == list(list_parameters(kind)) == list(parameters)
     for measure in found:
         if measure.end is not None:
             assert measure.length == pytest.approx(abs(parameters[measure.name]), abs=LEVEL), (
@@ -30,7 +35,7 @@ def test_every_parameter_is_drawn_as_long_as_it_is(kind):
 
 @pytest.mark.parametrize("kind", [name for name in CATALOGUE if name not in ("flat", "shed")])
 def test_heights_are_drawn_where_the_roof_is(kind):
-    roof = typical_building(kind).roof
+    roof = make_typical_building(kind).roof
     top = next(m for m in measures(kind) if m.name == "height")
     inside = np.clip(top.end[None, :2], [-5.999, -3.999], [5.999, 3.999])
     assert roof.height_at(inside)[0] == pytest.approx(top.end[2], abs=2e-3)

@@ -259,7 +259,7 @@ def names_in(requirements):
 
 def test_each_sentence_names_the_extra_that_brings_the_package():
     sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
-    found = set(re.findall(r'(?<!>> )needed\("(\w+)[\w.]*", "(\w+)"', sources))
+    found = set(re.findall(r'(?<!>> )import_extra\("(\w+)[\w.]*", "(\w+)"', sources))
     assert found == {*PACKAGES.items(), ("fsspec", "parquet")}
     assert [pair for pair in found if pair[0] not in names_in(OPTIONAL[pair[1]])] == []
     assert names_in(PROJECT["dependencies"]).isdisjoint(PACKAGES)

@@ -14,10 +14,10 @@ from hiproof import formats
 from hiproof.formats import (
     FORMATS,
     Format,
-    asked_files,
-    asked_fragments,
-    asked_tile_files,
-    module_of,
+    import_format,
+    requested_files,
+    requested_fragments,
+    requested_tile_files,
 )
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import files_text
@@ -34,11 +34,11 @@ README = Path(__file__).parents[1] / "README.md"
 def test_a_format_has_what_its_kind_needs(name):
     format = FORMATS[name]
     if format.fragment:
-        assert callable(module_of(format.module).writer) and callable(
-            module_of(format.fragment).fragment
+        assert callable(import_format(format.module).writer) and callable(
+            import_format(format.fragment).fragment
         )
     else:
-        assert callable(module_of(format.module).write_models) and not format.tile_ending
+        assert callable(import_format(format.module).write_models) and not format.tile_ending
 
 
 def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run():
@@ -46,15 +46,15 @@ def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run()
     told = README.read_text()
     assert [
         file.name
-        for file in asked_files(Settings(), Path()).values()
+        for file in requested_files(Settings(), Path()).values()
         if f"`{file.name}`" not in told
     ] == []
 
 
 def test_models_by_work_tile_need_the_same_parts_of_buildings():
     by_tile = Settings.from_dict({"city": {"models": "tiles"}})
-    assert set(asked_files(by_tile, Path())) == {"parameters", "gpkg"}
-    assert asked_fragments(by_tile.write) == asked_fragments(Settings().write)
+    assert set(requested_files(by_tile, Path())) == {"parameters", "gpkg"}
+    assert requested_fragments(by_tile.write) == requested_fragments(Settings().write)
 
 
 class Names(BuildingWriter):
@@ -79,7 +79,7 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     write_all(tmp_path / "one", buildings)
     head = FileHead(offset=np.array([85000.0, 446000.0, 0.0]))
     parts = [fragments(building, (building.id, building.id), head)[1] for building in buildings]
-    join_fragments(asked_files(Settings(), tmp_path / "two"), parts, head)
+    join_fragments(requested_files(Settings(), tmp_path / "two"), parts, head)
     for folder in ("one", "two"):
         assert (tmp_path / folder / "names.txt").read_text() == "a\nb\n"
     for name in (
@@ -102,9 +102,9 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
 )
 def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
     settings = Settings.from_dict({"write": {"citygml": version}, "city": {"models": "both"}})
-    asked = asked_files(settings, tmp_path)
+    asked = requested_files(settings, tmp_path)
     assert [file.name for file in asked.values() if file.suffix == ".gml"] == files
-    by_tile = asked_tile_files(settings, tmp_path, "0_0_0").values()
+    by_tile = requested_tile_files(settings, tmp_path, "0_0_0").values()
     assert [file.name for file in by_tile if file.suffix == ".gml"] == [
         name.replace("buildings", "0_0_0") for name in files
     ]

@@ -13,7 +13,7 @@ import pytest
 from hiproof import loopback
 from hiproof.edit.desk import Desk
 from hiproof.edit.server import Server, Service
-from hiproof.view.server import server_of
+from hiproof.view.server import make_server
 from sample_parameters import write_parameters_of_each_kind
 
 PAGES = ("edit", "view")
@@ -36,7 +36,7 @@ def page(request, tmp_path, monkeypatch, capfd):
         (folder / ".hidden").write_text("secret")
         (tmp_path / "secret.txt").write_text("secret")
         (folder / "link").symlink_to(tmp_path / "secret.txt")
-        server, start = server_of(folder, "run"), "/"
+        server, start = make_server(folder, "run"), "/"
     with serving(server):
         yield server.server_port, start
     said = capfd.readouterr()

@@ -13,7 +13,7 @@ from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
 from hiproof.errors import HiproofError, InputError, InputWarning
-from hiproof.masking import masked, masked_values
+from hiproof.masking import mask, masked_values
 
 ADDRESSES = [
     "postgresql://adm:{}@host:5432/db?table=fp",
@@ -42,15 +42,15 @@ def test_a_secret_is_masked_alone_and_within_a_sentence(address, secret):
         f"expected points at {filled}, got: [{filled!r}]; check it",
         json.dumps({"a": filled}, indent=1),
     ):
-        hidden = masked(text)
+        hidden = mask(text)
         assert "s3" not in hidden.replace("s3://", "") and "ret" not in hidden.replace("secret", "")
-        assert masked(hidden) == hidden
-    assert "host" in masked(filled) or "bucket" in masked(filled) or "server" in masked(filled)
+        assert mask(hidden) == hidden
+    assert "host" in mask(filled) or "bucket" in mask(filled) or "server" in mask(filled)
 
 
 @pytest.mark.parametrize("password", ["se/cret", "se?cret", "se@cret", "1/cret", "se#cret"])
 def test_a_password_with_unescaped_signs_is_masked_whole(password):
-    assert "cret" not in masked(f"postgresql://adm:{password}@host/db")
+    assert "cret" not in mask(f"postgresql://adm:{password}@host/db")
 
 
 @pytest.mark.parametrize(
@@ -65,7 +65,7 @@ def test_a_password_with_unescaped_signs_is_masked_whole(password):
     ],
 )
 def test_what_holds_no_secret_stays_as_it_is(address):
-    assert masked(address) == address
+    assert mask(address) == address
 
 
 def test_nested_values_are_masked_and_others_kept():

@@ -15,11 +15,11 @@ import hiproof
 from hiproof.city import run as city_run
 from hiproof.city import solve, table_values
 from hiproof.city.ledger import Ledger
-from hiproof.city.noted import noted_file, save_noted
+from hiproof.city.noted import noted_file, save_run_boxes
 from hiproof.city.overrides import table_records
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
-from hiproof.parametric.override import overridden, override_of
+from hiproof.parametric.override import overridden, read_override
 from hiproof.settings import Settings
 from hiproof.status import Grade, Status
 from hiproof.write.parameters import building_record
@@ -39,7 +39,7 @@ def scanned():
 
 
 def obeyed(scanned, **said):
-    return overridden(override_of({"id": "a", **said}), *scanned, settings=PLAIN, id="a")
+    return overridden(read_override({"id": "a", **said}), *scanned, settings=PLAIN, id="a")
 
 
 def test_examples_in_the_docstrings_run():
@@ -70,7 +70,7 @@ def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(scanne
 
     for said, is_told in (({"type": "gable"}, True), ({"z_ground": 1.0}, False)):
         house = overridden(
-            override_of({"id": "a", **said}), *scanned, Above(), settings=PLAIN, id="a"
+            read_override({"id": "a", **said}), *scanned, Above(), settings=PLAIN, id="a"
         )
         assert ("above its eaves" in house.detail) == is_told
 
@@ -103,7 +103,7 @@ def test_parts_given_stand_where_the_run_moved_the_footprint():
     beside = shapely.box(0.9, -1.1, 12.9, 6.9)
     house = hiproof.reconstruct(scan, beside, settings=PLAIN, id="a")
     assert np.hypot(*house.shift) > 1.0
-    again = overridden(override_of(building_record(house)), scan, beside, settings=PLAIN, id="a")
+    again = overridden(read_override(building_record(house)), scan, beside, settings=PLAIN, id="a")
     assert again.shift == house.shift and np.array_equal(again.solid.vertices, house.solid.vertices)
     assert again.quality == house.quality and "moved by" in again.detail
     block = obeyed((scan, beside), block_height=6.0, z_ground=1.0)
@@ -135,7 +135,7 @@ def test_parts_given_are_the_parts(scanned):
     assert house.type == "hip" and house.parts[0].parameters["ridge_length"] == 5.0
     assert house.quality.points > 500 and house.attributes == {} and "fitted" not in house.detail
     empty = overridden(
-        override_of({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}),
+        read_override({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}),
         np.zeros((0, 3)),
         scanned[1],
     )
@@ -188,7 +188,7 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
 )
 def test_what_an_override_cannot_say_is_one_sentence(said, message):
     with pytest.raises(InputError, match=message):
-        override_of(said)
+        read_override(said)
 
 
 @pytest.fixture
@@ -268,7 +268,7 @@ def test_what_is_redone_reads_the_points_near_it_alone(kept, tmp_path, monkeypat
     if kept == "lost":
         noted.unlink()
     elif kept == "of another file":
-        save_noted(noted, [np.zeros((3, 4))], 150)
+        save_run_boxes(noted, [np.zeros((3, 4))], 150)
     lines = ({"id": "house-0", "ridge_height": 8.0},)
     city_run.reconstruct_area(request(files, out, path, *lines))
     again = points_read(out)
@@ -459,10 +459,10 @@ def test_a_table_of_typed_columns_says_what_it_says_where_rows_leave_gaps(tmp_pa
 def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, text, told):
     (tmp_path / "o.csv").write_text(f"id,leave_out\na,{text}\n")
     (row,) = table_records(str(tmp_path / "o.csv"))
-    assert override_of(row).leave_out == bool(told)
+    assert read_override(row).leave_out == bool(told)
     (tmp_path / "o.csv").write_text("id,leave_out\na,perhaps\n")
     with pytest.raises(InputError, match="true or false as leave_out"):
-        override_of(*table_records(str(tmp_path / "o.csv")))
+        read_override(*table_records(str(tmp_path / "o.csv")))
 
 
 def test_tables_override_too(town_files, tmp_path):

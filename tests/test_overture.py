@@ -17,7 +17,7 @@ from hiproof.city import run as city_run
 from hiproof.city.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
-from hiproof.cli.reconstruct import settings_beside
+from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
@@ -81,7 +81,9 @@ def served(tmp_path, monkeypatch):
     that lists the ranges asked for.
     """
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    monkeypatch.setattr(city_run, "pieces_of", lambda request: ())  # solved without compiled code
+    monkeypatch.setattr(
+        city_run, "list_compiled_pieces", lambda request: ()
+    )  # solved without compiled code
     folder, log = tmp_path / "served", tmp_path / "ranges"
     folder.mkdir()
     log.touch()
@@ -152,7 +154,7 @@ def test_settings_beside_are_not_looked_for_where_overture_is(served, tmp_path, 
     (tmp_path / "start").mkdir()
     (tmp_path / "start" / "hiproof.toml").write_text("[fit]\nparts = 'one'\n")
     monkeypatch.chdir(tmp_path / "start")
-    assert settings_beside(str(served[0]), "overture") is None
+    assert find_settings_file(str(served[0]), "overture") is None
 
 
 def test_a_kept_file_gives_the_same_models(served, tmp_path, monkeypatch, capsys):

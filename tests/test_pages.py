@@ -7,10 +7,10 @@ import threading
 import numpy as np
 import pytest
 
-from hiproof.cli.view import tiles_of
+from hiproof.cli.view import open_tiles
 from hiproof.evaluate.report import write_report
 from hiproof.evaluate.run import evaluate_run
-from hiproof.view.server import server_of
+from hiproof.view.server import make_server
 from pages import (
     SIZES,
     at_every_size,
@@ -50,7 +50,7 @@ def report(folder):
 
 @pytest.fixture(scope="module")
 def view(folder):
-    with tiles_of(folder) as tiles, server_of(tiles, "a run") as server:
+    with open_tiles(folder) as tiles, make_server(tiles, "a run") as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield server.address
         server.shutdown()

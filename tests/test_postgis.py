@@ -20,7 +20,7 @@ from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_attributes, write_cityjson, write_parameters
 from hiproof.write.roof_figures import roof_figures
-from hiproof.write.tables.postgis import lie_of
+from hiproof.write.tables.postgis import measure_plane
 from postgis_server import running, why_not
 from sample_models import write_sample_run
 
@@ -69,7 +69,7 @@ def test_a_table_gives_the_footprints_a_file_would(table):
 
 
 def test_the_reference_system_is_asked_for_without_reading_rows(table, monkeypatch):
-    monkeypatch.setattr("hiproof.read.database.Table.rows", None)
+    monkeypatch.setattr("hiproof.read.database.DatabaseTable.rows", None)
     assert footprint_crs(table).to_epsg() == 28992
     assert footprint_crs(table + "&where=storeys=2").to_epsg() == 28992
     assert footprint_crs(table + "&where=storeys=99") is None
@@ -327,7 +327,7 @@ def test_loading_needs_a_run_and_a_database(database, tmp_path):
 
 def test_slope_and_azimuth_of_a_plane_falling_north_east():
     ring = [(0, 0, 2), (1, 0, 1), (1, 1, 0), (0, 1, 1)]
-    slope, azimuth, area = lie_of([np.array(ring, float)])
+    slope, azimuth, area = measure_plane([np.array(ring, float)])
     assert azimuth == pytest.approx(45)
     assert slope == pytest.approx(54.7356, abs=1e-3)
     assert area == pytest.approx(3**0.5)

@@ -29,7 +29,7 @@ from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run
 from hiproof.frames import METRES, Units
 from hiproof.read import read_footprints, read_points, read_terrain
-from hiproof.read.crs import units_of
+from hiproof.read.crs import find_units
 from hiproof.read.pointcloud import read_header
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
@@ -41,8 +41,8 @@ from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
 US_FOOT = 1200 / 3937
 TOWN = make_town(houses=2)
-FEET = units_of(pyproj.CRS("EPSG:2263"))
-MIXED = units_of(pyproj.CRS("EPSG:2263+5703"))
+FEET = find_units(pyproj.CRS("EPSG:2263"))
+MIXED = find_units(pyproj.CRS("EPSG:2263+5703"))
 
 
 def write_town_in(folder, units, cloud_crs, plan_crs):
@@ -262,10 +262,10 @@ def test_the_unit_of_heights_that_geotiff_keys_name_counts(tmp_path):
         entry = type(keys.geo_keys[0])(id=id, tiff_tag_location=0, count=1, value_offset=value)
         keys.geo_keys.append(entry)
     keys.geo_keys_header.number_of_keys = len(keys.geo_keys)
-    assert units_of(crs_of_header(header, tmp_path)).height == pytest.approx(US_FOOT)
+    assert find_units(crs_of_header(header, tmp_path)).height == pytest.approx(US_FOOT)
     keys.geo_keys.pop()
     keys.geo_keys_header.number_of_keys -= 1
-    assert units_of(crs_of_header(header, tmp_path)).height == 1.0
+    assert find_units(crs_of_header(header, tmp_path)).height == 1.0
 
 
 def crs_of_header(header, folder):

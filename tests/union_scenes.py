@@ -26,7 +26,7 @@ from hiproof.fit.union.volumes import (
     base_only,
     equalise_slopes,
 )
-from hiproof.primitives.family import SHAPES, Member
+from hiproof.primitives.family import GENERAL_SHAPES, Member
 
 OUTLINES = (
     shapely.box(-6.0, -4.0, 6.0, 4.0),
@@ -94,7 +94,7 @@ def member_of_shape(rng, shape, regular=False, skewed=False):
 
     `regular`: one eave and one slope, as most roofs have; `skewed`: planes that face a little off the axes.
     """
-    top, sides = next((has_top, sides) for (has_top, _, _), (name, sides) in SHAPES.items() if name == shape)
+    top, sides = next((has_top, sides) for (has_top, _, _), (name, sides) in GENERAL_SHAPES.items() if name == shape)
     sides, half = list(sides), np.array([rng.uniform(6.0, 8.0), rng.uniform(3.5, 5.0)])
     eaves, slopes, leans = np.full(4, np.inf), np.zeros(4), np.zeros(4)
     eaves[sides] = rng.uniform(3.0, 6.0) + (0.0 if regular else rng.uniform(0.0, 0.4, len(sides)))

@@ -74,7 +74,7 @@ _METHODS = {
     "with_part": "parametric.edit",
     "without_part": "parametric.edit",
     "refit": "parametric.refit",
-    "html_of": "draw.html",
+    "render_building": "draw.html",
 }
 
 __all__ = ["__version__", "reconstruct", *sorted(_HOME)]

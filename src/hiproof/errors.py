@@ -9,7 +9,7 @@ import traceback
 from pathlib import Path
 from typing import NamedTuple
 
-from .masking import masked
+from .masking import mask
 
 
 class HiproofError(Exception):
@@ -19,7 +19,7 @@ class HiproofError(Exception):
     """
 
     def __init__(self, message: str = ""):
-        super().__init__(masked(str(message)))
+        super().__init__(mask(str(message)))
 
 
 class InputError(HiproofError):
@@ -103,7 +103,7 @@ class HiproofWarning(UserWarning):
     """Base of the warnings: what was put right on the way, in one sentence."""
 
     def __init__(self, message: str = ""):
-        super().__init__(masked(str(message)))
+        super().__init__(mask(str(message)))
 
 
 class InputWarning(HiproofWarning):

@@ -10,21 +10,23 @@ from typing import Any
 from .errors import InputError
 
 
-def needed(package: str, extra: str, purpose: str, otherwise: str = "") -> Any:
+def import_extra(package: str, extra: str, purpose: str, alternative: str = "") -> Any:
     """The module `package` for a `purpose`.
 
     Raises InputError where it cannot be imported, with the `extra` that brings it.
 
-    `otherwise` is how to do without, where that is another way to what was asked for.
+    `alternative` is how to do without, where that is another way to what was asked for.
 
-    >>> needed("maths", "all", "sums")
+    >>> import_extra("maths", "all", "sums")
     Traceback (most recent call last):
     hiproof.errors.InputError: ...
     """
     try:
         return import_module(package)
     except ImportError as error:
-        advice = f"try: pip install 'hiproof[{extra}]'" + (f", or {otherwise}" if otherwise else "")
+        advice = f"try: pip install 'hiproof[{extra}]'" + (
+            f", or {alternative}" if alternative else ""
+        )
         raise InputError(
             f"expected the package {package} for {purpose}, got: {error}; {advice}"
         ) from error

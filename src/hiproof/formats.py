@@ -27,7 +27,7 @@ from typing import Any
 from .settings import Settings, WriteSettings
 
 
-def always(write: WriteSettings) -> bool:
+def is_always(write: WriteSettings) -> bool:
     return True
 
 
@@ -57,7 +57,7 @@ class Format:
     what: str
     module: str
     fragment: str = ""
-    asked: Callable[[WriteSettings], bool] = always
+    asked: Callable[[WriteSettings], bool] = is_always
     tile_ending: str = ""
     given: dict[str, Any] = field(default_factory=dict)
 
@@ -138,61 +138,61 @@ OF_TILES = {name: format for name, format in FORMATS.items() if format.tile_endi
 TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a run writes these
 
 
-def asked_files(settings: Settings, folder: Path) -> dict[str, Path]:
+def requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
     """Paths in `folder` of the files that a run of these settings writes for the whole area, by
     format.
 
-    >>> [path.name for path in asked_files(Settings(), Path("models")).values()]
+    >>> [path.name for path in requested_files(Settings(), Path("models")).values()]
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
     """
     by_tile_alone = settings.city.models == "tiles"
     written = {
         n: format
-        for n, format in asked_formats(settings.write).items()
+        for n, format in requested_formats(settings.write).items()
         if not (by_tile_alone and format.tile_ending)
     }
     return {name: folder / format.file for name, format in written.items()}
 
 
-def asked_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
+def requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
     """Paths in `folder` of the files of a work tile's own, by format; none where such a run writes
     none.
     """
     by_tile = settings.city.models != "merged"
-    asked = {
+    requested = {
         name: format
-        for name, format in asked_formats(settings.write).items()
+        for name, format in requested_formats(settings.write).items()
         if by_tile and format.tile_ending
     }
-    return {name: folder / f"{tile}{format.tile_ending}" for name, format in asked.items()}
+    return {name: folder / f"{tile}{format.tile_ending}" for name, format in requested.items()}
 
 
-def places_of_models(settings: Settings, folder: Path) -> list[Path]:
+def list_model_paths(settings: Settings, folder: Path) -> list[Path]:
     """Where the models of such a run stand in `folder`: files of the whole area, the folder of
     those of work tiles.
 
-    >>> [path.name for path in places_of_models(Settings.from_dict({"write": {"citygml": "3.0"}}),
+    >>> [path.name for path in list_model_paths(Settings.from_dict({"write": {"citygml": "3.0"}}),
     ...     Path("out"))]
     ['buildings.citygml3.gml', 'buildings.city.jsonl']
     """
-    whole = [path for name, path in asked_files(settings, folder).items() if name in OF_TILES]
+    whole = [path for name, path in requested_files(settings, folder).items() if name in OF_TILES]
     return whole if settings.city.models == "merged" else [*whole, folder / TILE_FOLDER]
 
 
-def asked_fragments(write: WriteSettings) -> list[str]:
+def requested_fragments(write: WriteSettings) -> list[str]:
     """The modules that make a building's parts of all files of such a run, those of its work tiles
     included.
     """
-    return list(dict.fromkeys(format.fragment for format in asked_formats(write).values()))
+    return list(dict.fromkeys(format.fragment for format in requested_formats(write).values()))
 
 
-def asked_formats(write: WriteSettings) -> dict[str, Format]:
+def requested_formats(write: WriteSettings) -> dict[str, Format]:
     """What a run of these settings writes, as whole files or by work tile."""
     return {
         name: format for name, format in FORMATS.items() if format.fragment and format.asked(write)
     }
 
 
-def module_of(name: str) -> ModuleType:
+def import_format(name: str) -> ModuleType:
     """The module of `write` of that name."""
     return import_module(f".write.{name}", __package__)

@@ -18,7 +18,7 @@ from multiprocessing import parent_process
 from pathlib import Path
 
 from .errors import HiproofWarning, OutputError
-from .masking import masked
+from .masking import mask
 
 LOGGER = logging.getLogger("hiproof")
 FILE_FORMAT = "%(asctime)s %(levelname)s %(process)d %(message)s"
@@ -37,20 +37,20 @@ class Level(StrEnum):
         return getattr(logging, self.name.upper())
 
 
-def counted(number: int, one: str, many: str = "") -> str:
-    """So many things in words; `many` is their plural where that is not `one` with an s.
+def count_things(number: int, item: str, many: str = "") -> str:
+    """So many things in words; `many` is their plural where that is not `item` with an s.
 
-    >>> counted(1, "building"), counted(2000, "vertex", "vertices")
+    >>> count_things(1, "building"), count_things(2000, "vertex", "vertices")
     ('1 building', '2,000 vertices')
     """
-    return f"{number:,} {one if number == 1 else many or one + 's'}"
+    return f"{number:,} {item if number == 1 else many or item + 's'}"
 
 
 class Masking(logging.Formatter):
     """Formats a record and masks the passwords in all of it, tracebacks too."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return masked(super().format(record))
+        return mask(super().format(record))
 
 
 class Console(logging.Handler):
@@ -80,27 +80,29 @@ class KeptFile(logging.FileHandler):
         with suppress(OSError):
             self.close()
         if parent_process() is None:  # of the processes that write to the file, the first tells
-            told = f"{error.strerror or error}; the work goes on without the log"
-            LOGGER.warning("expected to write the log to %s, got: %s", self.baseFilename, told)
+            text = f"{error.strerror or error}; the work goes on without the log"
+            LOGGER.warning("expected to write the log to %s, got: %s", self.baseFilename, text)
 
 
 def start(level: Level = Level.warning, file: Path | None = None) -> None:
     """Show the log of `level` and above on standard error, and keep that of `info` and above
     (`debug`, if that is the level) at the end of `file`. What was started before ends. Raises
     OutputError where the file cannot be written."""
-    handlers: list[logging.Handler] = [handler_of(Console(), "hiproof: %(message)s", level.number)]
+    handlers: list[logging.Handler] = [
+        make_handler(Console(), "hiproof: %(message)s", level.number)
+    ]
     if file is not None:
         try:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
-            kept = KeptFile(file, encoding="utf-8")
+            selection = KeptFile(file, encoding="utf-8")
         except OSError as error:
             raise OutputError(
                 f"expected a --log-file that can be written, got {file}: {error}; name another"
             ) from error
-        handlers.append(handler_of(kept, FILE_FORMAT, min(level.number, logging.INFO)))
-    for before in LOGGER.handlers[:]:
-        LOGGER.removeHandler(before)
-        before.close()
+        handlers.append(make_handler(selection, FILE_FORMAT, min(level.number, logging.INFO)))
+    for previous in LOGGER.handlers[:]:
+        LOGGER.removeHandler(previous)
+        previous.close()
     for handler in handlers:
         LOGGER.addHandler(handler)
     LOGGER.setLevel(min(handler.level for handler in handlers))
@@ -110,13 +112,13 @@ def start(level: Level = Level.warning, file: Path | None = None) -> None:
     warnings.showwarning = log_warning
 
 
-def handler_of(handler: logging.Handler, form: str, level: int) -> logging.Handler:
+def make_handler(handler: logging.Handler, form: str, level: int) -> logging.Handler:
     handler.setFormatter(Masking(form))
     handler.setLevel(level)
     return handler
 
 
-def started() -> tuple:
+def worker_arguments() -> tuple:
     """The arguments of `start` that a worker process needs to log as this one does; none where
     nothing was started."""
     console = next((handler for handler in LOGGER.handlers if isinstance(handler, Console)), None)

@@ -25,7 +25,7 @@ END_S = 30.0  # seconds that answers on their way get when the server ends
 MOST_THREADS = 128  # of this process, each a connection: a browser opens six
 MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's parts take
 HTML = "text/html; charset=utf-8"
-TEXT = "text/plain; charset=utf-8"
+TEXT_TYPE = "text/plain; charset=utf-8"
 SAFE = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src "
     "'self' "
@@ -46,7 +46,7 @@ class Answer(NamedTuple):
 
     code: int
     body: bytes
-    kind: str = TEXT
+    kind: str = TEXT_TYPE
     headers: Mapping[str, str] = {}
 
 
@@ -74,7 +74,7 @@ class LoopbackServer(ThreadingHTTPServer):
 
     def serve_until_stopped(self) -> None:
         """Serve until Ctrl-C, or until the process is asked to end."""
-        asked = {
+        old_handlers = {
             name: signal.signal(name, stop)
             for name in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
         }
@@ -82,8 +82,8 @@ class LoopbackServer(ThreadingHTTPServer):
             with suppress(KeyboardInterrupt):
                 self.serve_forever()
         finally:
-            for name, before in asked.items():
-                signal.signal(name, before)
+            for name, previous in old_handlers.items():
+                signal.signal(name, previous)
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Give a connection a thread, unless there are too many."""
@@ -93,7 +93,7 @@ class LoopbackServer(ThreadingHTTPServer):
             super().process_request(request, client_address)
 
     @contextmanager
-    def answering(self) -> Iterator[None]:
+    def count_answer(self) -> Iterator[None]:
         """Count an answer on its way; none begins once the server closes."""
         with self.changed:
             if self.is_closing:
@@ -133,10 +133,10 @@ class TimedReader(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
-        left = self.until - time.monotonic()
-        if left <= 0:
+        remainder = self.until - time.monotonic()
+        if remainder <= 0:
             raise TimeoutError("the request took too long")
-        self.connection.settimeout(left)
+        self.connection.settimeout(remainder)
         return self.connection.recv_into(buffer)
 
 
@@ -153,7 +153,7 @@ class LoopbackHandler(BaseHTTPRequestHandler):
         """The answer to a request, GET or POST."""
         raise NotImplementedError
 
-    def refused(self, code: int, sentence: str) -> Answer:
+    def refuse(self, code: int, sentence: str) -> Answer:
         """The answer that says why a request is refused."""
         return Answer(code, sentence.encode())
 
@@ -179,16 +179,16 @@ class LoopbackHandler(BaseHTTPRequestHandler):
         is_length = length.isascii() and length.isdigit() and len(length) < len(str(MOST_BYTES)) + 1
         if not is_length or int(length) > MOST_BYTES:
             self.close_connection = True
-            told = f"expected a body of at most {MOST_BYTES} bytes, got {length[:20] or 'none'}"
-            return self.send(self.refused(413, told))
+            text = f"expected a body of at most {MOST_BYTES} bytes, got {length[:20] or 'none'}"
+            return self.send(self.refuse(413, text))
         return self.send(self.safe_answer("POST", self.rfile.read(int(length))))
 
     def safe_answer(self, method: str, body: bytes = b"") -> Answer:
-        if told := refusal(self.headers, self.server.server_port):
-            return self.refused(403, told)
+        if reason := refusal(self.headers, self.server.server_port):
+            return self.refuse(403, reason)
         if not self.path.startswith("/"):
-            return self.refused(400, "expected a path, got something else")
-        with self.server.answering():
+            return self.refuse(400, "expected a path, got something else")
+        with self.server.count_answer():
             return self.answer(method, body)
 
     def send(self, answer: Answer) -> None:
@@ -227,25 +227,25 @@ def refusal(headers: Headers, port: int) -> str:
     ...     "Origin": "null"}, 8000)
     ('', 'expected a request of this page, got one of another origin')
     """
-    own = own_hosts(port)
+    own_hosts = list_own_hosts(port)
     hosts = headers.get_all("Host") if isinstance(headers, Message) else [headers.get("Host")]
-    if not hosts or len(hosts) > 1 or hosts[0] not in own:
+    if not hosts or len(hosts) > 1 or hosts[0] not in own_hosts:
         return (
             f"expected a request to {LOOPBACK}, got another host; use the address that was printed"
         )
     origin = headers.get("Origin")
-    if origin is not None and origin not in {f"http://{name}" for name in own}:
+    if origin is not None and origin not in {f"http://{name}" for name in own_hosts}:
         return "expected a request of this page, got one of another origin"
     if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
         return "expected a request of this page, got one of another site"
     return ""
 
 
-def own_hosts(port: int) -> set[Any]:
+def list_own_hosts(port: int) -> set[Any]:
     """What a request's Host may be: a site elsewhere that gives its own name this machine's address
     has another.
 
-    >>> sorted(own_hosts(8000))
+    >>> sorted(list_own_hosts(8000))
     ['127.0.0.1:8000', 'localhost:8000']
     """
     names = (LOOPBACK, "localhost")

@@ -1,9 +1,9 @@
-"""Secrets never leave the process: whatever is written or printed goes through `masked`.
+"""Secrets never leave the process: whatever is written or printed goes through `mask`.
 
 Addresses hold passwords in several ways (`scheme://user:password@host`, `?password=`, `PG:...
 password='...'`, signed links) and appear in the middle of others' error texts, so they are looked
 for in any text. Libraries also quote what they make of a malformed address, a piece of a password
-alone for example. So `remember` takes the secrets out of an address where it comes in, and `masked`
+alone for example. So `remember` takes the secrets out of an address where it comes in, and `mask`
 hides them and their pieces wherever they stand, as they are, percent-encoded or quoted. In doubt
 more is hidden: an address shown with too little in it harms nobody.
 """
@@ -24,26 +24,26 @@ HIDDEN = "..."
 AFTER_USER = re.compile(r"(://[^\s:@/?#\[]*):(?:[^\s?#]*@|(?!\d*(?:[/?#\s]|$))\S*@)")
 TOKEN_AS_USER = re.compile(r"(https?://)[^\s:@/?#]+@", re.IGNORECASE)
 ENCODED = re.compile(r"(%3A%2F%2F)[^\s&/]*%40", re.IGNORECASE)
-NAME = (
+SECRET_NAME = (
     r"(?<![a-z])(?:[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)"
     r"|pass|sig|key|accesskeyid)\s*=\s*"
 )
 NAMED = re.compile(
-    rf"({NAME})" r"""(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^&\s]*[^&\s,;:.)'"])""",
+    rf"({SECRET_NAME})" r"""(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^&\s]*[^&\s,;:.)'"])""",
     re.IGNORECASE,
 )
 
 # A scheme, or what a slip has left of it.
 SCHEME = re.compile(r"^(?:/vsi\w+[/?])?[\w+.-]*:?//?|^[\w+.-]+:(?=[^@]*:)")
 # The value of a parameter with a secret, and all that follows.
-VALUE = re.compile(rf"{NAME}(.*)", re.IGNORECASE | re.DOTALL)
+VALUE = re.compile(rf"{SECRET_NAME}(.*)", re.IGNORECASE | re.DOTALL)
 END = re.compile(r"[&\s;]+[\w-]+\s*=")  # of a value: the next parameter
 BREAKS = re.compile(r"[^\w.~-]+")  # where programs cut an address into pieces
 # Characters below which a secret is hidden as a whole word only, like one that is a word.
 WHOLE_WORD_BELOW = 4
 # What is hidden in addresses only: single letters and small numbers stand in most sentences.
 NO_SECRET = re.compile(r"\W*.?\W*|\d{1,3}")
-ADDRESS = re.compile(
+ADDRESS_PATTERN = re.compile(
     r"//|@|%2F%2F|^/vsi|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=",
     re.IGNORECASE,
 )
@@ -59,16 +59,16 @@ class Secrets:
     def add(self, secrets: Iterable[str]) -> None:
         new = set(secrets) - self.known
         self.known |= new
-        self.forms |= {form.lower(): form for secret in new for form in forms_of(secret)}
+        self.forms |= {form.lower(): form for secret in new for form in list_forms(secret)}
 
     def hide(self, text: str) -> str:
         lowered = text.lower()
-        held = (form for low, form in self.forms.items() if low in lowered)
-        found = sorted(held, key=len, reverse=True)
-        if not found:
+        fixed = (form for lower, form in self.forms.items() if lower in lowered)
+        result = sorted(fixed, key=len, reverse=True)
+        if not result:
             return text
         return re.sub(
-            "|".join(pattern_of(form) for form in found), HIDDEN, text, flags=re.IGNORECASE
+            "|".join(make_pattern(form) for form in result), HIDDEN, text, flags=re.IGNORECASE
         )
 
 
@@ -82,8 +82,12 @@ def remember(*addresses: object) -> None:
     What is no address, such as a condition or the name of a file that is there, holds none.
     """
     for address in addresses:
-        if isinstance(address, str) and ADDRESS.search(address) and not names_a_file(address):
-            SECRETS.add(secrets_of(address))
+        if (
+            isinstance(address, str)
+            and ADDRESS_PATTERN.search(address)
+            and not names_a_file(address)
+        ):
+            SECRETS.add(find_secrets(address))
 
 
 def names_a_file(address: str) -> bool:
@@ -93,14 +97,14 @@ def names_a_file(address: str) -> bool:
         return False
 
 
-def secrets_of(address: str) -> set[str]:
+def find_secrets(address: str) -> set[str]:
     """The secrets in an address, however malformed, with the pieces into which a program may cut
     them.
 
     >>> addresses = "postgresql//adm:S3cr3t@127.0.0.1/t", "host=h password=S3c r3t user=me"
-    >>> [sorted(secrets_of(address)) for address in addresses]
+    >>> [sorted(find_secrets(address)) for address in addresses]
     [['S3cr3t'], ['S3c', 'S3c r3t', 'r3t']]
-    >>> secrets_of("tiles/a.laz"), secrets_of("https://host:8080/tile.laz"), secrets_of("postgresql://me@host/db")
+    >>> find_secrets("tiles/a.laz"), find_secrets("https://host:8080/tile.laz"), find_secrets("postgresql://me@host/db")
     (set(), set(), set())
     """
     decoded = unquote(address)
@@ -117,18 +121,22 @@ def secrets_of(address: str) -> set[str]:
 def candidates(address: str) -> Iterator[str]:
     """Yield what may be a secret of an address: what a user's name is followed by up to an @, and
     values of named parameters."""
-    rest = SCHEME.sub("", address, count=1)
-    for end in {rest.find("@"), rest.rfind("@"), re.split(r"[?#]", rest, maxsplit=1)[0].rfind("@")}:
-        user, colon, password = rest[: max(end, 0)].partition(":")
+    remainder = SCHEME.sub("", address, count=1)
+    for end in {
+        remainder.find("@"),
+        remainder.rfind("@"),
+        re.split(r"[?#]", remainder, maxsplit=1)[0].rfind("@"),
+    }:
+        user, colon, password = remainder[: max(end, 0)].partition(":")
         if colon:
             yield password
         elif re.match(r"(?:/vsi\w+/)?https?:", address, re.IGNORECASE):
             yield user
-    for found in VALUE.finditer(address):
-        yield from values_at(found[1])
+    for result in VALUE.finditer(address):
+        yield from values_at(result[1])
     # VALUE takes all that follows, so parameters within it are looked for by their names.
-    for found in re.finditer(NAME, address, re.IGNORECASE):
-        yield from values_at(address[found.end() :])
+    for result in re.finditer(SECRET_NAME, address, re.IGNORECASE):
+        yield from values_at(address[result.end() :])
 
 
 def values_at(text: str) -> Iterator[str]:
@@ -145,7 +153,7 @@ def values_at(text: str) -> Iterator[str]:
     yield from (value, unquote_plus(value), re.split(r"[&\s]", value, maxsplit=1)[0])
 
 
-def forms_of(secret: str) -> set[str]:
+def list_forms(secret: str) -> set[str]:
     """How a secret may be written: as it is, decoded, encoded, and as programs quote texts and
     bytes."""
     plain = {secret, unquote(secret), unquote_plus(secret)}
@@ -162,7 +170,7 @@ def forms_of(secret: str) -> set[str]:
     }
 
 
-def pattern_of(form: str) -> str:
+def make_pattern(form: str) -> str:
     """The pattern that finds a form of a secret; a short one, or one like a word, where no letter
     stands beside it."""
     is_word = form.isalpha() and (form.islower() or form.isupper() or form.istitle())
@@ -171,13 +179,13 @@ def pattern_of(form: str) -> str:
     return rf"(?:(?<!\w)|(?<=%[0-9a-f]{{2}})|(?<=\\[a-z])){re.escape(form)}(?!\w)"
 
 
-def masked(text: str) -> str:
+def mask(text: str) -> str:
     """`text` with the passwords, tokens and signatures of all addresses in it replaced by three
     dots.
 
-    >>> masked("expected a table at postgresql://me:secret@host/db?table=fp, got none")
+    >>> mask("expected a table at postgresql://me:secret@host/db?table=fp, got none")
     'expected a table at postgresql://me:...@host/db?table=fp, got none'
-    >>> masked("PG:host=db user=me password='se cret' dbname=x"), masked("https://host/a.laz?sig=a%2Fb&v=1")
+    >>> mask("PG:host=db user=me password='se cret' dbname=x"), mask("https://host/a.laz?sig=a%2Fb&v=1")
     ('PG:host=db user=me password=... dbname=x', 'https://host/a.laz?sig=...&v=1')
     """
     text = AFTER_USER.sub(rf"\1:{HIDDEN}@", text)
@@ -189,7 +197,7 @@ def masked(text: str) -> str:
 def masked_values(value: Any) -> Any:
     """A copy of nested dictionaries and lists, each text in them masked."""
     if isinstance(value, str):
-        return masked(value)
+        return mask(value)
     if isinstance(value, dict):
         return {name: masked_values(inner) for name, inner in value.items()}
     return [masked_values(inner) for inner in value] if isinstance(value, (list, tuple)) else value

@@ -51,8 +51,8 @@ def reconstruct(
     stages.refuse_other_kinds(footprint, terrain, settings)
     points, settings = as_xyz(points), settings or Settings()
     stages.refuse_without_network(settings)
-    building = stages.asked_for(footprint, id)
-    building, footprint, of_footprint = stages.aligned(building, points, settings)
+    building = stages.start_building(footprint, id)
+    building, footprint, of_footprint = stages.align_footprint(building, points, settings)
     points, outline, status = stages.usable(points, footprint)
     if status is not Status.MODELLED:
         return dataclasses.replace(building, status=status, detail=status.value)
@@ -72,5 +72,5 @@ def reconstruct(
     roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, base, settings, unused)
     for text in (of_footprint, site.remark):
-        building = stages.remarked(building, text)
+        building = stages.add_remark(building, text)
     return building

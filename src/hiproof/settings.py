@@ -14,25 +14,25 @@ from typing import Any
 
 from .errors import SettingsError
 
-MOST = 10**15  # no number of a setting without bounds is larger
+LARGEST_INTEGER = 10**15  # no number of a setting without bounds is larger
 
 
 def setting(
     default: Any,
     help: str,
     unit: str = "",
-    low: float | None = None,
-    high: float | None = None,
+    lower: float | None = None,
+    upper: float | None = None,
     choices: tuple = (),
-    fewest: int = 0,
+    minimum: int = 0,
     option: str = "",
     names: str = "",
 ) -> Any:
     """Declare one setting of a section;
 
-    `low` and `high` are inclusive bounds, `choices` the allowed values.
+    `lower` and `upper` are inclusive bounds, `choices` the allowed values.
 
-    Of a setting of several values they hold for each, and there are at least `fewest`. With an
+    Of a setting of several values they hold for each, and there are at least `minimum`. With an
     `option` (such as "--roofs") the command line has it, its help and default made of this;
     settings that share one are set together. One that `names` "files" is another where other bytes
     stand in them.
@@ -40,10 +40,10 @@ def setting(
     metadata = {
         "help": help,
         "unit": unit,
-        "low": low,
-        "high": high,
+        "low": lower,
+        "high": upper,
         "choices": choices,
-        "fewest": fewest,
+        "fewest": minimum,
     }
     return field(default=default, metadata=metadata | {"option": option, "names": names})
 
@@ -58,7 +58,7 @@ class ReadSettings:
         "",
         0,
         255,
-        fewest=1,
+        minimum=1,
         option="--building-class",
     )
     ground_classes: tuple[int, ...] = setting(
@@ -134,7 +134,7 @@ class FitSettings:
         "m",
         0.001,
         1.0,
-        fewest=1,
+        minimum=1,
     )
     parts: str = setting(
         "compound",
@@ -270,7 +270,7 @@ class WriteSettings:
         "part, 2.2 roofs; CityJSON "
         "always has the footprint, CityGML one LoD1, the finer",
         choices=("0", "1.2", "1.3", "2.2"),
-        fewest=1,
+        minimum=1,
         option="--lods",
     )
     parts_as: str = setting(
@@ -372,20 +372,21 @@ class Settings:
                 got = (
                     f"[{section_name}]"
                     if isinstance(changes, dict)
-                    else f"{section_name} = {shown(changes)}"
+                    else f"{section_name} = {format_value(changes)}"
                 )
                 raise SettingsError(
                     f"expected a settings section (one of {', '.join(names)}), got {got}; `hiproof "
                     "settings` lists them"
                 )
-            known = {f.name: f for f in fields(section)}
+            by_name = {f.name: f for f in fields(section)}
             for name in changes:
-                if name not in known:
+                if name not in by_name:
                     raise SettingsError(
-                        f"expected a setting of [{section_name}] ({', '.join(known)}), got {name!r}"
+                        f"expected a setting of [{section_name}] ({', '.join(by_name)}), got "
+                        f"{name!r}"
                     )
             checked = {
-                name: check_value(f"{section_name}.{name}", known[name], value)
+                name: check_value(f"{section_name}.{name}", by_name[name], value)
                 for name, value in changes.items()
             }
             sections[section_name] = dataclasses.replace(section, **checked)
@@ -419,55 +420,68 @@ def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
 
     Raises SettingsError with the full sentence when it does not fit.
     """
-    default, told = declared.default, declared.metadata
+    default, metadata = declared.default, declared.metadata
     if not isinstance(default, tuple):
-        return checked_one(name, default, told, value)
+        return check_item(name, default, metadata, value)
     values = tuple(value) if isinstance(value, (list, tuple)) else (value,)
-    if len(values) < told["fewest"]:
+    if len(values) < metadata["fewest"]:
         raise SettingsError(
-            f"expected {name} to hold {told['fewest']} or more values, got none; {told['help']}"
+            f"expected {name} to hold {metadata['fewest']} or more values, got none; "
+            f"{metadata['help']}"
         )
-    return tuple(checked_one(name, KINDS[declared.type], told, one) for one in values)
+    return tuple(check_item(name, SETTING_KINDS[declared.type], metadata, item) for item in values)
 
 
-KINDS: dict[Any, object] = {"tuple[int, ...]": 0, "tuple[float, ...]": 0.0, "tuple[str, ...]": ""}
+SETTING_KINDS: dict[Any, object] = {
+    "tuple[int, ...]": 0,
+    "tuple[float, ...]": 0.0,
+    "tuple[str, ...]": "",
+}
 """A value of an element's type, by the declared type of a setting of several values."""
 
 
-def checked_one(name: str, like: Any, told: Any, value: Any) -> Any:
-    """One value of the type of `like`, within the bounds and among the choices declared."""
+def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:
+    """One value of the type of `template`, within the bounds and among the choices declared."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
-    if isinstance(like, (bool, str)):
-        fits = isinstance(value, type(like))
-    elif isinstance(like, int):
+    if isinstance(template, (bool, str)):
+        fits = isinstance(value, type(template))
+    elif isinstance(template, int):
         fits = whole
     else:
         fits = whole or isinstance(value, float)
     if not fits:
         kind = {bool: "true or false", str: "text", int: "a whole number", float: "a number"}[
-            type(like)
+            type(template)
         ]
-        raise SettingsError(f"expected {name} to be {kind}, got {shown(value)}; {told['help']}")
-    low, high, choices = told["low"], told["high"], told["choices"]
+        raise SettingsError(
+            f"expected {name} to be {kind}, got {format_value(value)}; {declared['help']}"
+        )
+    lower, upper, choices = declared["low"], declared["high"], declared["choices"]
     # so written that NaN is in no bounds; a number without bounds must still be finite
-    if isinstance(like, (int, float)) and not isinstance(like, bool):
-        low, high = -MOST if low is None else low, MOST if high is None else high
-        if not low <= value <= high:
-            bounds = " ".join(f"between {low} and {high} {told['unit']}".split())
-            raise SettingsError(f"expected {name} {bounds}, got {shown(value)}; {told['help']}")
+    if isinstance(template, (int, float)) and not isinstance(template, bool):
+        lower, upper = (
+            -LARGEST_INTEGER if lower is None else lower,
+            LARGEST_INTEGER if upper is None else upper,
+        )
+        if not lower <= value <= upper:
+            bounds = " ".join(f"between {lower} and {upper} {declared['unit']}".split())
+            raise SettingsError(
+                f"expected {name} {bounds}, got {format_value(value)}; {declared['help']}"
+            )
     if choices and value not in choices:
         raise SettingsError(
-            f"expected {name} to be one of {', '.join(map(str, choices))}, got {shown(value)}"
+            f"expected {name} to be one of {', '.join(map(str, choices))}, got "
+            f"{format_value(value)}"
         )
-    return type(like)(value)
+    return type(template)(value)
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """A value as a message shows it: whole numbers of thousands of digits and long texts
     cut short.
     """
-    if isinstance(value, int) and abs(value) > MOST:
-        return f"a number of more than {len(str(MOST)) - 1} digits"
+    if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
+        return f"a number of more than {len(str(LARGEST_INTEGER)) - 1} digits"
     if isinstance(value, (list, tuple, dict)):
         return f"a {type(value).__name__} of {len(value)}"
     text = repr(value)

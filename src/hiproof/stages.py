@@ -15,8 +15,8 @@ import shapely
 
 from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
-from .geometry.rings import enclosed
-from .log import counted
+from .geometry.rings import repair_polygons
+from .log import count_things
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid, as_xyz
 from .read.plausible import is_plausible
 from .settings import Settings
@@ -136,27 +136,27 @@ def refuse_without_network(settings: Settings) -> None:
         from .segment.inference import import_onnxruntime
 
         import_onnxruntime(
-            otherwise="--no-network (segment.enabled = false) to go by the points alone"
+            alternative="--no-network (segment.enabled = false) to go by the points alone"
         )
 
 
-def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
+def start_building(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
     """The outcome to start from: the building's name, its footprint and the attributes it came
     with.
     """
     if isinstance(footprint, Footprint):
-        known = {
+        input_values = {
             "footprint": footprint.polygon,
             "attributes": footprint.attributes,
             "shift": footprint.shift,
         }
-        return Building(footprint.id, Status.MODELLED, **known)
+        return Building(footprint.id, Status.MODELLED, **input_values)
     if footprint is not None and footprint.geom_type != "Polygon":
         footprint = largest_polygon(footprint)  # of several a building has one, and files hold one
     return Building(id, Status.MODELLED, footprint=footprint)
 
 
-def aligned(
+def align_footprint(
     building: Building, points: np.ndarray, settings: Settings
 ) -> tuple[Building, shapely.Polygon | None, str]:
     """The building with its footprint's shift onto its points, the footprint there, and a remark:
@@ -176,34 +176,34 @@ def aligned(
 
     polygon = largest_polygon(footprint)
     origin = np.floor(polygon.bounds[:2])
-    found = find_shift(
+    result = find_shift(
         finite(points[:, :2]) - origin, shapely.transform(polygon, lambda c: c - origin)
     )
-    if found.is_clear:
-        shift = (round(float(found.xy[0]), 3), round(float(found.xy[1]), 3))
+    if result.is_clear:
+        shift = (round(float(result.xy[0]), 3), round(float(result.xy[1]), 3))
         building = dataclasses.replace(building, shift=shift)
         footprint = shapely.transform(footprint, lambda c: c + shift)
-    return building, footprint, "; ".join(filter(None, (simplified, shift_remark(found))))
+    return building, footprint, "; ".join(filter(None, (simplified, shift_remark(result))))
 
 
-def shift_remark(found: Shift, of_row: int = 1) -> str:
+def shift_remark(result: Shift, of_row: int = 1) -> str:
     """What is said of a footprint that was moved, alone or with a row of so many, and of a roof of
     another size; empty where there is neither.
     """
     remarks = []
-    if found.is_clear:
+    if result.is_clear:
         error, row = (
-            float(np.hypot(*found.sigma)),
+            float(np.hypot(*result.sigma)),
             f" with the {of_row} of its row" if of_row > 1 else "",
         )
         remarks.append(
-            f"its footprint was moved{row} by ({found.xy[0]:.2f}, {found.xy[1]:.2f}) m, within "
+            f"its footprint was moved{row} by ({result.xy[0]:.2f}, {result.xy[1]:.2f}) m, within "
             f"{error:.2f} m, onto its roof"
         )
-    if found.is_size_clear:
-        reach = "reaches {:.1f} m beyond" if found.beyond > 0 else "stays {:.1f} m inside"
+    if result.is_size_clear:
+        reach = "reaches {:.1f} m beyond" if result.beyond > 0 else "stays {:.1f} m inside"
         remarks.append(
-            f"its roof {reach.format(abs(found.beyond))} its footprint on every side that shows"
+            f"its roof {reach.format(abs(result.beyond))} its footprint on every side that shows"
         )
     return "; ".join(remarks)
 
@@ -231,7 +231,7 @@ def usable(
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
     """The largest polygon of a geometry, made valid; an empty polygon where there is none."""
-    geometry = geometry if geometry.is_valid else enclosed(geometry)
+    geometry = geometry if geometry.is_valid else repair_polygons(geometry)
     if geometry.geom_type == "Polygon":
         return geometry
     polygons = [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon"]
@@ -242,8 +242,8 @@ def finite(points: np.ndarray) -> np.ndarray:
     """Those of the points (n, 2 or 3) whose coordinates are numbers, and of this Earth: what stands
     for no value may be 3.4e38.
     """
-    known = is_plausible(points)
-    return points if known.all() else points[known]
+    is_usable = is_plausible(points)
+    return points if is_usable.all() else points[is_usable]
 
 
 def distinct(points: np.ndarray) -> np.ndarray:
@@ -289,9 +289,9 @@ def without_needless_vertices(
             ring for ring in whole.interiors if shapely.Polygon(ring).area > tolerance_m**2
         ]
         simple = largest_polygon(
-            simplified_within(shapely.Polygon(whole.exterior, courtyards), tolerance_m)
+            simplify_outline(shapely.Polygon(whole.exterior, courtyards), tolerance_m)
         )
-    left = shapely.get_num_coordinates(simple)
+    remainder = shapely.get_num_coordinates(simple)
     apart_m = shapely.distance(
         shapely.points(shapely.get_coordinates(whole.exterior)), simple.exterior
     ).max()
@@ -299,20 +299,20 @@ def without_needless_vertices(
         apart_m = max(apart_m, tolerance_m)
     return (
         simple,
-        f"its outline of {count} vertices was simplified to {left}, within {apart_m:.2g} m",
+        f"its outline of {count} vertices was simplified to {remainder}, within {apart_m:.2g} m",
     )
 
 
-def simplified_within(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
+def simplify_outline(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
     """The polygon by Douglas and Peucker.
 
     Their time grows with the square of the vertices, so thousands go piece by piece.
     """
     rings = []
     for ring in (polygon.exterior, *polygon.interiors):
-        before, xy = math.inf, shapely.get_coordinates(ring)
-        while MOST_OUTLINE_VERTICES < len(xy) < 0.9 * before:
-            before, xy = len(xy), simplified_in_pieces(xy, tolerance_m)
+        previous, xy = math.inf, shapely.get_coordinates(ring)
+        while MOST_OUTLINE_VERTICES < len(xy) < 0.9 * previous:
+            previous, xy = len(xy), simplified_in_pieces(xy, tolerance_m)
         rings.append(xy)
     outer, *holes = [ring if len(ring) >= 4 else None for ring in rings]
     if outer is None:
@@ -360,7 +360,7 @@ def look_at_ground(
     return look_at_ground(points, outline, ground, frame, terrain, settings)
 
 
-def remarked(building: Building, remark: str) -> Building:
+def add_remark(building: Building, remark: str) -> Building:
     """The building with a remark added to what is said of it."""
     return (
         dataclasses.replace(
@@ -385,10 +385,10 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
     from .segment import segment
 
     try:
-        found = segment(points, settings)
+        result = segment(points, settings)
     except FitError:
         return Recognised()
-    return Recognised(found.weights if fits_one(settings) else None, found.types)
+    return Recognised(result.weights if fits_one(settings) else None, result.types)
 
 
 def fit(
@@ -416,12 +416,12 @@ def fit_several(
     """
     from .fit.union import fit_building
 
-    found = fit_building(points, outline, settings)
+    building = fit_building(points, outline, settings)
     return Fitted(
-        found.roof_parts,
-        found.outline,
-        found.objective,
-        detail=last_resort(found.roof_parts, settings),
+        building.roof_parts,
+        building.outline,
+        building.objective,
+        detail=last_resort(building.roof_parts, settings),
     )
 
 
@@ -434,7 +434,7 @@ def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
     if not types or "flat" in types or not flat:
         return ""
     return (
-        f"{flat} of {counted(len(parts), 'part')} made flat: none of the types asked for "
+        f"{flat} of {count_things(len(parts), 'part')} made flat: none of the types asked for "
         f"({', '.join(types)}) explains the points there"
     )
 
@@ -444,7 +444,7 @@ def fit_one(
 ) -> Fitted:
     """One primitive for the whole building (paper section 3.2)."""
     from .fit import fit_roof
-    from .segment import most_probable
+    from .segment import choose_most_probable
 
     def fit(types: tuple[str, ...]) -> Fit:
         allowed = settings.replace(
@@ -452,17 +452,17 @@ def fit_one(
         )
         return fit_roof(points, outline, allowed, weights=recognised.weights)
 
-    found, types = most_probable(fit, recognised.types)
-    shift = found.global_translation
+    result, types = choose_most_probable(fit, recognised.types)
+    shift = result.global_translation
     part = dataclasses.replace(
-        found.part,
-        translation=found.part.translation + shift,
-        pieces=tuple(p.moved(shift) for p in found.part.pieces),
+        result.part,
+        translation=result.part.translation + shift,
+        pieces=tuple(p.move(shift) for p in result.part.pieces),
     )
     outline = (
         shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
     )
-    return Fitted((part,), outline, found.value, types)
+    return Fitted((part,), outline, result.value, types)
 
 
 def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, ...]:
@@ -475,15 +475,15 @@ def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, .
     >>> candidates({"gable": 0.9, "hip": 0.08, "shed": 0.02}, paper)
     ('gable', 'hip')
     """
-    asked = tuple(settings.fit.types)
+    types = tuple(settings.fit.types)
     if settings.fit.objective != "paper":
-        return asked
+        return types
     likely = [
         name
         for name, share in recognised.items()
-        if share >= LIKELY and name in (asked or recognised)
+        if share >= LIKELY and name in (types or recognised)
     ]
-    return tuple(likely) or asked
+    return tuple(likely) or types
 
 
 def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:
@@ -516,15 +516,15 @@ def find_ground(
     the walls that are seen below `roof`.
     """
     from .compose import terrain_intersection
-    from .compose.settle import PLAN_DIGITS, settled
+    from .compose.settle import PLAN_DIGITS, round_number
 
     if terrain is not None:
         corners = np.concatenate(
             [np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)]
         )
-        heights, source = asked(terrain, frame.to_world(corners))
+        heights, source = query_terrain(terrain, frame.to_world(corners))
         if np.isfinite(heights).any():
-            z = settled(np.nanmin(heights), PLAN_DIGITS)
+            z = round_number(np.nanmin(heights), PLAN_DIGITS)
             lines = terrain_intersection(
                 outline,
                 lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2],
@@ -533,19 +533,19 @@ def find_ground(
             return Ground(
                 z, source, tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines)
             )
-    assumed, source = assumed_ground(points, roof)
-    return Ground(settled(assumed + frame.origin[2], PLAN_DIGITS), source)
+    assumed, source = assume_ground(points, roof)
+    return Ground(round_number(assumed + frame.origin[2], PLAN_DIGITS), source)
 
 
-def assumed_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
+def assume_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
     """Height in the frame of the points (n, 3) where nothing tells it but them, and what it goes
     by.
     """
     lowest, usual = float(points[:, 2].min()), f"assumed {ASSUMED_WALL_M:g} m below"
-    eave = math.inf if roof is None else lowest_over(points, roof)
+    eave = math.inf if roof is None else find_lowest_over(points, roof)
     if not math.isfinite(eave) or lowest >= eave - WALLS_SEEN_M:
         return lowest - ASSUMED_WALL_M, f"{usual} the lowest point"
-    foot = lowest_but_one(points)
+    foot = find_second_lowest(points)
     return (
         (foot, "assumed at the foot of its walls")
         if foot < eave - ASSUMED_WALL_M
@@ -553,17 +553,17 @@ def assumed_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
     )
 
 
-def lowest_over(points: np.ndarray, roof: Roof) -> float:
+def find_lowest_over(points: np.ndarray, roof: Roof) -> float:
     """The lowest height of the roof over the points (n, 3), in its frame."""
     return float(np.nanmin(roof.height_at(points[:, :2]), initial=math.inf))
 
 
-def lowest_but_one(points: np.ndarray) -> float:
+def find_second_lowest(points: np.ndarray) -> float:
     """Height of the lowest of the points (n, 3) but one: a single one may be noise."""
     return float(np.partition(points[:, 2], 1)[1]) if len(points) > 1 else float(points[0, 2])
 
 
-def asked(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
+def query_terrain(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
     """Terrain heights (n,) at `xy_world` (n, 2), and the source that answered first."""
     if hasattr(terrain, "heights_and_sources"):
         heights, sources = terrain.heights_and_sources(xy_world)
@@ -599,8 +599,8 @@ def solid_or_simpler(
             ),
         )
     except CompositionError as error:
-        why = f"{Status.SIMPLIFIED.value}: a flat block ({error})"
-    fitted = flat(points, roof.outline, Status.SIMPLIFIED, why)
+        text = f"{Status.SIMPLIFIED.value}: a flat block ({error})"
+    fitted = flat(points, roof.outline, Status.SIMPLIFIED, text)
     roof = settled_roof(dataclasses.replace(roof, parts=fitted.parts))
     try:
         return roof, compose(roof, z_ground, settings), fitted
@@ -625,7 +625,7 @@ def judge(
     """The finished building: quality measured on its solid, an honest status, the verdict and what
     is in doubt, everything back in the world's frame.
     """
-    from .compose.settle import settled_building
+    from .compose.settle import round_building
     from .evaluate.metrics import quality, well_inside
 
     if solid is None:
@@ -635,7 +635,7 @@ def judge(
         building,
         status=fitted.status,
         detail=fitted.detail,
-        built=Model(roof, solid.moved(roof.frame.origin), settings.compose),
+        built=Model(roof, solid.move(roof.frame.origin), settings.compose),
         quality=quality(solid, points, roof.outline, inner),
         z_ground=ground.z,
         ground_source=ground.source,
@@ -643,12 +643,12 @@ def judge(
         objective=fitted.objective,
         types=fitted.types,
     )
-    return cautioned(
-        graded(settled_building(measured), points, unused_within(roof, unused)), points, inner
+    return add_cautions(
+        grade_building(round_building(measured), points, select_unused(roof, unused)), points, inner
     )
 
 
-def unused_within(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
+def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
     """Those of the `unused` world points (m, 3) that are finite and inside a roof's outline, in the
     roof's frame.
     """
@@ -658,37 +658,39 @@ def unused_within(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
     return local.compress(shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1]), axis=0)
 
 
-def graded(building: Building, points: np.ndarray, unused: np.ndarray | None = None) -> Building:
+def grade_building(
+    building: Building, points: np.ndarray, unused: np.ndarray | None = None
+) -> Building:
     """The building with the verdict on its model by its `points` (n, 3), in the roof's frame, and
     by those that its fit left `unused` (m, 3).
     """
-    from .evaluate.verdict import verdict_of
+    from .evaluate.verdict import judge_model
 
-    grade, reasons = verdict_of(building.model, points, unused)
-    return remarked(dataclasses.replace(building, grade=grade), "; ".join(reasons))
+    grade, reasons = judge_model(building.model, points, unused)
+    return add_remark(dataclasses.replace(building, grade=grade), "; ".join(reasons))
 
 
-def cautioned(building: Building, points: np.ndarray, inner: Inner) -> Building:
+def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Building:
     """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in
     the roof's frame and those well `inner`, two surfaces one over the other.
     """
-    from .evaluate.layers import two_surfaces
+    from .evaluate.layers import find_second_surface
 
     roof = [
         building.solid.vertices[list(ring), 2]
-        for face in building.solid.of_kind(ROOF)
+        for face in building.solid.select_faces(ROOF)
         for ring in face.rings
     ]
     sunk = building.z_ground - float(np.concatenate(roof).min())
     if sunk > SUNK_M:
-        building = remarked(
+        building = add_remark(
             building,
             f"the ground ({building.ground_source}) lies {sunk:.1f} "
             f"{Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
         )
-    share, apart_m = two_surfaces(points, building.roof, inner)
+    share, apart_m = find_second_surface(points, building.roof, inner)
     if share:
-        building = remarked(
+        building = add_remark(
             building,
             f"over {100 * share:.0f} % of its area {Doubt.TWO_SURFACES.value}, {apart_m:.2f} m "
             "apart: two flights, two "

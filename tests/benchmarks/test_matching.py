@@ -118,7 +118,7 @@ def test_no_standard_deviations_are_said_so():
 
 def standing(roof, id="house"):
     return Building(
-        id, Status.MODELLED, built=Model(roof, compose(roof, 0.0).moved(roof.frame.origin))
+        id, Status.MODELLED, built=Model(roof, compose(roof, 0.0).move(roof.frame.origin))
     )
 
 

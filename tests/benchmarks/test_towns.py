@@ -40,7 +40,7 @@ def simulated(kind, seed):
     made = random_compound(
         np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0)
     )
-    solid = compose(made.roof, 0.0).moved(made.roof.frame.origin)
+    solid = compose(made.roof, 0.0).move(made.roof.frame.origin)
     return Building(f"{kind}-{seed}", Status.MODELLED, built=Model(made.roof, solid))
 
 
@@ -106,7 +106,7 @@ def test_true_roofs_composed_anew_have_the_true_heights(small_town):
             for b in (truth, again)
         ]
         assert np.mean(np.abs(heights[0] - heights[1]) < 0.02) > 0.98
-        assert again.solid.of_kind("RoofSurface")
+        assert again.solid.select_faces("RoofSurface")
 
 
 @needs_judge
@@ -134,8 +134,8 @@ def flat_roof(building) -> Roof:
 def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
     first, beside, apart = (
         box(),
-        box().moved(np.array([4.0, 0.0, 0.0])),
-        box(2.0, 2.0).moved(np.array([20.0, 0.0, 0.0])),
+        box().move(np.array([4.0, 0.0, 0.0])),
+        box(2.0, 2.0).move(np.array([20.0, 0.0, 0.0])),
     )
     found = touching("house", {"a": first, "b": beside, "c": apart})
     assert [building.id for building in found] == ["house", "house~2"]

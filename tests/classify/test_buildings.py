@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.classify import BUILDING, GROUND, UNKNOWN, classify, roof_points
+from hiproof.classify import BUILDING, GROUND_CLASS, UNKNOWN, classify, roof_points
 from leafy_scenes import GROUND as GROUND_SOURCE
 from leafy_scenes import TREE, drone, forest, house_under_a_tree, town
 
@@ -18,7 +18,7 @@ def test_a_town_is_told_from_its_trees_and_its_ground(density, least):
     cloud, _ = town(density)
     classes, built = classify(cloud.points), ~np.isin(cloud.source, (GROUND_SOURCE, TREE))
     assert f1(classes == BUILDING, built) > least
-    assert f1(classes == GROUND, cloud.source == GROUND_SOURCE) > 0.99
+    assert f1(classes == GROUND_CLASS, cloud.source == GROUND_SOURCE) > 0.99
 
 
 def test_the_order_of_points_does_not_matter():
@@ -45,7 +45,7 @@ def test_a_forest_holds_no_building(seed):
     cloud = forest(np.random.default_rng(seed))
     classes = classify(cloud.points)
     assert (classes == BUILDING).sum() < 0.01 * len(cloud)
-    assert f1(classes == GROUND, cloud.source == GROUND_SOURCE) > 0.98
+    assert f1(classes == GROUND_CLASS, cloud.source == GROUND_SOURCE) > 0.98
 
 
 @pytest.mark.parametrize("slope", [0.0, 1.0, 2.0])
@@ -53,13 +53,13 @@ def test_water_and_slopes_steeper_than_roofs_hold_no_building(slope):
     xy = np.random.default_rng(0).uniform(0, 60, (10_000, 2))
     classes = classify(np.column_stack([xy, slope * xy[:, 0]]))
     assert not (classes == BUILDING).any()
-    assert (classes == GROUND).mean() > 0.9
+    assert (classes == GROUND_CLASS).mean() > 0.9
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 5])
 def test_a_few_points_are_no_building(count):
     classes = classify(np.random.default_rng(0).random((count, 3)) * 20)
-    assert len(classes) == count and np.isin(classes, (GROUND, UNKNOWN)).all()
+    assert len(classes) == count and np.isin(classes, (GROUND_CLASS, UNKNOWN)).all()
 
 
 def test_points_in_one_place_are_no_building():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from hiproof.classify.files import classes_after, classify_file
+from hiproof.classify.files import classify_file, merge_classes
 from hiproof.cli.app import app
 from hiproof.errors import InputError, OutputError
 from hiproof.settings import Settings
@@ -52,7 +52,7 @@ def test_points_that_are_neither_keep_their_class_unless_it_was_one_of_the_two()
         np.array([1, 5, 2, 6, 5, 0, 6], np.uint8),
         np.array([1, 1, 1, 1, 6, 2, 6], np.uint8),
     )
-    assert classes_after(before, found).tolist() == [1, 5, 1, 1, 6, 2, 6]
+    assert merge_classes(before, found).tolist() == [1, 5, 1, 1, 6, 2, 6]
 
 
 @pytest.mark.parametrize("kind", [9, 7])

@@ -5,7 +5,7 @@ walls and without.
 import numpy as np
 import pytest
 
-from hiproof.classify.cut_out import is_cut_out, next_seen
+from hiproof.classify.cut_out import find_next_heights, is_cut_out
 from hiproof.classify.split import split_buildings
 from hiproof.errors import InputError
 from hiproof.model import PointCloud
@@ -76,7 +76,7 @@ def test_the_next_cell_with_points_is_that_of_a_plain_search():
     rng = np.random.default_rng(0)
     height = np.where(rng.random((9, 7)) < 0.5, -np.inf, rng.normal(size=(9, 7)))
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        found = next_seen(height, axis, way)
+        found = find_next_heights(height, axis, way)
         for cell in np.ndindex(height.shape):
             beyond = [np.add(cell, -way * step * np.eye(2, dtype=int)[axis]) for step in (1, 2)]
             seen = [height[tuple(c)] for c in beyond if (c >= 0).all() and (c < height.shape).all()]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hiproof.classify.ground import bare_points, filled, ground_grid, opened
+from hiproof.classify.ground import bare_points, fill_gaps, ground_grid, open_heights
 
 
 def land(slope=0.0, side=60.0, density=4.0, seed=0):
@@ -66,12 +66,12 @@ def test_an_opening_is_that_of_its_definition():
     for i, j in np.argwhere(np.isfinite(z)):
         window = np.s_[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2]
         expected[window] = np.maximum(expected[window], np.nanmin(z[window]))
-    assert np.array_equal(opened(z, 1), expected)
+    assert np.array_equal(open_heights(z, 1), expected)
 
 
 def test_nothing_known_is_level_and_what_is_known_stays():
-    assert not filled(np.full((3, 4), np.nan)).any()
+    assert not fill_gaps(np.full((3, 4), np.nan)).any()
     z = np.array([[1.0, np.nan, np.nan], [2.0, np.nan, 5.0]])
-    result = filled(z)
+    result = fill_gaps(z)
     assert np.array_equal(result[np.isfinite(z)], z[np.isfinite(z)])
     assert (result >= 1).all() and (result <= 5).all()

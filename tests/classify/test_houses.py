@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.classify.houses import told_apart
+from hiproof.classify.houses import separate_houses
 from hiproof.classify.split import split_buildings
 from hiproof.model import PointCloud
 from hiproof.settings import Settings
@@ -59,7 +59,7 @@ ONE_HOUSE = {
 @pytest.mark.parametrize("height", TWO_HOUSES.values(), ids=TWO_HOUSES)
 def test_houses_that_differ_are_told_apart_at_their_wall(height):
     points, area, world = block(height)
-    houses = told_apart(points, area, 1.0)
+    houses = separate_houses(points, area, 1.0)
     assert len(houses) == 2
     for own in (shapely.box(0, 0, 8.6, DEPTH), shapely.box(8.6, 0, WIDTH, DEPTH)):
         own = shapely.transform(own, world)
@@ -74,7 +74,7 @@ def test_houses_that_differ_are_told_apart_at_their_wall(height):
 @pytest.mark.parametrize("height", ONE_HOUSE.values(), ids=ONE_HOUSE)
 def test_one_house_stays_one(height, density):
     points, area, _ = block(height, density)
-    assert told_apart(points, area, 1.0) == [area]
+    assert separate_houses(points, area, 1.0) == [area]
 
 
 def test_houses_with_bushes_between_them_are_told_apart_in_any_order_of_points():
@@ -82,8 +82,8 @@ def test_houses_with_bushes_between_them_are_told_apart_in_any_order_of_points()
         return np.where(abs(x - 8.0) < 1.5, np.random.default_rng(1).uniform(1.0, 4.0, len(x)), 6.0)
 
     points, area, _ = block(height, density=15.0)
-    houses = told_apart(points, area, 1.0)
-    shuffled = told_apart(RNG.permutation(points), area, 1.0)
+    houses = separate_houses(points, area, 1.0)
+    shuffled = separate_houses(RNG.permutation(points), area, 1.0)
     assert len(houses) == 2
     assert all(any(one.equals_exact(other, 1e-6) for other in shuffled) for one in houses)
 
@@ -109,6 +109,6 @@ def test_a_neck_of_returns_joins_no_houses_but_a_wing_does(width, count):
     )
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 18, 0.4), np.arange(0.2, 9, 0.4)))
     xy = np.column_stack([x, y])[shapely.contains_xy(area, x, y)]
-    houses = told_apart(np.column_stack([xy, np.full(len(xy), 6.0)]), area, 1.0)
+    houses = separate_houses(np.column_stack([xy, np.full(len(xy), 6.0)]), area, 1.0)
     assert len(houses) == count
     assert sum(house.area for house in houses) == pytest.approx(area.area)

@@ -10,7 +10,7 @@ import shapely
 
 from hiproof.compose import check_solid, compose
 from hiproof.compose.blocks import block, blocks
-from hiproof.compose.building_parts import LEAST_PART_M2, building_parts, whole_of
+from hiproof.compose.building_parts import LEAST_PART_M2, building_parts, join_parts
 from hiproof.frames import LocalFrame
 from hiproof.model import GROUND, ROOF, Face, Part, Piece, Roof, Solid
 from hiproof.simulate import COMPOUND_KINDS, random_compound
@@ -71,9 +71,9 @@ def test_parts_are_valid_do_not_overlap_and_make_up_the_whole(kind, seed):
     if parts:
         # walls of the whole run straight past corners within half a millimetre of their line
         assert sum(part.solid.volume for part in parts) == pytest.approx(solid.volume, rel=1e-4)
-        faces = [face for part in parts for face in part.solid.of_kind(ROOF)]
-        assert len(faces) == len(solid.of_kind(ROOF))
-        whole = whole_of(together([part.solid for part in parts]))
+        faces = [face for part in parts for face in part.solid.select_faces(ROOF)]
+        assert len(faces) == len(solid.select_faces(ROOF))
+        whole = join_parts(together([part.solid for part in parts]))
         assert check_solid(whole) == () and whole.volume == pytest.approx(solid.volume, rel=1e-4)
 
 
@@ -90,7 +90,9 @@ def test_roofs_that_meet_at_a_wall_are_parts_and_those_that_share_an_edge_are_on
 def test_a_tower_out_of_a_roof_is_a_part_and_the_rest_goes_around_it():
     parts = building_parts(compose(roof(level(0, 0, 12, 10, 5.0), level(4, 3, 8, 7, 9.0)), 0.0))
     around, tower = parts
-    assert len(around.outline.interiors) == 1 and len(around.solid.of_kind(GROUND)[0].rings) == 2
+    assert (
+        len(around.outline.interiors) == 1 and len(around.solid.select_faces(GROUND)[0].rings) == 2
+    )
     assert tower.outline.equals(shapely.box(4, 3, 8, 7)) and tower.solid.volume == pytest.approx(
         16 * 9.0
     )
@@ -111,7 +113,7 @@ def test_what_is_smaller_than_a_part_stays_with_its_neighbour():
 def test_parts_move_with_the_building():
     solid = compose(roof(gable(0, 0, 6, 8, 6.0), level(6, 0, 10, 8, 3.0)), 0.0)
     shift = np.array([85000.0, 446000.0, 2.0])
-    for here, there in zip(building_parts(solid), building_parts(solid.moved(shift)), strict=True):
+    for here, there in zip(building_parts(solid), building_parts(solid.move(shift)), strict=True):
         assert (
             np.allclose(here.solid.vertices + shift, there.solid.vertices)
             and here.solid.faces == there.solid.faces

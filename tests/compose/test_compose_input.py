@@ -84,9 +84,9 @@ def test_slivers_join_a_neighbour_by_the_settings():
     narrow, wide = (
         Settings.from_dict({"compose": {"min_face_width_m": width}}) for width in (0.01, 0.1)
     )
-    assert len(compose(roof, 0.0, narrow).of_kind("RoofSurface")) == 3
-    assert len(compose(roof, 0.0, wide).of_kind("RoofSurface")) == 2
-    assert len(compose(roof, 0.0).of_kind("RoofSurface")) == 2
+    assert len(compose(roof, 0.0, narrow).select_faces("RoofSurface")) == 3
+    assert len(compose(roof, 0.0, wide).select_faces("RoofSurface")) == 2
+    assert len(compose(roof, 0.0).select_faces("RoofSurface")) == 2
 
 
 def test_coordinates_are_multiples_of_a_tenth_of_a_millimetre():

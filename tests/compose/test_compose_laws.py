@@ -35,7 +35,7 @@ def plane_of(solid, face):
 def roof_height(solid, xy):
     """Height (n,) of the solid's roof faces at `xy`, and how many of them cover each point."""
     z, covering = np.full(len(xy), np.nan), np.zeros(len(xy), int)
-    for face in solid.of_kind("RoofSurface"):
+    for face in solid.select_faces("RoofSurface"):
         inside = shapely.contains_xy(plan_polygon(solid, face), xy[:, 0], xy[:, 1])
         z[inside] = np.column_stack((xy, np.ones(len(xy))))[inside] @ plane_of(solid, face)
         covering += inside
@@ -68,7 +68,7 @@ def roof_heights_of(solid):
     """Lowest and highest height of a solid's roof faces."""
     z = solid.vertices[
         np.unique(
-            [v for face in solid.of_kind("RoofSurface") for ring in face.rings for v in ring]
+            [v for face in solid.select_faces("RoofSurface") for ring in face.rings for v in ring]
         ),
         2,
     ]
@@ -77,7 +77,7 @@ def roof_heights_of(solid):
 
 def thin_faces(solid):
     """How many roof faces are thinner than nobody draws."""
-    faces = [plan_polygon(solid, face) for face in solid.of_kind("RoofSurface")]
+    faces = [plan_polygon(solid, face) for face in solid.select_faces("RoofSurface")]
     return sum(2 * face.area / face.length < Settings().compose.min_face_width_m for face in faces)
 
 
@@ -117,7 +117,7 @@ def test_roof_of_the_solid_is_the_height_function(composed, kind):
 def test_roof_faces_tile_the_outline(composed, kind):
     for seed in SEEDS:
         roof, solid = composed[kind, seed]
-        area = sum(plan_polygon(solid, face).area for face in solid.of_kind("RoofSurface"))
+        area = sum(plan_polygon(solid, face).area for face in solid.select_faces("RoofSurface"))
         assert area == pytest.approx(roof.outline.area, abs=2e-3 * roof.outline.length)
 
 
@@ -127,7 +127,7 @@ def test_volume_is_the_integral_over_the_roof(composed, kind):
         _, solid = composed[kind, seed]
         z_ground = solid.vertices[:, 2].min()
         total = 0.0
-        for face in solid.of_kind("RoofSurface"):
+        for face in solid.select_faces("RoofSurface"):
             polygon = plan_polygon(solid, face)
             middle = np.array([polygon.centroid.x, polygon.centroid.y, 1.0])
             total += polygon.area * (middle @ plane_of(solid, face) - z_ground)
@@ -149,7 +149,7 @@ def test_a_part_under_the_others_changes_nothing(composed):
         low = Part("flat", (Piece(shapely.box(-9, -9, 9, 9), np.array([[0.0, 0.0, -50.0]])),))
         other = compose(Roof((*roof.parts, low), roof.outline, roof.frame), Z_GROUND, EXACT)
         assert other.volume == pytest.approx(solid.volume, rel=1e-4)
-        assert len(other.of_kind("RoofSurface")) == len(solid.of_kind("RoofSurface"))
+        assert len(other.select_faces("RoofSurface")) == len(solid.select_faces("RoofSurface"))
 
 
 def test_order_of_the_parts_does_not_matter(composed):
@@ -211,17 +211,20 @@ def test_faces_of_small_cases(name):
     roof = roof_zoo.roof(pieces, outline or pieces[0].outline)
     solid = compose(roof, 0.0)
     assert (
-        tuple(len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface"))
+        tuple(
+            len(solid.select_faces(kind))
+            for kind in ("RoofSurface", "WallSurface", "GroundSurface")
+        )
         == counts
     )
-    assert len(solid.of_kind("GroundSurface")[0].rings) == 1 + len(roof.outline.interiors)
+    assert len(solid.select_faces("GroundSurface")[0].rings) == 1 + len(roof.outline.interiors)
 
 
 def test_roof_faces_name_their_part():
     pieces, outline, _ = COUNTS["two levels"]
     solid = compose(roof_zoo.roof(pieces, outline), 0.0)
     heights = {
-        face.part: solid.vertices[face.rings[0][0], 2] for face in solid.of_kind("RoofSurface")
+        face.part: solid.vertices[face.rings[0][0], 2] for face in solid.select_faces("RoofSurface")
     }
     assert heights == {0: 5.0, 1: 3.0}
     assert {face.part for face in solid.faces if face.kind != "RoofSurface"} == {-1}

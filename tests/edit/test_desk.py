@@ -17,8 +17,8 @@ from flat_town import request_over
 from hiproof.city.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
-from hiproof.edit.doubt import doubt_of
-from hiproof.edit.edits import FILE, UNTOUCHED, Edits, OtherVersion
+from hiproof.edit.doubt import measure_doubt
+from hiproof.edit.edits import EDITS_FILE, UNTOUCHED, Edits, OtherVersion
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.evaluate.run import evaluate_run
 from hiproof.read.solids import read_solids
@@ -47,7 +47,7 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
     desk.accept(
         ID, {"parts": fitted["parts"], "version": start["version"], "note": "seen from the street"}
     )
-    hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
+    hiproof.reconstruct_area(request_over(town_files, folder, folder / EDITS_FILE))
     now = by_id(folder)
     assert now[ID]["type"] == "gable" and "(seen from the street, anna, " in now[ID]["detail"]
     assert now[ID]["parts"] == fitted["parts"]
@@ -144,8 +144,8 @@ def test_the_most_doubtful_come_first(desk):
 )
 def test_whatever_speaks_against_a_model_adds_to_its_doubt(said, reason):
     plain = {"status": "modelled", "parts": [], "residuals": {"share_within_20cm": 0.95}}
-    found = doubt_of(plain | said)
-    assert found.amount > doubt_of(plain).amount and found.reasons == (reason,)
+    found = measure_doubt(plain | said)
+    assert found.amount > measure_doubt(plain).amount and found.reasons == (reason,)
 
 
 def test_every_edit_gives_a_valid_model(desk):
@@ -238,7 +238,7 @@ def test_two_windows_lose_nothing(folder):
     assert other.building(ID)["accepted"]["who"] == "anna"
     other.accept("house-1", {"parts": other.building("house-1")["parts"], "version": UNTOUCHED})
     other.accept(ID, {"parts": gable["parts"], "version": caught.value.version})
-    kept = dict(read_overrides(str(folder / FILE)))
+    kept = dict(read_overrides(str(folder / EDITS_FILE)))
     assert {id: record["who"] for id, record in kept.items()} == {ID: "ben", "house-1": "ben"}
     assert kept[ID]["parts"][0]["type"] == "gable"
 
@@ -247,7 +247,7 @@ def test_no_process_writes_over_another(folder):
     """Two processes accept on one folder at once, each other buildings."""
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         done = list(pool.map(accept_many, [folder] * 2, range(2)))
-    kept = {id: record["ridge_height"] for id, record in read_overrides(str(folder / FILE))}
+    kept = {id: record["ridge_height"] for id, record in read_overrides(str(folder / EDITS_FILE))}
     assert kept == {id: height for own in done for id, height in own.items()}
 
 
@@ -266,7 +266,7 @@ def test_an_accepted_edit_can_be_taken_back(folder, desk):
     done = desk.accept(ID, {"parts": start["parts"], "version": start["version"]})
     assert desk.buildings()["accepted"] == 1
     assert desk.withdraw(ID, {"version": done["version"]}) == {"version": UNTOUCHED}
-    assert desk.building(ID)["accepted"] is None and (folder / FILE).read_text() == ""
+    assert desk.building(ID)["accepted"] is None and (folder / EDITS_FILE).read_text() == ""
 
 
 def test_what_makes_no_solid_is_not_accepted(folder, desk):
@@ -274,7 +274,7 @@ def test_what_makes_no_solid_is_not_accepted(folder, desk):
     wrong = [{**parts[0], "parameters": {"width": -1.0}}]
     with pytest.raises(InputError, match="positive width"):
         desk.accept(ID, {"parts": wrong, "version": UNTOUCHED})
-    assert not (folder / FILE).exists()
+    assert not (folder / EDITS_FILE).exists()
 
 
 def test_the_file_starts_with_the_overrides_that_the_run_obeyed(town_files, folder, tmp_path):
@@ -283,7 +283,7 @@ def test_the_file_starts_with_the_overrides_that_the_run_obeyed(town_files, fold
     hiproof.reconstruct_area(request_over(town_files, folder, known))
     desk = Desk(folder, "anna")
     desk.accept(ID, {"parts": desk.building(ID)["parts"], "version": UNTOUCHED})
-    kept = dict(read_overrides(str(folder / FILE)))
+    kept = dict(read_overrides(str(folder / EDITS_FILE)))
     assert kept["house-1"] == {"id": "house-1", "ridge_height": 9.5} and kept[ID]["who"] == "anna"
 
 
@@ -304,7 +304,7 @@ def test_without_its_points_all_but_refitting_works(town_files, tmp_path):
     with pytest.raises(HiproofError, match="3 points or more"):
         edited(desk, gable["parts"], action="refit")
     desk.accept(ID, {"parts": gable["parts"], "version": start["version"]})
-    assert (tmp_path / "run" / FILE).exists()
+    assert (tmp_path / "run" / EDITS_FILE).exists()
 
 
 @pytest.fixture
@@ -382,7 +382,7 @@ def test_points_that_can_no_longer_be_read_are_said_once(town_files, tmp_path):
 def test_what_a_folder_must_hold(tmp_path, folder):
     with pytest.raises(InputError, match=r"without parameters\.jsonl"):
         Desk(tmp_path, "anna")
-    (folder / FILE).symlink_to(tmp_path / "elsewhere.jsonl")
+    (folder / EDITS_FILE).symlink_to(tmp_path / "elsewhere.jsonl")
     with pytest.raises(InputError, match="got a link"):
         Edits(folder)
 

@@ -12,7 +12,7 @@ from flat_town import request_over
 from hiproof.city.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
-from hiproof.edit.edits import FILE
+from hiproof.edit.edits import EDITS_FILE
 from hiproof.edit.server import Server, Service
 from hiproof.read.solids import read_solids
 from pages import at_every_size, complaints, is_too_wide, needs_browser, places_on_canvas
@@ -102,7 +102,7 @@ def test_from_a_wrong_type_to_a_rebuilt_valid_citygml(town_files, page, folder):
     key(page, "a")
     assert page.inner_text("#say") == "accepted"
     assert page.get_attribute("[data-id=house-0]", "class").split() == ["current", "accepted"]
-    hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
+    hiproof.reconstruct_area(request_over(town_files, folder, folder / EDITS_FILE))
     rows = by_id(folder)
     assert {id: row["type"] for id, row in rows.items()} == {
         "house-0": "gable",
@@ -226,13 +226,13 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
     assert page.inner_text("#title") == "house-2: flat"
     page.click("#leave-out")
     key(page, "a")
-    said = dict(read_overrides(str(folder / FILE)))
+    said = dict(read_overrides(str(folder / EDITS_FILE)))
     assert (
         said["house-1"]["z_ground"] == 1.25
         and said["house-2"]["leave_out"] is True
         and "parts" not in said["house-2"]
     )
-    hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
+    hiproof.reconstruct_area(request_over(town_files, folder, folder / EDITS_FILE))
     rows = by_id(folder)
     assert rows["house-1"]["z_ground"] == 1.25 and rows["house-2"]["status"] == "left_out"
     page.reload()
@@ -245,7 +245,7 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
     )
     page.click("#withdraw")
     page.evaluate("() => queue")
-    assert set(dict(read_overrides(str(folder / FILE)))) == {"house-1"}
+    assert set(dict(read_overrides(str(folder / EDITS_FILE)))) == {"house-1"}
 
 
 def test_undo_back_to_what_was_accepted_leaves_nothing_changed(page):

@@ -17,7 +17,7 @@ import pytest
 
 from hiproof.city.overrides import read_overrides
 from hiproof.edit.desk import Desk
-from hiproof.edit.edits import FILE, UNTOUCHED
+from hiproof.edit.edits import EDITS_FILE, UNTOUCHED
 from hiproof.edit.server import Server, Service
 from hiproof.errors import InputError
 
@@ -74,7 +74,7 @@ def test_others_are_refused(service, folder, headers):
     )
     assert code(service, **headers) == 403
     assert code(service, f"/{service.token}/accept", "POST", body.encode(), **headers) == 403
-    assert not (folder / FILE).exists()
+    assert not (folder / EDITS_FILE).exists()
 
 
 def test_without_the_token_nothing_is_told(service):
@@ -231,12 +231,12 @@ def test_ctrl_c_leaves_nothing_half_written(folder):
     before = {path.name for path in folder.iterdir()}
     process, _ = accept_until(folder, signal.SIGINT)
     assert process.returncode == 0
-    assert {path.name for path in folder.iterdir()} - before == {FILE, f".{FILE}.lock"}
+    assert {path.name for path in folder.iterdir()} - before == {EDITS_FILE, f".{EDITS_FILE}.lock"}
 
 
 def test_a_kill_loses_no_accepted_edit(folder):
     _, confirmed = accept_until(folder, signal.SIGKILL)
-    kept = dict(read_overrides(str(folder / FILE)))
+    kept = dict(read_overrides(str(folder / EDITS_FILE)))
     assert set(kept) == set(confirmed)
     for id, note in confirmed.items():  # one that was on its way may have come through as well
         assert int(kept[id]["note"].split()[1]) >= int(note.split()[1])

@@ -25,7 +25,7 @@ from hiproof.evaluate.evaluation import (
 )
 from hiproof.evaluate.metrics import plan_outline
 from hiproof.evaluate.models import BuildingModel
-from hiproof.evaluate.run import evaluate_run, own_outline
+from hiproof.evaluate.run import evaluate_run, outline_of_solid
 from sample_models import ORIGIN, courtyard_solid, gable_solid, sample_points, write_sample_run
 
 
@@ -111,7 +111,7 @@ def test_footprints_bring_points_beyond_the_roof(tmp_path, run_folder):
 
 
 def block(id, x):
-    return BuildingModel(id, solid=courtyard_solid().moved(np.array([x, 0.0, 0.0])))
+    return BuildingModel(id, solid=courtyard_solid().move(np.array([x, 0.0, 0.0])))
 
 
 @pytest.mark.parametrize(
@@ -136,7 +136,7 @@ def test_where_nothing_lies_nearby_the_id_tells():
 )
 def test_footprints_are_found_by_the_column_that_named_the_buildings(tmp_path, is_told):
     solids = write_sample_run(tmp_path)
-    areas = [own_outline(BuildingModel(id, {}, solid)) for id, solid in solids.items()]
+    areas = [outline_of_solid(BuildingModel(id, {}, solid)) for id, solid in solids.items()]
     areas.append(shapely.transform(areas[0], lambda xy: xy + 200.0))
     names = np.array([*solids, "bare"], dtype=object)
     columns = [np.roll(names, 1), names]  # the usual column holds the names of others

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hiproof
-from hiproof.evaluate.layers import split_cells, two_surfaces, unseen_share
+from hiproof.evaluate.layers import find_second_surface, split_cells, unseen_share
 from hiproof.settings import Settings
 from hiproof.simulate import random_compound
 from points_of_roofs import sampled
@@ -30,7 +30,7 @@ def compound(seed, density=6.0, noise_m=0.03):
 @given(SEEDS, st.floats(2.0, 20.0), st.floats(0.0, 0.3))
 def test_points_of_one_roof_are_one_surface_whatever_their_noise(seed, density, noise_m):
     roof, points = compound(seed, density, noise_m)
-    assert two_surfaces(points, roof) == (0.0, 0.0)
+    assert find_second_surface(points, roof) == (0.0, 0.0)
 
 
 @settings(max_examples=40, deadline=None)
@@ -47,7 +47,7 @@ def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(
     roof, points = compound(seed)
     raised = np.random.default_rng(seed).random(len(points)) < share
     points[:, 2] += side * apart_m * (raised - between)
-    found, distance_m = two_surfaces(points, roof)
+    found, distance_m = find_second_surface(points, roof)
     assert found > 0.4
     assert distance_m == pytest.approx(apart_m, abs=0.05)
 
@@ -58,7 +58,7 @@ def test_a_part_that_the_model_lacks_is_no_second_surface(seed, height_m):
     roof, points = compound(seed)
     x0, _, x1, _ = roof.outline.bounds
     points[:, 2] += height_m * (points[:, 0] > x0 + 0.6 * (x1 - x0))
-    assert two_surfaces(points, roof) == (0.0, 0.0)
+    assert find_second_surface(points, roof) == (0.0, 0.0)
 
 
 def test_the_split_of_a_cell_is_the_best_of_all():

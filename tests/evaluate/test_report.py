@@ -14,7 +14,7 @@ import typer
 
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
-from hiproof.evaluate.report import embedded, report_html, worst_indices
+from hiproof.evaluate.report import embed_json, report_html, worst_indices
 from hiproof.evaluate.report_data import report_data
 from hiproof.evaluate.report_pictures import (
     building_pictures,
@@ -193,7 +193,7 @@ def test_names_from_the_data_cannot_become_markup(run):
     wicked = replace(run.models[0], id="</script><img src=x>")
     page = report_html(replace(run, models=(wicked, *run.models[1:])), "<b>")
     assert "<img" not in page and "&lt;b&gt;" in page
-    assert json.loads(embedded(["</script>"])) == ["</script>"]
+    assert json.loads(embed_json(["</script>"])) == ["</script>"]
 
 
 def test_text_of_the_data_is_not_taken_for_a_place_in_the_page(run):

@@ -18,7 +18,7 @@ from hiproof.city.run import reconstruct_area
 from hiproof.cli.running import graded_words
 from hiproof.cli.status import describe
 from hiproof.compose import compose
-from hiproof.evaluate.verdict import verdict_of
+from hiproof.evaluate.verdict import judge_model
 from hiproof.model import Model
 from hiproof.settings import Settings
 from hiproof.simulate import random_compound
@@ -62,8 +62,8 @@ def test_the_true_roof_is_good(seed, density):
     points = sampled(
         lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, 0.03, seed
     )
-    model = Model(roof, compose(roof, 0.0).moved(roof.frame.origin))
-    assert verdict_of(model, points).grade is Grade.GOOD
+    model = Model(roof, compose(roof, 0.0).move(roof.frame.origin))
+    assert judge_model(model, points).grade is Grade.GOOD
 
 
 @settings(max_examples=15, deadline=None)
@@ -75,7 +75,7 @@ def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
     narrow = shapely.box(0.0, 0.0, 12.0, 1.4)
     points = np.random.default_rng(2).uniform((0, 0), (12, 1.4), (400, 2))
     off = (np.arange(400) % 5 < 3) * side * off_m
-    found = verdict_of(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + off]))
+    found = judge_model(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + off]))
     assert found.grade is Grade.POOR and any(
         "% of its points lie within 0.2 m" in reason for reason in found.reasons
     )
@@ -84,7 +84,7 @@ def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
 def test_facade_points_say_nothing_of_a_roof():
     along, height = np.random.default_rng(3).uniform((0, 0.5), (12, 5.9), (900, 2)).T
     walls = np.column_stack([along, np.full(900, 0.05), height])
-    assert verdict_of(block(), np.concatenate([on_block(), walls])) == (Grade.GOOD, ())
+    assert judge_model(block(), np.concatenate([on_block(), walls])) == (Grade.GOOD, ())
 
 
 @pytest.mark.parametrize("with_footprint", [True, False])
@@ -106,7 +106,9 @@ def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
 @pytest.mark.parametrize("count", [5, 41, 296])
 @pytest.mark.parametrize("height", [4.0, 30.0])
 def test_points_far_above_a_model_are_named(count, height):
-    found = verdict_of(block(), np.concatenate([on_block(3000), cluster(count, height, width=1.5)]))
+    found = judge_model(
+        block(), np.concatenate([on_block(3000), cluster(count, height, width=1.5)])
+    )
     assert found.grade is not Grade.GOOD
     assert (
         f"{count} points up to {height:.{1 if height < 10 else 0}f} m above the model"
@@ -117,22 +119,24 @@ def test_points_far_above_a_model_are_named(count, height):
 def test_birds_and_a_chimney_do_not_count():
     birds = np.column_stack([np.linspace(1, 11, 6), np.linspace(1, 8, 6), np.full(6, 30.0)])
     chimney = cluster(20, 1.2, width=0.9)
-    assert verdict_of(block(), np.concatenate([on_block(3000), birds, chimney])).grade is Grade.GOOD
+    assert (
+        judge_model(block(), np.concatenate([on_block(3000), birds, chimney])).grade is Grade.GOOD
+    )
 
 
 def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
     points = on_block(1500)
     yard = (abs(points[:, 0] - 6) < 1.5) & (abs(points[:, 1] - 4.5) < 1.5)
     points[yard, 2] -= 4.0
-    found = verdict_of(block(), points)
+    found = judge_model(block(), points)
     assert found.grade is not Grade.GOOD
     assert any(reason.endswith("m below the model") for reason in found.reasons)
 
 
 def test_half_a_building_without_points_is_poor_and_a_tenth_is_not():
     points = on_block(800)
-    assert verdict_of(block(), points[points[:, 0] < 6.0]).grade is Grade.POOR
-    assert verdict_of(block(), points[points[:, 0] < 11.0]).grade is not Grade.POOR
+    assert judge_model(block(), points[points[:, 0] < 6.0]).grade is Grade.POOR
+    assert judge_model(block(), points[points[:, 0] < 11.0]).grade is not Grade.POOR
 
 
 def run_over_spire(folder, code, most=20_000):

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from hiproof.fit.bare_ground import find_bare_ground, largest_sum
-from hiproof.fit.standing import cover, ground_plane, what_stands
+from hiproof.fit.standing import classify_standing, cover, ground_plane
 
 FOOTPRINT = shapely.box(0, 0, 16, 12)
 YARDS = {
@@ -110,17 +110,19 @@ def test_the_ground_is_a_plane_by_what_is_known_of_it():
 def test_nothing_stands_where_few_points_lie_above_the_ground(share, is_empty):
     xy = scattered(FOOTPRINT, 4)
     points = np.column_stack([xy, sloping(xy) + np.where(xy[:, 0] < 16 * share, 4.0, 0.1)])
-    found = what_stands(points, np.array([0.1, -0.2, 3.0]))
+    found = classify_standing(points, np.array([0.1, -0.2, 3.0]))
     assert found.is_empty == is_empty and found.low_share == pytest.approx(1 - share, abs=0.05)
 
 
 def test_ground_seen_below_a_roof_does_not_make_it_none():
     xy = scattered(FOOTPRINT, 4)
     points = np.concatenate([np.column_stack([xy, np.full(len(xy), z)]) for z in (0.0, 2.4)])
-    found = what_stands(points, np.zeros(3))
+    found = classify_standing(points, np.zeros(3))
     assert found.low_share == 0.5 and not found.is_empty and cover(points, ~found.is_low) > 0.8
 
 
 def test_points_of_another_height_system_lie_on_no_ground():
     xy = scattered(FOOTPRINT, 4)
-    assert not what_stands(np.column_stack([xy, np.full(len(xy), -43.0)]), np.zeros(3)).is_low.any()
+    assert not classify_standing(
+        np.column_stack([xy, np.full(len(xy), -43.0)]), np.zeros(3)
+    ).is_low.any()

@@ -16,20 +16,20 @@ from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline, with_courts
 from hiproof.fit.outline.cost import (
     Border,
-    changed,
+    apply_change,
     cost_at_depth,
-    cost_of_change,
     costs_by_depth,
-    drawing_of,
-    known_cost,
+    evaluate_change,
+    interpolate_cost,
+    make_drawing,
     structure_cost,
 )
 from hiproof.fit.outline.lines import (
     BACK,
-    dropped,
+    drop_line,
     find_corners,
-    lines_through,
-    replaced,
+    make_lines,
+    replace_lines,
     replaced_by,
 )
 from hiproof.fit.outline.settle import (
@@ -37,14 +37,14 @@ from hiproof.fit.outline.settle import (
     DEEP_M,
     OFFSETS_M,
     SHALLOW_M,
-    STRAY,
+    STRAY_SHARE,
     WALLS_M,
     log_densities,
     log_likelihoods,
 )
 from hiproof.fit.outline.soft import SURE_BLURS
 from hiproof.fit.outline.spread import unevenness
-from hiproof.fit.outline.steps import RUN, best_levels, stepped
+from hiproof.fit.outline.steps import RUN, add_steps, best_levels
 from hiproof.fit.walls import on_walls
 
 ANYWHERE = (-np.inf, np.inf, -np.inf, np.inf)
@@ -216,9 +216,9 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
         6.0,
     )
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
-    drawing = drawing_of(lines_through(np.array(wedge, float)), 0.0, border)
-    assert len(stepped(drawing, border, 1).lines) == 7  # no matter of single sides
-    found = stepped(drawing, border, RUN)
+    drawing = make_drawing(make_lines(np.array(wedge, float)), 0.0, border)
+    assert len(add_steps(drawing, border, 1).lines) == 7  # no matter of single sides
+    found = add_steps(drawing, border, RUN)
     assert len(found.lines) == 8 and found.cost < drawing.cost
     assert iou(shapely.Polygon(found.corners), truth) > 0.96
 
@@ -227,13 +227,13 @@ def test_an_outline_ends_in_no_spike():
     xy, truth = points_in(shapely.box(0, 0, 14, 8), 8.0, angle=0.0)
     trail = np.column_stack([np.linspace(14, 20, 13), 8.0 + np.linspace(0.0, 0.4, 13)])
     outline = estimate_outline(np.concatenate([xy, trail]))
-    azimuth = lines_through(
+    azimuth = make_lines(
         shapely.get_coordinates(shapely.geometry.polygon.orient(outline).exterior)[:-1]
     )[:, 0]
     assert np.cos(azimuth - np.roll(azimuth, 1)).min() > BACK
     assert iou(outline, truth) > 0.95
     spike = np.array([(0, 0), (14, 0), (20, 8.2), (13.8, 7.7), (0, 8)], float)
-    assert not find_corners(lines_through(spike), np.empty_like(spike))
+    assert not find_corners(make_lines(spike), np.empty_like(spike))
 
 
 @pytest.mark.parametrize("name", ["rectangle", "l"])
@@ -312,25 +312,30 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
         6.0,
     )
     ring = np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float)
-    lines = lines_through(ring[::-1] if court else ring)
-    drawing = drawing_of(lines, 0.0, border)
+    lines = make_lines(ring[::-1] if court else ring)
+    drawing = make_drawing(lines, 0.0, border)
     priced = 0
     for i in range(len(lines)):
         notch = lines[[i] * 3] + [(0.0, 0.0), (np.pi / 2, 0.0), (0.0, -0.8)]
         middle = drawing.corners[[i, (i + 1) % len(lines)]].mean(axis=0)
         notch[1, 1] = middle @ [np.cos(notch[1, 0]), np.sin(notch[1, 0])]
-        changes = [(replaced(lines, i, 1, lines[i, 0] + 0.05, lines[i, 1] + 0.3), 2)]
-        changes += [(dropped(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
+        changes = [(replace_lines(lines, i, 1, lines[i, 0] + 0.05, lines[i, 1] + 0.3), 2)]
+        changes += [(drop_line(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
         for new, fresh in changes:
-            found, anew = changed(new, drawing, i, 1, fresh, border), drawing_of(new, 0.0, border)
-            assert cost_of_change(new, drawing, i, 1, fresh, border, np.inf) == pytest.approx(
+            found, anew = (
+                apply_change(new, drawing, i, 1, fresh, border),
+                make_drawing(new, 0.0, border),
+            )
+            assert evaluate_change(new, drawing, i, 1, fresh, border, np.inf) == pytest.approx(
                 found.cost
             )
             if np.isfinite(anew.cost):
                 assert (
-                    cost_of_change(new, drawing, i, 1, fresh, border, found.cost - 1e-6) == np.inf
+                    evaluate_change(new, drawing, i, 1, fresh, border, found.cost - 1e-6) == np.inf
                 )
-                assert cost_of_change(new, drawing, i, 1, fresh, border, found.cost + 1e-6) < np.inf
+                assert (
+                    evaluate_change(new, drawing, i, 1, fresh, border, found.cost + 1e-6) < np.inf
+                )
                 assert found.cost == pytest.approx(anew.cost) and found.structure == anew.structure
                 assert found.own == pytest.approx(anew.own) and found.corners == pytest.approx(
                     anew.corners
@@ -344,7 +349,9 @@ def test_what_points_cost_is_looked_up_as_it_is_computed(wall):
     for depth in np.random.default_rng(5).uniform(-5.0, 5.0, 300).tolist():
         sure = min(max(depth, -SURE_BLURS), SURE_BLURS)
         expected = cost_at_depth(sure, wall, 0.02)
-        assert known_cost(depth, wall, costs_by_depth(0.02)) == pytest.approx(expected, abs=5e-5)
+        assert interpolate_cost(depth, wall, costs_by_depth(0.02)) == pytest.approx(
+            expected, abs=5e-5
+        )
 
 
 def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
@@ -354,7 +361,7 @@ def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
     rings = {"square": [(0, 0), (8, 0), (8, 6), (0, 6)], "wedge": [(0, 0), (12, 0), (0, 5)]}
     rings |= {"slant": [(0, 0), (9, 0), (7, 6), (-2, 6)]}
     costs = {
-        k: structure_cost(lines_through(np.array(ring, float)), 0.0, border)
+        k: structure_cost(make_lines(np.array(ring, float)), 0.0, border)
         for k, ring in rings.items()
     }
     assert costs == {"square": 12.0, "wedge": 9.0 + 5.0 + 1.0 + 7.0, "slant": 12.0 + 5.0 + 2 * 1.0}
@@ -386,7 +393,7 @@ def test_kept_densities_say_of_a_side_what_its_points_do(seed):
         density = np.where(
             np.abs(away) > SURE_BLURS, away > 0.0, norm.cdf(away) + walls * norm.pdf(away) / blur
         )
-        logs = np.log(a_metre * (density + STRAY)).sum(axis=0) - a_metre * (
+        logs = np.log(a_metre * (density + STRAY_SHARE)).sum(axis=0) - a_metre * (
             DEEP_M + OFFSETS_M + walls
         )
         off = np.abs(log_likelihoods(depth, a_metre, log_densities())[row] - logs)

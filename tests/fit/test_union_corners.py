@@ -41,7 +41,7 @@ def house(name):
 def roof_edges(fit):
     """Lengths in plan (m,) of all edges of the solid's roof."""
     solid = compose(Roof(fit.roof_parts, fit.outline, LocalFrame(np.zeros(3))), -3.0)
-    rings = [solid.vertices[list(ring)][:, :2] for face in solid.of_kind(ROOF) for ring in face.rings]
+    rings = [solid.vertices[list(ring)][:, :2] for face in solid.select_faces(ROOF) for ring in face.rings]
     return np.concatenate([np.hypot(*(np.roll(ring, -1, axis=0) - ring).T) for ring in rings])
 
 

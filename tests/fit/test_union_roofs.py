@@ -14,7 +14,7 @@ from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.names import REGISTERED_M, REGISTERED_PLAN_M
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
-from hiproof.primitives.family import COMPONENTS, SHAPES, planes_of
+from hiproof.primitives.family import COMPONENTS, GENERAL_SHAPES, compute_planes
 from hiproof.settings import Settings
 from hiproof.simulate import ScanSettings, random_building, random_compound, scan
 from hiproof.simulate.scene import Defects
@@ -73,7 +73,7 @@ def fitted_winged(kind, type, seed):
 
 def some_fits():
     """Fits of all sorts, for what holds of every one."""
-    yield from (fitted_member(shape, 0)[3] for shape, _ in SHAPES.values())
+    yield from (fitted_member(shape, 0)[3] for shape, _ in GENERAL_SHAPES.values())
     yield from (fitted_winged(kind, type, 0)[2] for kind, type in WINGED)
 
 
@@ -81,7 +81,7 @@ def some_fits():
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("shape", [shape for shape, _ in SHAPES.values() if shape not in SPLIT])
+@pytest.mark.parametrize("shape", [shape for shape, _ in GENERAL_SHAPES.values() if shape not in SPLIT])
 def test_every_shape_of_the_family_is_found_again(shape, seed):
     member, xy, z, fit = fitted_member(shape, seed)
     assert [part.type for part in fit.roof_parts] == [member.name]
@@ -195,7 +195,7 @@ def test_the_answer_does_not_depend_on_the_order_of_points(kind, type):
 def test_planes_follow_from_the_parameters_to_a_millimetre():
     for fit in some_fits():
         for part in fit.roof_parts:
-            planes = planes_of(part.type, part.parameters, part.kappa, part.translation)
+            planes = compute_planes(part.type, part.parameters, part.kappa, part.translation)
             for piece in part.pieces:
                 xy = shapely.get_coordinates(piece.outline)
                 assert lowest_of(planes, xy) == pytest.approx(piece.height_at(xy), abs=1e-3)
@@ -214,7 +214,7 @@ def test_the_roof_of_the_solid_is_the_height_of_the_parts():
         assert check_solid(solid) == ()
         xy = strewn(fit.outline.buffer(-0.05), np.random.default_rng(number), 2.0)
         found = np.full(len(xy), np.nan)
-        for face in solid.of_kind("RoofSurface"):
+        for face in solid.select_faces("RoofSurface"):
             rings = [solid.vertices[list(ring)] for ring in face.rings]
             inside = shapely.contains_xy(shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]), *xy.T)
             design = np.column_stack([rings[0][:, :2], np.ones(len(rings[0]))])

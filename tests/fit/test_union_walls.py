@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from hiproof.fit.union.plan import BORDER_M, off_facades, ring_edges, signed_depth
 from hiproof.fit.union.slivers import FEWEST_SEEN, without_specks
 from hiproof.fit.union.volumes import V1, roof_heights
-from hiproof.fit.walls import REACH_SPACINGS, STEEPEST
+from hiproof.fit.walls import STEEPEST_ROOF, WALL_REACH_SPACINGS
 from hiproof.fit.walls import on_walls as found_on_walls
 from union_scenes import OUTLINES, random_scene, random_volumes
 
@@ -35,11 +35,11 @@ def on_walls(rng, outline, count):
 @pytest.mark.parametrize("seed", range(3))
 def test_sparse_roofs_keep_every_point_and_lose_those_of_their_walls(outline, seed):
     rng = np.random.default_rng(seed)
-    roof, depth = hip(rng, outline, 2.0, rng.uniform(0.0, STEEPEST))
+    roof, depth = hip(rng, outline, 2.0, rng.uniform(0.0, STEEPEST_ROOF))
     walls, wall_depth = on_walls(rng, outline, 20)
     assert wall_depth.max() < BORDER_M
     near = np.abs(walls[:, None, :2] - roof[None, depth >= BORDER_M, :2])
-    reach = REACH_SPACINGS * np.sqrt(outline.area / (len(roof) + len(walls)))
+    reach = WALL_REACH_SPACINGS * np.sqrt(outline.area / (len(roof) + len(walls)))
     seen = np.hypot(near[..., 0], near[..., 1]).min(axis=1) < reach  # far from any roof point a steep roof may be
 
     every = np.vstack([roof, walls])
@@ -52,8 +52,8 @@ def test_walls_are_told_by_what_stands_high_nearby():
     """Against scipy's tree of points."""
     rng = np.random.default_rng(8)
     roof, points = (rng.uniform((0, 0, 5), (9, 7, 9), (n, 3)) for n in (120, 60))
-    near = cKDTree(roof[:, :2]).query_ball_point(points[:, :2], REACH_SPACINGS * 0.7)
-    drop = STEEPEST * REACH_SPACINGS * 0.7
+    near = cKDTree(roof[:, :2]).query_ball_point(points[:, :2], WALL_REACH_SPACINGS * 0.7)
+    drop = STEEPEST_ROOF * WALL_REACH_SPACINGS * 0.7
     told = [any(roof[k, 2] > point[2] + drop for k in own) for point, own in zip(points, near, strict=True)]
     assert 0 < sum(told) < len(told)
     assert found_on_walls(points, roof, 0.7).tolist() == told

@@ -30,13 +30,13 @@ from hiproof.cli import check
 from hiproof.cli.convert import Made, convert
 from hiproof.cli.evaluate import evaluate
 from hiproof.cli.report import report
-from hiproof.cli.view import tiles_of
+from hiproof.cli.view import open_tiles
 from hiproof.edit.desk import Desk
 from hiproof.errors import HiproofError
 from hiproof.log import LOGGER
 from hiproof.parametric.run import build_file
 from hiproof.view.loading import load_postgis
-from hiproof.write.tables.postgis import Row, polyhedral_wkt, roof_rows
+from hiproof.write.tables.postgis import DatabaseRow, polyhedral_wkt, roof_rows
 from sample_parameters import write_parameters_of_each_kind
 
 FILES = ("buildings.city.jsonl", "parameters.jsonl", "run.json")
@@ -186,7 +186,7 @@ def build(folder: Path) -> None:
 
 
 def view(folder: Path) -> None:
-    with tiles_of(folder) as tiles:
+    with open_tiles(folder) as tiles:
         assert (tiles / "tileset.json").is_file()
 
 
@@ -194,7 +194,7 @@ def load(folder: Path) -> None:
     """All that is read for a database, and the values it would be sent."""
 
     def send(
-        dsn: str, rows: Iterable[Row], parts: Iterable[list[tuple]], srid: int, prefix: str
+        dsn: str, rows: Iterable[DatabaseRow], parts: Iterable[list[tuple]], srid: int, prefix: str
     ) -> int:
         for row in rows:
             sent = [

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from fuzz.damaged_footprints import ODD, SOUND_IN_THE_WORLD, wavy, write_beside_a_sound_one
 from hiproof import stages
-from hiproof.city.plan import WorkPlan, jobs_of_footprints
+from hiproof.city.plan import WorkPlan, make_jobs
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.model import Footprint
-from hiproof.read.assign import PointGrid, grown
-from hiproof.read.polygons import MOST_MEETINGS, WIDEST_M, meetings, simple_polygons
+from hiproof.read.assign import PointGrid, grow_polygon
+from hiproof.read.polygons import MOST_MEETINGS, WIDEST_BUILDING_M, meetings, simple_polygons
 from hiproof.settings import Settings
 from run_records import by_id
 from tiny_town import make_town, write_cloud, write_footprints
@@ -83,7 +83,7 @@ def test_what_an_outline_costs_grows_with_its_vertices(outline):
     start = time.process_time()
     simple, remark = stages.without_needless_vertices(outline)
     shapely.prepare(simple)
-    PointGrid(np.zeros((1, 2))).within(simple, 4.0)
+    PointGrid(np.zeros((1, 2))).find_within(simple, 4.0)
     assert time.process_time() - start < 1.0
     assert f"outline of {len(outline.exterior.coords)} vertices" in remark
     assert simple.is_valid and abs(simple.area / outline.area - 1) < 0.01
@@ -91,18 +91,20 @@ def test_what_an_outline_costs_grows_with_its_vertices(outline):
 
 def test_an_outline_of_hundreds_of_teeth_is_grown_fast_and_by_as_much():
     start = time.process_time()
-    outline = grown(comb(450), 4.0, quad_segs=4)
+    outline = grow_polygon(comb(450), 4.0, quad_segs=4)
     assert time.process_time() - start < 0.3
     assert outline.area == pytest.approx(
         shapely.buffer(shapely.convex_hull(comb(450)), 4.0).area, rel=0.03
     )
     square = shapely.box(0, 0, 9, 9)
-    assert grown(square, 4.0, quad_segs=4).equals_exact(shapely.buffer(square, 4.0, quad_segs=4))
+    assert grow_polygon(square, 4.0, quad_segs=4).equals_exact(
+        shapely.buffer(square, 4.0, quad_segs=4)
+    )
 
 
 def test_a_plan_keeps_the_footprint_and_works_on_a_simpler_area(tmp_path):
     outline = comb(2000)
-    (job,) = jobs_of_footprints((Footprint("a", outline, {"year": 1950}),))
+    (job,) = make_jobs((Footprint("a", outline, {"year": 1950}),))
     plan = WorkPlan((job,), {"0_0_0": (0,)}, None, Settings())
     plan.save(tmp_path / "plan.jsonl")
     (again,) = WorkPlan.load(tmp_path / "plan.jsonl").jobs
@@ -137,5 +139,6 @@ def test_any_ring_becomes_valid_polygons_of_a_buildings_size_or_none(rest):
     for polygon in polygons:
         assert polygon.is_valid
         assert (
-            polygon.is_empty or np.ptp(shapely.get_coordinates(polygon), axis=0).max() <= WIDEST_M
+            polygon.is_empty
+            or np.ptp(shapely.get_coordinates(polygon), axis=0).max() <= WIDEST_BUILDING_M
         )

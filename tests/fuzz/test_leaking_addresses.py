@@ -6,7 +6,7 @@ import re
 import pytest
 
 from fuzz.leaking_addresses import PARTS, address, leak, leaks
-from hiproof.masking import masked, remember
+from hiproof.masking import mask, remember
 
 COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_addresses` tries more
 
@@ -21,7 +21,7 @@ def test_pieces_that_a_library_may_quote_are_hidden():
         told = address(random.Random(number))
         remember(told)
         for text in (told, repr(told), *re.split(r"[@:/?#&= '\"]", told)):
-            assert leak(masked(f"got: {text!r}; check it")) == "", told
+            assert leak(mask(f"got: {text!r}; check it")) == "", told
 
 
 def test_sentences_keep_their_words():
@@ -31,19 +31,19 @@ def test_sentences_keep_their_words():
         "host=h password=12",
     )
     sentence = "expected a PostGIS database at postgresql://, got 12 buildings; pass a table"
-    assert masked(sentence) == sentence
-    assert masked("user postgres") == "user ..."
+    assert mask(sentence) == sentence
+    assert mask("user postgres") == "user ..."
 
 
 @pytest.mark.parametrize("name", ["year = 5 and owner = 7", "a.laz", "EPSG:28992", "models/12@5"])
 def test_what_is_no_address_has_no_secret(name):
     remember(name)
-    assert masked(f"got {name} of 5 and 7") == f"got {name} of 5 and 7"
+    assert mask(f"got {name} of 5 and 7") == f"got {name} of 5 and 7"
 
 
 def test_the_name_of_a_file_that_is_there_is_no_secret(tmp_path):
     path = tmp_path / "a:b@c.laz"
     path.touch()
     remember(str(path))
-    assert masked(f"{path} b") == f"{path} b"
-    assert PARTS[0] in masked(PARTS[0])
+    assert mask(f"{path} b") == f"{path} b"
+    assert PARTS[0] in mask(PARTS[0])

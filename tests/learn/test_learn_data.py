@@ -10,7 +10,7 @@ import pytest
 
 from hiproof.errors import InputError
 from hiproof.learn.data import open_source
-from hiproof.learn.houses import lengthened, resized, training_house, without_a_corner
+from hiproof.learn.houses import lengthen, resize, training_house, without_a_corner
 from hiproof.learn.sample import TEST, TRAINING, VALIDATION
 from hiproof.learn.shapes import read_shapes
 from hiproof.simulate import ROOF_TYPES
@@ -104,11 +104,11 @@ def test_a_cut_corner_leaves_a_convex_plan_under_the_same_planes():
 def test_a_resized_part_keeps_its_shape_and_a_lengthened_one_its_ends():
     rng = np.random.default_rng(0)
     hip = random_building(rng, "hip").roof.parts[0]
-    longer = lengthened(rng, hip).parameters
+    longer = lengthen(rng, hip).parameters
     assert longer["length"] - longer["ridge_length"] == pytest.approx(
         hip.parameters["length"] - hip.parameters["ridge_length"]
     )
-    smaller = resized(rng, hip).parameters
+    smaller = resize(rng, hip).parameters
     ratios = {name: smaller[name] / hip.parameters[name] for name in smaller}
     assert (
         ratios["length"] == pytest.approx(ratios["width"])

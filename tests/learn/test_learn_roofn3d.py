@@ -7,7 +7,7 @@ import pytest
 
 from hiproof.errors import InputError
 from hiproof.learn.data import open_source
-from hiproof.learn.roofn3d import BUILDINGS, SURFACES, TYPES
+from hiproof.learn.roofn3d import BUILDINGS_FILE, SURFACES_FILE, TRAINING_TYPES
 from hiproof.learn.sample import TEST, TRAINING
 from hiproof.segment.inference import NOT_ROOF
 from hiproof.simulate import training_sample
@@ -41,12 +41,14 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
     ]
     roof_points = {}
     for id in range(count):
-        points, labels, type = training_sample(np.random.default_rng(id), TYPES, n_points=(80, 200))
+        points, labels, type = training_sample(
+            np.random.default_rng(id), TRAINING_TYPES, n_points=(80, 200)
+        )
         points = points + (583_000.0, 4_507_000.0, 20.0)
         buildings.append(
             [
                 id,
-                CLASSES[TYPES[type]],
+                CLASSES[TRAINING_TYPES[type]],
                 multipoint(points),
                 OUTLINE,
                 "",
@@ -57,7 +59,7 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
         surfaces.append([1000 + id, multipoint(points[labels < 3]), OUTLINE, 0, 0, 1, -20, id])
         roof_points[str(id)] = int((labels < 3).sum())
     buildings.append(buildings[1])
-    for name, rows in ((BUILDINGS, buildings), (SURFACES, surfaces)):
+    for name, rows in ((BUILDINGS_FILE, buildings), (SURFACES_FILE, surfaces)):
         with open(folder / name, "w", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows(rows)
     return roof_points

@@ -7,7 +7,7 @@ torch = pytest.importorskip("torch", reason="needs the extra `train` (torch)")
 onnx = pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
 
 from hiproof.errors import InputError  # noqa: E402
-from hiproof.learn.augment import ACROSS, ALONG, AugmentSettings, symmetric, varied  # noqa: E402
+from hiproof.learn.augment import ACROSS_AXES, ALONG_AXES, AugmentSettings, symmetric, vary_cloud  # noqa: E402
 from hiproof.learn.batch import network_inputs  # noqa: E402
 from hiproof.learn.export import export, read_weights  # noqa: E402
 from hiproof.learn.network import NetworkSettings, RoofNetwork  # noqa: E402
@@ -100,10 +100,10 @@ def test_symmetric_mirrors_along_and_across_and_nothing_else():
         assert np.isin(signs[features != 0], (-1, 1)).all()
         along, across = (
             np.sign(signs[features[:, columns[0]] != 0, columns[0]][0])
-            for columns in (ALONG, ACROSS)
+            for columns in (ALONG_AXES, ACROSS_AXES)
         )
         expected = np.ones(features.shape[1])
-        expected[list(ALONG)], expected[list(ACROSS)] = along, across
+        expected[list(ALONG_AXES)], expected[list(ACROSS_AXES)] = along, across
         np.testing.assert_array_equal(
             np.where(features == 0, expected, signs), np.tile(expected, (len(features), 1))
         )
@@ -114,7 +114,7 @@ def test_symmetric_mirrors_along_and_across_and_nothing_else():
 def test_varied_keeps_labels_with_their_points():
     xyz, labels, _ = training_sample(np.random.default_rng(6))
     still = AugmentSettings(scale=0.0, stretch=0.0, jitter_m=0.0)
-    changed, kept = varied(xyz, labels, np.random.default_rng(1), still)
+    changed, kept = vary_cloud(xyz, labels, np.random.default_rng(1), still)
     label_of = {tuple(point): label for point, label in zip(xyz, labels, strict=True)}
     assert [label_of[tuple(point)] for point in changed] == kept.tolist()
     assert len(changed) <= len(xyz)

@@ -11,12 +11,12 @@ import shapely
 from shapely import affinity
 
 from handmade import RD_ORIGIN, courtyard, modelled, unmodelled
-from hiproof.city.solve import outcome_of
+from hiproof.city.solve import make_outcome
 from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
 from hiproof.model import Building, Model, Part, Piece, Roof
-from hiproof.model.shown import shared_out
+from hiproof.model.shown import share_surface
 from hiproof.status import Status
 from hiproof.write import write_all
 from hiproof.write.osm_tags import osm_tags
@@ -30,7 +30,7 @@ SNAPPED_M = 0.05  # composing moves edges by less than this
 def composed(roof):
     """A building as it stands in a national grid."""
     roof = replace(roof, frame=LocalFrame(RD_ORIGIN))
-    return Building("a", Status.MODELLED, built=Model(roof, compose(roof, 0.0).moved(RD_ORIGIN)))
+    return Building("a", Status.MODELLED, built=Model(roof, compose(roof, 0.0).move(RD_ORIGIN)))
 
 
 def flat(z, *box):
@@ -41,7 +41,7 @@ def flat(z, *box):
 @pytest.mark.parametrize("kind", KINDS)
 def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
     building = composed(generated(kind, seed))
-    areas = building.shown_areas()
+    areas = building.compute_visible_areas()
     assert len(areas) == len(building.parts)
     assert shapely.is_valid(areas).all()
     together = shapely.union_all(areas)
@@ -55,7 +55,7 @@ def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
 def test_where_a_part_shows_none_is_higher(kind, seed):
     building = composed(generated(kind, seed))
     roof, rng = building.roof, np.random.default_rng(seed)
-    for part, area in zip(roof.parts, building.shown_areas(), strict=True):
+    for part, area in zip(roof.parts, building.compute_visible_areas(), strict=True):
         inner = shapely.buffer(shapely.transform(area, roof.frame.to_local), -2 * SNAPPED_M)
         if inner.is_empty:
             continue
@@ -72,8 +72,10 @@ def test_parts_in_one_plane_share_a_surface_by_their_outlines():
         FRAME,
     )
     building = composed(roof)
-    assert len(building.solid.of_kind("RoofSurface")) == 1
-    assert [area.area for area in building.shown_areas()] == pytest.approx([30.0, 20.0, 0.0])
+    assert len(building.solid.select_faces("RoofSurface")) == 1
+    assert [area.area for area in building.compute_visible_areas()] == pytest.approx(
+        [30.0, 20.0, 0.0]
+    )
 
 
 def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
@@ -89,7 +91,9 @@ def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
     hidden = flat(3.0, 2, 1, 8, 4)
     roof = Roof((flat(2.5, 0, 0, 12, 5), gable, hidden), shapely.box(0, 0, 12, 5), FRAME)
     building = replace(composed(roof), z_ground=0.0)
-    assert building.type == "gable" and building.model.shown_m2 == pytest.approx((15.0, 45.0, 0.0))
+    assert building.type == "gable" and building.model.visible_m2 == pytest.approx(
+        (15.0, 45.0, 0.0)
+    )
     write_all(tmp_path, [building])
     (model,) = read_models(tmp_path / "buildings.city.jsonl")
     assert model.roof_type == "gable"
@@ -98,7 +102,7 @@ def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
     assert record["type"] == "gable"
     gml = (tmp_path / "buildings.gml").read_text()
     assert "1130</bldg:roofType>" in gml  # two types show
-    assert outcome_of(0, building, 0.0).type == "gable"
+    assert make_outcome(0, building, 0.0).type == "gable"
 
 
 def test_hidden_parts_do_not_make_a_roof_a_mixed_one(tmp_path):
@@ -123,7 +127,7 @@ def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one()
 
 def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
     small, far = shapely.box(0, 0, 0.1, 0.1), shapely.box(5, 5, 6, 6)
-    left, others = shared_out(small, small, far)
+    left, others = share_surface(small, small, far)
     assert left.equals(small) and others.is_empty
 
 
@@ -140,7 +144,7 @@ def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
     )
     own = shapely.Polygon([(-2.039, 1.999), (-4.604, 0.098), (-4.72, 0.253)])
     other = shapely.Polygon([(-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)])
-    left, others = shared_out(area, own, other)
+    left, others = share_surface(area, own, other)
     assert {left.geom_type, others.geom_type} == {"MultiPolygon"}
     assert left.area + others.area == pytest.approx(area.area, abs=1e-2)
 
@@ -158,7 +162,7 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
     ]
     parts = tuple(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)) for box in boxes)
     building = composed(Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME))
-    areas = building.shown_areas()
+    areas = building.compute_visible_areas()
     assert shapely.is_valid(areas).all() and {area.geom_type for area in areas} == {"Polygon"}
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0], abs=0.1)
 
@@ -166,14 +170,14 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
 def test_a_part_drawn_with_a_spike_of_no_width_shares_its_surface_all_the_same():
     spiked = shapely.Polygon([(0, 0), (6, 0), (6, 3), (9, 3), (6, 3), (6, 5), (0, 5)])
     parts = (Part("flat", (Piece(spiked, np.array([[0.0, 0.0, 3.0]])),)), flat(3.0, 6, 0, 10, 5))
-    areas = composed(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)).shown_areas()
+    areas = composed(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)).compute_visible_areas()
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0])
 
 
 def test_a_part_around_a_yard_has_a_hole():
-    (area,) = modelled(courtyard(), kinds=("flat",)).shown_areas()
+    (area,) = modelled(courtyard(), kinds=("flat",)).compute_visible_areas()
     assert area.area == pytest.approx(84.0) and len(area.interiors) == 1
 
 
 def test_a_building_without_a_model_shows_nothing():
-    assert unmodelled().shown_areas() == []
+    assert unmodelled().compute_visible_areas() == []

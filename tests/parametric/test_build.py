@@ -23,7 +23,7 @@ from hiproof.parametric.file import opened_parameters
 from hiproof.parametric.run import build_file
 from hiproof.parametric.schema import schema, schema_text
 from hiproof.primitives import CATALOGUE
-from hiproof.primitives.parameters import names_of
+from hiproof.primitives.parameters import list_parameters
 from hiproof.simulate import demo_files
 
 FILES = (
@@ -117,20 +117,22 @@ def test_every_type_can_be_built_by_its_own_parameters():
         if name in CATALOGUE:
             parameters = CATALOGUE[name].typical(8.0, 12.0, 3.0)
         else:
-            parameters = {key: 30.0 if key.startswith("pitch") else 0.0 for key in names_of(name)}
+            parameters = {
+                key: 30.0 if key.startswith("pitch") else 0.0 for key in list_parameters(name)
+            }
             parameters |= {"width": 8.0, "length": 12.0} | (
                 {"height": 1.5} if "height" in parameters else {}
             )
         building = hiproof.build(house(type=name, parameters=parameters))
         assert building.type == name and not check_solid(building.solid), name
-        assert list(parameters) == [key for key in names_of(name) if key in parameters]
+        assert list(parameters) == [key for key in list_parameters(name) if key in parameters]
 
 
 def test_a_saw_tooth_by_hand_has_all_its_teeth():
     parameters = {"width": 8.0, "length": 12.0, "height": 1.0, "teeth": 4.0}
     for part in ({}, {"outlines": [[RING]]}):
         solid = hiproof.build(house(type="shed", parameters=parameters, **part)).solid
-        assert len(solid.of_kind("RoofSurface")) == 4
+        assert len(solid.select_faces("RoofSurface")) == 4
         assert np.ptp(solid.vertices[:, 2]) == pytest.approx(6.0)
         assert solid.volume == pytest.approx(96 * 5.5, rel=1e-3)
 

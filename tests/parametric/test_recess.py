@@ -6,7 +6,7 @@ import pytest
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
 from hiproof.parametric.building import build
-from hiproof.parametric.recess import placed, with_recess
+from hiproof.parametric.recess import replace_part, with_recess
 from hiproof.write.parameters import building_record
 from parametric_house import gable_house
 
@@ -68,7 +68,7 @@ def test_a_part_that_leaves_nothing_out_stays_as_it_is(house):
         house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0])
     )["parts"]
     moved = {**parts[1], "position": [2.0, 0.0, 12.0], "outlines": None}
-    assert placed(parts, 1, moved)[0] == parts[0]
+    assert replace_part(parts, 1, moved)[0] == parts[0]
 
 
 def test_a_recess_beside_the_roof_or_over_all_of_a_part_is_one_sentence(house):

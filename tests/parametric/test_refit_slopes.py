@@ -5,7 +5,7 @@ differences of its heights.
 import numpy as np
 import pytest
 
-from hiproof.parametric.refit import FAR_M, Heights, unknowns_of
+from hiproof.parametric.refit import UNBOUNDED_M, Heights, list_unknowns
 from hiproof.simulate import random_compound
 
 STEP = 1e-6
@@ -20,7 +20,7 @@ def scene(seed):
     west, south, east, north = roof.outline.bounds
     xy = rng.uniform((west - 1.0, south - 1.0), (east + 1.0, north + 1.0), (400, 2))
     points = np.column_stack([xy, rng.normal(3.0, 2.0, len(xy))])
-    return roof, points, unknowns_of(roof.parts, {})
+    return roof, points, list_unknowns(roof.parts, {})
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -30,7 +30,7 @@ def test_heights_are_the_roofs(seed):
     found = Heights(roof.parts, points, unknowns).at(unknowns.start).gaps
     covered = np.isfinite(expected)
     np.testing.assert_allclose(found[covered], expected[covered], atol=1e-6)
-    assert (np.abs(found[~covered]) == FAR_M).all()
+    assert (np.abs(found[~covered]) == UNBOUNDED_M).all()
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -11,11 +11,18 @@ import shapely
 
 from hiproof.errors import FitError
 from hiproof.primitives import CATALOGUE, get
-from hiproof.primitives.family import KIN, SHAPES, Member, member_of, name_among, planes_of
+from hiproof.primitives.family import (
+    GENERAL_SHAPES,
+    KIN,
+    Member,
+    compute_planes,
+    name_among,
+    read_member,
+)
 from hiproof.primitives.parameters import refuse_no_shape
 from union_scenes import lowest_of, member_of_shape, rectangle_of
 
-SHAPE_NAMES = [name for name, _ in SHAPES.values()]
+SHAPE_NAMES = [name for name, _ in GENERAL_SHAPES.values()]
 each_shape = pytest.mark.parametrize("shape", SHAPE_NAMES)
 
 
@@ -65,7 +72,7 @@ def in_one_order(planes):
 @each_shape
 def test_planes_follow_from_the_description(shape):
     for member in members(shape):
-        planes = planes_of(member.name, *member.describe())
+        planes = compute_planes(member.name, *member.describe())
         assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
 
 
@@ -74,7 +81,7 @@ def test_planes_follow_from_the_description_side_by_side(shape):
     for member in members(shape):
         parameters, kappa, translation = member.describe(as_catalogue=False)
         if any(member.has):  # a flat roof has no side to be described by
-            planes = planes_of(member.name, parameters, kappa, translation)
+            planes = compute_planes(member.name, parameters, kappa, translation)
             assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
 
 
@@ -83,7 +90,7 @@ def test_planes_follow_from_written_parameters_to_a_millimetre(shape):
     for member in members(shape):
         parameters, kappa, translation = member.describe()
         written = {name: round(value, 6) for name, value in parameters.items()}
-        planes = planes_of(member.name, written, round(kappa, 6), np.round(translation, 6))
+        planes = compute_planes(member.name, written, round(kappa, 6), np.round(translation, 6))
         xy = over_plan(member)
         assert lowest_of(planes, xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-3)
 
@@ -130,7 +137,7 @@ def test_what_runs_over_nothing_is_written_so_that_it_can_be_read():
         words, kappa, place = member.describe()
         written = {name: round(value, 6) for name, value in words.items()}
         refuse_no_shape(member.name, written, "part 0")
-        planes = planes_of(member.name, written, kappa, place)
+        planes = compute_planes(member.name, written, kappa, place)
         at = np.column_stack([over_plan(member), np.ones(200)])
         assert (at @ planes.T).min(axis=1) == pytest.approx(
             (at @ member.planes().T).min(axis=1), abs=1e-3
@@ -142,7 +149,7 @@ def test_turning_the_axes_keeps_surface_plan_and_name(shape):
     for member in members(shape):
         turned, xy = member, over_plan(member)
         for _ in range(4):
-            turned = turned.turned()
+            turned = turned.turn()
             assert lowest_of(turned.planes(), xy) == pytest.approx(
                 lowest_of(member.planes(), xy), abs=1e-9
             )
@@ -159,7 +166,7 @@ def plan_of(member):
 def test_however_its_axes_were_turned_a_member_is_described_alike(shape):
     for member in members(shape):
         described = member.describe()
-        assert described[0] == pytest.approx(member.turned().describe()[0], abs=1e-9)
+        assert described[0] == pytest.approx(member.turn().describe()[0], abs=1e-9)
         once = member.canonical()
         assert once.has == once.canonical().has and once.kappa == once.canonical().kappa
 
@@ -186,7 +193,7 @@ def test_eaves_lie_where_the_parameters_say(shape):
         parameters, kappa, translation = member.describe(as_catalogue=False)
         c, s = math.cos(kappa), math.sin(kappa)
         half = 0.5 * np.array([parameters["length"], parameters["width"]])
-        planes = planes_of(member.name, parameters, kappa, translation)
+        planes = compute_planes(member.name, parameters, kappa, translation)
         for name, way in {
             "left": (-1, 0),
             "right": (1, 0),
@@ -228,7 +235,7 @@ def test_a_shape_of_the_catalogue_is_told_by_its_own_parameters(name):
         width = rng.uniform(6.0, 12.0)
         theta_p = primitive.typical(width, width * rng.uniform(1.2, 2.5), rng.uniform(1.5, 4.0))
         theta = primitive.to_theta(theta_p, rng.uniform(-1.5, 1.5), rng.normal(0.0, 20.0, 3))
-        planes = planes_of(name, *primitive.from_theta(theta))
+        planes = compute_planes(name, *primitive.from_theta(theta))
         expected = np.concatenate([piece.planes for piece in primitive.part(theta).pieces])
         assert planes == pytest.approx(expected, abs=1e-9)
 
@@ -241,10 +248,12 @@ def test_a_member_like_a_shape_is_described_in_its_words(shape):
     rng = np.random.default_rng(5)
     for _ in range(10):
         theta = shape.to_theta(
-            shape.drawn(rng, rng.uniform(6.0, 12.0)), rng.uniform(-1.5, 1.5), rng.normal(0, 20, 3)
+            shape.draw_parameters(rng, rng.uniform(6.0, 12.0)),
+            rng.uniform(-1.5, 1.5),
+            rng.normal(0, 20, 3),
         )
         theta_p, kappa, translation = shape.from_theta(shape.canonical_theta(theta))
-        member = member_of(shape.name, theta_p, kappa, translation)
+        member = read_member(shape.name, theta_p, kappa, translation)
         if member.name == shape.name:  # an asymmetric gable whose slopes are drawn equal is a gable
             named, kappa_named, place = member.describe()
             assert named == pytest.approx(theta_p)
@@ -286,13 +295,11 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
         )
         for change in (0.0, 1e-3, 0.02)
     ]
-    looks_alike = member.turned(2).has == member.has  # else it is seen from one side alone
-    for kappa in [
-        member.turned(quarters).kappa for quarters in (range(4) if looks_alike else (0,))
-    ]:
+    looks_alike = member.turn(2).has == member.has  # else it is seen from one side alone
+    for kappa in [member.turn(quarters).kappa for quarters in (range(4) if looks_alike else (0,))]:
         together, alone = (
-            several(each).measures_of(kind, kappa),
-            [own.measures_of(kind, kappa) for own in each],
+            several(each).measure_as(kind, kappa),
+            [own.measure_as(kind, kappa) for own in each],
         )
         assert np.array([np.broadcast_to(of, 3) for of in together]) == pytest.approx(
             np.array(alone).T, abs=1e-12
@@ -325,7 +332,7 @@ def test_a_cant_rises_square_from_its_wall(shape):
             continue
         parameters, kappa, translation = with_cants(rng, member).describe()
         told = [name.split("_")[1] for name in parameters if name.startswith("facing_")]
-        planes = member_of(member.name, parameters, kappa, translation).planes()[
+        planes = read_member(member.name, parameters, kappa, translation).planes()[
             -len(told) - member.has_top :
         ][: len(told)]
         for cant, plane in zip(told, planes, strict=True):
@@ -344,7 +351,7 @@ def planted_gable(eaves):
     """An asymmetric gable in its canonical direction with these eaves in front and at the back."""
     parameters = {"width": 8.0, "length": 12.0, "pitch_front": 50.0, "pitch_back": 30.0}
     parameters |= {"eave_front": eaves[0] - 3.0, "eave_back": eaves[1] - 3.0}
-    return member_of("asymmetric_gable", parameters, 0.4, np.array([1.0, 2.0, 3.0])).canonical()
+    return read_member("asymmetric_gable", parameters, 0.4, np.array([1.0, 2.0, 3.0])).canonical()
 
 
 def test_every_shape_of_the_family_has_its_own_planes_or_is_kin():
@@ -370,10 +377,10 @@ def test_a_name_stands_for_itself_its_kin_or_nothing(name):
 
 def test_what_is_no_type_or_lacks_a_parameter_is_told_in_a_sentence():
     with pytest.raises(FitError, match=r"expected a roof type .* got 'onion'"):
-        planes_of("onion", {"pitch_front": 30.0}, 0.0, np.zeros(3))
+        compute_planes("onion", {"pitch_front": 30.0}, 0.0, np.zeros(3))
     parameters, kappa, translation = member_of_shape(
         np.random.default_rng(0), "corner"
     ).side_by_side()
     del parameters["eave_front"]
     with pytest.raises(FitError, match="expected the parameter eave_front of a corner roof"):
-        planes_of("corner", parameters, kappa, translation)
+        compute_planes("corner", parameters, kappa, translation)

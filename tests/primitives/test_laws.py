@@ -7,7 +7,7 @@ import shapely
 from hiproof.errors import FitError, SettingsError
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.algebra import SYMBOLS, U, V, formula, q0, q1, q2
-from hiproof.primitives.contract import HALF_WIDTH, placed
+from hiproof.primitives.contract import HALF_WIDTH, place_vertices
 
 VARIANTS = [variant for primitive in CATALOGUE.values() for variant in primitive.variants]
 IDS = [f"{variant.name}-{len(variant.parameters)}-{variant.strips}" for variant in VARIANTS]
@@ -80,7 +80,7 @@ def test_vertices_lie_on_the_surface_and_on_the_part(primitive):
         theta = primitive.to_theta(theta_p, kappa, translation)
         vertices = primitive.vertices(theta_p)
         inside = [np.mean(vertices[list(face)], axis=0) for face in primitive.faces]
-        centroids = placed(np.array(inside), kappa, translation)
+        centroids = place_vertices(np.array(inside), kappa, translation)
         np.testing.assert_allclose(
             primitive.height_at(theta, centroids[:, :2]), centroids[:, 2], atol=1e-9
         )

@@ -8,7 +8,7 @@ from pyproj import CRS
 import hiproof.read.columns
 import hiproof.read.crs
 from hiproof.errors import InputError
-from hiproof.read.crs import combine, parse_crs, same_horizontal, units_of, vertical_crs
+from hiproof.read.crs import combine, find_units, parse_crs, same_horizontal, vertical_crs
 from hiproof.write.naming import srs_name
 
 
@@ -54,7 +54,7 @@ def test_nothing_is_called_nothing():
 @pytest.mark.parametrize("code", [4326, 4979, 4978, 6360])
 def test_what_counts_in_no_length_in_plan_is_refused(code):
     with pytest.raises(InputError, match="expected the cloud in a"):
-        units_of(CRS.from_epsg(code), "the cloud")
+        find_units(CRS.from_epsg(code), "the cloud")
 
 
 @pytest.mark.parametrize(
@@ -69,16 +69,18 @@ def test_what_counts_in_no_length_in_plan_is_refused(code):
     ],
 )
 def test_units_are_those_of_the_axes(crs, plan, height):
-    units = units_of(CRS(crs))
+    units = find_units(CRS(crs))
     assert (units.plan, units.height) == pytest.approx((plan, height), rel=1e-12)
 
 
 def test_a_unit_that_contradicts_the_crs_is_refused():
     assert (
-        units_of(None, named="foot").plan == units_of(CRS("EPSG:2222"), named="foot").plan == 0.3048
+        find_units(None, unit_name="foot").plan
+        == find_units(CRS("EPSG:2222"), unit_name="foot").plan
+        == 0.3048
     )
     with pytest.raises(InputError, match="--unit"):
-        units_of(CRS("EPSG:7415"), named="foot")
+        find_units(CRS("EPSG:7415"), unit_name="foot")
 
 
 def test_a_name_nobody_knows_is_refused():

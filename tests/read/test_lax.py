@@ -11,7 +11,7 @@ import pytest
 from hiproof.errors import InputWarning
 from hiproof.read.lax import read_lax
 from hiproof.read.pointcloud import iter_points
-from hiproof.read.runs import joined
+from hiproof.read.runs import join_runs
 from read.test_pointcloud import write_las
 
 POINTS = 4000
@@ -91,7 +91,7 @@ def test_the_runs_hold_every_point_of_any_boxes(indexed, seed, monkeypatch):
     rng = np.random.default_rng(seed)
     low = rng.uniform((610990, 6269990), (611380, 6270280), (3, 2))
     boxes = np.hstack([low, low + rng.uniform(1, 60, (3, 2))])
-    runs = read_lax(path).runs_meeting(boxes)
+    runs = read_lax(path).find_runs(boxes)
     read = np.concatenate([cloud.xyz for cloud in iter_points(path, 100, runs=runs)])
     wanted = np.array(
         [p for p in xyz if any((p[:2] >= b[:2]).all() and (p[:2] <= b[2:]).all() for b in boxes)]
@@ -102,14 +102,14 @@ def test_the_runs_hold_every_point_of_any_boxes(indexed, seed, monkeypatch):
 
 def test_boxes_away_from_all_points_read_nothing(indexed):
     path, _ = indexed
-    runs = read_lax(path).runs_meeting(np.array([[0.0, 0.0, 9.0, 9.0]]))
+    runs = read_lax(path).find_runs(np.array([[0.0, 0.0, 9.0, 9.0]]))
     assert len(runs) == 0 and list(iter_points(path, runs=runs)) == []
 
 
 def test_runs_that_are_near_are_one():
     runs = np.array([[200_000, 200_010], [0, 10], [5, 8], [59_000, 60_000]])
-    assert joined(runs).tolist() == [[0, 10], [59_000, 60_000], [200_000, 200_010]]
-    assert joined(np.array([[0, 10], [50_009, 50_020]])).tolist() == [[0, 50_020]]
+    assert join_runs(runs).tolist() == [[0, 10], [59_000, 60_000], [200_000, 200_010]]
+    assert join_runs(np.array([[0, 10], [50_009, 50_020]])).tolist() == [[0, 50_020]]
 
 
 def test_a_file_without_index_has_none(tmp_path):

@@ -18,7 +18,7 @@ from hiproof.read.pointcloud import (
     iter_points,
     read_header,
     read_points,
-    say_how_coarse,
+    warn_coarse,
 )
 from hiproof.settings import Settings
 
@@ -271,14 +271,14 @@ def test_coordinates_in_coarse_steps_are_told_of_once(tmp_path, write, name, pla
     with pytest.warns(
         InputWarning, match=f"{name} and 2 more: coordinates come in steps of {told}, and"
     ) as caught:
-        say_how_coarse([header, *others], METRES)
+        warn_coarse([header, *others], METRES)
     assert len(caught) == 1
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_of_coordinates_in_fine_steps_nothing_is_said(tmp_path, name, recwarn):
     path = FORMATS[name](tmp_path, *some_points())
-    say_how_coarse([read_header(path)], METRES)
+    warn_coarse([read_header(path)], METRES)
     read_points(path)
     assert not recwarn.list
 

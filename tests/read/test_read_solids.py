@@ -124,8 +124,8 @@ def test_solid_comes_back(tmp_path, name):
     assert solid.volume == pytest.approx(SOLID.volume)
     if name != "by_value.gml":
         kinds = ("RoofSurface", "WallSurface", "GroundSurface")
-        assert [len(solid.of_kind(kind)) for kind in kinds] == [
-            len(SOLID.of_kind(kind)) for kind in kinds
+        assert [len(solid.select_faces(kind)) for kind in kinds] == [
+            len(SOLID.select_faces(kind)) for kind in kinds
         ]
 
 

@@ -17,7 +17,7 @@ import hiproof.read.wkb
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.read.polygons import is_surface, simple_polygons
-from hiproof.read.wkb import as_polygons, geometries_of
+from hiproof.read.wkb import as_polygons, decode_geometries
 
 pytestmark = pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 X, Y = 500000.0, 4649776.0
@@ -211,10 +211,10 @@ def test_wkb_of_postgis_is_renamed_too_and_damaged_wkb_left_alone():
         + struct.pack("<IiI", TIN | flags, 32633, struct.unpack_from("<I", faces, 5)[0])
         + faces[9:]
     )
-    (geometry,) = geometries_of(np.array([ewkb], object))
+    (geometry,) = decode_geometries(np.array([ewkb], object))
     assert geometry.geom_type == "MultiPolygon" and shapely.get_srid(geometry) == 32633
     assert as_polygons(ewkb[:100]) == ewkb[:100]
-    cut, curve, none = geometries_of(
+    cut, curve, none = decode_geometries(
         np.array([ewkb[:100], struct.pack("<BII", 1, 10, 0), None], object)
     )
     assert cut is None and curve is None and none is None

@@ -18,7 +18,7 @@ from hiproof.city.frame import settle_frame
 from hiproof.city.prepare import read_headers
 from hiproof.city.run import Request
 from hiproof.errors import InputError, InputWarning
-from hiproof.read.crs import UnknownCRS, names_place, parse_crs, units_of, vertical_crs
+from hiproof.read.crs import UnknownCRS, find_units, names_place, parse_crs, vertical_crs
 from hiproof.read.footprints import read_footprints
 from hiproof.read.las_crs import las_crs
 from hiproof.read.pointcloud import read_header, read_points
@@ -185,7 +185,7 @@ def test_examples_in_the_docstrings_run():
 def test_units_are_understood_and_so_is_whether_there_is_a_place(kind):
     definition, plan, height = (UNDERSTOOD | LOCAL)[kind]
     crs = parse_crs(definition)
-    units = units_of(crs)
+    units = find_units(crs)
     assert (units.plan, units.height) == pytest.approx((plan, height), rel=1e-12)
     assert names_place(crs) is (kind in UNDERSTOOD)
 
@@ -194,7 +194,7 @@ def test_units_are_understood_and_so_is_whether_there_is_a_place(kind):
 def test_what_no_roof_can_be_built_in_is_refused_in_one_sentence(kind):
     definition, told = REFUSED[kind]
     with pytest.raises(InputError, match=told) as caught:
-        units_of(parse_crs(definition), "the cloud")
+        find_units(parse_crs(definition), "the cloud")
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 400
 
 
@@ -218,7 +218,7 @@ def test_a_derived_projected_crs_is_understood():
         "coordinate_system": base["coordinate_system"],
     }
     crs = CRS.from_json_dict(derived)
-    assert names_place(crs) and units_of(crs).are_metres
+    assert names_place(crs) and find_units(crs).are_metres
 
 
 def directory(*keys):
@@ -288,7 +288,7 @@ def test_geotiff_keys_are_understood(tmp_path, kind):
     crs = crs_through_a_file(
         tmp_path, (34735, directory(*entries)), (34736, doubles), (34737, CITATION)
     )
-    units = units_of(crs)
+    units = find_units(crs)
     assert (units.plan, units.height) == pytest.approx((plan, height), rel=1e-12)
     plan_crs = crs.sub_crs_list[0] if crs.is_compound else crs
     assert plan_crs.to_epsg() == code
@@ -341,7 +341,7 @@ def test_a_header_that_cannot_be_understood_is_refused_unless_something_stands_i
 
 def test_wkt_in_latin_1_and_beside_keys_is_read(tmp_path):
     text = UTM.replace("WGS 84 / UTM zone 33N", "Zone Réunion").encode("latin-1")
-    assert units_of(crs_through_a_file(tmp_path, (2112, text))).are_metres
+    assert find_units(crs_through_a_file(tmp_path, (2112, text))).are_metres
     feet = directory(*short(k3072=2277))
     assert crs_through_a_file(tmp_path, (2112, b""), (34735, feet)).to_epsg() == 2277
     assert crs_through_a_file(tmp_path, (2112, UTM[:99].encode()), (34735, feet)).to_epsg() == 2277
@@ -378,7 +378,7 @@ UNPLACED = {
 def test_footprints_of_no_place_are_taken_to_be_in_the_clouds_crs(tmp_path, kind, cloud):
     """A traceback before. Their unit counts where they name one."""
     crs, unit = UNPLACED[kind]
-    unit = unit if kind.startswith("Nonearth") else units_of(CRS(cloud)).plan
+    unit = unit if kind.startswith("Nonearth") else find_units(CRS(cloud)).plan
     path = write_footprints(tmp_path / "f.gpkg", crs, unit)
     with pytest.warns(InputWarning, match="taken to be in the cloud's"):
         (footprint,) = read_footprints(path, target_crs=cloud)
@@ -468,6 +468,6 @@ def test_a_terrain_model_beside_a_local_cloud_is_asked_in_its_own_coordinates(
     with rasterio.open(tmp_path / "dtm.tif", "w", **profile) as file:
         file.write(np.full((40, 40), 7.0, np.float32), 1)
     asked = parse_crs(LOCAL[cloud][0] if cloud else "EPSG:32633")
-    units = units_of(asked)
+    units = find_units(asked)
     terrain = read_terrain(tmp_path / "dtm.tif", asked, units)
     assert terrain.height_at(units.to_metres([[500010.0, 4649780.0]]))[0] == pytest.approx(7.0)

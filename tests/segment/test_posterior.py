@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hiproof.segment import combine, most_probable
+from hiproof.segment import choose_most_probable, combine
 from hiproof.segment.posterior import (
     EVIDENCE_EXPONENT,
     OUTLIER_DISTANCE_M,
@@ -64,7 +64,7 @@ def test_a_type_the_fit_gave_up_is_behind_the_best_but_its_evidence_says_little(
 
 
 class FakeFit:
-    """What `most_probable` needs of a fit."""
+    """What `choose_most_probable` needs of a fit."""
 
     points_used = 100
 
@@ -82,9 +82,9 @@ def test_most_probable_fits_again_only_where_the_network_disagrees_with_the_evid
         asked.append(names)
         return FakeFit(names)
 
-    found, posterior = most_probable(fit, {"gable": 0.9, "hip": 0.1})
+    found, posterior = choose_most_probable(fit, {"gable": 0.9, "hip": 0.1})
     assert found.type == "gable" == next(iter(posterior)) and asked == [()]
-    found, posterior = most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    found, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
     assert found.type == "hip" == next(iter(posterior)) and asked == [(), (), ("hip",)]
 
 
@@ -93,7 +93,7 @@ def test_a_named_type_far_from_the_points_is_not_built(worse):
     def fit(names):
         return FakeFit(names, **(worse if names else {}))
 
-    found, posterior = most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    found, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
     assert next(iter(posterior)) == "hip" and found.type == "gable"
 
 
@@ -101,7 +101,7 @@ def test_with_the_papers_objective_the_named_type_is_built():
     def fit(names):
         return FakeFit(names, noise_m=0.9 if names else 0.5, objective="paper")
 
-    found, _ = most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    found, _ = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
     assert found.type == "hip"
 
 

@@ -8,9 +8,9 @@ import pytest
 from hiproof.segment.arrange import Layout, arrange
 from hiproof.segment.sampling import (
     BALL_FACTOR,
-    FEATURES,
+    POINT_FEATURES,
     SURFACE_NEIGHBOURS,
-    arranged,
+    arrange_cloud,
     thin_to_grid,
 )
 from hiproof.simulate import training_sample
@@ -63,11 +63,11 @@ def slow_surface(xyz, i):
 @pytest.mark.parametrize("seed", range(3))
 def test_choice_and_surfaces_equal_the_slow_oracle(seed):
     xyz = some_cloud(seed)
-    order, features, *_ = arranged(xyz, COUNT, *LEVELS, GROUP)
+    order, features, *_ = arrange_cloud(xyz, COUNT, *LEVELS, GROUP)
     assert order.tolist() == slow_farthest_points(xyz, COUNT)
     for row, i in enumerate(order):
         normal, roughness, convexity, offset = slow_surface(xyz, i)
-        told = dict(zip(FEATURES, features[row], strict=True))
+        told = dict(zip(POINT_FEATURES, features[row], strict=True))
         assert told["normal_z"] == pytest.approx(normal[2], abs=1e-5)
         assert told["roughness"] == pytest.approx(min(roughness / 0.2, 5), abs=1e-4)
         if normal[2] > 1e-6:
@@ -89,7 +89,7 @@ def slow_groups(xyz, centres, sources, count, radius):
 @pytest.mark.parametrize("count", [200, 40, 12])
 def test_neighbourhoods_equal_the_slow_oracle(count):
     xyz = some_cloud(1, count)
-    order, _, groups, radii, ups, weights = arranged(xyz, COUNT, *LEVELS, GROUP)
+    order, _, groups, radii, ups, weights = arrange_cloud(xyz, COUNT, *LEVELS, GROUP)
     found, chosen = len(order), xyz[order]
     for above, level, index, radius in zip((COUNT, *LEVELS), LEVELS, groups, radii, strict=False):
         cover = distances(xyz, chosen[:level]).min(axis=1).max()
@@ -114,8 +114,8 @@ def test_neighbourhoods_equal_the_slow_oracle(count):
 def test_few_points_are_all_chosen_and_repeated():
     xyz = some_cloud(0, 20)
     arrangement = arrange(xyz, LAYOUT)
-    assert sorted(arrangement.chosen[:20].tolist()) == list(range(20)) and arrangement.sampled == 20
-    np.testing.assert_array_equal(arrangement.chosen[20:40], arrangement.chosen[:20])
+    assert sorted(arrangement.select[:20].tolist()) == list(range(20)) and arrangement.sampled == 20
+    np.testing.assert_array_equal(arrangement.select[20:40], arrangement.select[:20])
     np.testing.assert_array_equal(arrangement.features[20:40], arrangement.features[:20])
 
 
@@ -158,7 +158,7 @@ def test_a_tilted_plane_has_its_normal_everywhere_and_falls_along_an_axis():
 def test_features_do_not_change_when_the_points_turn(angle):
     xyz = some_cloud(4, 400)
     before, after = arrange(xyz, LAYOUT), arrange(turned(xyz, angle), LAYOUT)
-    np.testing.assert_array_equal(before.chosen, after.chosen)
+    np.testing.assert_array_equal(before.select, after.select)
     np.testing.assert_allclose(before.features, after.features, atol=1e-4)
 
 

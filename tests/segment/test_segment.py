@@ -9,7 +9,7 @@ import pytest
 
 from hiproof.errors import FitError, InputError, SettingsError
 from hiproof.fit import fit_roof
-from hiproof.segment import NOT_ROOF, Segmentation, inference, most_probable, segment
+from hiproof.segment import NOT_ROOF, Segmentation, choose_most_probable, inference, segment
 from hiproof.segment.inference import SHIPPED_WEIGHTS, carried_back, load
 from hiproof.settings import Settings
 from hiproof.simulate import ROOF_TYPES, training_sample
@@ -104,7 +104,7 @@ def test_labelled_real_roofs_with_the_fits_evidence():
         points = np.loadtxt(path)[:, :3]
         found = segment(points)
         fit = partial(fit_roof, points, weights=found.weights)
-        _, posterior = most_probable(
+        _, posterior = choose_most_probable(
             lambda types, fit=fit: fit(settings=Settings.from_dict({"fit": {"types": types}})),
             found.types,
         )

@@ -11,7 +11,7 @@ import shapely
 
 from hiproof.errors import OutputError
 from hiproof.simulate import ROOF_TYPES, demo_files
-from hiproof.simulate.neighbourhood import FILES, STREETS, neighbourhood, write_neighbourhood
+from hiproof.simulate.neighbourhood import DEMO_FILES, STREETS, neighbourhood, write_neighbourhood
 from hiproof.simulate.relief import Plane, Relief
 from hiproof.simulate.survey import write_laz
 
@@ -24,7 +24,7 @@ def cloud():
 
 def test_bundled_files_are_small_and_complete():
     sizes = [path.stat().st_size for path in demo_files().values()]
-    assert len(sizes) == len(FILES) and sum(sizes) < 1_500_000
+    assert len(sizes) == len(DEMO_FILES) and sum(sizes) < 1_500_000
 
 
 def test_every_type_and_the_compounds_stand_there():
@@ -93,7 +93,7 @@ def test_beams_meet_the_terrain():
     for terrain in (Plane(0.03, -0.02, 5.0), Relief.random(rng, 4.0, np.zeros(2))):
         z = terrain.hit(xy0, slope)
         assert np.abs(terrain.height_at(xy0 + slope * z[:, None]) - z).max() < 2e-3
-    moved = terrain.moved(np.array([10.0, 20.0, 3.0]))
+    moved = terrain.move(np.array([10.0, 20.0, 3.0]))
     assert np.allclose(moved.height_at(xy0 + (10.0, 20.0)), terrain.height_at(xy0) + 3.0)
 
 

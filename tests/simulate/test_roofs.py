@@ -14,9 +14,9 @@ from hiproof.primitives import CATALOGUE
 from hiproof.simulate import (
     COMPOUND_KINDS,
     ROOF_TYPES,
-    building_of,
     random_building,
     random_compound,
+    read_truth,
 )
 from hiproof.simulate.shapes import box
 
@@ -168,7 +168,7 @@ def test_kappa_turns_the_building_and_nothing_else():
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)
 def test_truth_rebuilds_the_building(kind):
     building = random_compound(np.random.default_rng(8), kind, origin=(5.0, 6.0, 7.0))
-    again = building_of(json.loads(json.dumps(building.truth())))
+    again = read_truth(json.loads(json.dumps(building.truth())))
     assert again.footprint.symmetric_difference(building.footprint).area < 1e-6
     xy = np.random.default_rng(0).uniform(-8, 8, (500, 2))
     xy = xy[shapely.contains_xy(building.outline.buffer(-0.01), xy[:, 0], xy[:, 1])]
@@ -179,7 +179,7 @@ def test_truth_rebuilds_the_building(kind):
 def test_what_is_no_truth_is_refused():
     for wrong in ({}, {"parts": [{}]}, {"parts": 3}):
         with pytest.raises(InputError, match="expected a building's truth"):
-            building_of(wrong)
+            read_truth(wrong)
 
 
 def test_boxes_stand_where_they_are_put():

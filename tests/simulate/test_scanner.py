@@ -22,10 +22,10 @@ from hiproof.simulate import (
     training_sample,
     uniform_points,
 )
-from hiproof.simulate.flight import Swath, beams_of
+from hiproof.simulate.flight import Swath, make_beams
 from hiproof.simulate.raycast import cast_crowns
 from hiproof.simulate.scanner import bare_scene, first_hits, returns
-from hiproof.simulate.scene import Body, scene_of
+from hiproof.simulate.scene import Body, make_scene
 
 ROOF, WALL, GROUND = (SOURCES.index(name) for name in ("roof", "wall", "ground"))
 EXACT = ScanSettings(
@@ -104,7 +104,7 @@ def test_heading_changes_no_label():
     """
     for heading in (0.0, 1.0, 2.5):
         building = random_building(np.random.default_rng(2), "hip", kappa=0.3 + heading)
-        beams = beams_of(
+        beams = make_beams(
             np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.2), np.zeros(2), 12.0, 0.0
         )
         cloud = returns(bare_scene(building), beams, np.random.default_rng(4), EXACT)
@@ -113,7 +113,7 @@ def test_heading_changes_no_label():
         assert np.array_equal(cloud.label, first.label) and np.array_equal(
             cloud.source, first.source
         )
-        nadir = beams_of(
+        nadir = make_beams(
             np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.0), np.zeros(2), 12.0, 0.0
         )
         assert (
@@ -213,13 +213,13 @@ def test_pieces_that_beams_cannot_enter_are_refused():
     yard = shapely.Point(0, 0).buffer(9).difference(shapely.Point(0, 0).buffer(3))
     for outline, fault in ((corner, "re-entrant corner"), (yard, "hole")):
         with pytest.raises(InputError, match=fault):
-            scene_of([Body(Piece(outline, np.zeros((1, 3))))])
+            make_scene([Body(Piece(outline, np.zeros((1, 3))))])
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_either_orientation_of_an_outline_will_do(order):
     square = shapely.Polygon([(0, 0), (4, 0), (4, 4), (0, 4)][::order])
-    scene = scene_of([Body(Piece(square, np.array([[0.0, 0.0, 3.0]])))])
+    scene = make_scene([Body(Piece(square, np.array([[0.0, 0.0, 3.0]])))])
     z, _, _ = first_hits(scene, np.array([[2.0, 2.0], [5.0, 2.0]]), np.zeros((2, 2)))
     assert z.tolist() == [3.0, 0.0]
 

@@ -17,10 +17,10 @@ import pytest
 from hiproof.cli.convert import convert
 from hiproof.cli.evaluate import evaluate
 from hiproof.cli.report import report
-from hiproof.cli.view import tiles_of
+from hiproof.cli.view import open_tiles
 from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
-from hiproof.view.server import Handler, page_of, server_of
+from hiproof.view.server import ViewHandler, make_server, render_page
 from hiproof.write import files
 from hiproof.write.meshes.tiles import write_models
 from hiproof.write.meshes.viewed import ViewedModel
@@ -88,7 +88,7 @@ def tiles(tmp_path_factory):
         for id, (kind, solid) in SOLIDS.items()
     ]
     pair = two_parts()
-    beside = pair.solid.moved(np.array([0, 20, 0]) - ORIGIN)
+    beside = pair.solid.move(np.array([0, 20, 0]) - ORIGIN)
     models.append(
         pair._replace(solid=beside, attributes={"parameters": parameters("gable", "hip")})
     )
@@ -122,7 +122,7 @@ def answer(port, path, host=None):
 
 def document_of(page, folder, serving, profile):
     """The page over the tiles in `folder` after its scripts ran, as text."""
-    port = serving(LoopbackServer(partial(Handler, directory=str(folder), page=page)))
+    port = serving(LoopbackServer(partial(ViewHandler, directory=str(folder), page=page)))
     command = [
         BROWSER,
         "--headless",
@@ -142,7 +142,7 @@ def document_of(page, folder, serving, profile):
 
 @needs_browser
 def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving, tmp_path):
-    page = page_of("a <run>").replace("</body>", ACT + "</body>")
+    page = render_page("a <run>").replace("</body>", ACT + "</body>")
     text = document_of(page, tiles, serving, tmp_path / "profile")
     said = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
     assert said, f"the page's scripts did not run to their end: {text[-2000:]}"
@@ -165,7 +165,10 @@ def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving
 def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
     shutil.copytree(tiles, tmp_path / "broken")
     (tmp_path / "broken/tiles/r.glb").unlink()
-    page, folder = page_of("run").replace("</body>", UNTIL_SETTLED + "</body>"), tmp_path / "broken"
+    page, folder = (
+        render_page("run").replace("</body>", UNTIL_SETTLED + "</body>"),
+        tmp_path / "broken",
+    )
     text = document_of(page, folder, serving, tmp_path / "first")
     assert "Some tiles cannot be read (tiles/r.glb: 404)" in text
     (folder / "tileset.json").unlink()
@@ -175,7 +178,7 @@ def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
 
 
 def test_page_and_tiles_are_served(tiles, serving):
-    port = serving(server_of(tiles, "a <run>"))
+    port = serving(make_server(tiles, "a <run>"))
     status, page = answer(port, "/")
     assert (
         status == 200
@@ -188,33 +191,33 @@ def test_page_and_tiles_are_served(tiles, serving):
 
 def test_nothing_outside_is_served(tiles, serving):
     (tiles.parent / "secret.txt").write_text("x")
-    port = serving(server_of(tiles, "run"))
+    port = serving(make_server(tiles, "run"))
     assert answer(port, "/../secret.txt")[0] == 404
     assert answer(port, "/", host="elsewhere.example")[0] == 403
     assert answer(port, "/", host=f"localhost:{port + 1}")[0] == 403
 
 
 def test_a_port_that_is_taken_is_told(tiles, serving):
-    port = serving(server_of(tiles, "run"))
+    port = serving(make_server(tiles, "run"))
     with pytest.raises(InputError, match="leave --port out"):
-        server_of(tiles, "run", port)
+        make_server(tiles, "run", port)
 
 
 def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys):
     write_sample_run(tmp_path)
-    with tiles_of(tmp_path) as folder:
+    with open_tiles(tmp_path) as folder:
         made = (folder / "tileset.json").stat().st_mtime_ns
-    with tiles_of(tmp_path) as again:
+    with open_tiles(tmp_path) as again:
         assert again == folder and (folder / "tileset.json").stat().st_mtime_ns == made
     os.utime(tmp_path / "buildings.city.jsonl", (made / 1e9 + 10, made / 1e9 + 10))
-    with tiles_of(tmp_path) as anew:
+    with open_tiles(tmp_path) as anew:
         assert (anew / "tileset.json").stat().st_mtime_ns > made
-    with tiles_of(folder) as own:
+    with open_tiles(folder) as own:
         assert own == folder
 
 
 def test_a_folder_of_neither_is_refused(tmp_path):
-    with pytest.raises(HiproofError, match="hiproof reconstruct"), tiles_of(tmp_path):
+    with pytest.raises(HiproofError, match="hiproof reconstruct"), open_tiles(tmp_path):
         pass
 
 
@@ -247,7 +250,7 @@ def refuse_writing_below(folder, monkeypatch):
 def test_a_run_that_cannot_be_written_is_shown_all_the_same(tmp_path, monkeypatch, caplog):
     write_sample_run(tmp_path / "run")
     refuse_writing_below(tmp_path / "run", monkeypatch)
-    with tiles_of(tmp_path / "run") as tiles:
+    with open_tiles(tmp_path / "run") as tiles:
         assert json.loads((tiles / "tileset.json").read_text())["asset"]["version"] == "1.1"
         assert not tiles.is_relative_to(tmp_path)
     assert not tiles.exists()

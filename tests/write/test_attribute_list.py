@@ -12,7 +12,7 @@ from hiproof.evaluate.evaluation import BuildingFigures, Comparison
 from hiproof.frames import METRES, Units
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.family import COMPONENTS
-from hiproof.primitives.parameters import names_of, side_by_side_names
+from hiproof.primitives.parameters import list_parameters, list_side_parameters
 from hiproof.write import write_all
 from hiproof.write.attribute_list import (
     EVALUATION,
@@ -30,9 +30,9 @@ from hiproof.write.attribute_list import (
     ROOFER,
     TABLES,
 )
-from hiproof.write.building_attributes import building_attributes, figures_of
+from hiproof.write.building_attributes import building_attributes, measure_figures
 from hiproof.write.parameters import FileHead, building_record, head_record
-from hiproof.write.tables.postgis import MEASURES, SCHEMA
+from hiproof.write.tables.postgis import MEASURE_COLUMNS, TABLE_SCHEMA
 
 DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
 KINDS = {"number": (int, float), "count": int, "text": str}
@@ -56,7 +56,7 @@ def test_everything_is_explained():
 def test_buildings_have_the_attributes_declared():
     feet = Units(0.3048, 0.3048, "foot", "foot")
     for building in (modelled(gable_house()), unmodelled()):
-        found = building_attributes(building, figures_of(building), units=feet)
+        found = building_attributes(building, measure_figures(building), units=feet)
         own = set(found) - set(building.attributes)
         assert own == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
         for attribute, prefix in (
@@ -68,7 +68,9 @@ def test_buildings_have_the_attributes_declared():
 
 
 def test_validity_stands_under_our_own_name_only():
-    attributes = building_attributes(modelled(gable_house()), figures_of(modelled(gable_house())))
+    attributes = building_attributes(
+        modelled(gable_house()), measure_figures(modelled(gable_house()))
+    )
     assert attributes["hiproof_iso19107_lod22"] == "[]"
     assert building_attributes(unmodelled())["hiproof_iso19107_lod22"] is None
     assert not any("val3dity" in name for name in attributes)
@@ -94,11 +96,11 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
 
 
 def test_tables_of_the_database_are_as_declared():
-    tables = re.findall(r"create table if not exists \{(\w+)\} \((.*?)\);", SCHEMA, re.DOTALL)
+    tables = re.findall(r"create table if not exists \{(\w+)\} \((.*?)\);", TABLE_SCHEMA, re.DOTALL)
     for (name, body), attributes in zip(
         tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS, POSTGIS_PARTS), strict=True
     ):
-        body = body.replace("{measures}", MEASURES)
+        body = body.replace("{measures}", MEASURE_COLUMNS)
         columns = re.findall(r"(?:^|,)\s*(\w+) (?=text|integer|double|jsonb|geometry)", body)
         assert columns == names(attributes), name
 
@@ -107,10 +109,10 @@ def test_the_table_of_parts_has_a_column_for_every_parameter():
     parameters = {
         parameter
         for kind in CATALOGUE
-        for parameter in (*names_of(kind), *side_by_side_or_none(kind))
+        for parameter in (*list_parameters(kind), *side_by_side_or_none(kind))
     }
     assert parameters <= set(names(PARTS_LAYER))
 
 
 def side_by_side_or_none(kind):
-    return () if kind in COMPONENTS else side_by_side_names(kind)
+    return () if kind in COMPONENTS else list_side_parameters(kind)

@@ -34,7 +34,7 @@ from hiproof.write import (
 from hiproof.write.citygml.roof_codes import CODE_SPACES
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter
 from hiproof.write.citygml.version3 import CityGML3Writer
-from hiproof.write.colours import ROOF_COLOURS, legend_of, type_colour
+from hiproof.write.colours import ROOF_COLOURS, list_legend, type_colour
 from hiproof.write.tables.postgis import polyhedral_wkt
 from hiproof.write.tables.styles import STYLES, TABLE
 
@@ -60,7 +60,7 @@ def terrace(id="terrace"):
     )
     roof = Roof((gable, flat), shapely.box(0, 0, 10, 8), LocalFrame(RD_ORIGIN))
     line = np.array([[0, 0, 0.2], [10, 0, 0.0], [10, 8, 0.1], [0, 0, 0.2]]) + RD_ORIGIN
-    solid = compose(roof, 0.0).moved(RD_ORIGIN)
+    solid = compose(roof, 0.0).move(RD_ORIGIN)
     return Building(
         id,
         Status.MODELLED,
@@ -215,7 +215,7 @@ def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, wr
     assert check_solid(model.solid, 0.01) == () and model.solid.volume == pytest.approx(
         building.solid.volume, rel=1e-4
     )
-    for face in model.solid.of_kind(ROOF):
+    for face in model.solid.select_faces(ROOF):
         x, y, z = ring_normal(model.solid.vertices[list(face.rings[0])])
         assert model.part_types[face.part] == ("gable" if np.hypot(x, y) > 0.1 * z else "flat")
 
@@ -287,7 +287,7 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
         assert len(renderer.findall("symbols/symbol")) == len(style.colours)
     with sqlite3.connect(tmp_path / "a.gpkg") as file:
         kind, entry = file.execute(f"select type, {STYLES[1].expression} from parts").fetchone()
-    assert entry == legend_of(kind) and ROOF_COLOURS[entry] == type_colour(kind)
+    assert entry == list_legend(kind) and ROOF_COLOURS[entry] == type_colour(kind)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from benchmarks.campaign_scenes import SceneSettings, place_building
 import hiproof
 from hiproof import stages
 from hiproof.read import read_footprints, read_points
-from hiproof.read.assign import points_of_footprints
+from hiproof.read.assign import assign_points
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES
 from hiproof.status import Status
@@ -32,7 +32,7 @@ def buildings(clouds, footprints, most):
     xyz = np.concatenate([cloud.xyz[cloud.classification == BUILDING_CLASS] for cloud in points])
     asked = list(read_footprints(footprints))
     asked = [asked[k] for k in np.random.default_rng(0).permutation(len(asked))[:most]]
-    own = points_of_footprints(xyz, asked)
+    own = assign_points(xyz, asked)
     return [hiproof.reconstruct(xyz[i], f, settings=PLAIN) for i, f in zip(own, asked, strict=True)]
 
 

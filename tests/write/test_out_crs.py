@@ -11,8 +11,8 @@ import pytest
 import shapely
 from lxml import etree
 
-from hiproof.city.plan import jobs_of_footprints
-from hiproof.city.prepare import say_where_files_lie
+from hiproof.city.plan import make_jobs
+from hiproof.city.prepare import warn_files_elsewhere
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import compose
 from hiproof.errors import InputError
@@ -21,7 +21,7 @@ from hiproof.evaluate.run import evaluate_run
 from hiproof.frames import METRES
 from hiproof.model import WALL, Building, Footprint, Model
 from hiproof.parametric.run import build_file
-from hiproof.read.crs import parse_crs, units_of
+from hiproof.read.crs import find_units, parse_crs
 from hiproof.settings import Settings, WriteSettings
 from hiproof.simulate import COMPOUND_KINDS, random_compound
 from hiproof.status import Status
@@ -29,7 +29,7 @@ from hiproof.view.run_models import run_crs_text
 from hiproof.write import write_cityjson
 from hiproof.write.building_attributes import building_attributes
 from hiproof.write.naming import FileUnits
-from hiproof.write.reprojected import crs_of_files
+from hiproof.write.reprojected import choose_file_crs
 from tiny_town import make_town, write_cloud, write_footprints
 
 DELFT, NEW_YORK, PARIS = (
@@ -50,7 +50,7 @@ WAYS = {
 def buildings_at(origin):
     for seed, kind in enumerate(COMPOUND_KINDS):
         sim = random_compound(np.random.default_rng(seed), kind, origin=origin)
-        solid = compose(sim.roof, 0.0).moved(sim.roof.frame.origin)
+        solid = compose(sim.roof, 0.0).move(sim.roof.frame.origin)
         yield Building(kind, Status.MODELLED, built=Model(sim.roof, solid), z_ground=origin[2])
 
 
@@ -80,7 +80,7 @@ def test_solids_stay_valid_and_their_walls_upright(way):
             building.id
         )
         before, after = building.solid.vertices, units.from_metres(building.solid.vertices)
-        for face in building.solid.of_kind(WALL):
+        for face in building.solid.select_faces(WALL):
             ring = list(face.rings[0])
             assert len(np.unique(after[ring, :2], axis=0)) == len(
                 np.unique(before[ring, :2], axis=0)
@@ -220,14 +220,14 @@ def test_the_same_crs_is_no_other(tmp_path):
 )
 def test_where_nothing_can_be_written_one_sentence_says_so(crs, out, sentence):
     with pytest.raises(InputError, match=sentence):
-        FileUnits.of(crs, units_of(parse_crs(crs)) if crs else METRES, out)
+        FileUnits.of(crs, find_units(parse_crs(crs)) if crs else METRES, out)
 
 
 def test_a_projection_of_another_place_is_doubted():
-    (job,) = jobs_of_footprints((Footprint("house", shapely.box(85000, 446000, 85010, 446010)),))
+    (job,) = make_jobs((Footprint("house", shapely.box(85000, 446000, 85010, 446010)),))
     for out, is_told in (("EPSG:25835", True), ("EPSG:25832", False)):
         units = FileUnits.of("EPSG:7415", out_crs=out)
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
-            say_where_files_lie((job,), crs_of_files("EPSG:7415", out), units)
+            warn_files_elsewhere((job,), choose_file_crs("EPSG:7415", out), units)
         assert [str(w.message).count("4.4 E 52.0 N, far from") for w in said] == [1] * is_told

@@ -78,8 +78,8 @@ def test_half_the_roof_at_a_level_is_enough_for_it(width):
         prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 3),
         prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 6),
     )
-    faces = low.of_kind(ROOF) + tuple(
-        Face(tuple(tuple(i + 8 for i in r) for r in f.rings), ROOF) for f in high.of_kind(ROOF)
+    faces = low.select_faces(ROOF) + tuple(
+        Face(tuple(tuple(i + 8 for i in r) for r in f.rings), ROOF) for f in high.select_faces(ROOF)
     )
     for order in (faces, faces[::-1]):
         assert roof_figures(Solid(np.vstack([low.vertices, high.vertices]), order)).h_50p == 3.0
@@ -90,7 +90,7 @@ def test_percentiles_match_a_fine_grid(seed):
     rng = np.random.default_rng(seed)
     width, length, eave = rng.uniform(4, 20, 3)
     solid = gable_house(width, length, eave, eave + rng.uniform(0.1, 9))
-    solid = [solid, hip_house()][seed % 2].moved(rng.uniform(-1e6, 1e6, 3) * [1, 1, 1e-3])
+    solid = [solid, hip_house()][seed % 2].move(rng.uniform(-1e6, 1e6, 3) * [1, 1, 1e-3])
     figures = roof_figures(solid)
     z, area = sampled_roof(solid, 200)
     order = np.argsort(z)
@@ -103,7 +103,7 @@ def test_percentiles_match_a_fine_grid(seed):
 def sampled_roof(solid, steps):
     """Slow oracle: heights and areas of many small cells of every roof face."""
     heights, areas = [], []
-    for face in solid.of_kind(ROOF):
+    for face in solid.select_faces(ROOF):
         xyz = solid.vertices[list(face.rings[0])]
         plane = np.linalg.lstsq(
             np.c_[xyz[:, :2] - xyz[0, :2], np.ones(len(xyz))], xyz[:, 2], rcond=None
@@ -134,7 +134,7 @@ def test_many_levels_are_searched_exactly():
 
 @pytest.mark.parametrize("shift", [(0, 0, 0), (1e7, -1e7, 0), (85000, 446000, -6)])
 def test_figures_move_with_the_solid(shift):
-    here, there = roof_figures(hip_house()), roof_figures(hip_house().moved(np.array(shift, float)))
+    here, there = roof_figures(hip_house()), roof_figures(hip_house().move(np.array(shift, float)))
     for name in ("h_min", "h_50p", "h_70p", "h_max", "h_ridge", "h_base"):
         assert getattr(there, name) - shift[2] == pytest.approx(getattr(here, name), abs=1e-6)
     for name in ("volume_m3", "plan_area_m2", "roof_area_m2", "slope_deg", "azimuth_deg"):

@@ -15,7 +15,7 @@ from pyproj import CRS
 from glb_files import accessor_values, parse_glb, view_bytes
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError, InputError, InputWarning
-from hiproof.read.crs import units_of
+from hiproof.read.crs import find_units
 from hiproof.write.colours import linear_rgb, type_colour
 from hiproof.write.meshes.tiles import Globe, write_models
 from hiproof.write.meshes.tiles.properties import NO_NUMBER, Found
@@ -49,7 +49,7 @@ def town(count=60, seed=0):
             "flag": k > 3,
         }
         kind = "flat" if k % 5 == 0 else "gable"
-        yield ViewedModel(f"house-{k}", kind, solid.moved(at), told, {0: kind})
+        yield ViewedModel(f"house-{k}", kind, solid.move(at), told, {0: kind})
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +224,7 @@ def test_a_quadtree_parts_its_buildings_and_shows_the_largest_first(seed):
     sizes, triangles = rng.uniform(1, 50, 200), rng.integers(1, 90, 200)
     if seed == 3:
         centres[:150] = 5.0  # all in one place
-    root = quadtree(centres, sizes, triangles, most=300, widest=20_000)
+    root = quadtree(centres, sizes, triangles, limit=300, widest=20_000)
     items, stack = [], [root]
     while stack:
         tile = stack.pop()
@@ -232,14 +232,14 @@ def test_a_quadtree_parts_its_buildings_and_shows_the_largest_first(seed):
         assert len(tile.items) < 2 or triangles[tile.items].sum() <= 300
         if len(tile.items):
             assert np.ptp(centres[tile.items], axis=0).max() <= 20_000
-            assert sizes[tile.items].min() >= sizes[tile.below()].max(initial=0)
+            assert sizes[tile.items].min() >= sizes[tile.list_below()].max(initial=0)
         stack += tile.children
     assert sorted(items) == list(range(200))
 
 
 @pytest.mark.parametrize("name", PLACES)
 def test_places_come_back_from_the_globe(name):
-    globe, units = Globe.of(name), units_of(CRS(name))
+    globe, units = Globe.of(name), find_units(CRS(name))
     rng = np.random.default_rng(0)
     world = units.to_metres(np.append(PLACES[name], 0.0)) + rng.uniform(0, 1000, (50, 3))
     earth = globe.to_earth(world)
@@ -297,7 +297,7 @@ def test_a_failure_leaves_the_older_tileset(tmp_path):
     folder = tmp_path / "a.3dtiles"
     write_models(folder, town(2), "EPSG:7415", GEOID_M)
     before = (folder / "tiles" / "r.glb").read_bytes()
-    nowhere = ViewedModel("x", "flat", gable_solid().moved(np.array([1e9, 1e9, 0])), {}, {})
+    nowhere = ViewedModel("x", "flat", gable_solid().move(np.array([1e9, 1e9, 0])), {}, {})
     with pytest.raises(InputError, match="no place there"):
         write_models(folder, [*town(3), nowhere], "EPSG:7415", GEOID_M)
     assert (folder / "tiles" / "r.glb").read_bytes() == before
@@ -376,7 +376,7 @@ def test_the_command_tells_id_type_and_parameters(tmp_path, capsys):
 
 def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters(tmp_path, globe):
     told = {"id": 7, "type": "church", "year": 1905}
-    model = ViewedModel("a", "gable", gable_solid().moved(ORIGIN), told, {0: "gable"})
+    model = ViewedModel("a", "gable", gable_solid().move(ORIGIN), told, {0: "gable"})
     write_models(tmp_path / "a.3dtiles", [model], "EPSG:7415", GEOID_M)
     tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
     (row,) = content_of(tmp_path / "a.3dtiles", tileset["root"])[2]

@@ -12,10 +12,10 @@ from handmade import box, courtyard, gable_house, modelled, unmodelled
 from hiproof.read.solids import read_solids
 from hiproof.write.citygml.version2 import NAMESPACES as OLD
 from hiproof.write.citygml.version2 import write_citygml
-from hiproof.write.citygml.version3 import ID, NAMESPACES, upgraded, write_citygml3
+from hiproof.write.citygml.version3 import ID, NAMESPACES_3, upgrade_member, write_citygml3
 from hiproof.write.fragments import Fragment
 
-HREF = f"{{{NAMESPACES['xlink']}}}href"
+HREF = f"{{{NAMESPACES_3['xlink']}}}href"
 
 # What may stand in a building, in its schemas' order: gml, core (feature, city object, space),
 # construction, building.
@@ -86,13 +86,13 @@ def roots(files):
 
 
 def new(root, path):
-    return root.xpath(path, namespaces=NAMESPACES)
+    return root.xpath(path, namespaces=NAMESPACES_3)
 
 
 def assert_in_order(element, sequence):
     """The children of `element` are of the sequence's names, in its order."""
     known = [
-        f"{{{NAMESPACES[prefix]}}}{name}"
+        f"{{{NAMESPACES_3[prefix]}}}{name}"
         for prefix, names in sequence.items()
         for name in names.split()
     ]
@@ -108,12 +108,12 @@ def assert_told_as_the_schemas_ask(root):
     ids = new(root, "//@gml:id")
     assert len(set(ids)) == len(ids)
     for element in root.iter(etree.Element):
-        assert etree.QName(element).namespace in NAMESPACES.values()
+        assert etree.QName(element).namespace in NAMESPACES_3.values()
         if etree.QName(element).localname in WITH_ID:
             assert element.get(ID), element
     assert {href.removeprefix("#") for href in new(root, "//@xlink:href")} <= set(ids)
     assert {child.tag for child in new(root, "//gml:Solid/gml:exterior/*")} <= {
-        f"{{{NAMESPACES['gml']}}}Shell"
+        f"{{{NAMESPACES_3['gml']}}}Shell"
     }
 
 
@@ -137,7 +137,10 @@ def test_the_same_attributes_stand_in_both(roots):
     ]
     again = [
         [
-            (a.findtext("gen:name", None, NAMESPACES), a.findtext("gen:value", None, NAMESPACES))
+            (
+                a.findtext("gen:name", None, NAMESPACES_3),
+                a.findtext("gen:value", None, NAMESPACES_3),
+            )
             for a in new(b, "core:genericAttribute/*")
         ]
         for b in new(later, "//bldg:Building")
@@ -173,8 +176,8 @@ def test_heights_dates_and_terrain_lines_are_told_in_the_newer_way(roots):
 
 
 def test_parts_and_level_0_are_told_in_the_newer_way():
-    member = upgraded(Fragment(TWO_PARTS.replace("\n", "").encode(), (0.0,) * 6))
-    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
+    member = upgrade_member(Fragment(TWO_PARTS.replace("\n", "").encode(), (0.0,) * 6))
+    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES_3.items())
     root = etree.fromstring(
         f'<core:CityModel {declared} gml:id="c">'.encode() + member.text + b"</core:CityModel>"
     )
@@ -200,4 +203,4 @@ def test_parts_and_level_0_are_told_in_the_newer_way():
 def test_no_buildings_make_an_empty_model(tmp_path):
     write_citygml3(tmp_path / "a.gml", [])
     root = etree.parse(tmp_path / "a.gml").getroot()
-    assert root.tag == f"{{{NAMESPACES['core']}}}CityModel" and len(root) == 0
+    assert root.tag == f"{{{NAMESPACES_3['core']}}}CityModel" and len(root) == 0

@@ -76,7 +76,7 @@ def test_the_solid_comes_back(tmp_path):
     transform = head["transform"]
     xyz = np.array(feature["vertices"]) * transform["scale"] + transform["translate"]
     assert len(np.unique(xyz, axis=0)) == len(xyz)
-    want = courtyard().moved(RD_ORIGIN)
+    want = courtyard().move(RD_ORIGIN)
     geometry = solid_of(feature["CityObjects"]["a"])
     kinds = [
         geometry["semantics"]["surfaces"][v]["type"] for v in geometry["semantics"]["values"][0]
@@ -222,7 +222,9 @@ def test_a_measuring_tool_reads_it(tmp_path):
     spec.loader.exec_module(tool)
     sequence(tmp_path, street())
     roofs = list(tool.read_roofs(tmp_path / "a.city.jsonl"))
-    assert len(roofs) == sum(len(b.solid.of_kind(ROOF)) for b in street() if b.built is not None)
+    assert len(roofs) == sum(
+        len(b.solid.select_faces(ROOF)) for b in street() if b.built is not None
+    )
     assert sum(polygon.area for polygon, *_ in roofs) == pytest.approx(96 + 84 + 20, rel=1e-6)
 
 

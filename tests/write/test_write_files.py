@@ -35,7 +35,7 @@ def no_roof(solid):
 
 
 def no_number(solid):
-    return solid.moved(np.array([0.0, 0.0, np.nan]))
+    return solid.move(np.array([0.0, 0.0, np.nan]))
 
 
 def no_vertex(solid):

@@ -28,7 +28,7 @@ def generated(seed):
     made |= {kind: random_compound(rng, kind) for kind in COMPOUND_KINDS}
     for number, (name, sim) in enumerate(made.items()):
         origin = sim.roof.frame.origin
-        solid = compose(sim.roof, 0.0).moved(origin)
+        solid = compose(sim.roof, 0.0).move(origin)
         quality = Quality(points=100 + number, density=4.0, rmse=0.05)
         yield Building(
             name,

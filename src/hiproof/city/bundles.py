@@ -33,20 +33,21 @@ import shapely
 from .. import __version__
 from ..errors import ErrorReport, InputError, is_interrupt
 from ..log import LOGGER
-from ..masking import masked, masked_values
+from ..masking import mask, masked_values
 from ..model import Footprint
-from ..parametric.override import TOLD, Override, override_of
-from ..read.las import explained
+from ..parametric.override import NOTE_KEYS, Override, read_override
+from ..read.las import translate_errors
 from ..settings import Settings
-from .overrides import FILE
+from .overrides import OVERRIDES_FILE
 from .plan import Job, WorkPlan, neighbourhood
-from .sort import KINDS, load_points
+from .sort import POINT_KINDS, load_points
 from .terrain_check import TerrainModel
 
-FOLDER, FACTS = "failures", "failure.json"
+FAILURES_FOLDER, FACTS = "failures", "failure.json"
 MOST_BUNDLES = 20  # Bundles of a run: more failures have the same few causes, and take space.
-CLASSES = dict(zip(KINDS, (6, 2, 1, 18), strict=True))  # ASPRS classes by the kind of points.
-EXACT = ("exact_x", "exact_y", "exact_z")  # Extra dimensions (float64); LAZ rounds to SCALE_M.
+CLASSES = dict(zip(POINT_KINDS, (6, 2, 1, 18), strict=True))  # ASPRS classes by the kind of points.
+# Extra dimensions (float64); LAZ rounds to SCALE_M.
+EXACT_COLUMNS = ("exact_x", "exact_y", "exact_z")
 SCALE_M = 0.001  # Steps (m) of the LAZ coordinates; enough to look at.
 MARGIN_M = 2.0  # Points so far beyond a building's reach complete its outermost ground cells.
 ROOF_REACH_M = 10.0  # Reach of the search for ground between roofs (BESIDE_ALL_M of solve.py).
@@ -113,7 +114,7 @@ def keep_failure(
     if not plan.settings.city.keep_failures:
         return
     try:
-        folder = root.parent / FOLDER / folder_name(job.id)
+        folder = root.parent / FAILURES_FOLDER / folder_name(job.id)
         if folder.exists() or len(bundles_in(root.parent)) < MOST_BUNDLES:
             save_bundle(folder, root, tile, plan, job, trace, terrain())
             if len(bundles_in(root.parent)) > MOST_BUNDLES:  # another process was faster
@@ -122,7 +123,7 @@ def keep_failure(
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         LOGGER.warning(
-            "the input of building %s could not be kept in %s: %s", job.id, FOLDER, error
+            "the input of building %s could not be kept in %s: %s", job.id, FAILURES_FOLDER, error
         )
 
 
@@ -141,20 +142,20 @@ def folder_name(id: str) -> str:
 
 def bundles_in(out: Path) -> list[Path]:
     """The bundles in the output folder of a run; nobody else's folders."""
-    return sorted(facts.parent for facts in (Path(out) / FOLDER).glob(f"[!.]*/{FACTS}"))
+    return sorted(facts.parent for facts in (Path(out) / FAILURES_FOLDER).glob(f"[!.]*/{FACTS}"))
 
 
-def bundles_of(out: Path) -> Path | None:
+def find_bundle_folder(out: Path) -> Path | None:
     """The folder of the bundles of a run, None where it has none."""
-    return Path(out) / FOLDER if bundles_in(out) else None
+    return Path(out) / FAILURES_FOLDER if bundles_in(out) else None
 
 
 def remove_bundles(out: Path, failed_ids: Collection[str] = ()) -> None:
     """Remove all bundles but those of buildings that failed, and unfinished ones."""
-    folder = Path(out) / FOLDER
-    kept = {folder_name(id) for id in failed_ids}
+    folder = Path(out) / FAILURES_FOLDER
+    selection = {folder_name(id) for id in failed_ids}
     for bundle in bundles_in(out):
-        if bundle.name not in kept:
+        if bundle.name not in selection:
             shutil.rmtree(bundle, ignore_errors=True)
     for unfinished in folder.glob(".bundle-*"):
         shutil.rmtree(unfinished, ignore_errors=True)
@@ -172,29 +173,29 @@ def save_bundle(
     terrain: TerrainRecorder | None,
 ) -> None:
     """Write the bundle `folder`, whole or not at all."""
-    with whole_folder(folder) as beside:
-        write_points(beside / "points.laz", cropped(load_points(root, tile), plan, job))
-        write_outline(beside / "footprint.geojson", job)
-        (beside / "settings.toml").write_text(plan.settings.to_toml(), encoding="utf-8")
-        (beside / "traceback.txt").write_text(masked(trace), encoding="utf-8", errors="replace")
+    with whole_folder(folder) as temporary:
+        write_points(temporary / "points.laz", crop_points(load_points(root, tile), plan, job))
+        write_outline(temporary / "footprint.geojson", job)
+        (temporary / "settings.toml").write_text(plan.settings.to_toml(), encoding="utf-8")
+        (temporary / "traceback.txt").write_text(mask(trace), encoding="utf-8", errors="replace")
         if terrain is not None:
             rows = np.unique(np.concatenate(terrain.rows), axis=0)
             lines = [",".join(map(repr, row)) for row in rows.tolist()]
-            (beside / "terrain.csv").write_text(
+            (temporary / "terrain.csv").write_text(
                 "\n".join(["x,y,z,coded", *lines]) + "\n", encoding="utf-8"
             )
         facts = {
             "hiproof": __version__,
             "id": job.id,
             "has_footprint": job.footprint is not None,
-            "names": list(plan.names_of(job)),
+            "names": list(plan.list_names(job)),
             "crs": plan.crs_wkt,
             "cityjson_translate": plan.translate.tolist(),
             "terrain": None if terrain is None else terrain.source,
             "override": override_record(root, job),
             "error": job.error,
         }
-        (beside / FACTS).write_text(
+        (temporary / FACTS).write_text(
             json.dumps(masked_values(facts), indent=1) + "\n", encoding="utf-8"
         )
 
@@ -202,17 +203,17 @@ def save_bundle(
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
     """Yield a hidden folder that becomes `folder` when the block ends well."""
-    beside = folder.with_name(f".bundle-{os.getpid()}-{secrets.token_hex(4)}")
-    beside.mkdir(parents=True)
+    sibling_path = folder.with_name(f".bundle-{os.getpid()}-{secrets.token_hex(4)}")
+    sibling_path.mkdir(parents=True)
     try:
-        yield beside
+        yield sibling_path
         shutil.rmtree(folder, ignore_errors=True)
-        beside.rename(folder)
+        sibling_path.rename(folder)
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(sibling_path, ignore_errors=True)
 
 
-def cropped(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str, np.ndarray]:
+def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str, np.ndarray]:
     """Those of a tile's points (n, 3), by kind, that the building may see."""
     reaches = {
         "roof": max(plan.around_m, ROOF_REACH_M),
@@ -220,14 +221,14 @@ def cropped(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str
         "low": plan.terrain_reach_m,
         "noise": plan.around_m,
     }
-    found = {}
+    result = {}
     for kind, xyz in points.items():
         if job.area.is_empty:
-            found[kind] = np.zeros((0, 3))
+            result[kind] = np.zeros((0, 3))
             continue
-        low, high = neighbourhood(job, reaches[kind] + MARGIN_M).reshape(2, 2)
-        found[kind] = xyz[((xyz[:, :2] >= low) & (xyz[:, :2] <= high)).all(axis=1)]
-    return found
+        lower, upper = neighbourhood(job, reaches[kind] + MARGIN_M).reshape(2, 2)
+        result[kind] = xyz[((xyz[:, :2] >= lower) & (xyz[:, :2] <= upper)).all(axis=1)]
+    return result
 
 
 def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
@@ -236,15 +237,18 @@ def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
 
     xyz = np.concatenate(list(points.values()))
     header = laspy.LasHeader(version="1.4", point_format=6)
-    header.add_extra_dims([laspy.ExtraBytesParams(name, "f8") for name in EXACT])
+    header.add_extra_dims([laspy.ExtraBytesParams(name, "f8") for name in EXACT_COLUMNS])
     header.scales = np.full(3, SCALE_M)
     header.offsets = np.floor(xyz.min(axis=0)) if len(xyz) else np.zeros(3)
     cloud = laspy.LasData(header, laspy.ScaleAwarePointRecord.zeros(len(xyz), header=header))
     cloud.x, cloud.y, cloud.z = xyz.T
-    for name, values in zip(EXACT, xyz.T, strict=True):
+    for name, values in zip(EXACT_COLUMNS, xyz.T, strict=True):
         cloud[name] = values
     cloud.classification = np.concatenate(
-        [np.full(len(own), CLASSES[kind], np.uint8) for kind, own in points.items()]
+        [
+            np.full(len(points_of_kind), CLASSES[kind], np.uint8)
+            for kind, points_of_kind in points.items()
+        ]
     )
     cloud.write(path)
 
@@ -253,9 +257,9 @@ def read_exact_points(path: Path) -> dict[str, np.ndarray]:
     """Read the points (n, 3) by kind from `write_points`. Raises InputError for other files."""
     import laspy
 
-    with explained(path):
+    with translate_errors(path):
         cloud = laspy.read(path)
-        xyz = np.column_stack([np.asarray(cloud[name], float) for name in EXACT])
+        xyz = np.column_stack([np.asarray(cloud[name], float) for name in EXACT_COLUMNS])
         classes = np.asarray(cloud.classification)
     return {kind: xyz[classes == number] for kind, number in CLASSES.items()}
 
@@ -271,11 +275,11 @@ def write_outline(path: Path, job: Job) -> None:
 
 def override_record(root: Path, job: Job) -> dict[str, Any] | None:
     """The building's override without what a person noted; None where it has none."""
-    path = root / FILE
+    path = root / OVERRIDES_FILE
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         index, record = json.loads(line)
         if index == job.index:
-            return {key: value for key, value in record.items() if key not in TOLD}
+            return {key: value for key, value in record.items() if key not in NOTE_KEYS}
     return None
 
 
@@ -300,7 +304,7 @@ def load_bundle(
             (str(facts["names"][0]), str(facts["names"][1])),
             np.array(facts["cityjson_translate"], float),
         )
-        override = None if facts["override"] is None else override_of(facts["override"])
+        override = None if facts["override"] is None else read_override(facts["override"])
         terrain = None
         if facts["terrain"] is not None:
             rows = np.loadtxt(folder / "terrain.csv", delimiter=",", skiprows=1, ndmin=2)
@@ -317,7 +321,7 @@ def load_bundle(
         raise InputError(
             f"expected a folder that a run kept of a failed building at {folder}, got: {error}; it "
             "lies in the run's "
-            f"folder {FOLDER}"
+            f"folder {FAILURES_FOLDER}"
         ) from error
     settings = Settings.from_toml(folder / "settings.toml")
     # the outline lies where the run had moved it

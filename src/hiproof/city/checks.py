@@ -8,7 +8,7 @@ import difflib
 from typing import Any
 
 from ..errors import InputError, SettingsError
-from ..settings import Settings, shown
+from ..settings import Settings, format_value
 from ..stages import refuse_without_network
 
 MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
@@ -16,10 +16,11 @@ MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill a
 
 def refuse_unusable(request: Any) -> None:
     """Raise SettingsError or InputError for options of a `run.Request` that cannot be met here."""
-    asked = request.processes
-    if asked is not None and not (type(asked) is int and 1 <= asked <= MOST_PROCESSES):
+    processes = request.processes
+    if processes is not None and not (type(processes) is int and 1 <= processes <= MOST_PROCESSES):
         raise SettingsError(
-            f"expected --jobs between 1 and {MOST_PROCESSES}, got {shown(asked)}; a process a core "
+            f"expected --jobs between 1 and {MOST_PROCESSES}, got {format_value(processes)}; a "
+            "process a core "
             "is enough, as it is without this option"
         )
     for name in ("layer", "where", "id_attribute"):
@@ -79,24 +80,28 @@ def refuse_unknown_types(fit: Any) -> None:
     """Roof types must be those of the catalogue."""
     from ..primitives import CATALOGUE
 
-    known = tuple(CATALOGUE)
-    unknown = [name for name in fit.types if name not in known]
+    allowed = tuple(CATALOGUE)
+    unknown = [name for name in fit.types if name not in allowed]
     if unknown:
-        near = [difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5) for name in unknown]
-        meant = [
-            f"{shown(name)} (did you mean {found[0]}?)" if found else shown(name)
-            for name, found in zip(unknown, near, strict=True)
+        nearby = [
+            difflib.get_close_matches(name.lower(), allowed, n=1, cutoff=0.5) for name in unknown
         ]
-        raise SettingsError(f"expected roof types among {', '.join(known)}, got {', '.join(meant)}")
+        meant = [
+            f"{format_value(name)} (did you mean {result[0]}?)" if result else format_value(name)
+            for name, result in zip(unknown, nearby, strict=True)
+        ]
+        raise SettingsError(
+            f"expected roof types among {', '.join(allowed)}, got {', '.join(meant)}"
+        )
 
 
 def refuse_crs(read: Any) -> None:
     """The CRS that settings give the clouds must be known, projected, and of the unit that they
     give.
     """
-    from ..read.crs import parse_crs, units_of
+    from ..read.crs import find_units, parse_crs
 
     try:
-        units_of(parse_crs(read.crs), "the point clouds", read.unit)
+        find_units(parse_crs(read.crs), "the point clouds", read.unit)
     except InputError as error:
         raise SettingsError(str(error)) from error

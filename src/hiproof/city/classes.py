@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, InputWarning
-from ..log import counted
+from ..log import count_things
 from ..read.pointcloud import iter_points
 from ..read.runs import RUN_POINTS
 from ..settings import ReadSettings, Settings
@@ -43,9 +43,11 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     # with scipy.ndimage: not where the clouds have a building class
     from ..classify.scene import NO_ROOFS
 
-    others = tuple(sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes))
-    present = ", ".join(f"{c} ({counted(n, 'point')})" for c, n in sorted(counts.items()))
-    if not others:
+    selected_counts = tuple(
+        sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes)
+    )
+    present = ", ".join(f"{c} ({count_things(n, 'point')})" for c, n in sorted(counts.items()))
+    if not selected_counts:
         raise InputError(
             f"expected points that may be roofs, got classes {present}, all of them ground, water, "
             "noise, low vegetation "
@@ -55,29 +57,32 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
         warnings.warn(
             f"the clouds have no building class ({', '.join(map(str, read.building_classes))}) but "
             f"{present}: roofs are looked "
-            f"for among the points of class {', '.join(map(str, others))}; say otherwise with "
+            f"for among the points of class {', '.join(map(str, selected_counts))}; say otherwise "
+            "with "
             "--building-class",
             InputWarning,
         )
-    return with_read(
-        settings, roofs="shape" if read.roofs == "auto" else read.roofs, building_classes=others
+    return choose_classes(
+        settings,
+        roofs="shape" if read.roofs == "auto" else read.roofs,
+        building_classes=selected_counts,
     )
 
 
-def with_read(settings: Settings, **changes: Any) -> Settings:
+def choose_classes(settings: Settings, **changes: Any) -> Settings:
     return dataclasses.replace(settings, read=dataclasses.replace(settings.read, **changes))
 
 
-def count_classes(clouds: tuple[str, ...], enough: tuple[int, ...]) -> Counter[int]:
+def count_classes(clouds: tuple[str, ...], is_enough: tuple[int, ...]) -> Counter[int]:
     """Points by class, 0 where a file has none, of all readable files; counted no further than a
-    point of class `enough`.
+    point of class `is_enough`.
     """
     counts: Counter[int] = Counter()
     for name in clouds:
         try:
             for chunk in iter_points(name, PEEK_POINTS):
                 counts.update({c: int(n) for c, n in enumerate(np.bincount(chunk.classes)) if n})
-                if any(counts[c] for c in enough):
+                if any(counts[c] for c in is_enough):
                     return counts
         except MemoryError:
             raise

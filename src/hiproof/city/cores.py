@@ -20,12 +20,14 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 def cores() -> int:
     """Those that this process may use, by the system and by the quota of its container."""
-    here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     try:
         quota, period = QUOTA.read_text(encoding="ascii").split()
-        return max(1, min(here, round(int(quota) / int(period))))
+        return max(1, min(count, round(int(quota) / int(period))))
     except (OSError, ValueError, ZeroDivisionError):
-        return here
+        return count
 
 
 def as_many_as_pay(buildings: int, tiles: int, footprints: bool = True) -> int:
@@ -53,14 +55,14 @@ def has_semaphores() -> bool:
 
 
 @contextmanager
-def one_thread_each() -> Iterator[None]:
+def limit_threads() -> Iterator[None]:
     """Processes started in here do linear algebra in one thread, unless the user said otherwise:
     there are as many of them as cores.
     """
-    ours = [name for name in THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(ours, "1"))
+    own_names = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(own_names, "1"))
     try:
         yield
     finally:
-        for name in ours:
+        for name in own_names:
             os.environ.pop(name, None)

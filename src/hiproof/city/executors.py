@@ -30,8 +30,8 @@ from .. import log
 from ..compiled import news
 from ..compiled.stamp import count_compiled
 from ..errors import InputError, NotKeptWarning, OutputError, is_interrupt
-from ..extras import needed
-from .cores import one_thread_each
+from ..extras import import_extra
+from .cores import limit_threads
 from .tasks import make_ready
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
@@ -61,7 +61,7 @@ class InProcess:
                     raise KeyboardInterrupt from error
                 yield task, None, error
 
-    def isolated(self) -> Processes:
+    def isolate(self) -> Processes:
         return Processes(1)
 
     def close(self) -> None:
@@ -117,12 +117,12 @@ class Processes:
         if self.pool is None:
             context = get_context("spawn")
             heard, self.word = context.Pipe(duplex=False)
-            given = (os.getpid(), heard, log.started())
+            arguments = (os.getpid(), heard, log.worker_arguments())
             self.pool = ProcessPoolExecutor(
-                self.count, mp_context=context, initializer=begin_worker, initargs=given
+                self.count, mp_context=context, initializer=begin_worker, initargs=arguments
             )
         try:
-            with one_thread_each():
+            with limit_threads():
                 return self.pool.submit(function, *task)
         except BrokenProcessPool as error:
             lost: Future = Future()
@@ -145,7 +145,7 @@ class Processes:
             )
         running.clear()
 
-    def isolated(self) -> Processes:
+    def isolate(self) -> Processes:
         return Processes(1)
 
     def close(self) -> None:
@@ -241,11 +241,11 @@ class Dask:
 
         Where all workers are gone and none comes, the run ends: Dask itself would wait for ever.
         """
-        without = 0
-        while without < WORKERLESS_S:
+        count = 0
+        while count < WORKERLESS_S:
             with suppress(Empty):
                 return ends.get(timeout=POLL_S)
-            without = 0 if self.client.nthreads() else without + POLL_S
+            count = 0 if self.client.nthreads() else count + POLL_S
         raise OutputError(
             f"expected workers at the Dask scheduler {self.address}, got none for {WORKERLESS_S} "
             "s; start some, the same "
@@ -275,7 +275,7 @@ class Dask:
         except (TimeoutError, CancelledError, KilledWorker):
             return None, WorkerLost("a worker process died with its result")
 
-    def isolated(self) -> Dask:
+    def isolate(self) -> Dask:
         return Dask(self.address)
 
     def close(self) -> None:
@@ -284,7 +284,7 @@ class Dask:
 
 def import_distributed() -> Any:
     """What speaks to a Dask cluster. Raises InputError where it is missing."""
-    return needed("distributed", "city", "--scheduler")
+    return import_extra("distributed", "city", "--scheduler")
 
 
 def make_executor(processes: int, scheduler: str | None = None) -> InProcess | Processes | Dask:

@@ -38,42 +38,42 @@ class FoundRoof:
 
 
 def found_roof(
-    near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False
+    nearby: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False
 ) -> FoundRoof:
-    """The roof within `area`, from the points `near` (n, 3) it and their `height` (n,) above
+    """The roof within `area`, from the points `nearby` (n, 3) it and their `height` (n,) above
     ground, NaN where unknown.
 
     `is_asked_for`: the area is a footprint, not one that was found by these points. Shares are of
     points thinned to one a voxel, so that a wall or a crown hit often does not count as more.
     """
     from ..classify import roof_points
-    from ..classify.surfaces import one_a_voxel
+    from ..classify.surfaces import thin_to_voxels
 
-    inside = shapely.intersects_xy(area, near[:, 0], near[:, 1])
+    inside = shapely.intersects_xy(area, nearby[:, 0], nearby[:, 1])
     if not inside.any():
-        return FoundRoof(near[inside])
+        return FoundRoof(nearby[inside])
     shapely.prepare(area)
     is_high = ~(height < CLEAR_M)
-    is_roof = np.zeros(len(near), bool)
-    is_roof[is_high] = roof_points(near[is_high], FOOTPRINT_ODDS if is_asked_for else 0.0)
-    chosen, _ = one_a_voxel(near[inside])
-    roof, high = is_roof[inside][chosen].mean(), is_high[inside][chosen].mean()
-    ground = near[inside & ~is_high]
-    what = "leaves" if high > 0.5 * (1 + roof) else "ground"
+    is_roof = np.zeros(len(nearby), bool)
+    is_roof[is_high] = roof_points(nearby[is_high], FOOTPRINT_ODDS if is_asked_for else 0.0)
+    selection, _ = thin_to_voxels(nearby[inside])
+    roof, upper = is_roof[inside][selection].mean(), is_high[inside][selection].mean()
+    ground = nearby[inside & ~is_high]
+    text = "leaves" if upper > 0.5 * (1 + roof) else "ground"
     if roof < HARDLY:
-        return FoundRoof(near[inside], f"no roof seen: its points are {what}", False, ground)
+        return FoundRoof(nearby[inside], f"no roof seen: its points are {text}", False, ground)
     if roof < MOSTLY:
         remark = (
             f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, "
-            f"the rest {what}"
+            f"the rest {text}"
         )
-        return FoundRoof(near[inside & is_roof], remark, ground=ground)
-    return FoundRoof(near[inside & is_roof], ground=ground)
+        return FoundRoof(nearby[inside & is_roof], remark, ground=ground)
+    return FoundRoof(nearby[inside & is_roof], ground=ground)
 
 
-def found_alone(near: np.ndarray, area: shapely.Geometry) -> FoundRoof:
+def find_lone_roof(nearby: np.ndarray, area: shapely.Geometry) -> FoundRoof:
     """The roof within `area` of points (n, 3) that are roofs' or leaves': without these, unless
     hardly anything would be left.
     """
-    found = found_roof(near, area, np.full(len(near), np.nan))
-    return found if found.is_seen else FoundRoof(found.points)
+    roof = found_roof(nearby, area, np.full(len(nearby), np.nan))
+    return roof if roof.is_seen else FoundRoof(roof.points)

@@ -14,16 +14,16 @@ from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..read.crs import (
     combine,
-    described,
+    describe_crs,
+    find_units,
     names_heights_alone,
     names_place,
     parse_crs,
-    units_of,
     vertical_crs,
 )
 from ..read.footprints import footprint_crs
 from ..read.overlap import doubtful_place, refuse_degrees, stretch
-from ..read.pointcloud import PointFileHeader, common_crs, say_how_coarse
+from ..read.pointcloud import PointFileHeader, common_crs, warn_coarse
 
 # of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
 SAME_UNIT = 1e-5
@@ -62,18 +62,18 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     )
     footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
     if not names_place(cloud):
-        refuse_degrees_of_either(request.footprints, footprints, headers)
-        cloud = placed(cloud, footprints, headers[0].path, read.unit)
-    frame = AreaFrame(cloud, footprints, units_of(cloud or footprints, named=read.unit))
+        refuse_degrees_in_inputs(request.footprints, footprints, headers)
+        cloud = place_crs(cloud, footprints, headers[0].path, read.unit)
+    frame = AreaFrame(cloud, footprints, find_units(cloud or footprints, unit_name=read.unit))
     if cloud is None and (footprints is not None or read.unit == "auto"):
-        say_what_is_assumed(headers[0].path, frame)
-    say_how_coarse(headers, frame.units)
+        log_assumed_crs(headers[0].path, frame)
+    warn_coarse(headers, frame.units)
     if frame.crs is not None:
-        say_where_it_lies(headers, frame)
+        warn_outside_area_of_use(headers, frame)
     return frame
 
 
-def placed(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
+def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
     """The CRS of clouds that leave their place open: the footprints' with the clouds' heights, else
     the clouds' local one.
 
@@ -83,31 +83,31 @@ def placed(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
     if cloud is None:
         return None
     if not names_place(footprints):
-        units_of(cloud, named=unit)
+        find_units(cloud, unit_name=unit)
         if names_heights_alone(cloud):
             return None
         place = "which is no place on the Earth, and so are the models; say with --crs where it is"
-        warnings.warn(f"{path}: names a local CRS, {described(cloud)}, {place}", InputWarning)
+        warnings.warn(f"{path}: names a local CRS, {describe_crs(cloud)}, {place}", InputWarning)
         return cloud
-    there = units_of(footprints, "the footprints")
+    units = find_units(footprints, "the footprints")
     if (
         not names_heights_alone(cloud)
-        and abs(units_of(cloud, named=unit).plan / there.plan - 1) > SAME_UNIT
+        and abs(find_units(cloud, unit_name=unit).plan / units.plan - 1) > SAME_UNIT
     ):
         raise InputError(
-            f"expected clouds and footprints in one CRS, got {described(cloud)} in "
-            f"{units_of(cloud)} and "
-            f"{described(footprints)} in {there}; say with --crs in which the clouds are"
+            f"expected clouds and footprints in one CRS, got {describe_crs(cloud)} in "
+            f"{find_units(cloud)} and "
+            f"{describe_crs(footprints)} in {units}; say with --crs in which the clouds are"
         )
     heights = cloud if names_heights_alone(cloud) else vertical_crs(cloud)
-    taken = f"taken to be in the footprints' {described(footprints)}; say otherwise with --crs"
+    text = f"taken to be in the footprints' {describe_crs(footprints)}; say otherwise with --crs"
     warnings.warn(
-        f"{path}: names {described(cloud)}, which is no place on the Earth; {taken}", InputWarning
+        f"{path}: names {describe_crs(cloud)}, which is no place on the Earth; {text}", InputWarning
     )
     return combine(footprints, heights)
 
 
-def say_where_it_lies(headers: list[PointFileHeader], frame: AreaFrame) -> None:
+def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -> None:
     """One line where the CRS puts the clouds far from the area it is made for, so that it is
     another or of another unit, or where its lengths there are not those on the ground.
     """
@@ -122,7 +122,8 @@ def say_where_it_lies(headers: list[PointFileHeader], frame: AreaFrame) -> None:
         )
     elif abs((times := stretch(frame.crs, middles)) - 1.0) > MOST_STRETCH:
         warnings.warn(
-            f"{headers[0].path}: in {described(frame.crs)} a metre on the ground is {times:.2f} m "
+            f"{headers[0].path}: in {describe_crs(frame.crs)} a metre on the ground is {times:.2f} "
+            "m "
             "long there, and so are "
             "roofs, but not their heights; reproject clouds and footprints to the UTM zone or the "
             "national grid",
@@ -136,7 +137,7 @@ def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
     return bounds[np.isfinite(bounds).all(axis=1)]
 
 
-def refuse_degrees_of_either(
+def refuse_degrees_in_inputs(
     path: str | None, footprints: Any, headers: list[PointFileHeader]
 ) -> None:
     """Clouds that name no CRS may not count in degrees, nor can footprints in degrees stand in for
@@ -145,7 +146,7 @@ def refuse_degrees_of_either(
     if footprints is not None and footprints.is_geographic:
         raise InputError(
             f"expected footprints that tell the CRS of clouds that name none, got {path} in "
-            f"{described(footprints)}, which "
+            f"{describe_crs(footprints)}, which "
             "is in degrees; name the clouds' CRS with --crs, or reproject the footprints"
         )
     advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
@@ -153,14 +154,12 @@ def refuse_degrees_of_either(
         refuse_degrees(plan_bounds(headers), "the point clouds", advice)
 
 
-def say_what_is_assumed(path: str, frame: AreaFrame) -> None:
+def log_assumed_crs(path: str, frame: AreaFrame) -> None:
     """One line where no cloud names a CRS: what is then taken for granted would else be taken in
     silence.
     """
     if frame.footprints is None:
-        taken = f"its unit is taken as {frame.units}"
+        text = f"its unit is taken as {frame.units}"
     else:
-        taken = f"taken to be in the footprints' {described(frame.footprints)}"
-    warnings.warn(
-        f"{path}: names no CRS; {taken}; say otherwise with --crs or --unit", InputWarning
-    )
+        text = f"taken to be in the footprints' {describe_crs(frame.footprints)}"
+    warnings.warn(f"{path}: names no CRS; {text}; say otherwise with --crs or --unit", InputWarning)

@@ -7,10 +7,10 @@ from __future__ import annotations
 import warnings
 
 from ..errors import InputError, InputWarning
-from ..log import counted
+from ..log import count_things
 from ..model import PointCloud
 from ..settings import Settings
-from .classes import with_read
+from .classes import choose_classes
 from .plan import Job
 
 
@@ -23,16 +23,18 @@ def jobs_from_cloud(
     from ..classify.split import split_buildings
 
     cloud = readable_points(clouds, settings)
-    found = split_buildings(cloud, settings)
-    if settings.read.roofs == "shape" and found and found[0].is_cut_out:
-        roofs = counted(len(found), "roof") if len(found) > 1 else "one roof"
-        said = (
+    buildings = split_buildings(cloud, settings)
+    if settings.read.roofs == "shape" and buildings and buildings[0].is_cut_out:
+        roofs = count_things(len(buildings), "roof") if len(buildings) > 1 else "one roof"
+        text = (
             f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks "
             "like ground"
         )
-        warnings.warn(said, InputWarning)
-        settings = with_read(settings, roofs="alone")
-    return tuple(Job(i, one.id, one.area, None, one.error) for i, one in enumerate(found)), settings
+        warnings.warn(text, InputWarning)
+        settings = choose_classes(settings, roofs="alone")
+    return tuple(
+        Job(i, item.id, item.area, None, item.error) for i, item in enumerate(buildings)
+    ), settings
 
 
 def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:

@@ -17,7 +17,7 @@ import shapely
 from pyproj import CRS
 
 from ..errors import InputError, OutputError, SettingsError
-from ..log import LOGGER, counted
+from ..log import LOGGER, count_things
 from ..masking import masked_values
 from ..read.overture import TYPES, OvertureFootprints, is_overture, read_overture
 from ..write.files import atomic
@@ -26,13 +26,13 @@ from .request import Request
 if TYPE_CHECKING:
     from ..read.pointcloud import PointFileHeader
 
-KEPT = "overture.gpkg"
+KEPT_FILE = "overture.gpkg"
 """The file in a run's own folder."""
 
 SOURCE = "hiproof_source"
 """The entry of a GeoPackage's metadata that tells where its footprints come from, as JSON."""
 
-HALF_TURN = 180.0  # degrees of longitude that no clouds extend over on one side of the meridian
+HALF_TURN_DEG = 180.0  # degrees of longitude that no clouds extend over on one side of the meridian
 SIDE_PARTS = 16  # of each side of a cloud's box: its sides are curves in longitude and latitude
 
 
@@ -49,10 +49,10 @@ def with_overture(request: Request, headers: list[PointFileHeader]) -> Request:
 
 def kept_file(out: Path) -> Path:
     """Where the run in the folder `out` keeps the footprints that it fetches."""
-    return Path(out) / ".hiproof" / KEPT
+    return Path(out) / ".hiproof" / KEPT_FILE
 
 
-def kept_or_named(request: Request) -> str | None:
+def choose_footprints(request: Request) -> str | None:
     """The footprints from which a run is made: what it has kept, else what the request names."""
     return str(kept_file(request.out)) if is_overture(request.footprints) else request.footprints
 
@@ -71,22 +71,22 @@ def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path
             "without it buildings are read"
         )
     catalogue = request.settings.read.overture_catalogue
-    found = read_overture(catalogue, extent_of(request, headers), kind)
+    found = read_overture(catalogue, compute_extent(request, headers), kind)
     write_geopackage(found, path)
     LOGGER.info(
         "%s of Overture's release %s",
-        counted(len(found.table), "footprint"),
+        count_things(len(found.table), "footprint"),
         found.note["release"],
     )
     return found.note
 
 
-def extent_of(request: Request, headers: list[PointFileHeader]) -> shapely.Geometry:
+def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.Geometry:
     """The boxes of the point files in longitude and latitude, as one geometry.
 
     Raises InputError where no file names a CRS, and for an extent across the 180th meridian.
     """
-    from ..read.crs import names_place, parse_crs, way_between
+    from ..read.crs import make_transformer, names_place, parse_crs
     from ..read.pointcloud import common_crs
     from .frame import plan_bounds
 
@@ -99,7 +99,7 @@ def extent_of(request: Request, headers: list[PointFileHeader]) -> shapely.Geome
             f"expected clouds that name their CRS with --footprints overture, got {headers[0].path}"
             " without one; name it with --crs"
         )
-    transformer = way_between(crs, CRS("OGC:CRS84"))
+    transformer = make_transformer(crs, CRS("OGC:CRS84"))
     bounds = plan_bounds(headers)
     sides = np.maximum(bounds[:, 2:] - bounds[:, :2], 1e-6).max(axis=1)
     boxes = shapely.segmentize(shapely.box(*bounds.T), sides / SIDE_PARTS)
@@ -107,7 +107,7 @@ def extent_of(request: Request, headers: list[PointFileHeader]) -> shapely.Geome
         shapely.transform(boxes, lambda xy: np.column_stack(transformer.transform(*xy.T)))
     )
     west, _, east, _ = extent.bounds
-    if not east - west < HALF_TURN:
+    if not east - west < HALF_TURN_DEG:
         raise InputError(
             f"expected clouds on one side of the 180th meridian with --footprints overture, got "
             f"clouds from {west:.2f} to {east:.2f} degrees; run each side alone"
@@ -136,7 +136,7 @@ def write_geopackage(found: OvertureFootprints, path: Path) -> None:
             ) from error
 
 
-def source_of(path: str | None) -> dict[str, Any] | None:
+def read_source(path: str | None) -> dict[str, Any] | None:
     """Where the footprints of a GeoPackage come from, None where it does not tell or is not
     there.
     """

@@ -43,13 +43,13 @@ class Cells:
         """Points (m, 3) of the known cells inside the whole-metre `box` (xmin, ymin, xmax,
         ymax).
         """
-        left, low, right, high = (
+        left, lower, right, upper = (
             max(int(side) - first, 0)
             for side, first in zip(box, self.low.tolist() * 2, strict=True)
         )
-        known = np.isfinite(self.z[low:high, left:right])
+        mask = np.isfinite(self.z[lower:upper, left:right])
         return np.column_stack(
-            [table[low:high, left:right][known] for table in (self.x, self.y, self.z)]
+            [table[lower:upper, left:right][mask] for table in (self.x, self.y, self.z)]
         )
 
 
@@ -131,33 +131,33 @@ class WhereSeen:
 
 
 @compiled
-def window(x, y, reach, low, shape, box):
-    """Rows and columns, [first, end), of a table whose corner is cell `low`: at most `reach` from
+def window(x, y, reach, lower, shape, box):
+    """Rows and columns, [first, end), of a table whose corner is cell `lower`: at most `reach` from
     (x, y), inside `box`.
     """
     column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
     rows = (
-        max(row - reach, box[1], low[1]) - low[1],
-        min(row + reach + 1, box[3], low[1] + shape[0]) - low[1],
+        max(row - reach, box[1], lower[1]) - lower[1],
+        min(row + reach + 1, box[3], lower[1] + shape[0]) - lower[1],
     )
     columns = (
-        max(column - reach, box[0], low[0]) - low[0],
-        min(column + reach + 1, box[2], low[0] + shape[1]) - low[0],
+        max(column - reach, box[0], lower[0]) - lower[0],
+        min(column + reach + 1, box[2], lower[0] + shape[1]) - lower[0],
     )
     return rows[0], rows[1], columns[0], columns[1]
 
 
 @compiled
-def plane_heights(xy, x, y, z, low, box):
+def plane_heights(xy, x, y, z, lower, box):
     """Heights (n,) at `xy` (n, 2) of the weighted planes through the known cells of the tables x,
     y, z inside `box`.
     """
     heights = np.full(len(xy), np.nan)
     for i in range(len(xy)):
         for reach in RINGS:
-            bounds = window(xy[i, 0], xy[i, 1], reach, low, z.shape, box)
-            known, total, mean_x, mean_y, mean_z = weighted_mean(xy[i], x, y, z, bounds)
-            if known >= (3 if reach < RINGS[-1] else 1):
+            bounds = window(xy[i, 0], xy[i, 1], reach, lower, z.shape, box)
+            known_count, total, mean_x, mean_y, mean_z = weighted_mean(xy[i], x, y, z, bounds)
+            if known_count >= (3 if reach < RINGS[-1] else 1):
                 slope_x, slope_y = weighted_slope(
                     xy[i], x, y, z, bounds, total, mean_x, mean_y, mean_z
                 )
@@ -167,29 +167,29 @@ def plane_heights(xy, x, y, z, low, box):
 
 
 @compiled
-def weighted_mean(at, x, y, z, bounds):
-    """Known cells within `bounds`, the sum of their weights, and their mean offset from `at` (2,)
-    and height.
+def weighted_mean(position, x, y, z, bounds):
+    """Known cells within `bounds`, the sum of their weights, and their mean offset from `position`
+    (2,) and height.
     """
-    known, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
+    count, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
     for row in range(bounds[0], bounds[1]):
         for column in range(bounds[2], bounds[3]):
             if not np.isnan(z[row, column]):
-                dx, dy = x[row, column] - at[0], y[row, column] - at[1]
+                dx, dy = x[row, column] - position[0], y[row, column] - position[1]
                 weight = 1.0 / (dx * dx + dy * dy + SOFT_M2)
-                known, total = known + 1, total + weight
+                count, total = count + 1, total + weight
                 sum_x, sum_y, sum_z = (
                     sum_x + weight * dx,
                     sum_y + weight * dy,
                     sum_z + weight * z[row, column],
                 )
-    if known == 0:
+    if count == 0:
         return 0, 0.0, 0.0, 0.0, 0.0
-    return known, total, sum_x / total, sum_y / total, sum_z / total
+    return count, total, sum_x / total, sum_y / total, sum_z / total
 
 
 @compiled
-def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
+def weighted_slope(position, x, y, z, bounds, total, mean_x, mean_y, mean_z):
     """Rise of the plane through the known cells within `bounds` along x and along y, held back by
     LEVELLING.
     """
@@ -197,7 +197,7 @@ def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
     for row in range(bounds[0], bounds[1]):
         for column in range(bounds[2], bounds[3]):
             if not np.isnan(z[row, column]):
-                dx, dy = x[row, column] - at[0], y[row, column] - at[1]
+                dx, dy = x[row, column] - position[0], y[row, column] - position[1]
                 weight = 1.0 / (dx * dx + dy * dy + SOFT_M2) / total
                 dx, dy, rise = dx - mean_x, dy - mean_y, z[row, column] - mean_z
                 xx, yy, xy = xx + weight * dx * dx, yy + weight * dy * dy, xy + weight * dx * dy
@@ -207,22 +207,22 @@ def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
 
 
 @compiled
-def lowest_heights(xy, z, low, box):
+def lowest_heights(xy, z, lower, box):
     """Lowest known height (n,) of the table z around `xy` (n, 2) and inside `box`, the second
     lowest of ten or more.
     """
     heights = np.full(len(xy), np.nan)
     for i in range(len(xy)):
-        bounds = window(xy[i, 0], xy[i, 1], RINGS[-1], low, z.shape, box)
-        known, lowest, second = 0, np.inf, np.inf
+        bounds = window(xy[i, 0], xy[i, 1], RINGS[-1], lower, z.shape, box)
+        count, lowest, second = 0, np.inf, np.inf
         for row in range(bounds[0], bounds[1]):
             for column in range(bounds[2], bounds[3]):
-                here = z[row, column]
-                if not np.isnan(here):
-                    known += 1
-                    lowest, second = min(lowest, here), min(second, max(lowest, here))
-        if known:
-            heights[i] = second if known >= 10 else lowest
+                current = z[row, column]
+                if not np.isnan(current):
+                    count += 1
+                    lowest, second = min(lowest, current), min(second, max(lowest, current))
+        if count:
+            heights[i] = second if count >= 10 else lowest
     return heights
 
 

@@ -76,18 +76,18 @@ class Claim(NamedTuple):
     digest: str
 
 
-def how_to_look(path: Path) -> str:
+def read_only_address(path: Path) -> str:
     """How SQLite is to open a ledger that is only read.
 
     It wants to make a file beside one in WAL mode: where another person's folder allows none, and
     no run is at work, the ledger is read as it stands.
     """
-    beside = path.with_name(path.name + "-wal")
-    at_rest = not beside.exists() or beside.stat().st_size == 0
+    sibling_path = path.with_name(path.name + "-wal")
+    at_rest = not sibling_path.exists() or sibling_path.stat().st_size == 0
     return "?mode=ro&immutable=1" if at_rest and not os.access(path.parent, os.W_OK) else "?mode=ro"
 
 
-TABLES = ("run", "task", "building", "override", "output")
+LEDGER_TABLES = ("run", "task", "building", "override", "output")
 
 
 class Ledger:
@@ -100,7 +100,9 @@ class Ledger:
     """
 
     def __init__(self, path: Path, read_only: bool = False):
-        address = Path(path).absolute().as_uri() + (how_to_look(Path(path)) if read_only else "")
+        address = Path(path).absolute().as_uri() + (
+            read_only_address(Path(path)) if read_only else ""
+        )
         self.database = sqlite3.connect(address, uri=True, isolation_level=None, timeout=60)
         if not read_only:
             self.database.execute("pragma journal_mode=wal")
@@ -160,7 +162,7 @@ class Ledger:
 
     def forget(self) -> None:
         """Drop all that is known of a run."""
-        for table in TABLES:
+        for table in LEDGER_TABLES:
             self.database.execute(f"delete from {table}")
 
     def add_tasks(self, tasks: list[Task]) -> None:
@@ -244,7 +246,7 @@ class Ledger:
         self.database.execute("commit")
 
     def put_outcomes(self, task: str, outcomes: Iterable[Outcome]) -> None:
-        rows = [(position, id, task, *rest) for position, id, *rest in outcomes]
+        rows = [(position, id, task, *remainder) for position, id, *remainder in outcomes]
         self.database.executemany(
             "insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows
         )

@@ -17,16 +17,16 @@ from ..errors import OutputError
 
 
 @contextmanager
-def held(state: Path) -> Iterator[None]:
+def hold_folder(state: Path) -> Iterator[None]:
     """Hold the run's folder `state` for the block.
 
     Raises OutputError at once where another run holds it.
     """
-    with closing(locked(state)):
+    with closing(lock_folder(state)):
         yield
 
 
-def locked(state: Path) -> sqlite3.Connection:
+def lock_folder(state: Path) -> sqlite3.Connection:
     try:
         lock = sqlite3.connect(state / "lock.sqlite", isolation_level=None, timeout=0)
         lock.execute("begin exclusive")

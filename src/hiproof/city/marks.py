@@ -19,20 +19,21 @@ from .. import __version__
 from ..masking import masked_values
 from .request import Request
 
-BESIDE = (".dbf", ".shx", ".prj", ".cpg", ".tfw")  # parts of one file that formats keep beside it
+# parts of one file that formats keep beside it
+SIDECAR_ENDINGS = (".dbf", ".shx", ".prj", ".cpg", ".tfw")
 APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
 SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was replaced
 
 
-def inputs_of(request: Request) -> dict[str, Any]:
+def describe_inputs(request: Request) -> dict[str, Any]:
     """Everything that decides the result of a building, by name: values, and size and time of the
     files they name.
     """
     return {"version": __version__} | dict(named_values("", request, "the result"))
 
 
-def choice_of(request: Request) -> dict[str, Any]:
-    """Everything that decides which buildings there are, as `inputs_of` tells it."""
+def describe_selection(request: Request) -> dict[str, Any]:
+    """Everything that decides which buildings there are, as `describe_inputs` tells it."""
     return dict(named_values("", request, "which buildings"))
 
 
@@ -45,16 +46,16 @@ def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any
     """
     for declared in dataclasses.fields(value):
         if declared.metadata.get("decides", "the result") == decides:
-            inner, found = (
+            inner, result = (
                 f"{name}.{declared.name}" if name else declared.name,
                 getattr(value, declared.name),
             )
-            if dataclasses.is_dataclass(found):
-                yield from named_values(inner, found, decides)
+            if dataclasses.is_dataclass(result):
+                yield from named_values(inner, result, decides)
             else:
                 yield (
                     inner,
-                    with_files(found) if declared.metadata.get("names") == "files" else found,
+                    with_files(result) if declared.metadata.get("names") == "files" else result,
                 )
 
 
@@ -76,19 +77,19 @@ def file_stamps(path: Path) -> list[tuple[str, int, int]]:
         if path.is_dir():
             folder, files = path, [file for file in path.rglob("*") if file.is_file()]
         else:
-            beside = [path.with_suffix(end) for end in BESIDE] + [
+            sidecars = [path.with_suffix(end) for end in SIDECAR_ENDINGS] + [
                 Path(f"{path}{end}") for end in APPENDED
             ]
             folder, files = (
                 path.parent,
-                [file for file in {path, *beside} if path.is_file() and file.is_file()],
+                [file for file in {path, *sidecars} if path.is_file() and file.is_file()],
             )
         stamps = [(file.relative_to(folder).as_posix(), file.stat()) for file in files]
         return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stamps)
     return []
 
 
-def changed_files(told: Any, known: Any) -> str:
+def changed_files(new_stamps: Any, old_stamps: Any) -> str:
     """Which files of an input differ, in brackets, from the values of `with_files` as JSON gives
     them; empty where it names none.
 
@@ -96,9 +97,9 @@ def changed_files(told: Any, known: Any) -> str:
     ...     2]]])
     ' (b.laz)'
     """
-    names = sorted({name for name, *_ in stamps_in(told) ^ stamps_in(known)})
-    more = f" and {len(names) - SHOWN_FILES} more" if len(names) > SHOWN_FILES else ""
-    return f" ({', '.join(names[:SHOWN_FILES])}{more})" if names else ""
+    names = sorted({name for name, *_ in stamps_in(new_stamps) ^ stamps_in(old_stamps)})
+    text = f" and {len(names) - SHOWN_FILES} more" if len(names) > SHOWN_FILES else ""
+    return f" ({', '.join(names[:SHOWN_FILES])}{text})" if names else ""
 
 
 def stamps_in(value: Any) -> set[tuple[str, int, int]]:
@@ -114,14 +115,14 @@ def stamps_in(value: Any) -> set[tuple[str, int, int]]:
     return set().union(*map(stamps_in, value))
 
 
-def mark_of(inputs: dict[str, Any], salt: str) -> str:
+def compute_mark(inputs: dict[str, Any], salt: str) -> str:
     """The mark of a run.
 
     A slow digest with a salt where an address holds a password: nobody shall try them out on it.
     """
-    text, shown = (
-        json.dumps(told, sort_keys=True, default=str) for told in (inputs, masked_values(inputs))
+    text, masked = (
+        json.dumps(value, sort_keys=True, default=str) for value in (inputs, masked_values(inputs))
     )
-    if text == shown:
+    if text == masked:
         return hashlib.sha256((salt + text).encode()).hexdigest()
     return hashlib.scrypt(text.encode(), salt=salt.encode(), n=1 << 14, r=8, p=1, dklen=32).hex()

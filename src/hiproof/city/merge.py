@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..formats import FORMATS, OF_TILES, TILE_FOLDER, asked_files, asked_tile_files
+from ..formats import FORMATS, OF_TILES, TILE_FOLDER, requested_files, requested_tile_files
 from ..write.fragments import Fragments, load_fragments
 from ..write.run_files import join_fragments
 from .plan import WorkPlan
@@ -27,10 +27,10 @@ def merge(
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
-    join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.head)
+    join_fragments(whole_files(plan, out), iterate_fragments(plan, state, progress), plan.head)
 
 
-def parts_of(
+def iterate_fragments(
     plan: WorkPlan, state: Path, progress: Callable[[str, int, int], None]
 ) -> Iterator[Fragments]:
     for number, tile in enumerate(plan.tiles):
@@ -53,12 +53,12 @@ def output_files(plan: WorkPlan, out: Path) -> list[Path]:
 
 def whole_files(plan: WorkPlan, out: Path) -> dict[str, Path]:
     """Files of the whole area by format."""
-    return asked_files(plan.settings, out)
+    return requested_files(plan.settings, out)
 
 
 def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
     """Files of one work tile's models by format, where the settings ask for them."""
-    return asked_tile_files(plan.settings, out / TILE_FOLDER, tile)
+    return requested_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
 def write_tile(plan: WorkPlan, out: Path, tile: str, parts: list[Fragments]) -> None:

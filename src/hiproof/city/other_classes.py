@@ -46,7 +46,7 @@ class OtherPoints:
 
         `terrain` says how high they lie.
         """
-        ground, other = (points[within(area, points)] for points in (ground, other))
+        ground, other = (points[select_inside(area, points)] for points in (ground, other))
         return cls(
             area,
             ground,
@@ -58,21 +58,24 @@ class OtherPoints:
         return min(1.0, len(cells) * CELL_M2 / self.area.area)
 
 
-def bare_ground(points: OtherPoints) -> np.ndarray:
+def find_bare_cells(points: OtherPoints) -> np.ndarray:
     """The ground points (k, 3) in whose cells nothing of another class lies high: no leaves, no
     roof without a class.
     """
     if not len(points.high):
         return points.ground
-    return points.ground[~np.isin(cell_numbers(points.ground), cells_of(points.high))]
+    return points.ground[~np.isin(cell_numbers(points.ground), list_cells(points.high))]
 
 
-def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
+def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
     """The detail of a building without points of the building `classes`, empty where nothing else
     was seen either.
     """
-    bare = cells_of(points.ground)
-    share, share_bare = points.share(np.setdiff1d(cells_of(points.high), bare)), points.share(bare)
+    bare = list_cells(points.ground)
+    share, share_bare = (
+        points.share(np.setdiff1d(list_cells(points.high), bare)),
+        points.share(bare),
+    )
     none = f"no model: no points of class {' or '.join(map(str, classes))} inside the footprint"
     if share > MOSTLY:
         lie = f"over {100 * share:.0f} % of it {Doubt.POINTS_OF_OTHER_CLASSES.value}"
@@ -85,17 +88,17 @@ def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
     return ""
 
 
-def roof_of_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
+def remark_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
     """A remark where, over much of a building, only points of other classes lie high: in cells
     without `roof` points (n, 3) and without ground. Empty otherwise.
     """
     if not is_much(points.high, points):  # a point a cell: most buildings need no further look
         return ""
-    high = np.setdiff1d(cells_of(points.high), cells_of(np.concatenate([roof, points.ground])))
-    if not is_much(high, points):
+    upper = np.setdiff1d(list_cells(points.high), list_cells(np.concatenate([roof, points.ground])))
+    if not is_much(upper, points):
         return ""
     lie = (
-        f"over {100 * points.share(high):.0f} % of its outline, without points of its class, "
+        f"over {100 * points.share(upper):.0f} % of its outline, without points of its class, "
         f"{Doubt.POINTS_OF_OTHER_CLASSES.value}"
     )
     return f"{lie}: leaves, or a roof that --roofs shape finds"
@@ -115,16 +118,16 @@ def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
     One flight sees no ground through a roof, but two do where a house was built or pulled down
     between them.
     """
-    fewest = UNDER_ROOF * FEWEST_CELLS
-    if len(points.ground) < fewest:
+    minimum = UNDER_ROOF * FEWEST_CELLS
+    if len(points.ground) < minimum:
         return ""
     inner = shapely.buffer(points.area, -BESIDE_WALL_M)
-    ground = points.ground[within(inner, points.ground)]
-    if len(ground) < fewest:
+    ground = points.ground[select_inside(inner, points.ground)]
+    if len(ground) < minimum:
         return ""
-    seen = cells_of(roof[within(inner, roof)])
-    share = np.isin(seen, cells_of(ground)).sum() / max(len(seen), 1)
-    if len(seen) < FEWEST_CELLS or share <= UNDER_ROOF:
+    cells = list_cells(roof[select_inside(inner, roof)])
+    share = np.isin(cells, list_cells(ground)).sum() / max(len(cells), 1)
+    if len(cells) < FEWEST_CELLS or share <= UNDER_ROOF:
         return ""
     return (
         f"over {100 * share:.0f} % of its area {Doubt.GROUND_UNDER_ROOF.value}: two dates, or a "
@@ -132,12 +135,12 @@ def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
     )
 
 
-def within(area: shapely.Geometry, points: np.ndarray) -> np.ndarray:
+def select_inside(area: shapely.Geometry, points: np.ndarray) -> np.ndarray:
     """Whether (n,) points (n, 3) lie in `area` in plan."""
     return shapely.intersects_xy(area, points[:, 0], points[:, 1])
 
 
-def cells_of(points: np.ndarray) -> np.ndarray:
+def list_cells(points: np.ndarray) -> np.ndarray:
     """The whole-metre cells (k,) that points (n, 3) lie in, each once, as one number."""
     return np.unique(cell_numbers(points))
 

@@ -46,15 +46,15 @@ class Outlines:
         """Boxes (n, 4) of what each outline is moved with: its row, or itself where that is too
         long.
         """
-        own, labels = shapely.bounds(self.polygons), self.labels
-        low, high = (
+        bounds, labels = shapely.bounds(self.polygons), self.labels
+        lower, upper = (
             np.full((labels.max(initial=0) + 1, 2), np.inf),
             np.full((labels.max(initial=0) + 1, 2), -np.inf),
         )
-        np.fmin.at(low, labels, own[:, :2])
-        np.fmax.at(high, labels, own[:, 2:])
-        is_short = ((high - low).max(axis=1) <= MOST_ROW_M)[labels]
-        return np.where(is_short[:, None], np.hstack([low, high])[labels], own)
+        np.fmin.at(lower, labels, bounds[:, :2])
+        np.fmax.at(upper, labels, bounds[:, 2:])
+        is_short = ((upper - lower).max(axis=1) <= MOST_ROW_M)[labels]
+        return np.where(is_short[:, None], np.hstack([lower, upper])[labels], bounds)
 
     @functools.cached_property
     def members(self) -> list[np.ndarray]:

@@ -24,11 +24,11 @@ def claims(files: Iterable[Path], out: Path) -> list[Claim]:
     ]
 
 
-def broken_claims(known: Iterable[Claim], out: Path) -> list[str]:
+def broken_claims(claims: Iterable[Claim], out: Path) -> list[str]:
     """Names of those files that are gone or not as they were written; sizes are asked before
     digests.
     """
-    return [claim.name for claim in known if not stands(out / claim.name, claim)]
+    return [claim.name for claim in claims if not stands(out / claim.name, claim)]
 
 
 def stands(file: Path, claim: Claim) -> bool:

@@ -15,47 +15,47 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, InputWarning, OutputError
-from ..log import LOGGER, counted
-from ..masking import masked
-from ..parametric.file import HEAD, objects
-from ..parametric.override import KEYS, Override, override_of
-from ..read.attribute_columns import as_declared, where_known
-from ..read.footprints import attribute_rows, reading
+from ..log import LOGGER, count_things
+from ..masking import mask
+from ..parametric.file import HEAD_KEY, objects
+from ..parametric.override import KEYS, Override, read_override
+from ..read.attribute_columns import make_known_condition, restore_declared_types
+from ..read.footprints import attribute_rows, translate_read_errors
 from ..write.files import atomic
 from .ledger import Ledger
 from .merge import tile_parts
 from .plan import Job, WorkPlan
-from .table_values import LeftOut
+from .table_values import SkippedValues
 
-FILE, REDO = "overrides.jsonl", "redo.json"
-TABLES = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
-SHOWN = 5  # ids in a sentence; more would hide what is said
+OVERRIDES_FILE, REDO = "overrides.jsonl", "redo.json"
+TABLE_ENDINGS = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
+MOST_SHOWN_IDS = 5  # ids in a sentence; more would hide what is said
 
 
 def settle_overrides(
-    path: str | None, plan: WorkPlan, state: Path, ledger: Ledger, fresh: bool
+    path: str | None, plan: WorkPlan, state: Path, ledger: Ledger, is_new: bool
 ) -> None:
-    """Keep the overrides at `path` for the workers; of a run that is not `fresh`, open the tiles of
-    buildings whose override is another than before. Raises InputError for a file that cannot be
+    """Keep the overrides at `path` for the workers; of a run that is not `is_new`, open the tiles
+    of buildings whose override is another than before. Raises InputError for a file that cannot be
     read or contradicts itself.
     """
-    records = matched(dict(read_overrides(path)) if path else {}, plan)
-    digests = {index: digest_of(record) for index, record in records.items()}
-    with atomic(state / FILE) as beside:
-        Path(beside).write_text(
+    records = match_overrides(dict(read_overrides(path)) if path else {}, plan)
+    digests = {index: digest_override(record) for index, record in records.items()}
+    with atomic(state / OVERRIDES_FILE) as temporary:
+        Path(temporary).write_text(
             "".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())),
             encoding="utf-8",
         )
-    known = ledger.overrides()
-    changed = {index for index in digests | known if digests.get(index) != known.get(index)}
-    if fresh or not changed:
+    stored = ledger.overrides()
+    changed = {index for index in digests | stored if digests.get(index) != stored.get(index)}
+    if is_new or not changed:
         ledger.set_overrides(digests)
         return
     redo = tiles_to_redo(changed, plan, state, ledger)
-    with atomic(state / REDO) as beside:
-        Path(beside).write_text(json.dumps(redo), encoding="utf-8")
+    with atomic(state / REDO) as temporary:
+        Path(temporary).write_text(json.dumps(redo), encoding="utf-8")
     LOGGER.info(
-        "%s with another override than before to be redone", counted(len(changed), "building")
+        "%s with another override than before to be redone", count_things(len(changed), "building")
     )
     ledger.open_again([f"solve:{tile}" for tile in redo], digests)
 
@@ -67,15 +67,15 @@ def tiles_to_redo(
     tile not solved yet.
     """
     finished = {task.name for task in ledger.tasks() if task.state == "done"}
-    left, redo = load_redo(state), {}
+    remainder, redo = load_redo(state), {}
     for tile, members in plan.tiles.items():
-        own = changed.intersection(members)
+        overlap = changed.intersection(members)
         if not tile_parts(state, tile).exists():
-            own = set(members)
+            overlap = set(members)
         elif f"solve:{tile}" not in finished:
-            own |= set(left.get(tile, members))
-        if own:
-            redo[tile] = sorted(own)
+            overlap |= set(remainder.get(tile, members))
+        if overlap:
+            redo[tile] = sorted(overlap)
     return redo
 
 
@@ -83,24 +83,24 @@ def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """(id, record) of every override in a JSONL file or a table; those of a parameters.jsonl are
     lists of parts.
     """
-    seen: dict[str, dict[str, Any]] = {}
+    visited: dict[str, dict[str, Any]] = {}
     for where, record in override_records(path):
         try:
-            id = override_of(record).id
+            id = read_override(record).id
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
-        if id in seen and seen[id] != record:
+        if id in visited and visited[id] != record:
             raise InputError(
                 f"expected one override a building in {path}, got two that differ of {id!r}; keep "
                 "one"
             )
-        seen[id] = record
+        visited[id] = record
         yield id, record
 
 
 def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """(where, record) of every line or row."""
-    if str(path).lower().endswith(TABLES):
+    if str(path).lower().endswith(TABLE_ENDINGS):
         yield from (
             (f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1)
         )
@@ -122,7 +122,7 @@ def is_other_line(record: Any) -> bool:
     without a model.
     """
     return isinstance(record, dict) and (
-        HEAD in record or ("status" in record and not record.get("parts"))
+        HEAD_KEY in record or ("status" in record and not record.get("parts"))
     )
 
 
@@ -131,69 +131,79 @@ def table_records(path: str) -> list[dict[str, Any]]:
     import pyogrio
 
     def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
-        meta, _, _, columns = reading(
+        meta, _, _, columns = translate_read_errors(
             lambda: pyogrio.raw.read(str(path), read_geometry=False, where=where), path
         )
         return list(meta["fields"]), list(meta["dtypes"]), columns
 
     names, declared, columns = read()
-    columns = as_declared(
-        names, declared, columns, lambda name: read(where_known(name, None))[2][names.index(name)]
+    columns = restore_declared_types(
+        names,
+        declared,
+        columns,
+        lambda name: read(make_known_condition(name, None))[2][names.index(name)],
     )
     rows = attribute_rows(names, columns, len(columns[0]) if columns else 0)
-    left_out = LeftOut(masked(path))
+    left_out = SkippedValues(mask(path))
     records = [left_out.possible(row, str(row.get("id", ""))) for row in rows]
     left_out.warn()
     return records
 
 
-def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dict[str, Any]]:
+def match_overrides(
+    records: dict[str, dict[str, Any]], plan: WorkPlan
+) -> dict[int, dict[str, Any]]:
     """The overrides by the number of their building, with those that columns of the footprints
     hold; unknown ones are told.
     """
-    names, found, left = columns_of(plan), {}, dict(records)
-    impossible = LeftOut("columns of the footprints")
+    names, result, remainder = pair_columns(plan), {}, dict(records)
+    impossible = SkippedValues("columns of the footprints")
     for job in plan.jobs:
-        own = beside(column_override(job, names, impossible), left.pop(job.id, {}), job.id)
-        if own:
-            found[job.index] = {**own, "id": job.id}
+        override = merge_override(
+            column_override(job, names, impossible), remainder.pop(job.id, {}), job.id
+        )
+        if override:
+            result[job.index] = {**override, "id": job.id}
     impossible.warn()
-    if left:
-        some = ", ".join(list(left)[:SHOWN]) + (" and others" if len(left) > SHOWN else "")
+    if remainder:
+        subset = ", ".join(list(remainder)[:MOST_SHOWN_IDS]) + (
+            " and others" if len(remainder) > MOST_SHOWN_IDS else ""
+        )
         warnings.warn(
-            f"no building of this run for {len(left)} of {counted(len(records), 'override')}: "
-            f"{some}",
+            f"no building of this run for {len(remainder)} of "
+            f"{count_things(len(records), 'override')}: "
+            f"{subset}",
             InputWarning,
         )
-    return found
+    return result
 
 
-def beside(of_columns: dict[str, Any], of_file: dict[str, Any], id: str) -> dict[str, Any]:
+def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str) -> dict[str, Any]:
     """What a file says of building `id`, and of what columns say that which can be beside it.
 
     Raises InputError where columns contradict themselves.
 
-    >>> beside({"type": "hip", "z_ground": 2.5}, {"leave_out": True}, "a")
+    >>> merge_override({"type": "hip", "z_ground": 2.5}, {"leave_out": True}, "a")
     {'leave_out': True, 'z_ground': 2.5}
     """
     if of_columns:
-        override_of({**of_columns, "id": id})
-    both = dict(of_file)
+        read_override({**of_columns, "id": id})
+    combined = dict(of_file)
     for key, value in of_columns.items():
-        if of_file.get(key) in (None, "") and is_override({**both, key: value, "id": id}):
-            both[key] = value
-    return both
+        if of_file.get(key) in (None, "") and is_override({**combined, key: value, "id": id}):
+            combined[key] = value
+    return combined
 
 
 def is_override(record: dict[str, Any]) -> bool:
     try:
-        override_of(record)
+        read_override(record)
     except InputError:
         return False
     return True
 
 
-def columns_of(plan: WorkPlan) -> list[tuple[str, str]]:
+def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
     """(column of the footprints, key of an override) as the settings pair them.
 
     Raises InputError for those that are not there.
@@ -201,35 +211,37 @@ def columns_of(plan: WorkPlan) -> list[tuple[str, str]]:
     pairs = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
     if not plan.jobs:
         return []
-    known = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
-    refuse_others([column for column, _ in pairs], sorted(known), "columns of the footprints")
+    columns = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
+    refuse_others([column for column, _ in pairs], sorted(columns), "columns of the footprints")
     refuse_others([key for _, key in pairs], KEYS, "keys of an override")
     return pairs
 
 
-def refuse_others(told: list[str], known: Sequence[str], what: str) -> None:
-    """Raise InputError where something is told in the settings that is not `known`."""
-    other = [name for name in told if name not in known]
+def refuse_others(names: list[str], allowed: Sequence[str], subject: str) -> None:
+    """Raise InputError where something is told in the settings that is not `allowed`."""
+    other = [name for name in names if name not in allowed]
     if other:
         raise InputError(
-            f"expected {what} ({', '.join(known) or 'there are none'}) in the setting "
+            f"expected {subject} ({', '.join(allowed) or 'there are none'}) in the setting "
             f"override_columns, got {other[0]!r}; "
             'write COLUMN=KEY, such as "daktype=type"'
         )
 
 
-def column_override(job: Job, names: list[tuple[str, str]], impossible: LeftOut) -> dict[str, Any]:
+def column_override(
+    job: Job, names: list[tuple[str, str]], impossible: SkippedValues
+) -> dict[str, Any]:
     """The override in the columns of a building's footprint, empty where they say nothing; what
     cannot be is noted.
     """
     attributes = job.footprint.attributes if job.footprint else {}
-    found = impossible.possible(
+    result = impossible.possible(
         {key: attributes[name] for name, key in names if name in attributes}, job.id
     )
-    return {key: value for key, value in found.items() if (key, value) != ("leave_out", False)}
+    return {key: value for key, value in result.items() if (key, value) != ("leave_out", False)}
 
 
-def digest_of(record: dict[str, Any]) -> str:
+def digest_override(record: dict[str, Any]) -> str:
     return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()
 
 
@@ -253,11 +265,11 @@ def load_overrides(state: Path) -> dict[int, Override]:
     """The overrides of the run whose state is in `state`, by the number of their building; read
     once a process.
     """
-    path = state / FILE
-    return overrides_at(path, path.stat().st_mtime_ns) if path.exists() else {}
+    path = state / OVERRIDES_FILE
+    return parse_overrides(path, path.stat().st_mtime_ns) if path.exists() else {}
 
 
 @functools.lru_cache(maxsize=1)
-def overrides_at(path: Path, stamp: int) -> dict[int, Override]:
+def parse_overrides(path: Path, stamp: int) -> dict[int, Override]:
     with path.open(encoding="utf-8") as file:
-        return {index: override_of(record) for index, record in map(json.loads, file)}
+        return {index: read_override(record) for index, record in map(json.loads, file)}

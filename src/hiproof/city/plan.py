@@ -23,7 +23,7 @@ from ..read.crs import parse_crs
 from ..read.operations import Operation
 from ..settings import Settings
 from ..stages import without_needless_vertices
-from ..write.cityjson.features import offset_of
+from ..write.cityjson.features import choose_offset
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
 from ..write.parameters import crs_text
@@ -80,7 +80,7 @@ class WorkPlan:
     operations: tuple[Operation, ...] = ()
     others: tuple[shapely.Polygon, ...] = ()
 
-    def names_of(self, job: Job) -> tuple[str, str]:
+    def list_names(self, job: Job) -> tuple[str, str]:
         return self.names.get(job.index) or (job.id, gml_name(job.id))
 
     @property
@@ -127,9 +127,9 @@ class WorkPlan:
         """Units of the clouds' and the footprints' coordinates; everything in between counts in
         metres.
         """
-        from ..read.crs import units_of
+        from ..read.crs import find_units
 
-        return units_of(self.crs(), named=self.settings.read.unit)
+        return find_units(self.crs(), unit_name=self.settings.read.unit)
 
     def crs(self) -> Any:
         """The output's reference system, None where no input names one; by its code where that says
@@ -179,8 +179,7 @@ class WorkPlan:
             shift = registration.shift if registration else (0.0, 0.0)
             return WorkPlan(
                 jobs=tuple(
-                    job_of_row(i, *row, shift)
-                    for i, row in enumerate(zip(rows, areas, strict=True))
+                    read_job(i, *row, shift) for i, row in enumerate(zip(rows, areas, strict=True))
                 ),
                 tiles={name: tuple(members) for name, members in whole["tiles"].items()},
                 crs_wkt=whole["crs"],
@@ -197,17 +196,17 @@ class WorkPlan:
             ) from error
 
 
-def job_of_row(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
+def read_job(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
     """A building of the plan's file: [id, area, attributes, error]; no attributes without a
     footprint.
     """
     id, _, attributes, error = row
     if attributes is None:
         return Job(index, id, area, None, error and ErrorReport(*error))
-    return job_of_footprint(index, Footprint(id, area, attributes), shift)
+    return make_job(index, Footprint(id, area, attributes), shift)
 
 
-def job_of_footprint(index: int, footprint: Footprint, shift: tuple[float, float]) -> Job:
+def make_job(index: int, footprint: Footprint, shift: tuple[float, float]) -> Job:
     """The building of a footprint that lies `shift` beside its roof."""
     area = without_needless_vertices(footprint.polygon)[0]
     area = shapely.transform(area, lambda xy: xy + shift) if any(shift) else area
@@ -237,14 +236,14 @@ def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
     return unusual
 
 
-def offset_of_jobs(jobs: tuple[Job, ...], units: Units) -> np.ndarray:
+def choose_file_offset(jobs: tuple[Job, ...], units: Units) -> np.ndarray:
     """The CityJSON file's offset (3,) in its `units`, from the first area that is one."""
     corners = (units.from_metres(job.area.bounds[:2]) for job in jobs if not job.area.is_empty)
-    return next(map(offset_of, corners), np.zeros(3))
+    return next(map(choose_offset, corners), np.zeros(3))
 
 
-def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str, tuple[int, ...]]:
-    """Work tiles by name: the buildings whose area starts in the same square, at most `most` in a
+def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, limit: int) -> dict[str, tuple[int, ...]]:
+    """Work tiles by name: the buildings whose area starts in the same square, at most `limit` in a
     tile.
 
     A building belongs to the square of its lower left corner, so ownership needs no geometry and
@@ -256,12 +255,12 @@ def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str,
         squares.setdefault((math.floor(x / tile_m), math.floor(y / tile_m)), []).append(job.index)
     tiles = {}
     for (column, row), members in sorted(squares.items()):
-        for number, start in enumerate(range(0, len(members), most)):
-            tiles[f"{column}_{row}_{number}"] = tuple(members[start : start + most])
+        for number, start in enumerate(range(0, len(members), limit)):
+            tiles[f"{column}_{row}_{number}"] = tuple(members[start : start + limit])
     return tiles
 
 
-def jobs_of_footprints(
+def make_jobs(
     footprints: tuple[Footprint, ...], shift: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[Job, ...]:
     """One job a footprint, in the order of the file; all lie `shift` beside their roofs."""
@@ -270,7 +269,7 @@ def jobs_of_footprints(
             "expected at least one polygon in the footprints, got none; check the file and its "
             "layer"
         )
-    return tuple(job_of_footprint(i, f, shift) for i, f in enumerate(footprints))
+    return tuple(make_job(i, f, shift) for i, f in enumerate(footprints))
 
 
 def neighbourhood(job: Job, reach_m: float) -> np.ndarray:

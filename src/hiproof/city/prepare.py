@@ -11,12 +11,12 @@ import shapely
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
-from ..masking import masked
+from ..masking import mask
 from ..model import Footprint
-from ..read.overlap import told_box
+from ..read.overlap import format_box
 from ..settings import Settings
 from ..write.naming import FileUnits
-from ..write.reprojected import crs_of_files
+from ..write.reprojected import choose_file_crs
 from ..write.tables.geopackage import attributes_with_a_column
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
@@ -25,10 +25,10 @@ from .outlines import MOST_ROW_M
 from .plan import (
     Job,
     WorkPlan,
+    choose_file_offset,
     cut_into_tiles,
-    job_of_footprint,
-    jobs_of_footprints,
-    offset_of_jobs,
+    make_job,
+    make_jobs,
     unusual_names,
 )
 from .request import Box, Request
@@ -55,11 +55,11 @@ def make_plan(request: Request) -> WorkPlan:
     # opened only to be told now if it cannot be read, and not after all points are sorted
     terrain = read_terrain(request.terrain, frame.crs, frame.units) if request.terrain else None
     if terrain is not None and not request.footprints:
-        terrain.knows_any(places_over(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
+        terrain.knows_any(list_places(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
     settings = settle_classes(request.clouds, request.settings)
-    registration, operations, others = None, [], ()
+    registration, operations, neighbours = None, [], ()
     if request.footprints:
-        jobs, others, registration = jobs_from_footprints(request, headers, frame, settings)
+        jobs, neighbours, registration = jobs_from_footprints(request, headers, frame, settings)
         operations += footprint_operations(request, frame, jobs)
     else:
         jobs, settings = jobs_from_cloud(request.clouds, settings)
@@ -69,23 +69,23 @@ def make_plan(request: Request) -> WorkPlan:
         operations += terrain_operations(terrain, frame, jobs)
     units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
     if settings.write.out_crs:
-        out_crs = crs_of_files(frame.crs, settings.write.out_crs)
-        say_where_files_lie(jobs, out_crs, units)
+        out_crs = choose_file_crs(frame.crs, settings.write.out_crs)
+        warn_files_elsewhere(jobs, out_crs, units)
         operations += file_operations(frame, out_crs, jobs)
     return WorkPlan(
         jobs=jobs,
-        tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
+        tiles=cut_into_tiles(jobs, TILE_M, limit_buildings_per_tile(request.settings)),
         crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
         settings=settings,
         names=unusual_names(jobs),
-        translate=offset_of_jobs(jobs, units.cityjson),
+        translate=choose_file_offset(jobs, units.cityjson),
         registration=registration,
         operations=tuple(operations),
-        others=others,
+        others=neighbours,
     )
 
 
-def say_where_files_lie(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> None:
+def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> None:
     """One line where the CRS of the files is made for another place than that of the buildings."""
     from ..read.overlap import doubtful_place
 
@@ -115,23 +115,23 @@ def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
     )
     advice = "its values" if "height" in lies else "its CRS"
     warnings.warn(
-        f"{masked(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}",
+        f"{mask(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}",
         InputWarning,
     )
 
 
-def places_over(corners: np.ndarray) -> np.ndarray:
+def list_places(corners: np.ndarray) -> np.ndarray:
     """Places (k, 2), 8 by 8 of them over the box of `corners` (n, 2): where buildings are to be
     looked for first.
     """
     x, y = (
-        np.linspace(low, high, 8)
-        for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
+        np.linspace(lower, upper, 8)
+        for lower, upper in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
     )
     return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
 
 
-def most_buildings_a_tile(settings: Settings) -> int:
+def limit_buildings_per_tile(settings: Settings) -> int:
     """Progress is told by tiles, and the paper's objective takes seconds a building: there each is
     a tile of its own.
     """
@@ -142,7 +142,7 @@ def read_headers(clouds: tuple[str, ...]) -> list:
     """Headers of the point files that can be read and hold points; one that does not ends
     no run.
     """
-    from ..read.pointcloud import and_others, as_input_error, read_header
+    from ..read.pointcloud import as_input_error, format_others, read_header
 
     headers, errors = [], []
     for name in clouds:
@@ -160,7 +160,7 @@ def read_headers(clouds: tuple[str, ...]) -> list:
             else InputError(f"expected points in {', '.join(empty)}, got none; check the files")
         )
     if empty:
-        warnings.warn(f"{empty[0]}{and_others(empty)}: holds no points", InputWarning)
+        warnings.warn(f"{empty[0]}{format_others(empty)}: holds no points", InputWarning)
     return [header for header in headers if header.count]
 
 
@@ -174,7 +174,7 @@ def jobs_from_footprints(
     from .frame import plan_bounds
     from .registration import find_registration, is_registered, warn_if_moved
 
-    footprints = footprints_of(request, frame, where=request.where, bbox=request.bbox)
+    footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))
     say_if_columns_run_out(str(request.footprints), footprints)
@@ -192,24 +192,30 @@ def jobs_from_footprints(
     if registration is not None:
         warn_if_moved(registration, str(request.footprints))
         shift = registration.shift
-    others = [
-        job_of_footprint(0, footprint, shift).area for footprint in around(footprints, data_set)
+    areas = [
+        make_job(0, footprint, shift).area for footprint in select_neighbours(footprints, data_set)
     ]
-    return jobs_of_footprints(footprints, shift), tuple(others), registration
+    return make_jobs(footprints, shift), tuple(areas), registration
 
 
-def around(footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]) -> list[Footprint]:
+def select_neighbours(
+    footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]
+) -> list[Footprint]:
     """Those of the data set near the footprints that are asked for, and not these."""
     if data_set is footprints:
         return []
-    asked = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
-    known = set(shapely.to_wkb(asked).tolist())
-    others = [f for f in data_set if not f.polygon.is_empty and f.polygon.wkb not in known]
-    if not len(asked) or not others:
+    polygons_requested = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
+    own_polygons = set(shapely.to_wkb(polygons_requested).tolist())
+    neighbours = [
+        f for f in data_set if not f.polygon.is_empty and f.polygon.wkb not in own_polygons
+    ]
+    if not len(polygons_requested) or not neighbours:
         return []
-    polygons = np.array([f.polygon for f in others])
-    near = shapely.STRtree(asked).query(polygons, predicate="dwithin", distance=MOST_ROW_M)[0]
-    return [others[i] for i in np.unique(near)]
+    polygons = np.array([f.polygon for f in neighbours])
+    nearby = shapely.STRtree(polygons_requested).query(
+        polygons, predicate="dwithin", distance=MOST_ROW_M
+    )[0]
+    return [neighbours[i] for i in np.unique(nearby)]
 
 
 def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[Footprint, ...]:
@@ -229,12 +235,12 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)
-        return footprints_of(
+        return read_requested_footprints(
             request, frame, where=request.where if is_database(path) else None, bbox=box
         )
 
 
-def footprints_of(
+def read_requested_footprints(
     request: Request, frame: AreaFrame, where: str | None, bbox: Box | None
 ) -> tuple[Footprint, ...]:
     from ..read.footprints import read_footprints
@@ -258,8 +264,8 @@ def footprint_operations(
     """
     if frame.cloud is None or frame.footprints is None:
         return []
-    return operations_between(
-        masked(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs
+    return list_operations(
+        mask(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs
     )
 
 
@@ -273,10 +279,10 @@ def terrain_operations(
 
     if frame.crs is None or terrain.own_crs is None:
         return []
-    found = operations_between(masked(terrain.path), frame.crs, terrain.own_crs, frame, jobs)
-    for operation in found:
+    result = list_operations(mask(terrain.path), frame.crs, terrain.own_crs, frame, jobs)
+    for operation in result:
         warn_if_coarse(operation)
-    return found
+    return result
 
 
 def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> list[Operation]:
@@ -285,13 +291,13 @@ def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> li
     """
     from ..read.operations import warn_if_coarse
 
-    found = operations_between("--out-crs", frame.crs, out_crs, frame, jobs)
-    for operation in found:
+    result = list_operations("--out-crs", frame.crs, out_crs, frame, jobs)
+    for operation in result:
         warn_if_coarse(operation)
-    return found
+    return result
 
 
-def operations_between(
+def list_operations(
     subject: str, source: Any, target: Any, frame: AreaFrame, jobs: tuple[Job, ...]
 ) -> list[Operation]:
     """The operation from `source` to `target` in plan where the buildings stand; none where both
@@ -299,7 +305,7 @@ def operations_between(
     """
     from ..read.crs import horizontal_crs, names_place, same_horizontal
     from ..read.operations import find_operation
-    from ..read.overlap import reprojected
+    from ..read.overlap import reproject_positions
 
     boxes = shapely.bounds([job.area for job in jobs])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
@@ -310,7 +316,7 @@ def operations_between(
     ):
         return []
     middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
-    x, y = reprojected(middle, frame.crs, source)[0]
+    x, y = reproject_positions(middle, frame.crs, source)[0]
     return [
         find_operation(
             subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y))
@@ -325,7 +331,7 @@ def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) 
     count = len({name for footprint in footprints for name in footprint.attributes})
     if count > (room := attributes_with_a_column()):
         warnings.warn(
-            f"{masked(str(path))}: has {count:,} attributes; buildings.gpkg holds the first "
+            f"{mask(str(path))}: has {count:,} attributes; buildings.gpkg holds the first "
             f"{room:,}, because its tables have at "
             "most 2,000 columns, and the other files hold all",
             InputWarning,
@@ -359,13 +365,14 @@ def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
         return
     extent = [*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)]
     raise InputError(
-        f"expected a --bbox that meets the clouds, which lie in {told_box(extent)}, got "
-        f"{told_box(bbox)}; give it in their coordinates"
+        f"expected a --bbox that meets the clouds, which lie in {format_box(extent)}, got "
+        f"{format_box(bbox)}; give it in their coordinates"
     )
 
 
 def nothing_in(bbox: Box) -> str:
     return (
-        f"expected buildings in --bbox {told_box(bbox)}, got none; it is in the coordinates of the "
+        f"expected buildings in --bbox {format_box(bbox)}, got none; it is in the coordinates of "
+        "the "
         "clouds"
     )

@@ -17,12 +17,12 @@ from .plan import load_plan
 TRIES = 3
 
 
-def run_alone(alone: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
+def run_isolated(single: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
     """(result, error) of `function(*task)` in an isolated executor, tried again when its process
     dies.
     """
     for _ in range(TRIES):
-        ((_, result, error),) = alone.run(function, [task])
+        ((_, result, error),) = single.run(function, [task])
         if not is_loss(error):
             break
     return result, error
@@ -34,21 +34,23 @@ def is_loss(error: Exception | None) -> bool:
 
 
 def solve_in_quarantine(
-    alone: Any, function: Callable, task: tuple
+    single: Any, function: Callable, task: tuple
 ) -> tuple[Any, Exception | None]:
     """The rows of `solve_tile` for its arguments `task` (folder, tile, terrain), without the
     buildings that kill their process: they become internal errors.
 
     Where the tile as a whole kills its process even alone, its buildings are tried one by one.
     """
-    result, error = run_alone(alone, function, task)
+    result, error = run_isolated(single, function, task)
     if not is_loss(error):
         return result, error
     folder, tile, _ = task
     members = load_plan(Path(folder)).tiles[tile]
 
     def is_deadly(index: int) -> bool:
-        others = tuple(i for i in members if i != index)
-        return not others or is_loss(run_alone(alone, function, (*task, others))[1])
+        selected_members = tuple(i for i in members if i != index)
+        return not selected_members or is_loss(
+            run_isolated(single, function, (*task, selected_members))[1]
+        )
 
-    return run_alone(alone, function, (*task, tuple(filter(is_deadly, members))))
+    return run_isolated(single, function, (*task, tuple(filter(is_deadly, members))))

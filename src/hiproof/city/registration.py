@@ -16,17 +16,17 @@ import numpy as np
 import shapely
 
 from ..errors import InputWarning, is_interrupt
-from ..fit.registration import FARTHEST_M, Registration, register
+from ..fit.registration import FARTHEST_SHIFT_M, Registration, register
 from ..frames import Units
 from ..geometry.grid import number_cells
-from ..masking import masked
+from ..masking import mask
 from ..model import Footprint, PointCloud
 from ..read.las import is_copc
 from ..read.lax import read_lax
 from ..read.pointcloud import PointFileHeader, file_kind, iter_points
 from ..settings import Settings
 
-CELL_M = 250.0
+SAMPLE_CELL_M = 250.0
 """Side (m) of the squares of the world that are sampled: some dozens of houses."""
 
 ENOUGH_FOOTPRINTS, MOST_CELLS, MOST_FILES = 400, 16, 8
@@ -35,7 +35,7 @@ ENOUGH_FOOTPRINTS, MOST_CELLS, MOST_FILES = 400, 16, 8
 The others bound what is read for it.
 """
 
-AROUND_M = FARTHEST_M + 1.0
+CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
 """How far (m) around a square footprints bear on its points."""
 
 Cell = tuple[int, int]
@@ -58,16 +58,16 @@ def find_registration(
     `headers`.
     """
     polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
-    boxes = boxes_of(headers, units)
+    boxes = read_boxes(headers, units)
     number_of = footprints_by_cell(polygons)
-    cells, files = sampled(number_of, boxes)
+    cells, files = sample_cells(number_of, boxes)
     points = points_by_cell(
         cells, [headers[i].path for i in sorted(files)], units, settings.read.building_classes
     )
     tree = shapely.STRtree(polygons)
-    seen = [cell for cell in cells if cell in points]
-    found = register((points[cell], polygons_near(tree, cell)) for cell in seen)
-    return dataclasses.replace(found, footprints=sum(number_of[cell] for cell in seen))
+    selected_cells = [cell for cell in cells if cell in points]
+    result = register((points[cell], find_polygons(tree, cell)) for cell in selected_cells)
+    return dataclasses.replace(result, footprints=sum(number_of[cell] for cell in selected_cells))
 
 
 def warn_if_moved(registration: Registration, path: str) -> None:
@@ -75,7 +75,7 @@ def warn_if_moved(registration: Registration, path: str) -> None:
     if registration.is_clear:
         (x, y), sigma = registration.xy, max(registration.sigma)
         warnings.warn(
-            f"{masked(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, "
+            f"{mask(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, "
             f"{y:.2f}) m, with a standard "
             f"deviation of {sigma:.2f} m; check the CRS of footprints and clouds, or keep them in "
             "place with --align off",
@@ -83,7 +83,7 @@ def warn_if_moved(registration: Registration, path: str) -> None:
         )
 
 
-def boxes_of(headers: list[PointFileHeader], units: Units) -> np.ndarray:
+def read_boxes(headers: list[PointFileHeader], units: Units) -> np.ndarray:
     """Boxes (n, 4) of point files in world metres; the whole plane where a header knows none."""
     bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
     boxes = units.to_metres(bounds.reshape(-1, 2)).reshape(-1, 4)
@@ -94,12 +94,14 @@ def boxes_of(headers: list[PointFileHeader], units: Units) -> np.ndarray:
 
 def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
     """How many footprints have their lower left corner in each square that has any."""
-    low = np.floor(shapely.bounds(polygons).reshape(-1, 4)[:, :2] / CELL_M).astype(np.int64)
-    places, counts = np.unique(low, axis=0, return_counts=True)
+    lower = np.floor(shapely.bounds(polygons).reshape(-1, 4)[:, :2] / SAMPLE_CELL_M).astype(
+        np.int64
+    )
+    places, counts = np.unique(lower, axis=0, return_counts=True)
     return {(int(i), int(j)): int(n) for (i, j), n in zip(places, counts, strict=True)}
 
 
-def sampled(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:
+def sample_cells(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:
     """Squares to look at, drawn by a hash of their place, and the numbers of the files that hold
     them.
 
@@ -108,8 +110,8 @@ def sampled(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], 
     cells: list[Cell] = []
     files: set[int] = set()
     footprints = 0
-    for cell in sorted(number_of, key=hash_of):
-        meeting = set(np.flatnonzero(meets(boxes, box_of(cell))).tolist())
+    for cell in sorted(number_of, key=hash_cell):
+        meeting = set(np.flatnonzero(meets(boxes, expand_cell(cell))).tolist())
         if not meeting or len(files | meeting) > max(MOST_FILES, len(meeting)):
             continue
         files |= meeting
@@ -120,15 +122,15 @@ def sampled(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], 
     return cells, files
 
 
-def hash_of(cell: Cell) -> bytes:
+def hash_cell(cell: Cell) -> bytes:
     """A number as good as a draw, the same on every machine."""
     return hashlib.blake2b(f"{cell[0]} {cell[1]}".encode(), digest_size=8).digest()
 
 
-def box_of(cell: Cell, around_m: float = 0.0) -> tuple[float, float, float, float]:
+def expand_cell(cell: Cell, around_m: float = 0.0) -> tuple[float, float, float, float]:
     """The square of a cell with a margin: (xmin, ymin, xmax, ymax)."""
-    x, y = CELL_M * cell[0], CELL_M * cell[1]
-    return x - around_m, y - around_m, x + CELL_M + around_m, y + CELL_M + around_m
+    x, y = SAMPLE_CELL_M * cell[0], SAMPLE_CELL_M * cell[1]
+    return x - around_m, y - around_m, x + SAMPLE_CELL_M + around_m, y + SAMPLE_CELL_M + around_m
 
 
 def meets(boxes: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
@@ -136,9 +138,11 @@ def meets(boxes: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarr
     return np.all(boxes[:, :2] <= box[2:], axis=1) & np.all(boxes[:, 2:] >= box[:2], axis=1)
 
 
-def polygons_near(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
+def find_polygons(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
     """The footprints in and around a cell."""
-    return list(tree.geometries[np.sort(tree.query(shapely.box(*box_of(cell, AROUND_M))))])
+    return list(
+        tree.geometries[np.sort(tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M))))]
+    )
 
 
 def points_by_cell(
@@ -147,21 +151,21 @@ def points_by_cell(
     """Roof points (n, 2) of the `cells`, of all files that can be read: the step that sorts points
     names the others.
     """
-    found: dict[Cell, list[np.ndarray]] = {}
-    wanted = set(cells)
+    result: dict[Cell, list[np.ndarray]] = {}
+    targets = set(cells)
     for path in paths:
         for cloud in readable_chunks(path, cells, units):
             xy = cloud.xyz[np.isin(cloud.classes, building_classes), :2]
-            for cell, own in split_by_cell(xy, wanted):
-                found.setdefault(cell, []).append(own)
-    return {cell: np.concatenate(parts) for cell, parts in found.items()}
+            for cell, points in split_by_cell(xy, targets):
+                result.setdefault(cell, []).append(points)
+    return {cell: np.concatenate(parts) for cell, parts in result.items()}
 
 
-def split_by_cell(xy: np.ndarray, wanted: set[Cell]) -> Iterator[tuple[Cell, np.ndarray]]:
+def split_by_cell(xy: np.ndarray, targets: set[Cell]) -> Iterator[tuple[Cell, np.ndarray]]:
     """The points (n, 2) of each wanted cell among `xy`."""
-    places, number = number_cells(np.floor(xy / CELL_M))
+    places, number = number_cells(np.floor(xy / SAMPLE_CELL_M))
     for k, (i, j) in enumerate(places.tolist()):
-        if (i, j) in wanted:
+        if (i, j) in targets:
             yield (i, j), xy[number == k]
 
 
@@ -170,7 +174,7 @@ def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[Poin
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # the step that sorts points says them
         try:
-            for chunks in chunks_of(path, cells, units):
+            for chunks in read_chunks(path, cells, units):
                 yield from chunks
         except MemoryError:
             raise
@@ -179,9 +183,9 @@ def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[Poin
                 raise KeyboardInterrupt from error
 
 
-def chunks_of(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[PointCloud]]:
+def read_chunks(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[PointCloud]]:
     """What to read of a file: of one with a spatial index only what lies near the cells."""
-    boxes = [box_of(cell) for cell in cells]
+    boxes = [expand_cell(cell) for cell in cells]
     if file_kind(path) != "las":
         return [iter_points(path, units=units)]
     if is_copc(path):
@@ -189,5 +193,5 @@ def chunks_of(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[P
     index = read_lax(path)
     if index is None:
         return [iter_points(path, units=units)]
-    own = units.from_metres(np.array(boxes).reshape(-1, 2)).reshape(-1, 4)
-    return [iter_points(path, runs=index.runs_meeting(own), units=units)]
+    file_boxes = units.from_metres(np.array(boxes).reshape(-1, 2)).reshape(-1, 4)
+    return [iter_points(path, runs=index.find_runs(file_boxes), units=units)]

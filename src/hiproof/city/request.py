@@ -11,7 +11,7 @@ from ..settings import Settings
 Box = tuple[float, float, float, float]
 NO_MATTER = {"decides": "nothing"}
 WHICH = {"decides": "which buildings"}
-FILES = {"names": "files"}
+FILES_FIELD = {"names": "files"}
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Request:
     'likelihood'
     """
 
-    clouds: tuple[str, ...] = field(metadata=FILES)
+    clouds: tuple[str, ...] = field(metadata=FILES_FIELD)
     out: Path = field(metadata=NO_MATTER)
-    footprints: str | None = field(default=None, metadata=WHICH | FILES)
-    terrain: str | None = field(default=None, metadata=FILES)
+    footprints: str | None = field(default=None, metadata=WHICH | FILES_FIELD)
+    terrain: str | None = field(default=None, metadata=FILES_FIELD)
     id_attribute: str | None = field(default=None, metadata=WHICH)
     layer: str | None = field(default=None, metadata=WHICH)
     settings: Settings = field(default_factory=Settings)

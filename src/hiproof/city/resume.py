@@ -13,14 +13,14 @@ from pathlib import Path
 from .. import __version__
 from ..errors import OutputError, OutputWarning
 from ..formats import FORMATS
-from ..log import LOGGER, counted
+from ..log import LOGGER, count_things
 from ..masking import masked_values
 from ..write.files import atomic
 from . import noted
 from .bundles import remove_bundles
 from .changed import take_over
 from .ledger import Ledger, Task
-from .marks import changed_files, choice_of, inputs_of, mark_of
+from .marks import changed_files, compute_mark, describe_inputs, describe_selection
 from .merge import remove_tiles, tile_parts, whole_files
 from .outputs import broken_claims
 from .overrides import REDO, settle_overrides
@@ -76,17 +76,17 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
     """The plan of an earlier run of the same request whose files stand as it left them, else a new
     one; where the footprints changed since, a new one that takes over what is known of the others.
     """
-    fresh = False
+    new_items = False
     plan = None if request.restart else plan_to_go_on(request, state, ledger)
-    if plan is None or ledger.get("choice") != mark_of(
-        choice_of(request), ledger.get("salt") or ""
+    if plan is None or ledger.get("choice") != compute_mark(
+        describe_selection(request), ledger.get("salt") or ""
     ):
         old, plan = plan, make_plan(request)
-        fresh = old is None or not take_over(plan, old, state, ledger)
-        if fresh:
+        new_items = old is None or not take_over(plan, old, state, ledger)
+        if new_items:
             begin(plan, request, state, ledger)
         enter(request, ledger)
-    settle_overrides(request.overrides, plan, state, ledger, fresh=fresh)
+    settle_overrides(request.overrides, plan, state, ledger, is_new=new_items)
     if ledger.open_tasks("solve") and not any((state / "points").iterdir()):
         # somebody made room: without points, the buildings that are left would come out as ones
         # that have none
@@ -94,10 +94,10 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
     LOGGER.info(
         "version %s %s in %s: %s in %s",
         __version__,
-        "begins" if fresh else "goes on",
+        "begins" if new_items else "goes on",
         request.out,
-        counted(len(plan.jobs), "building"),
-        counted(len(plan.tiles), "work tile"),
+        count_things(len(plan.jobs), "building"),
+        count_things(len(plan.tiles), "work tile"),
     )
     return plan
 
@@ -107,7 +107,7 @@ def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | N
 
     Raises OutputError for another's.
     """
-    inputs = inputs_of(request)
+    inputs = describe_inputs(request)
     if ledger.get("mark") is None or not (is_of(inputs, ledger) or is_begun(ledger)):
         return None
     refuse_other_inputs(request.out, inputs, ledger)
@@ -120,10 +120,10 @@ def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | N
 
 def begin(plan: WorkPlan, request: Request, state: Path, ledger: Ledger) -> None:
     """Put the run on `plan`, with nothing done yet."""
-    remove_unasked(plan, Path(request.out), ledger)
+    remove_unrequested(plan, Path(request.out), ledger)
     forget(state, ledger)
-    with atomic(state / PLAN_FILE) as beside:
-        plan.save(Path(beside))
+    with atomic(state / PLAN_FILE) as temporary:
+        plan.save(Path(temporary))
     ledger.add_tasks([Task(f"sort:{i}", "sort", 0) for i in range(len(request.clouds))])
     ledger.add_tasks(
         [Task(f"solve:{tile}", "solve", len(members)) for tile, members in plan.tiles.items()]
@@ -132,15 +132,18 @@ def begin(plan: WorkPlan, request: Request, state: Path, ledger: Ledger) -> None
 
 def enter(request: Request, ledger: Ledger) -> None:
     """Enter whose run it is, which makes it one to go on from."""
-    inputs, salt = inputs_of(request), secrets.token_hex(16)
-    told = json.dumps(masked_values(inputs), default=str)
-    marks = {"mark": mark_of(inputs, salt), "choice": mark_of(choice_of(request), salt)}
-    ledger.set(inputs=told, salt=salt, started=str(time.time()), **marks)
+    inputs, salt = describe_inputs(request), secrets.token_hex(16)
+    text = json.dumps(masked_values(inputs), default=str)
+    marks = {
+        "mark": compute_mark(inputs, salt),
+        "choice": compute_mark(describe_selection(request), salt),
+    }
+    ledger.set(inputs=text, salt=salt, started=str(time.time()), **marks)
 
 
 def is_of(inputs: dict, ledger: Ledger) -> bool:
     """Whether the run in the folder is that of these inputs."""
-    return ledger.get("mark") == mark_of(inputs, ledger.get("salt") or "")
+    return ledger.get("mark") == compute_mark(inputs, ledger.get("salt") or "")
 
 
 def is_begun(ledger: Ledger) -> bool:
@@ -154,14 +157,14 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     """Raise OutputError, naming what differs, where the folder holds a run of another request."""
     if is_of(inputs, ledger):
         return
-    known, told = (
+    old_inputs, new_inputs = (
         json.loads(ledger.get("inputs") or "{}"),
         json.loads(json.dumps(masked_values(inputs), default=str)),
     )
     other = [
-        name + changed_files(told.get(name), known.get(name))
-        for name in told | known
-        if told.get(name) != known.get(name)
+        name + changed_files(new_inputs.get(name), old_inputs.get(name))
+        for name in new_inputs | old_inputs
+        if new_inputs.get(name) != old_inputs.get(name)
     ]
     raise OutputError(
         f"expected {out} to be new or to hold a run of the same inputs, settings and version, got "
@@ -205,11 +208,11 @@ def has_parts(plan: WorkPlan, state: Path) -> bool:
     return all(tile_parts(state, tile).exists() for tile in plan.tiles)
 
 
-def remove_unasked(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
+def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
     """Remove files that an earlier run wrote and this one will not: they would pass for its own."""
-    earlier, asked = {claim.name for claim in ledger.claims()}, whole_files(plan, out).values()
+    earlier, requested = {claim.name for claim in ledger.claims()}, whole_files(plan, out).values()
     for name in (format.file for format in FORMATS.values() if format.fragment):
-        if name in earlier and out / name not in asked:
+        if name in earlier and out / name not in requested:
             (out / name).unlink(missing_ok=True)
 
 
@@ -221,6 +224,6 @@ def forget(state: Path, ledger: Ledger) -> None:
     remove_bundles(state.parent)
     ledger.forget()
     (state / REDO).unlink(missing_ok=True)
-    for name in ("tiles", "points", noted.FOLDER):
+    for name in ("tiles", "points", noted.NOTED_FOLDER):
         shutil.rmtree(state / name, ignore_errors=True)
         (state / name).mkdir()

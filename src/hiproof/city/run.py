@@ -19,25 +19,25 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError, OutputError
-from ..formats import places_of_models
+from ..formats import list_model_paths
 from ..frames import METRES, Units
-from ..log import LOGGER, counted
-from ..masking import masked, masked_values
+from ..log import LOGGER, count_things
+from ..masking import mask, masked_values
 from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
-from .bundles import bundles_of, remove_bundles
+from .bundles import find_bundle_folder, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
 from .executors import make_executor
-from .from_overture import kept_or_named, source_of
+from .from_overture import choose_footprints, read_source
 from .ledger import Failure, Ledger
-from .lock import held
+from .lock import hold_folder
 from .merge import merge, output_files
 from .outputs import claims
 from .overrides import REDO, load_redo
 from .plan import WorkPlan
-from .quarantine import is_loss, run_alone, solve_in_quarantine
+from .quarantine import is_loss, run_isolated, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
 from .tasks import MAIN_JOB, ONE_PRIMITIVE, RECOGNISING, WITHOUT_FOOTPRINTS, solve_tile, sort_cloud
@@ -88,11 +88,11 @@ def reconstruct_area(
     """
     refuse_unusable(request)
     state = open_state(request.out)
-    with held(state):
-        return reconstruct_alone(request, state, progress)
+    with hold_folder(state):
+        return reconstruct_in_folder(request, state, progress)
 
 
-def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summary:
+def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> Summary:
     """The steps of a run that has its folder `state` to itself."""
     clock = Clock()
     executor = make_executor(request.processes or 1, request.scheduler)
@@ -100,10 +100,10 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
     try:
         plan = resume_or_plan(request, state, ledger)
         if request.processes is None and not request.scheduler:
-            executor = make_executor(processes_for(request, plan, state, ledger))
+            executor = make_executor(count_processes(request, plan, state, ledger))
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
-            executor.prepare(pieces_of(request))
+            executor.prepare(list_compiled_pieces(request))
         clock.lap("prepare")
         arguments = functools.partial(task_arguments, request, state)
         work_off(ledger, executor, "sort", sort_cloud, arguments, progress)
@@ -117,7 +117,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         summary = summarise(request, plan, ledger, clock)
         LOGGER.info(
             "%s: %s; seconds: %s",
-            counted(summary.buildings, "building"),
+            count_things(summary.buildings, "building"),
             summary.by_status,
             summary.seconds,
         )
@@ -138,14 +138,17 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         ledger.close()
 
 
-def processes_for(request: Request, plan: WorkPlan, state: Path, ledger: Ledger) -> int:
+def count_processes(request: Request, plan: WorkPlan, state: Path, ledger: Ledger) -> int:
     """As many as pay for the buildings that are left to do."""
-    left, redo = [name.partition(":")[2] for name in ledger.open_tasks("solve")], load_redo(state)
-    buildings = sum(len(redo.get(tile, plan.tiles[tile])) for tile in left)
-    return as_many_as_pay(buildings, len(left), request.footprints is not None)
+    remainder, redo = (
+        [name.partition(":")[2] for name in ledger.open_tasks("solve")],
+        load_redo(state),
+    )
+    buildings = sum(len(redo.get(tile, plan.tiles[tile])) for tile in remainder)
+    return as_many_as_pay(buildings, len(remainder), request.footprints is not None)
 
 
-def pieces_of(request: Request) -> tuple[str, ...]:
+def list_compiled_pieces(request: Request) -> tuple[str, ...]:
     """What of the compiled code the run needs."""
     besides = RECOGNISING if asks_network(request.settings) else ()
     if request.footprints is None:
@@ -161,8 +164,8 @@ class Clock:
         self.seconds: dict[str, float] = {}
 
     def lap(self, step: str) -> None:
-        now = time.perf_counter()
-        self.seconds[step], self.start = round(now - self.start, 3), now
+        current = time.perf_counter()
+        self.seconds[step], self.start = round(current - self.start, 3), current
 
 
 def work_off(
@@ -180,12 +183,14 @@ def work_off(
     """
     total = len([task for task in ledger.tasks() if task.kind == kind])
     while names := ledger.open_tasks(kind):
-        done = total - len(names)
-        progress(kind, done, total)
+        finished = total - len(names)
+        progress(kind, finished, total)
         suspects = [name for name in names if ledger.losses(name) >= MOST_LOSSES]
         for name in suspects:
-            work_off_alone(ledger, executor, kind, name, function, arguments(name))
-        tasks = started(ledger, [name for name in names if name not in set(suspects)], arguments)
+            run_task_isolated(ledger, executor, kind, name, function, arguments(name))
+        tasks = iterate_started(
+            ledger, [name for name in names if name not in set(suspects)], arguments
+        )
         for task, result, error in executor.run(function, tasks):
             name = f"{kind}:{task[1]}"
             if is_loss(error):
@@ -194,12 +199,14 @@ def work_off(
                     "%s was lost (%s) and is tried again", name, error or "out of memory"
                 )
                 continue
-            done += 1
+            finished += 1
             record(ledger, kind, name, result, error)
-            progress(kind, done, total)
+            progress(kind, finished, total)
 
 
-def started(ledger: Ledger, names: list[str], arguments: Callable[[str], tuple]) -> Iterator[tuple]:
+def iterate_started(
+    ledger: Ledger, names: list[str], arguments: Callable[[str], tuple]
+) -> Iterator[tuple]:
     """The tasks' arguments, each entered as running when an executor takes it."""
     for name in names:
         ledger.start(name)
@@ -238,7 +245,9 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
                 )
                 LOGGER.log(level, "building %s: %s", outcome.id, outcome.detail)
         LOGGER.info(
-            "%s is done: %s", name, counted(len(result), "building") if kind == "solve" else result
+            "%s is done: %s",
+            name,
+            count_things(len(result), "building") if kind == "solve" else result,
         )
     elif kind == "sort" and isinstance(error, InputError):
         ledger.finish(name, "failed", str(error))
@@ -247,16 +256,16 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
         raise error
 
 
-def work_off_alone(
+def run_task_isolated(
     ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple
 ) -> None:
     """A task whose process died again and again, in a process of its own; see quarantine.py."""
     LOGGER.warning(
-        "%s was lost %s and is now tried alone", name, counted(ledger.losses(name), "time")
+        "%s was lost %s and is now tried alone", name, count_things(ledger.losses(name), "time")
     )
-    with closing(executor.isolated()) as alone:
-        result, error = (solve_in_quarantine if kind == "solve" else run_alone)(
-            alone, function, task
+    with closing(executor.isolate()) as single:
+        result, error = (solve_in_quarantine if kind == "solve" else run_isolated)(
+            single, function, task
         )
     if is_loss(error):
         died = "the process died each time it read this file; not enough memory, or a damaged file"
@@ -285,11 +294,12 @@ def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
     for task in tasks:
         if task.state == "done":
             classes.update({int(c): n for c, n in json.loads(task.message)["classes"].items()})
-    wanted = plan.settings.read.building_classes
-    if sum(classes.values()) and not any(classes[c] for c in wanted):
-        present = ", ".join(f"{c} ({counted(n, 'point')})" for c, n in sorted(classes.items()))
+    building_classes = plan.settings.read.building_classes
+    if sum(classes.values()) and not any(classes[c] for c in building_classes):
+        present = ", ".join(f"{c} ({count_things(n, 'point')})" for c, n in sorted(classes.items()))
         raise InputError(
-            f"expected points of building class {', '.join(map(str, wanted))}, got classes "
+            f"expected points of building class {', '.join(map(str, building_classes))}, got "
+            "classes "
             f"{present}; "
             "say which class holds roofs with --building-class"
         )
@@ -300,7 +310,7 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
     failed = [task for task in ledger.tasks() if task.state == "failed"]
     broken = tuple((request_name(task.name, request), task.message) for task in failed)
     return Summary(
-        models=tuple(places_of_models(plan.settings, Path(request.out))),
+        models=tuple(list_model_paths(plan.settings, Path(request.out))),
         buildings=sum(ledger.counts("status").values()),
         by_status=ledger.counts("status"),
         by_type=ledger.counts("type"),
@@ -311,31 +321,31 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
         seconds=clock.seconds,
         units=plan.head.units.gml,
         doubts=ledger.doubts(),
-        bundles=bundles_of(Path(request.out)),
+        bundles=find_bundle_folder(Path(request.out)),
         by_quality=ledger.counts("quality"),
     )
 
 
 def request_name(task: str, request: Request) -> str:
     kind, key = task.split(":", 1)
-    return masked(request.clouds[int(key)]) if kind == "sort" else task
+    return mask(request.clouds[int(key)]) if kind == "sort" else task
 
 
 def median(values: list) -> float | None:
-    known = sorted(v for v in values if v is not None)
-    return known[len(known) // 2] if known else None
+    selected_values = sorted(v for v in values if v is not None)
+    return selected_values[len(selected_values) // 2] if selected_values else None
 
 
 def mean(values: list) -> float | None:
-    known = [v for v in values if v is not None]
-    return math.fsum(known) / len(known) if known else None
+    selected_values = [v for v in values if v is not None]
+    return math.fsum(selected_values) / len(selected_values) if selected_values else None
 
 
 def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
     """run.json: version, effective settings, inputs, counts, timings: the only file of a run that
     knows the time.
     """
-    footprints = kept_or_named(request)
+    footprints = choose_footprints(request)
     record = {
         "hiproof": __version__,
         "settings": plan.settings.to_dict(),
@@ -350,11 +360,11 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
             "overrides": request.overrides,
             "started_in": str(Path.cwd()),  # what is not an address or absolute is meant from there
         },
-        "footprints_source": source_of(footprints),
+        "footprints_source": read_source(footprints),
         "crs": plan.crs_wkt,
         "transformations": [operation.to_dict() for operation in plan.operations],
         "registration": plan.registration and plan.registration.to_dict(),
-        "units": plan.head.units.told(),
+        "units": plan.head.units.describe(),
         "processes": request.processes,
         "buildings": summary.buildings,
         "by_status": summary.by_status,
@@ -365,8 +375,8 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "broken_inputs": [list(pair) for pair in summary.broken_inputs],
         "seconds": summary.seconds,
     }
-    with atomic(Path(request.out) / "run.json") as beside:
-        Path(beside).write_text(
+    with atomic(Path(request.out) / "run.json") as temporary:
+        Path(temporary).write_text(
             json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
         )
 

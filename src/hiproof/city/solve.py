@@ -19,21 +19,21 @@ from ..errors import DamagedRaster, report_error
 from ..fit.align import Shift, find_shift
 from ..frames import Units
 from ..log import LOGGER
-from ..masking import masked
+from ..masking import mask
 from ..model import Building
 from ..parametric.override import Override, overridden
-from ..read.assign import PointGrid, grown
+from ..read.assign import PointGrid, grow_polygon
 from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import hashes, thin_to_count, without_repeats
 from ..reconstruct import reconstruct
-from ..stages import distinct, largest_polygon, remarked, shift_remark
+from ..stages import add_remark, distinct, largest_polygon, shift_remark
 from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
 from .bundles import TerrainRecorder, keep_failure
-from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_alone, found_roof
+from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, find_lone_roof, found_roof
 from .ground import (
     BareAround,
     Cells,
@@ -47,19 +47,19 @@ from .ledger import Outcome
 from .merge import tile_parts, write_tile
 from .other_classes import (
     OtherPoints,
-    bare_ground,
+    explain_missing_points,
+    find_bare_cells,
     ground_under_roof,
-    roof_of_other_classes,
-    why_no_points,
+    remark_other_classes,
 )
 from .outlines import row_outline
 from .overrides import load_overrides, load_redo
-from .plan import Job, WorkPlan, job_of_footprint, load_plan, neighbourhood
+from .plan import Job, WorkPlan, load_plan, make_job, neighbourhood
 from .sort import load_points
-from .terrain_check import TerrainModel, WhereLikeGround, doubt_of_terrain
+from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
 
 # corners that change an outline by less make the area beside it slow to draw and no truer
-NEEDLESS_M = 0.05
+COARSEST_THINNING_M = 0.05
 
 DIED = "the process died while it worked on this building"
 
@@ -79,7 +79,7 @@ class Surroundings:
         self.low = Cells(lowest_in_cells(points["low"]))
         self.shifts: dict[int, Shift] = {}
 
-    def shift_of(self, job: Job) -> Shift:
+    def find_row_shift(self, job: Job) -> Shift:
         """How far the job's area lies beside its roof, as that of its whole row does."""
         row = (
             self.plan.outlines.row(job.index)
@@ -92,15 +92,17 @@ class Surroundings:
         if label not in self.shifts:
             outline = row_outline(row)
             origin = np.floor(outline.bounds[:2])
-            near = distinct(self.roof.take(self.grid.within(outline, self.plan.around_m), axis=0))
+            nearby = distinct(
+                self.roof.take(self.grid.find_within(outline, self.plan.around_m), axis=0)
+            )
             self.shifts[label] = find_shift(
-                near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin)
+                nearby[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin)
             )
         return self.shifts[label]
 
-    def moved(self, job: Job) -> tuple[Job, str]:
+    def move(self, job: Job) -> tuple[Job, str]:
         """The job with its area on its roof, and a remark where its row was moved there."""
-        shift = self.shift_of(job)
+        shift = self.find_row_shift(job)
         if job.footprint is None:
             return job, ""
         remark = shift_remark(
@@ -110,9 +112,9 @@ class Surroundings:
             return job, remark
         x, y = (round(float(value), 3) for value in shift.xy)
         whole = round(job.footprint.shift[0] + x, 3), round(job.footprint.shift[1] + y, 3)
-        return job_of_footprint(job.index, job.footprint, whole), remark
+        return make_job(job.index, job.footprint, whole), remark
 
-    def roof_of(self, job: Job) -> FoundRoof:
+    def select_roof_points(self, job: Job) -> FoundRoof:
         """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be
         moved onto them.
 
@@ -121,29 +123,33 @@ class Surroundings:
         """
         read = self.plan.settings.read
         if read.by_class or job.area.is_empty:
-            return FoundRoof(self.roof.take(self.grid.within(job.area, self.plan.around_m), axis=0))
-        near = self.points_near(job, 0.0)
+            return FoundRoof(
+                self.roof.take(self.grid.find_within(job.area, self.plan.around_m), axis=0)
+            )
+        nearby = self.select_points(job, 0.0)
         if read.roofs == "alone":
-            return found_alone(near, job.area)
-        height = near[:, 2] - self.ground_to_leave_out(job).height_at(near)
-        return found_roof(near, job.area, height, job.footprint is not None)
+            return find_lone_roof(nearby, job.area)
+        height = nearby[:, 2] - self.ground_to_leave_out(job).height_at(nearby)
+        return found_roof(nearby, job.area, height, job.footprint is not None)
 
-    def noise_over(self, job: Job, roof: np.ndarray) -> np.ndarray:
+    def select_noise(self, job: Job, roof: np.ndarray) -> np.ndarray:
         """Points (m, 3) of noise classes in the job's area that lie higher than half of its `roof`
         points (n, 3): where they are many they are a spire, not birds.
         """
         if job.area.is_empty or not len(roof) or not len(self.noise):
             return np.zeros((0, 3))
-        noise = self.noise.take(self.noise_grid.within(job.area, self.plan.around_m), axis=0)
+        noise = self.noise.take(self.noise_grid.find_within(job.area, self.plan.around_m), axis=0)
         return without_repeats(noise[noise[:, 2] > np.median(roof[:, 2])])
 
-    def points_near(self, job: Job, reach_m: float) -> np.ndarray:
+    def select_points(self, job: Job, reach_m: float) -> np.ndarray:
         """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the
         building, each once.
         """
-        low, high = neighbourhood(job, reach_m).reshape(2, 2)
-        near = self.roof[self.grid.candidates((*low, *high))]
-        return without_repeats(near[((near[:, :2] >= low) & (near[:, :2] <= high)).all(axis=1)])
+        lower, upper = neighbourhood(job, reach_m).reshape(2, 2)
+        nearby = self.roof[self.grid.candidates((*lower, *upper))]
+        return without_repeats(
+            nearby[((nearby[:, :2] >= lower) & (nearby[:, :2] <= upper)).all(axis=1)]
+        )
 
     def ground_to_leave_out(self, job: Job) -> TerrainChain:
         """The ground around the building; the terrain model's alone among roofs cut out beforehand,
@@ -153,54 +159,56 @@ class Surroundings:
 
         # classes tell it
         if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):
-            return TerrainChain(self.grounds_of(job))
-        around = self.points_near(job, BESIDE_ALL_M)
+            return TerrainChain(self.find_grounds(job))
+        surroundings = self.select_points(job, BESIDE_ALL_M)
         return TerrainChain(
-            [self.model] if len(around) and is_cut_out(around) else self.grounds_of(job)
+            [self.model]
+            if len(surroundings) and is_cut_out(surroundings)
+            else self.find_grounds(job)
         )
 
-    def grounds_of(self, job: Job) -> list[Terrain | None]:
+    def find_grounds(self, job: Job) -> list[Terrain | None]:
         """The terrain model, the ground points in the whole-metre box around the building, and the
         ground found there.
         """
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        found = WhereSeen(BareAround(self.low, box), lambda: self.is_seen_around(job, box))
+        result = WhereSeen(BareAround(self.low, box), lambda: self.has_points_around(job, box))
         points = GroundAround(self.ground, box)
-        return [self.model and WhereLikeGround(self.model, points), points, found]
+        return [self.model and WhereLikeGround(self.model, points), points, result]
 
-    def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
+    def has_points_around(self, job: Job, box: np.ndarray) -> bool:
         """Whether anything beside the building is known: else the lowest points are the roof's
         own.
         """
-        beside = self.low.inside(box)
-        outline = grown(shapely.simplify(job.area, NEEDLESS_M), BESIDE_M)
+        points = self.low.inside(box)
+        outline = grow_polygon(shapely.simplify(job.area, COARSEST_THINNING_M), BESIDE_M)
         return (
-            int((~shapely.intersects_xy(outline, beside[:, 0], beside[:, 1])).sum())
+            int((~shapely.intersects_xy(outline, points[:, 0], points[:, 1])).sum())
             >= FEWEST_BESIDE
         )
 
-    def terrain_of(self, job: Job) -> TerrainChain | None:
-        """What answers for the ground around the building: that of `grounds_of`, else the lowest
+    def choose_terrain(self, job: Job) -> TerrainChain | None:
+        """What answers for the ground around the building: that of `find_grounds`, else the lowest
         points.
         """
         if job.area.is_empty:
             return None
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        lowest = WhereSeen(LowestAround(self.low, box), lambda: self.is_seen_around(job, box))
-        return TerrainChain([*self.grounds_of(job), lowest])
+        lowest = WhereSeen(LowestAround(self.low, box), lambda: self.has_points_around(job, box))
+        return TerrainChain([*self.find_grounds(job), lowest])
 
-    def doubt_of_terrain(self, job: Job) -> str:
+    def remark_terrain(self, job: Job) -> str:
         """A remark where the terrain model contradicts the ground points around a building; empty
         otherwise.
         """
         if self.model is None or job.area.is_empty:
             return ""
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        return doubt_of_terrain(
+        return check_terrain(
             self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area)
         )
 
-    def other_points(self, job: Job) -> OtherPoints | None:
+    def select_other_points(self, job: Job) -> OtherPoints | None:
         """What lies inside the building's area beside the points of its class;
 
         None where classes tell no roofs.
@@ -208,24 +216,22 @@ class Surroundings:
         if not self.plan.settings.read.by_class or job.area.is_empty:
             return None
         box = neighbourhood(job, 0.0)
-        terrain = TerrainChain(self.grounds_of(job))
+        terrain = TerrainChain(self.find_grounds(job))
         return OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
 
-    def bare(self, job: Job, found: FoundRoof, others: OtherPoints | None) -> np.ndarray:
+    def bare(self, job: Job, result: FoundRoof, neighbours: OtherPoints | None) -> np.ndarray:
         """Points (n, 3) of bare ground inside the building's area: those of the ground class where
         nothing of another class stands over them, and those that were told from the roof by their
         height.
         """
         if job.area.is_empty or job.footprint is None:
-            return found.ground
-        if others is not None:
-            return bare_ground(others)
+            return result.ground
+        if neighbours is not None:
+            return find_bare_cells(neighbours)
         classified = self.ground.inside(neighbourhood(job, 0.0))
-        return np.concatenate([found.ground, classified])
+        return np.concatenate([result.ground, classified])
 
-    def looked_at(
-        self, building: Building, points: OtherPoints | None, roof: np.ndarray
-    ) -> Building:
+    def inspect(self, building: Building, points: OtherPoints | None, roof: np.ndarray) -> Building:
         """The building with what the points of other classes say of it, where classes tell roofs;
 
         `roof` (n, 3) are its own.
@@ -233,10 +239,15 @@ class Surroundings:
         if points is None:
             return building
         if building.status is Status.NO_POINTS:
-            why = why_no_points(points, self.plan.settings.read.building_classes)
-            return dataclasses.replace(building, detail=why) if why else building
-        return remarked(
-            remarked(building, roof_of_other_classes(points, roof)), ground_under_roof(points, roof)
+            missing_points = explain_missing_points(
+                points, self.plan.settings.read.building_classes
+            )
+            return (
+                dataclasses.replace(building, detail=missing_points) if missing_points else building
+            )
+        return add_remark(
+            add_remark(building, remark_other_classes(points, roof)),
+            ground_under_roof(points, roof),
         )
 
 
@@ -255,21 +266,21 @@ def solve_tile(
         terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()),
         plan,
     )
-    overrides, kept = load_overrides(root), kept_parts(root, tile, plan)
+    overrides, selection = load_overrides(root), kept_parts(root, tile, plan)
     keep = functools.partial(keep_failure, root, tile, plan)
     parts, rows = [], []
     for index in plan.tiles[tile]:
-        if index in kept:
-            parts.append(kept[index])
+        if index in selection:
+            parts.append(selection[index])
             continue
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
-            building, part = failed(plan, job, DIED)
+            building, part = record_failure(plan, job, DIED)
             keep(job, DIED, no_terrain)
         else:
             building, part = solve_one(plan, job, surroundings, overrides.get(index), keep)
         parts.append(part)
-        rows.append(outcome_of(index, building, time.perf_counter() - start))
+        rows.append(make_outcome(index, building, time.perf_counter() - start))
     write_tile(plan, root.parent, tile, parts)
     with atomic_file(tile_parts(root, tile)) as file:
         save_fragments(file, parts)
@@ -297,7 +308,7 @@ def terrain_model(
     return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
 
 
-def nothing_kept(job: Job, trace: str, terrain: Callable[[], TerrainRecorder | None]) -> None:
+def keep_nothing(job: Job, trace: str, terrain: Callable[[], TerrainRecorder | None]) -> None:
     """Keep nothing of a building that failed."""
 
 
@@ -310,7 +321,7 @@ def solve_one(
     job: Job,
     surroundings: Surroundings,
     override: Override | None = None,
-    keep: Callable[[Job, str, Callable[[], TerrainRecorder | None]], None] = nothing_kept,
+    keep: Callable[[Job, str, Callable[[], TerrainRecorder | None]], None] = keep_nothing,
 ) -> tuple[Building, Fragments]:
     """One building and its texts, whatever happens: an exception becomes its status.
 
@@ -322,26 +333,35 @@ def solve_one(
     record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
     if job.error is not None:
         keep(job, job.error.trace, no_terrain)
-        return failed(plan, job, job.error.detail)
+        return record_failure(plan, job, job.error.detail)
     try:
-        job, moved = surroundings.moved(job)
-        found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
-        if not found.is_seen and override is None and not (found.is_ground and keeps_empty(plan)):
-            return fragments(not_seen(job, found), plan.names_of(job), plan.head)
-        # first of all: a footprint is put where points are many
-        points = without_repeats(found.points)
-        used = thin_to_count(points, most)
-        others = surroundings.other_points(job)
-        bare = surroundings.bare(job, found, others)
-        building = modelled(job, points, used, bare, surroundings, override)
-        if len(used) < len(points):
-            building = told_of_thinning(building, len(used), len(points))
-        building = remarked(remarked(building, moved), found.remark)
-        building = remarked(building, surroundings.doubt_of_terrain(job))
-        building = remarked(
-            surroundings.looked_at(building, others, points), doubt_of_ground(building)
+        job, moved = surroundings.move(job)
+        roof_points, max_points_a_building = (
+            surroundings.select_roof_points(job),
+            plan.settings.city.max_points_a_building,
         )
-        building, texts = fragments(building, plan.names_of(job), plan.head)
+        if (
+            not roof_points.is_seen
+            and override is None
+            and not (roof_points.is_ground and keeps_empty(plan))
+        ):
+            return fragments(
+                make_unseen_building(job, roof_points), plan.list_names(job), plan.head
+            )
+        # first of all: a footprint is put where points are many
+        points = without_repeats(roof_points.points)
+        in_use = thin_to_count(points, max_points_a_building)
+        other_points = surroundings.select_other_points(job)
+        bare = surroundings.bare(job, roof_points, other_points)
+        building = reconstruct_job(job, points, in_use, bare, surroundings, override)
+        if len(in_use) < len(points):
+            building = add_full_density(building, len(in_use), len(points))
+        building = add_remark(add_remark(building, moved), roof_points.remark)
+        building = add_remark(building, surroundings.remark_terrain(job))
+        building = add_remark(
+            surroundings.inspect(building, other_points, points), remark_missing_ground(building)
+        )
+        building, texts = fragments(building, plan.list_names(job), plan.head)
         if building.status is Status.INTERNAL_ERROR:
             keep(job, building.detail, record_terrain)
         return building, texts
@@ -350,7 +370,7 @@ def solve_one(
     except Exception as error:
         report = report_error(error)
         keep(job, report.trace, record_terrain)
-        return failed(plan, job, report.detail)
+        return record_failure(plan, job, report.detail)
 
 
 def recorded_terrain(
@@ -362,50 +382,63 @@ def recorded_terrain(
     """
     if surroundings.model is None:
         return None
-    again = copy.copy(surroundings)
-    again.model = recorder = TerrainRecorder(surroundings.model)
-    solve_one(plan, job, again, override)
+    repeat = copy.copy(surroundings)
+    repeat.model = recorder = TerrainRecorder(surroundings.model)
+    solve_one(plan, job, repeat, override)
     return recorder
 
 
-def modelled(
+def reconstruct_job(
     job: Job,
     points: np.ndarray,
-    used: np.ndarray,
+    used_points: np.ndarray,
     bare: np.ndarray,
     surroundings: Surroundings,
     override: Override | None,
 ) -> Building:
-    """The building fitted to the `used` of its `points` (n, 3) and judged by all, noise over it
-    included; or as its override says.
+    """The building fitted to the `used_points` of its `points` (n, 3) and judged by all, noise over
+    it included; or as its override says.
 
     `bare` (m, 3) are points of bare ground inside its area.
     """
     aligned = surroundings.plan.settings.replace({"reconstruct": {"align": "off"}})
-    known = used, job.footprint, surroundings.terrain_of(job), aligned, job.id, bare
+    arguments = (
+        used_points,
+        job.footprint,
+        surroundings.choose_terrain(job),
+        aligned,
+        job.id,
+        bare,
+    )
     if override is not None:
-        return overridden(override, *known)
-    unused = np.concatenate([thinned_out(points, used), surroundings.noise_over(job, points)])
-    return reconstruct(*known, unused=unused)
+        return overridden(override, *arguments)
+    unused = np.concatenate(
+        [thinned_out(points, used_points), surroundings.select_noise(job, points)]
+    )
+    return reconstruct(*arguments, unused=unused)
 
 
-def thinned_out(points: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Those of `points` (n, 3), each once, that are not among the `used` (m, 3)."""
-    if len(used) == len(points):
+def thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:
+    """Those of `points` (n, 3), each once, that are not among the `used_points` (m, 3)."""
+    if len(used_points) == len(points):
         return points[:0]
-    return points[~np.isin(hashes(points), hashes(used))]
+    return points[~np.isin(hashes(points), hashes(used_points))]
 
 
-def told_of_thinning(building: Building, used: int, count: int) -> Building:
-    """The building with the density of all its `count` points, not of those `used`; a model says
+def add_full_density(building: Building, in_use: int, count: int) -> Building:
+    """The building with the density of all its `count` points, not of those `in_use`; a model says
     that it is fitted to these.
     """
-    quality = dataclasses.replace(building.quality, density=building.quality.density * count / used)
-    remark = f"fitted to {used} of its {count} points" if building.status is Status.MODELLED else ""
-    return remarked(dataclasses.replace(building, quality=quality), remark)
+    quality = dataclasses.replace(
+        building.quality, density=building.quality.density * count / in_use
+    )
+    remark = (
+        f"fitted to {in_use} of its {count} points" if building.status is Status.MODELLED else ""
+    )
+    return add_remark(dataclasses.replace(building, quality=quality), remark)
 
 
-def doubt_of_ground(building: Building) -> str:
+def remark_missing_ground(building: Building) -> str:
     """A remark where no ground was found around a building: volume and height over ground then hang
     on a wall's usual height.
     """
@@ -422,13 +455,13 @@ def keeps_empty(plan: WorkPlan) -> bool:
     return plan.settings.reconstruct.empty_footprints == "model"
 
 
-def not_seen(job: Job, found: FoundRoof) -> Building:
+def make_unseen_building(job: Job, result: FoundRoof) -> Building:
     """A building whose outline holds no roof, as far as its points tell."""
-    status = Status.NO_BUILDING if found.is_ground and job.footprint else Status.NO_ROOF
-    return with_input(Building(job.id, status, found.remark), job)
+    status = Status.NO_BUILDING if result.is_ground and job.footprint else Status.NO_ROOF
+    return add_input(Building(job.id, status, result.remark), job)
 
 
-def with_input(building: Building, job: Job) -> Building:
+def add_input(building: Building, job: Job) -> Building:
     """Add the outline and the attributes that the input has for a building without a model."""
     if job.footprint is None:
         return dataclasses.replace(building, footprint=largest_polygon(job.area))
@@ -438,23 +471,23 @@ def with_input(building: Building, job: Job) -> Building:
     )
 
 
-def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
+def record_failure(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
     """Record a building that hiproof failed on.
 
     The outline and attributes may be the cause of the failure. If writing them fails as well, the
     record consists of the id and the message.
     """
-    building = Building(job.id, Status.INTERNAL_ERROR, masked(detail))
+    building = Building(job.id, Status.INTERNAL_ERROR, mask(detail))
     try:
-        return fragments(with_input(building, job), plan.names_of(job), plan.head)
+        return fragments(add_input(building, job), plan.list_names(job), plan.head)
     except Exception as error:
         LOGGER.info(
             "building %s: its outline cannot be written: %s", job.id, report_error(error).detail
         )
-        return fragments(building, plan.names_of(job), plan.head)
+        return fragments(building, plan.list_names(job), plan.head)
 
 
-def outcome_of(position: int, building: Building, seconds: float) -> Outcome:
+def make_outcome(position: int, building: Building, seconds: float) -> Outcome:
     quality = building.quality
     share, psd = (
         float(v) if np.isfinite(v) else None for v in (quality.share_within_20cm, quality.psd_mean)

@@ -31,12 +31,12 @@ from ..read.pointcloud import as_input_error, file_kind, iter_points, read_heade
 from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import lowest_in_cells
-from .noted import load_noted, noted_file, save_noted
+from .noted import load_run_boxes, noted_file, save_run_boxes
 from .overrides import REDO, load_redo
 from .plan import PLAN_FILE, WorkPlan, load_plan
 
 NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
-KINDS = ("roof", "ground", "low", "noise")
+POINT_KINDS = ("roof", "ground", "low", "noise")
 ROOF, GROUND, OTHER, NOISE = range(4)  # kinds of points, by what a work tile needs them for
 # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
 SQUARE_M = 50.0
@@ -65,10 +65,10 @@ class Reach:
         """A byte a whole-metre cell (columns, rows): bit 0 in a roof box, bit 1 in a terrain
         box.
         """
-        low, high = self.bounds[:2], self.bounds[2:]
-        mask = np.zeros((high - low).astype(int), np.uint8)
+        lower, upper = self.bounds[:2], self.bounds[2:]
+        mask = np.zeros((upper - lower).astype(int), np.uint8)
         for bit, boxes in ((1, self.roof_boxes), (2, self.terrain_boxes)):
-            for xmin, ymin, xmax, ymax in (boxes - np.tile(low, 2)).astype(int):
+            for xmin, ymin, xmax, ymax in (boxes - np.tile(lower, 2)).astype(int):
                 mask[xmin:xmax, ymin:ymax] |= bit
         return mask
 
@@ -89,19 +89,19 @@ class Reaches:
 
     def __init__(self, plan: WorkPlan, only: Mapping[str, Sequence[int]] | None = None):
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
-        low, high = bounds[:, :2], bounds[:, 2:]
+        lower, upper = bounds[:, :2], bounds[:, 2:]
         self.roof_boxes, reach_m = plan.roof_boxes, plan.terrain_reach_m
-        self.terrain_boxes = np.hstack([np.floor(low - reach_m), np.ceil(high + reach_m)])
+        self.terrain_boxes = np.hstack([np.floor(lower - reach_m), np.ceil(upper + reach_m)])
         has_area = np.isfinite(bounds[:, 0])
         self.is_partial = only is not None
-        wanted = plan.tiles if only is None else only
-        members = {tile: [i for i in own if has_area[i]] for tile, own in wanted.items()}
-        self.members = {tile: own for tile, own in members.items() if own}
+        tiles = plan.tiles if only is None else only
+        members = {tile: [i for i in own_items if has_area[i]] for tile, own_items in tiles.items()}
+        self.members = {tile: own_items for tile, own_items in members.items() if own_items}
         self.names = list(self.members)
         self.place = {tile: number for number, tile in enumerate(self.names)}
         boxes = [
-            np.vstack([self.terrain_boxes[own], self.roof_boxes[own]])
-            for own in self.members.values()
+            np.vstack([self.terrain_boxes[own_items], self.roof_boxes[own_items]])
+            for own_items in self.members.values()
         ]
         self.bounds = np.array(
             [[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]
@@ -112,17 +112,17 @@ class Reaches:
         """Names, in plan order, of the tiles whose reach meets `box` (xmin, ymin, xmax, ymax)."""
         return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
 
-    def bounds_of(self, tiles: Sequence[str]) -> np.ndarray:
+    def compute_bounds(self, tiles: Sequence[str]) -> np.ndarray:
         """Boxes (t, 4) of the tiles' reaches."""
         return self.bounds[[self.place[tile] for tile in tiles]].reshape(-1, 4)
 
     def of(self, tile: str) -> Reach:
-        own = self.members[tile]
-        return Reach(self.roof_boxes[own], self.terrain_boxes[own])
+        members = self.members[tile]
+        return Reach(self.roof_boxes[members], self.terrain_boxes[members])
 
 
 @functools.lru_cache(maxsize=1)
-def reaches_of(root: Path, stamp: int) -> Reaches:
+def load_reaches(root: Path, stamp: int) -> Reaches:
     """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone,
     theirs alone.
     """
@@ -147,14 +147,14 @@ class Gatherer:
         self.points += len(cloud)
         classes = cloud.classes
         self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
-        kinds = self.kind_of_class()[classes]
+        kinds = self.classify_las_classes()[classes]
         grid = PointGrid(cloud.xyz, SQUARE_M)
         for tile in self.near(grid.bounds):
             reach = self.reach_of(tile)
             candidates = grid.candidates(reach.bounds)
             bits = reach.bits(cloud.xyz, candidates)
-            wanted = bits > 0
-            candidates, bits = candidates[wanted], bits[wanted]
+            mask = bits > 0
+            candidates, bits = candidates[mask], bits[mask]
             kind = kinds[candidates]
             self.keep(
                 tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0)
@@ -167,12 +167,12 @@ class Gatherer:
             self.keep(
                 tile, "noise", cloud.xyz.take(candidates[(kind == NOISE) & (bits & 1 > 0)], axis=0)
             )
-            low = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
-            self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(low, axis=0)))
+            lower = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
+            self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(lower, axis=0)))
         if self.held > HELD_POINTS:
             self.flush()
 
-    def kind_of_class(self) -> np.ndarray:
+    def classify_las_classes(self) -> np.ndarray:
         """ROOF, GROUND, OTHER or NOISE (256,) by LAS class; a class that is both counts as roof."""
         kinds = np.full(256, OTHER, np.uint8)
         for classes, kind in (
@@ -190,10 +190,10 @@ class Gatherer:
 
     def flush(self) -> None:
         """Write what is held, a file a tile; done again after a kill it writes the same files."""
-        for tile, found in sorted(self.found.items()):
+        for tile, result in sorted(self.found.items()):
             with atomic_file(self.folder / tile / f"{self.number}-{self.flushes}.npz") as file:
                 arrays: dict[str, Any] = {
-                    kind: np.concatenate(several) for kind, several in found.items()
+                    kind: np.concatenate(items) for kind, items in result.items()
                 }
                 np.savez(file, **arrays)
         self.found, self.held, self.flushes = {}, 0, self.flushes + 1
@@ -212,12 +212,12 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     file's failure is that file's alone; what writing comes to passes through.
     """
     root = Path(folder)
-    plan, reaches = load_plan(root), reaches_of(root, newest(root / PLAN_FILE, root / REDO))
+    plan, reaches = load_plan(root), load_reaches(root, newest(root / PLAN_FILE, root / REDO))
     gatherer = Gatherer(reaches, plan.settings.read, root / "points", number)
     noted = noted_file(root, number)
-    found: list[np.ndarray] = []
+    result: list[np.ndarray] = []
     try:
-        for cloud in wanted_points(address, reaches, plan.units, noted, found):
+        for cloud in wanted_points(address, reaches, plan.units, noted, result):
             gatherer.add(cloud)
     except (MemoryError, OutputError):
         raise
@@ -227,8 +227,8 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
             raise KeyboardInterrupt from error
         raise as_input_error(error, address) from error
     gatherer.flush()
-    if found:
-        save_noted(noted, found, read_header(address).count)
+    if result:
+        save_run_boxes(noted, result, read_header(address).count)
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
@@ -238,11 +238,11 @@ def newest(*paths: Path) -> int:
 
 
 def wanted_points(
-    path: str, reaches: Reaches, units: Units, noted: Path, found: list[np.ndarray] | None = None
+    path: str, reaches: Reaches, units: Units, noted: Path, result: list[np.ndarray] | None = None
 ) -> Iterator[PointCloud]:
     """All chunks of a file in `units`; of one with a spatial index, or where a part of the area is
     wanted and `noted` is the file that tells where its points lie, only what holds buildings'
-    surroundings. Where it is read from end to end, `found` is told so (noted.py).
+    surroundings. Where it is read from end to end, `result` is told so (noted.py).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)
@@ -253,11 +253,11 @@ def wanted_points(
         return iter(())
     if is_copc(path):
         return points_by_squares(path, reaches, units)
-    index = read_lax(path) or (load_noted(noted, header.count) if reaches.is_partial else None)
+    index = read_lax(path) or (load_run_boxes(noted, header.count) if reaches.is_partial else None)
     if index is None:
-        return iter_points(path, units=units, noted=found)
+        return iter_points(path, units=units, noted=result)
     boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
-    return iter_points(path, runs=index.runs_meeting(boxes), units=units)
+    return iter_points(path, runs=index.find_runs(boxes), units=units)
 
 
 def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
@@ -270,22 +270,22 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
     (xmin, ymin), (xmax, ymax) = units.to_metres(
         np.reshape(read_header(path).bounds, (2, 3))[:, :2]
     )
-    wanted = reaches.bounds_of(reaches.near((xmin, ymin, xmax, ymax)))
+    bounds = reaches.compute_bounds(reaches.near((xmin, ymin, xmax, ymax)))
     corners = np.floor(
-        np.clip(wanted, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M
+        np.clip(bounds, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M
     ).astype(np.int64)
     columns_and_rows = {
         (column, row)
-        for left, low, right, high in corners.tolist()
+        for left, lower, right, upper in corners.tolist()
         for column in range(left, right + 1)
-        for row in range(low, high + 1)
+        for row in range(lower, upper + 1)
     }
     for column, row in sorted(columns_and_rows):
         square = QUERY_M * np.array([column, row, column + 1, row + 1])
-        near = reaches.bounds_of(reaches.near(square))
-        if len(near):
-            low, high = near[:, :2].min(axis=0), near[:, 2:].max(axis=0)
-            box = (*np.maximum(square[:2], low), *np.minimum(square[2:], high))
+        nearby = reaches.compute_bounds(reaches.near(square))
+        if len(nearby):
+            lower, upper = nearby[:, :2].min(axis=0), nearby[:, 2:].max(axis=0)
+            box = (*np.maximum(square[:2], lower), *np.minimum(square[2:], upper))
             yield from iter_points(path, box=box, units=units)
 
 
@@ -295,9 +295,9 @@ def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
     files = sorted(
         path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith(".")
     )
-    found: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in KINDS}
+    result: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in POINT_KINDS}
     for path in files:
         with np.load(path) as part:
             for kind in part.files:
-                found[kind].append(part[kind])
-    return {kind: np.concatenate(arrays) for kind, arrays in found.items()}
+                result[kind].append(part[kind])
+    return {kind: np.concatenate(arrays) for kind, arrays in result.items()}

@@ -16,7 +16,7 @@ from typing import Any
 from ..errors import InputWarning
 from ..parametric.override import possible_range
 
-SHOWN = 3  # values that a sentence shows
+MOST_SHOWN_VALUES = 3  # values that a sentence shows
 
 YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fromkeys(
     ("0", "0.0", "false", "no", "f", "n", ""), False
@@ -25,7 +25,7 @@ YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fr
 
 
 @dataclass
-class LeftOut:
+class SkippedValues:
     """Values that no building can have, by key, as "VALUE of ID"."""
 
     source: str
@@ -33,33 +33,36 @@ class LeftOut:
 
     def possible(self, record: Mapping[str, Any], id: str) -> dict[str, Any]:
         """The record without values that say nothing or cannot be; the latter are noted."""
-        found = {}
+        result = {}
         for key, value in record.items():
-            value = typed(key, value)
-            if says_nothing(value):
+            value = convert_value(key, value)
+            if is_empty(value):
                 continue
             if is_possible(key, value):
-                found[key] = value
+                result[key] = value
             else:
                 self.values.setdefault(key, []).append(f"{str(value)[:20]} of {id}")
-        return found
+        return result
 
     def warn(self) -> None:
         """One line for each key of which values were left out."""
-        for key, told in self.values.items():
-            low, high = possible_range(key) or (0.0, 0.0)
-            some = ", ".join(told[:SHOWN]) + (", ..." if len(told) > SHOWN else "")
+        for key, values in self.values.items():
+            lower, upper = possible_range(key) or (0.0, 0.0)
+            subset = ", ".join(values[:MOST_SHOWN_VALUES]) + (
+                ", ..." if len(values) > MOST_SHOWN_VALUES else ""
+            )
             warnings.warn(
-                f"{self.source}: expected {key} from {low:g} to {high:g}, left out {len(told)} of "
-                f"its values: {some}",
+                f"{self.source}: expected {key} from {lower:g} to {upper:g}, left out "
+                f"{len(values)} of "
+                f"its values: {subset}",
                 InputWarning,
             )
 
 
-def typed(key: str, value: Any) -> Any:
+def convert_value(key: str, value: Any) -> Any:
     """A table's value as the override's key wants it.
 
-    >>> typed("z_ground", "0"), typed("leave_out", "0"), typed("id", 7)
+    >>> convert_value("z_ground", "0"), convert_value("leave_out", "0"), convert_value("id", 7)
     (0.0, False, '7')
     """
     if key == "leave_out":
@@ -72,10 +75,10 @@ def typed(key: str, value: Any) -> Any:
     return str(value) if key == "id" else value
 
 
-def says_nothing(value: Any) -> bool:
+def is_empty(value: Any) -> bool:
     """Whether a cell is empty. A 0 is a value.
 
-    >>> says_nothing(0.0), says_nothing(None), says_nothing(" ")
+    >>> is_empty(0.0), is_empty(None), is_empty(" ")
     (False, True, True)
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):

@@ -19,7 +19,7 @@ ONE_PRIMITIVE = (*MAIN_JOB, "single")
 WITHOUT_FOOTPRINTS = (*ONE_PRIMITIVE, "outlines")
 """Those of runs without footprints."""
 
-RECOGNISING = ("recognising",)
+RECOGNISING = ("warm_recognition",)
 """What runs that ask the network need besides."""
 
 ALL = (*WITHOUT_FOOTPRINTS, *RECOGNISING)

@@ -46,27 +46,27 @@ class WhereLikeGround:
         ground points.
         """
         heights = self.model.height_at(xy_world)
-        apart = np.abs(heights - self.ground.height_at(xy_world))
-        return np.where(apart > OTHER_GROUND_M, np.nan, heights)
+        gap = np.abs(heights - self.ground.height_at(xy_world))
+        return np.where(gap > OTHER_GROUND_M, np.nan, heights)
 
 
-def doubt_of_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
+def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
     """A remark where the terrain model has no true height at some of the corners `xy` (n, 2) of an
     outline, or lies far above or below the ground points there. Empty otherwise.
     """
     coded = model.is_coded_at(xy)
     if coded.any():
-        where = "" if coded.all() else "part of "
-        known = np.isfinite(ground.height_at(xy[coded])).all()
-        use = "the ground points are used there" if known else "it is not used there"
+        text = "" if coded.all() else "part of "
+        mask = np.isfinite(ground.height_at(xy[coded])).all()
+        use = "the ground points are used there" if mask else "it is not used there"
         return (
-            f"the {model.source} {Doubt.TERRAIN_WITHOUT_HEIGHTS.value} under {where}the building; "
+            f"the {model.source} {Doubt.TERRAIN_WITHOUT_HEIGHTS.value} under {text}the building; "
             f"{use}"
         )
-    apart = model.height_at(xy) - ground.height_at(xy)
-    apart = apart[np.isfinite(apart)]
-    is_other = np.abs(apart) > OTHER_GROUND_M
-    above = float(np.median(apart[is_other] if is_other.any() else apart)) if len(apart) else 0.0
+    gap = model.height_at(xy) - ground.height_at(xy)
+    gap = gap[np.isfinite(gap)]
+    is_other = np.abs(gap) > OTHER_GROUND_M
+    above = float(np.median(gap[is_other] if is_other.any() else gap)) if len(gap) else 0.0
     if abs(above) <= FAR_GROUND_M:
         return ""
     way = "above" if above > 0 else "below"

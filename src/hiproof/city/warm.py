@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from ..compiled import kept, news
-from ..compiled.kinds import KIND, own_processor, runs_kind
-from ..compiled.stamp import PACKAGE, stamp_of_all
+from ..compiled.kinds import KIND, read_processor, runs_kind
+from ..compiled.stamp import PACKAGE, compute_common_stamp
 from ..log import LOGGER
 from .cores import cores
 
@@ -32,14 +32,17 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     Code that came with hiproof for processors like this one will do, unless it is to be its `own`.
     """
     places = kept.folders(make_ready, str(PACKAGE / "__init__.py"))
-    stamp, processors = stamp_of_all(), (own_processor(), KIND)[: 1 if own else 1 + runs_kind()]
+    stamp, processors = (
+        compute_common_stamp(),
+        (read_processor(), KIND)[: 1 if own else 1 + runs_kind()],
+    )
     missing = []
     for piece in pieces:
         marks = [
             place / mark(piece, stamp, processor) for processor in processors for place in places
         ]
-        if made := next(filter(Path.exists, marks), None):
-            news.ready.update(made.read_text(encoding="utf-8", errors="replace").split())
+        if created := next(filter(Path.exists, marks), None):
+            news.ready.update(created.read_text(encoding="utf-8", errors="replace").split())
         else:
             missing.append(piece)
     folder = kept.place_to_write(places) if missing else None
@@ -49,15 +52,15 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     kept.remove_outdated(folder, "warm", stamp)
     news.processes = min(cores(), len(missing))
     news.tell()
-    left = iter(missing)
+    remainder = iter(missing)
 
     def work_off() -> None:
-        for piece in compiled_pieces(left):
-            keep_mark(folder / mark(piece, stamp, own_processor()))
+        for piece in compiled_pieces(remainder):
+            keep_mark(folder / mark(piece, stamp, read_processor()))
 
     with ThreadPoolExecutor(news.processes) as pool:
-        for done in [pool.submit(work_off) for _ in range(news.processes)]:
-            done.result()
+        for finished in [pool.submit(work_off) for _ in range(news.processes)]:
+            finished.result()
     news.processes = 1
 
 
@@ -74,9 +77,9 @@ def keep_mark(file: Path) -> None:
         kept.warn_not_kept()
 
 
-def compiled_pieces(left: Iterator[str]) -> Iterator[str]:
-    """Have a process of its own compile pieces while any are `left`, which other threads take from
-    as well; each that came to its end. The process' functions count as ready here too.
+def compiled_pieces(remainder: Iterator[str]) -> Iterator[str]:
+    """Have a process of its own compile pieces while any are `remainder`, which other threads take
+    from as well; each that came to its end. The process' functions count as ready here too.
     """
     command = [sys.executable, "-m", "hiproof.city.warm_pieces"]
     pipes: dict[str, Any] = {
@@ -87,7 +90,7 @@ def compiled_pieces(left: Iterator[str]) -> Iterator[str]:
     try:
         with subprocess.Popen(command, text=True, bufsize=1, env=environment(), **pipes) as at_work:
             assert at_work.stdin and at_work.stdout
-            for piece in left:
+            for piece in remainder:
                 print(piece, file=at_work.stdin)
                 for line in map(str.strip, iter(at_work.stdout.readline, "")):
                     if line == piece:
@@ -105,7 +108,7 @@ def compiled_pieces(left: Iterator[str]) -> Iterator[str]:
 def environment() -> dict[str, str]:
     """This process's, with its places to import from, and the processor to compile for."""
     path = os.pathsep.join(filter(None, sys.path))
-    return {**os.environ, "PYTHONPATH": path, "NUMBA_CPU_NAME": own_processor()}
+    return {**os.environ, "PYTHONPATH": path, "NUMBA_CPU_NAME": read_processor()}
 
 
 def mark(piece: str, stamp: str, processor: str) -> str:

@@ -46,7 +46,7 @@ def moves() -> None:
     from ..fit.union.objective import objective
     from ..fit.union.volumes import base_only
 
-    scene, base = scene_of_house()[1], base_only(-3.0)
+    scene, base = make_house_scene()[1], base_only(-3.0)
     value = objective(base, scene, np.inf)
     improve(base, scene, value, np.array([0.7]), 1)
     simplify(base, scene, value, 0.1)
@@ -57,11 +57,11 @@ def planes() -> None:
     """The planes and gables that the search begins with."""
     from ..fit.union.candidates import HOUSE, candidates_of
 
-    _, scene = scene_of_house()
+    _, scene = make_house_scene()
     candidates_of(scene, np.arange(scene.n), HOUSE.planes)
 
 
-def scene_of_house() -> tuple:
+def make_house_scene() -> tuple:
     """The plan of the house and the scene that the search sees."""
     from ..fit.union.allowed import allowed_shapes
     from ..fit.union.plan import lay_out_plan
@@ -111,7 +111,7 @@ def single() -> None:
     fit_roof(house())
 
 
-def recognising() -> None:
+def warm_recognition() -> None:
     """What the network is given of a cloud."""
     from ..segment.arrange import Layout, arrange
 
@@ -120,10 +120,10 @@ def recognising() -> None:
 
 def outlines() -> None:
     """What runs without footprints draw: touching houses told apart, the outline of each."""
-    from ..classify.houses import told_apart
+    from ..classify.houses import separate_houses
     from ..fit.outline import estimate_outline
 
-    told_apart(house(), OUTLINE, 1.0)
+    separate_houses(house(), OUTLINE, 1.0)
     estimate_outline(house(), 0.3)
 
 
@@ -146,7 +146,7 @@ def points() -> None:
 
 PIECES: dict[str, Callable[[], None]] = {
     piece.__name__: piece
-    for piece in (moves, planes, outlines, solid, check, points, single, recognising)
+    for piece in (moves, planes, outlines, solid, check, points, single, warm_recognition)
 }
 
 
@@ -154,12 +154,12 @@ def main() -> None:
     """Compile the pieces whose names come in, a line each, and print the names of functions as they
     become ready; after each piece its own.
     """
-    said: set[str] = set()
+    reported: set[str] = set()
 
-    def tell(done: int, total: int) -> None:
-        for new in sorted(news.ready - said):
+    def tell(finished: int, total: int) -> None:
+        for new in sorted(news.ready - reported):
             print(new, flush=True)
-        said.update(news.ready)
+        reported.update(news.ready)
 
     news.listener = tell
     gc.set_threshold(RARELY)

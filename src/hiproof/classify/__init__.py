@@ -12,6 +12,6 @@ split       a cloud without footprints into buildings
 files       what was found, written into a copy of a file
 """
 
-from .buildings import BUILDING, GROUND, UNKNOWN, classify, roof_points
+from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify, roof_points
 
-__all__ = ["BUILDING", "GROUND", "UNKNOWN", "classify", "roof_points"]
+__all__ = ["BUILDING", "GROUND_CLASS", "UNKNOWN", "classify", "roof_points"]

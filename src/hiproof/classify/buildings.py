@@ -10,22 +10,23 @@ from scipy import ndimage
 from ..read.assign import PointGrid
 from .cells import SquareCells, plan_density
 from .ground import ground_grid
-from .surfaces import Surfaces, surfaces_of
+from .surfaces import Surfaces, find_surfaces
 
-UNKNOWN, GROUND, BUILDING = 1, 2, 6  # classes of ASPRS
+UNKNOWN, GROUND_CLASS, BUILDING = 1, 2, 6  # classes of ASPRS
 
 # a cloud is worked through in squares, with what lies so far around each
-WORK_M, BORDER_M = 250.0, 40.0
-GROUND_M = 0.25  # of a point above or below the ground; on slopes more, by what half a cell rises
-HIGH_M = 1.5  # what is lower is no roof
+WORK_M, SQUARE_BORDER_M = 250.0, 40.0
+# of a point above or below the ground; on slopes more, by what half a cell rises
+GROUND_HEIGHT_M = 0.25
+HIGH_OBJECT_M = 1.5  # what is lower is no roof
 OPEN_M = 0.5  # what is lower is taken for ground when it is counted around a point
-FOOT_M = 0.3  # walls are a building's from here on
+WALL_FOOT_M = 0.3  # walls are a building's from here on
 CELLS_M = (0.5, 1.0, 2.0)  # sides of the cells in which buildings are put together, by density
-AROUND_M = 4.5  # side of the window in which ground is looked for around a point
+NEIGHBOURHOOD_M = 4.5  # side of the window in which ground is looked for around a point
 
 # Log odds of roof or wall against leaves, chosen on simulated towns and on one half of a real one.
 LOG_ROUGHNESS, LOG_LARGEST, LOG_EXTENT, GROUND_SHARE, CONSTANT = -0.93, 0.82, 0.46, -7.0, -1.65
-ROUNDS = 4  # of taking the mean over neighbours
+SMOOTHING_ROUNDS = 4  # of taking the mean over neighbours
 
 CORE_M2 = 5.0  # a building has cells with a surface of that size ...
 FEWEST_M2 = 16.0  # ... on that much of its plan,
@@ -51,19 +52,19 @@ def classify(
     classes = np.full(len(xyz), UNKNOWN, np.uint8)
     if not len(xyz):
         return classes
-    grid, cell_m = PointGrid(xyz, 10.0), cell_for(xyz)
+    grid, cell_m = PointGrid(xyz, 10.0), choose_cell_size(xyz)
     for column, row in np.unique(np.floor(xyz[:, :2] / WORK_M).astype(np.int64), axis=0).tolist():
-        low = WORK_M * np.array([column, row])
-        near = grid.candidates((*(low - BORDER_M), *(low + WORK_M + BORDER_M)))
-        own = (np.floor(xyz[near, :2] / WORK_M) == (column, row)).all(axis=1)
+        lower = WORK_M * np.array([column, row])
+        nearby = grid.candidates((*(lower - SQUARE_BORDER_M), *(lower + WORK_M + SQUARE_BORDER_M)))
+        mask = (np.floor(xyz[nearby, :2] / WORK_M) == (column, row)).all(axis=1)
         try:
-            classes[near[own]] = classes_of_square(xyz[near], cell_m)[own]
+            classes[nearby[mask]] = classify_square(xyz[nearby], cell_m)[mask]
         except Exception as error:
-            on_error(near[own], error)
+            on_error(nearby[mask], error)
     return classes
 
 
-def cell_for(xyz: np.ndarray) -> float:
+def choose_cell_size(xyz: np.ndarray) -> float:
     """Side of the cells that buildings are put together of: the smallest that most often holds a
     point where any are.
     """
@@ -71,13 +72,15 @@ def cell_for(xyz: np.ndarray) -> float:
     return next((cell for cell in CELLS_M if density * cell**2 >= 1.0), CELLS_M[-1])
 
 
-def classes_of_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
+def classify_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     """Class (n,) of all points of a small cloud (n, 3), n > 0."""
     ground = ground_grid(xyz)
     rise = 0.5 * ground.cell_m * ground.slope_at(xyz)
     # the ground's cells lie as low as their lowest point
     height = xyz[:, 2] - ground.height_at(xyz) - rise
-    classes = np.where(np.abs(height) <= GROUND_M + rise, GROUND, UNKNOWN).astype(np.uint8)
+    classes = np.where(np.abs(height) <= GROUND_HEIGHT_M + rise, GROUND_CLASS, UNKNOWN).astype(
+        np.uint8
+    )
     classes[building_points(xyz, height, cell_m)] = BUILDING
     return classes
 
@@ -90,8 +93,8 @@ def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
     """
     if len(xyz) < 4:
         return np.ones(len(xyz), bool)
-    surfaces = surfaces_of(xyz)
-    return smoothed(surfaces, log_odds(surfaces) + more_odds)[surfaces.voxel] > 0
+    surfaces = find_surfaces(xyz)
+    return smooth_odds(surfaces, log_odds(surfaces) + more_odds)[surfaces.voxel] > 0
 
 
 def log_odds(surfaces: Surfaces) -> np.ndarray:
@@ -105,42 +108,46 @@ def log_odds(surfaces: Surfaces) -> np.ndarray:
     )
 
 
-def smoothed(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
+def smooth_odds(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
     """Log odds (v,), those of neighbours taken together; none is surer than 6."""
     odds = np.clip(odds, -6.0, 6.0)
-    for _ in range(ROUNDS):
+    for _ in range(SMOOTHING_ROUNDS):
         odds = surfaces.around(odds)
     return odds
 
 
 def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.ndarray:
     """Which (n,) of the points (n, 3), `height` (n,) above ground, are a building's."""
-    cells, high = SquareCells(xyz, cell_m), height > HIGH_M
+    cells, mask = SquareCells(xyz, cell_m), height > HIGH_OBJECT_M
     odds, is_large = np.zeros(len(xyz)), np.zeros(len(xyz), bool)
-    if high.sum() < 4:
+    if mask.sum() < 4:
         return is_large
-    surfaces = surfaces_of(xyz[high])
-    in_the_open = cells.share_around(height < OPEN_M, AROUND_M)[cells.of(surfaces.xyz)]
-    odds[high] = smoothed(surfaces, log_odds(surfaces) + GROUND_SHARE * in_the_open)[surfaces.voxel]
-    is_large[high] = surfaces.extent_m2[surfaces.voxel] >= CORE_M2
+    surfaces = find_surfaces(xyz[mask])
+    in_the_open = cells.compute_local_share(height < OPEN_M, NEIGHBOURHOOD_M)[
+        cells.of(surfaces.xyz)
+    ]
+    odds[mask] = smooth_odds(surfaces, log_odds(surfaces) + GROUND_SHARE * in_the_open)[
+        surfaces.voxel
+    ]
+    is_large[mask] = surfaces.extent_m2[surfaces.voxel] >= CORE_M2
     plan = building_cells(
-        cells.count(odds > 0), cells.count(high), cells.count(is_large & (odds > 0)) > 0, cell_m
+        cells.count(odds > 0), cells.count(mask), cells.count(is_large & (odds > 0)) > 0, cell_m
     )
-    inside, near = (
+    inside, nearby = (
         where.ravel()[cells.index] for where in (plan, ndimage.binary_dilation(plan, SQUARE))
     )
     below_roof = (height < cells.highest(height, odds > 0).ravel()[cells.index]) & (odds > UNLIKELY)
-    return (inside & ~high & (height > FOOT_M)) | (near & high & ((odds > 0) | below_roof))
+    return (inside & ~mask & (height > WALL_FOOT_M)) | (nearby & mask & ((odds > 0) | below_roof))
 
 
 def building_cells(
-    solid: np.ndarray, high: np.ndarray, core: np.ndarray, cell_m: float
+    solid: np.ndarray, upper: np.ndarray, core: np.ndarray, cell_m: float
 ) -> np.ndarray:
     """Which cells (c, r) are buildings', from the points in each that are high, those of them that
     are solid, and whether it holds a large surface.
     """
-    likely = closed((solid > 0) & (2 * solid >= high))
-    core = closed(core & likely)
+    likely = close_gaps((solid > 0) & (2 * solid >= upper))
+    core = close_gaps(core & likely)
     narrowest = max(1, round(NARROWEST_M / cell_m))
     core = ndimage.binary_opening(core, np.ones((narrowest, narrowest)))
     label, count = ndimage.label(core, SQUARE)
@@ -152,12 +159,12 @@ def building_cells(
     )
     gaps = (
         ndimage.binary_fill_holes(plan)
-        & (high > 0)
+        & (upper > 0)
         & (ndimage.uniform_filter(plan.astype(float), 7) > 0.6)
     )
     return plan | gaps
 
 
-def closed(cells: np.ndarray) -> np.ndarray:
+def close_gaps(cells: np.ndarray) -> np.ndarray:
     """`cells` (c, r) and those narrow gaps between them that are wholly surrounded."""
     return cells | ndimage.binary_closing(np.pad(cells, 2), SQUARE)[2:-2, 2:-2]

@@ -25,9 +25,9 @@ class SquareCells:
         column, row = (np.floor(xyz[:, :2] / self.cell_m).astype(np.int64) - self.first).T
         return column * self.shape[1] + row
 
-    def count(self, chosen: np.ndarray) -> np.ndarray:
-        """Table of how many of the points `chosen` (n,) each cell holds."""
-        return np.bincount(self.index[chosen], minlength=self.shape[0] * self.shape[1]).reshape(
+    def count(self, selection: np.ndarray) -> np.ndarray:
+        """Table of how many of the points `selection` (n,) each cell holds."""
+        return np.bincount(self.index[selection], minlength=self.shape[0] * self.shape[1]).reshape(
             self.shape
         )
 
@@ -39,20 +39,20 @@ class SquareCells:
         np.maximum.at(table, self.index, values)
         return table.reshape(self.shape)
 
-    def highest(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Table of the largest of the `values` (n,) of points `chosen` (n,) in each cell and those
-        around it.
+    def highest(self, values: np.ndarray, selection: np.ndarray) -> np.ndarray:
+        """Table of the largest of the `values` (n,) of points `selection` (n,) in each cell and
+        those around it.
         """
-        return ndimage.maximum_filter(self.top(np.where(chosen, values, -np.inf)), 3)
+        return ndimage.maximum_filter(self.top(np.where(selection, values, -np.inf)), 3)
 
-    def share_around(self, chosen: np.ndarray, width_m: float) -> np.ndarray:
+    def compute_local_share(self, selection: np.ndarray, width_m: float) -> np.ndarray:
         """Share, flat by cells, of the points in a window of `width_m` about each cell that are
-        `chosen` (n,).
+        `selection` (n,).
         """
         size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
         mean = [
             ndimage.uniform_filter(self.count(c).astype(float), size)
-            for c in (chosen, np.ones(len(chosen), bool))
+            for c in (selection, np.ones(len(selection), bool))
         ]
         return (mean[0] / np.maximum(mean[1], 1e-9)).ravel()
 

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from .buildings import HIGH_M, roof_points
+from .buildings import HIGH_OBJECT_M, roof_points
 from .cells import SquareCells, plan_density
-from .ground import plane_through
+from .ground import fit_plane
 
 CELL_M, SPACINGS_A_CELL = 1.0, 2.0  # side of the cells, at least so many spacings of points
 REACH_CELLS = 2  # that no beam may have hit between a roof and the ground
@@ -38,26 +38,28 @@ def is_cut_out(xyz: np.ndarray) -> bool | None:
     """
     cell_m = max(CELL_M, SPACINGS_A_CELL / math.sqrt(plan_density(xyz)))
     cells = SquareCells(xyz, cell_m)
-    height = cells.top(xyz[:, 2]) - plane_through(-cells.top(-xyz[:, 2]), cell_m)
+    height = cells.top(xyz[:, 2]) - fit_plane(-cells.top(-xyz[:, 2]), cell_m)
     ends = walls = 0
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        beyond = next_seen(height, axis, way)
-        border = (height > HIGH_M) & (beyond <= HIGH_M)
-        is_wall = np.isfinite(beyond[border]) & (height[border] - beyond[border] > WALL_M)
+        next_heights = find_next_heights(height, axis, way)
+        border = (height > HIGH_OBJECT_M) & (next_heights <= HIGH_OBJECT_M)
+        is_wall = np.isfinite(next_heights[border]) & (
+            height[border] - next_heights[border] > WALL_M
+        )
         walls += int(is_wall.sum())
         ends += int((~is_wall).sum())
     if ends < OPEN_SHARE * (ends + walls) or roof_points(xyz).mean() <= SMOOTH_SHARE:
         return False
-    return True if (height > HIGH_M).any() else None
+    return True if (height > HIGH_OBJECT_M).any() else None
 
 
-def next_seen(height: np.ndarray, axis: int, way: int) -> np.ndarray:
+def find_next_heights(height: np.ndarray, axis: int, way: int) -> np.ndarray:
     """Of each cell (c, r) the height of the next one with points within REACH_CELLS on one side;
     minus infinity where there is none.
     """
     wide = np.pad(height, REACH_CELLS, constant_values=-np.inf)
-    found = np.full(wide.shape, -np.inf)
+    result = np.full(wide.shape, -np.inf)
     for step in range(REACH_CELLS, 0, -1):
-        near = np.roll(wide, way * step, axis)
-        found = np.where(np.isfinite(near), near, found)
-    return found[REACH_CELLS:-REACH_CELLS, REACH_CELLS:-REACH_CELLS]
+        nearby = np.roll(wide, way * step, axis)
+        result = np.where(np.isfinite(nearby), nearby, result)
+    return result[REACH_CELLS:-REACH_CELLS, REACH_CELLS:-REACH_CELLS]

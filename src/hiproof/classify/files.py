@@ -11,14 +11,14 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..frames import Units
-from ..read.crs import parse_crs, units_of
-from ..read.las import explained, facts_of, read_las_header
+from ..read.crs import find_units, parse_crs
+from ..read.las import read_checked_facts, read_las_header, translate_errors
 from ..read.las_crs import las_crs
 from ..read.overlap import refuse_degrees
 from ..read.pointcloud import common_crs, file_kind, refuse_implausible
 from ..settings import Settings
 from ..write.files import atomic
-from .buildings import BUILDING, GROUND, UNKNOWN, classify
+from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify
 
 LEFT_ALONE = (7, 9, 17, 18)  # noise, water, bridges
 
@@ -40,21 +40,22 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
         )
     las = read_whole(path)
     units = units_in(las, path, settings)
-    before = np.asarray(las.classification, np.uint8)
-    asked = ~np.isin(before, LEFT_ALONE) & ~np.asarray(las.withheld, bool)
-    if not asked.any():
+    classification = np.asarray(las.classification, np.uint8)
+    mask = ~np.isin(classification, LEFT_ALONE) & ~np.asarray(las.withheld, bool)
+    if not mask.any():
         raise InputError(
-            f"expected points that may be ground or buildings in {path}, got {len(before):,} of "
+            f"expected points that may be ground or buildings in {path}, got "
+            f"{len(classification):,} of "
             "noise, water or bridges alone; "
             "check the file's classes"
         )
-    found = classify(units.to_metres(np.asarray(las.xyz)[asked]))
-    las.classification[asked] = classes_after(before[asked], found)
+    result = classify(units.to_metres(np.asarray(las.xyz)[mask]))
+    las.classification[mask] = merge_classes(classification[mask], result)
     write_whole(las, out)
     counts = {
-        "points": len(before),
-        "ground": (found == GROUND).sum(),
-        "building": (found == BUILDING).sum(),
+        "points": len(classification),
+        "ground": (result == GROUND_CLASS).sum(),
+        "building": (result == BUILDING).sum(),
     }
     return {name: int(count) for name, count in counts.items()}
 
@@ -65,7 +66,7 @@ def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
     Raises InputError for degrees, also where no CRS says that they are.
     """
     crs = common_crs(
-        {str(path): las_crs(facts_of(path).projection)},
+        {str(path): las_crs(read_checked_facts(path).projection)},
         parse_crs(settings.read.crs),
         settings.read.unit,
     )
@@ -76,15 +77,15 @@ def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
             str(path),
             "reproject it to the UTM zone or the national grid of the place (`pdal translate`)",
         )
-    return units_of(crs, str(path), settings.read.unit)
+    return find_units(crs, str(path), settings.read.unit)
 
 
-def classes_after(before: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Classes (n,) from those `before` and those `found`: neither ground nor building keeps its
+def merge_classes(previous: np.ndarray, result: np.ndarray) -> np.ndarray:
+    """Classes (n,) from those `previous` and those `result`: neither ground nor building keeps its
     own, unless it was one.
     """
-    own = np.where(np.isin(before, (GROUND, BUILDING)), UNKNOWN, before)
-    return np.where(found == UNKNOWN, own, found).astype(np.uint8)
+    classes = np.where(np.isin(previous, (GROUND_CLASS, BUILDING)), UNKNOWN, previous)
+    return np.where(result == UNKNOWN, classes, result).astype(np.uint8)
 
 
 def read_whole(path: Path) -> laspy.LasData:
@@ -96,7 +97,7 @@ def read_whole(path: Path) -> laspy.LasData:
         )
     if not read_las_header(path).point_count:
         raise InputError(f"expected points in {path}, got none; copy or download it again")
-    with explained(path):
+    with translate_errors(path):
         las = laspy.read(path)
         refuse_implausible(np.asarray(las.xyz), path)
         return las
@@ -109,5 +110,5 @@ def write_whole(las: laspy.LasData, out: Path) -> None:
     header = las.header
     header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
     header.evlrs = [record for record in header.evlrs or [] if record.user_id != "copc"]
-    with atomic(out) as beside, open(beside, "wb") as file:
+    with atomic(out) as temporary, open(temporary, "wb") as file:
         las.write(file, do_compress=out.suffix.lower() == ".laz")

@@ -65,14 +65,14 @@ def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
     0.0
     """
     first, lowest = lowest_in_cells(xyz, cell_m)
-    return GroundGrid(np.array(first) * cell_m, filled(bare_ground(lowest, cell_m)), cell_m)
+    return GroundGrid(np.array(first) * cell_m, fill_gaps(remove_objects(lowest, cell_m)), cell_m)
 
 
 def bare_points(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
     """Those of the points (m, 3), at most one a cell, that are the ground's."""
     first, table = lowest_in_cells(lowest, cell_m)
     column, row = (np.floor(lowest[:, :2] / cell_m).astype(np.int64) - first).T
-    return lowest[np.isfinite(bare_ground(table, cell_m))[column, row]]
+    return lowest[np.isfinite(remove_objects(table, cell_m))[column, row]]
 
 
 def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
@@ -86,57 +86,57 @@ def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np
     return first, np.where(np.isfinite(lowest), lowest, np.nan)
 
 
-def bare_ground(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
+def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
     """The lowest heights of cells (c, r), NaN where no point is, with NaN also where they are not
     the ground's.
     """
     lowest = np.where(lowest < np.nanmedian(lowest) - ABYSS_M, np.nan, lowest)
-    level = lowest - plane_through(lowest, cell_m)
-    pit = -opened(-level, 1) - level > PIT_M
+    level = lowest - fit_plane(lowest, cell_m)
+    pit = -open_heights(-level, 1) - level > PIT_M
     level = np.where(pit, np.nan, level)
-    known, raised, before = np.isfinite(level), np.zeros(level.shape, bool), level
+    mask, raised, previous = np.isfinite(level), np.zeros(level.shape, bool), level
     for half in WINDOWS_M:
         cells = max(1, round(half / cell_m))
-        after = opened(before, cells)
-        raised |= before - after > SLOPE * half
-        before = np.where(known, after, np.nan)
-    return np.where(known & ~raised, lowest, np.nan)
+        heights = open_heights(previous, cells)
+        raised |= previous - heights > SLOPE * half
+        previous = np.where(mask, heights, np.nan)
+    return np.where(mask & ~raised, lowest, np.nan)
 
 
-def plane_through(z: np.ndarray, cell_m: float) -> np.ndarray:
+def fit_plane(z: np.ndarray, cell_m: float) -> np.ndarray:
     """Heights at every cell of the plane through the known cells of `z`: of all, then twice of the
     half farthest below.
     """
     column, row = (index * cell_m for index in np.indices(z.shape))
-    terms, known = np.stack([column, row, np.ones(z.shape)], axis=-1), np.isfinite(z)
+    terms, mask = np.stack([column, row, np.ones(z.shape)], axis=-1), np.isfinite(z)
     for _ in range(PLANES):
-        plane = terms @ np.linalg.lstsq(terms[known], z[known], rcond=None)[0]
-        known = known & (z - plane <= np.median((z - plane)[known]))
+        plane = terms @ np.linalg.lstsq(terms[mask], z[mask], rcond=None)[0]
+        mask = mask & (z - plane <= np.median((z - plane)[mask]))
     return plane
 
 
-def opened(z: np.ndarray, half: int) -> np.ndarray:
+def open_heights(z: np.ndarray, half: int) -> np.ndarray:
     """The opening of `z` by squares of 2 half + 1 cells whose middles are known cells; unknown ones
     (NaN) take no part.
     """
-    known, size = np.isfinite(z), 2 * half + 1
+    mask, size = np.isfinite(z), 2 * half + 1
     eroded = ndimage.grey_erosion(
-        np.where(known, z, np.inf), size=size, mode="constant", cval=np.inf
+        np.where(mask, z, np.inf), size=size, mode="constant", cval=np.inf
     )
     return ndimage.grey_dilation(
-        np.where(known, eroded, -np.inf), size=size, mode="constant", cval=-np.inf
+        np.where(mask, eroded, -np.inf), size=size, mode="constant", cval=-np.inf
     )
 
 
-def filled(z: np.ndarray) -> np.ndarray:
+def fill_gaps(z: np.ndarray) -> np.ndarray:
     """`z` with the nearest known height in unknown cells (NaN), smoothed there; zeros where nothing
     is known.
     """
-    known = np.isfinite(z)
-    if not known.any():
+    mask = np.isfinite(z)
+    if not mask.any():
         return np.zeros(z.shape)
-    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
     heights = z[tuple(nearest)]
     for _ in range(SMOOTHINGS):
-        heights = np.where(known, z, ndimage.uniform_filter(heights, 3, mode="nearest"))
+        heights = np.where(mask, z, ndimage.uniform_filter(heights, 3, mode="nearest"))
     return heights

@@ -18,12 +18,12 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
-from ..fit.direction import quarter_gap, support_of
-from ..geometry.rings import GRID_M, with_area
-from .surfaces import Surfaces, surfaces_of
+from ..fit.direction import measure_support, quarter_gap
+from ..geometry.rings import OVERLAY_GRID_M, with_area
+from .surfaces import Surfaces, find_surfaces
 
-REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
-STEP_M = 0.2  # surfaces that miss each other by less go on
+BOND_REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
+CUT_STEP_M = 0.2  # surfaces that miss each other by less go on
 ROUGH_STEP_M = 0.5  # so much higher or lower than what is no surface
 UPRIGHT = 0.25  # cosine of the slope from which a surface is a wall
 HOLD = 3.0  # what a bond that holds counts against one that does not
@@ -40,10 +40,10 @@ LEAST_APART, LEAST_GAIN, LEAST_LENGTH_M = (
     0.35,
     3.0,
 )  # of a run: share of stretches that nothing holds; gain a metre
-COARSE = 0.5  # of these two for lines that are not yet in their place
+COARSE_CUT_M = 0.5  # of these two for lines that are not yet in their place
 LEAST_HOUSE_M2, LEAST_DEPTH_M = 25.0, 4.0  # of roof on either side, and by the metre of the cut
 NECK_M = 1.5  # what is narrower joins no houses
-TRIES = 20  # cuts tried of an area, the best first
+MAX_CUTS_TRIED = 20  # cuts tried of an area, the best first
 LIKE_DEG, LIKE_M = 12.0, 1.0  # degrees and m within which two cuts are one
 # degrees within which edges and slopes support a direction, and between two directions; how many at
 # most; least share of all support
@@ -64,9 +64,9 @@ class Bonds:
     state: np.ndarray
     weight: np.ndarray
 
-    def among(self, chosen: np.ndarray) -> Bonds:
-        """The `chosen` (b,) ones."""
-        number = np.flatnonzero(chosen)
+    def among(self, selection: np.ndarray) -> Bonds:
+        """The `selection` (b,) ones."""
+        number = np.flatnonzero(selection)
         return Bonds(*(getattr(self, f.name).take(number, axis=0) for f in fields(self)))
 
     def inside(self, area: shapely.Geometry) -> Bonds:
@@ -77,7 +77,7 @@ class Bonds:
         return (self.ends.reshape(-1, 2) @ cut.normal - cut.offset).reshape(-1, 2)
 
 
-HELD, LOOSE, UNKNOWN = 0, 1, 2  # states of a bond between neighbouring points
+HELD_BOND, LOOSE, UNKNOWN_BOND = 0, 1, 2  # states of a bond between neighbouring points
 
 
 @dataclass(frozen=True)
@@ -118,13 +118,18 @@ class Cut:
 
     def is_like(self, other: Cut) -> bool:
         """Whether both run nearly the same way in nearly the same place."""
-        turn, away = abs(self.normal @ other.normal), abs(self.middle @ other.normal - other.offset)
-        low, high = other.longest[:2]
-        beside = low < self.middle @ other.along < high
-        return bool(beside and away < LIKE_M and turn > math.cos(math.radians(LIKE_DEG)))
+        turn, distance = (
+            abs(self.normal @ other.normal),
+            abs(self.middle @ other.normal - other.offset),
+        )
+        lower, upper = other.longest[:2]
+        mask = lower < self.middle @ other.along < upper
+        return bool(mask and distance < LIKE_M and turn > math.cos(math.radians(LIKE_DEG)))
 
 
-def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[shapely.Geometry]:
+def separate_houses(
+    xyz: np.ndarray, area: shapely.Geometry, gap_m: float
+) -> list[shapely.Geometry]:
     """The areas of the single houses among roof points (n, 3) in `area`, all in world metres: they
     share it without a rest.
 
@@ -133,13 +138,14 @@ def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[sh
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 16, 0.4), np.arange(0.2, 9,
     ...     0.4)))
     >>> pair = np.column_stack([x, y, np.where(x < 8, 6.0, 7.0) - 0.6 * abs(y - 4.5)])
-    >>> [bool(abs(house.area - 72) < 1.5) for house in told_apart(pair, shapely.box(0, 0, 16, 9),
+    >>> [bool(abs(house.area - 72) < 1.5) for house in separate_houses(pair, shapely.box(0, 0, 16,
+    ...     9),
     ...     1.0)]
     [True, True]
     """
     origin = np.floor(xyz.min(axis=0))
-    surfaces = surfaces_of(xyz - origin)
-    roofs, bonds = roofs_of(surfaces), bonds_of(surfaces)
+    surfaces = find_surfaces(xyz - origin)
+    roofs, bonds = find_roofs(surfaces), find_bonds(surfaces)
     houses = [
         with_area(shapely.intersection(house, block))
         for block in without_necks(
@@ -163,12 +169,12 @@ def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[sh
         -0.5 * (gap_m + NECK_M),
         join_style="mitre",
     )
-    sides, rest = [], area
+    sides, remainder = [], area
     for part in shapely.get_parts(wide):
         side = shapely.buffer(part, 0.5 * NECK_M, join_style="mitre")
-        sides.append(with_area(shapely.intersection(rest, side)))
-        rest = with_area(shapely.difference(rest, side))
-    return with_crumbs([*sides, *shapely.get_parts(rest)], roofs)
+        sides.append(with_area(shapely.intersection(remainder, side)))
+        remainder = with_area(shapely.difference(remainder, side))
+    return with_crumbs([*sides, *shapely.get_parts(remainder)], roofs)
 
 
 def houses_in(area: shapely.Geometry, roofs: Roofs, bonds: Bonds) -> list[shapely.Geometry]:
@@ -176,11 +182,11 @@ def houses_in(area: shapely.Geometry, roofs: Roofs, bonds: Bonds) -> list[shapel
     if roof_m2(area, roofs) < 2 * LEAST_HOUSE_M2:
         return [area]
     bonds = bonds.inside(area)
-    for rough in best_cuts(bonds, directions_of(area, roofs)):
-        cut = refined(rough, bonds)
+    for rough in best_cuts(bonds, find_directions(area, roofs)):
+        cut = refine_cut(rough, bonds)
         if cut is None:
             continue
-        sides = with_crumbs(sides_of(area, cut), roofs)
+        sides = with_crumbs(cut_area(area, cut), roofs)
         if len(sides) > 1 and all(depth_m(side, cut, roofs) > LEAST_DEPTH_M for side in sides):
             return [house for side in sides for house in houses_in(side, roofs, bonds)]
     return [area]
@@ -200,7 +206,7 @@ class Roofs(NamedTuple):
     normal: np.ndarray
 
 
-def roofs_of(surfaces: Surfaces) -> Roofs:
+def find_roofs(surfaces: Surfaces) -> Roofs:
     roof = is_roof(surfaces)
     normal = surfaces.normal[roof]
     return Roofs(surfaces.xyz[roof, :2], surfaces.own_m2[roof] * np.abs(normal[:, 2]), normal)
@@ -218,7 +224,7 @@ def depth_m(side: shapely.Geometry, cut: Cut, roofs: Roofs) -> float:
     return 2.0 * float(np.median(np.abs(roofs.xy[inside] @ cut.normal - cut.offset)))
 
 
-def bonds_of(surfaces: Surfaces) -> Bonds:
+def find_bonds(surfaces: Surfaces) -> Bonds:
     """All pairs of neighbours in plan, walls left out.
 
     A surface holds both where the plane of one goes through the other, or where their planes meet
@@ -226,9 +232,9 @@ def bonds_of(surfaces: Surfaces) -> Bonds:
     """
     from scipy.spatial import cKDTree
 
-    kept = is_roof(surfaces) | ~surfaces.is_smooth
+    mask = is_roof(surfaces) | ~surfaces.is_smooth
     xyz, normal, smooth = (
-        values[kept] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth)
+        values[mask] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth)
     )
     if len(xyz) < 2:
         return Bonds(
@@ -239,20 +245,20 @@ def bonds_of(surfaces: Surfaces) -> Bonds:
         )
     tree = cKDTree(xyz[:, :2])
     spacing = np.median(tree.query(xyz[:, :2], k=2)[0][:, 1])
-    points = tree.query_pairs(max(REACH_M, REACH_SPACINGS * spacing), output_type="ndarray")
-    one, other = points.T
+    points = tree.query_pairs(max(BOND_REACH_M, REACH_SPACINGS * spacing), output_type="ndarray")
+    item, other = points.T
     slope = -normal[:, :2] / np.where(np.abs(normal[:, 2]) < UPRIGHT, 1.0, normal[:, 2])[:, None]
-    between = xyz[other] - xyz[one]
-    above = between[:, 2] - (slope[one] * between[:, :2]).sum(axis=1)
+    between = xyz[other] - xyz[item]
+    above = between[:, 2] - (slope[item] * between[:, :2]).sum(axis=1)
     below = -between[:, 2] + (slope[other] * between[:, :2]).sum(axis=1)
-    goes_on = (np.minimum(np.abs(above), np.abs(below)) < STEP_M) | (above * below > 0)
-    rough = np.where(np.abs(between[:, 2]) > ROUGH_STEP_M, LOOSE, UNKNOWN)
-    state = np.where(smooth[one] & smooth[other], np.where(goes_on, HELD, LOOSE), rough)
+    goes_on = (np.minimum(np.abs(above), np.abs(below)) < CUT_STEP_M) | (above * below > 0)
+    rough = np.where(np.abs(between[:, 2]) > ROUGH_STEP_M, LOOSE, UNKNOWN_BOND)
+    state = np.where(smooth[item] & smooth[other], np.where(goes_on, HELD_BOND, LOOSE), rough)
     ends, length = xyz[points, :2], np.hypot(between[:, 0], between[:, 1])
     return Bonds(points, ends, ends.mean(axis=1), state, 1.0 / np.maximum(length, SHORT_M))
 
 
-def directions_of(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
+def find_directions(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
     """Azimuths (d,) in which cuts are looked for: those of slopes and of the block's border, and
     across them.
     """
@@ -267,51 +273,53 @@ def directions_of(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
     steep = np.hypot(*normal[:, :2].T)
     angle = np.r_[np.arctan2(normal[:, 1], normal[:, 0]), np.arctan2(edges[:, 1], edges[:, 0])]
     weight = np.r_[steep / max(steep.sum(), 1e-9), np.hypot(*edges.T) / np.hypot(*edges.T).sum()]
-    tried = np.radians(np.arange(0.0, 90.0, 1.0))
-    support = support_of(tried, angle, weight, math.radians(DIRECTION_DEG))
-    found: list[float] = []
+    candidates = np.radians(np.arange(0.0, 90.0, 1.0))
+    support = measure_support(candidates, angle, weight, math.radians(DIRECTION_DEG))
+    result: list[float] = []
     for k in np.argsort(-support):
-        far = all(abs(quarter_gap(tried[k] - other)) > math.radians(APART_DEG) for other in found)
-        if far and support[k] > LEAST_SUPPORT * weight.sum() and len(found) < MOST_DIRECTIONS:
-            found.append(tried[k])
-    return np.array([turned for angle in found for turned in (angle, angle + 0.5 * math.pi)])
+        mask = all(
+            abs(quarter_gap(candidates[k] - other)) > math.radians(APART_DEG) for other in result
+        )
+        if mask and support[k] > LEAST_SUPPORT * weight.sum() and len(result) < MOST_DIRECTIONS:
+            result.append(candidates[k])
+    return np.array([turned for angle in result for turned in (angle, angle + 0.5 * math.pi)])
 
 
 def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
     """Cuts in all `directions`, none near a better one, the best first."""
-    cuts = [cut for angle in directions for cut in cuts_along(angle, bonds, LINE_M, COARSE)]
+    cuts = [cut for angle in directions for cut in cuts_along(angle, bonds, LINE_M, COARSE_CUT_M)]
     best: list[Cut] = []
     for cut in sorted(cuts, key=lambda cut: -cut.gain):
-        if len(best) < TRIES and not any(cut.is_like(other) for other in best):
+        if len(best) < MAX_CUTS_TRIED and not any(cut.is_like(other) for other in best):
             best.append(cut)
     return best
 
 
-def refined(cut: Cut, bonds: Bonds) -> Cut | None:
+def refine_cut(cut: Cut, bonds: Bonds) -> Cut | None:
     """The best of the lines near `cut`, turned a little and at a tenth of a metre;
 
     None where it is none to cut at.
     """
     x, y = bonds.middle.T
     away2 = (x - cut.middle[0]) ** 2 + (y - cut.middle[1]) ** 2
-    near = bonds.among(away2 < (0.5 * cut.length + 2.0) ** 2)
+    nearby = bonds.among(away2 < (0.5 * cut.length + 2.0) ** 2)
     angle = math.atan2(cut.normal[1], cut.normal[0])
-    tried = [
+    candidates = [
         other
         for turn in np.radians(FINE_TURNS_DEG)
-        for other in cuts_along(angle + turn, near, FINE_LINE_M)
+        for other in cuts_along(angle + turn, nearby, FINE_LINE_M)
     ]
-    like = [
+    template = [
         other
-        for other in tried
+        for other in candidates
         if abs(other.normal @ cut.middle - other.offset) < FINE_SHIFT_M
         and other.length > 0.7 * cut.length
     ]
-    if not like:
+    if not template:
         return None
-    best = max(like, key=lambda other: other.gain)
-    one, other = bonds.across(best).T
-    crossing = bonds.among((np.minimum(one, other) < NEXT_M) & (np.maximum(one, other) > -NEXT_M))
+    best = max(template, key=lambda other: other.gain)
+    item, other = bonds.across(best).T
+    crossing = bonds.among((np.minimum(item, other) < NEXT_M) & (np.maximum(item, other) > -NEXT_M))
     whole = cuts_along(math.atan2(best.normal[1], best.normal[0]), crossing, FINE_LINE_M)
     return next(
         (other for other in whole if abs(other.offset - best.offset) < 0.5 * FINE_LINE_M), None
@@ -325,7 +333,7 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
     normal = np.array([math.cos(angle), math.sin(angle)])
     crossed, first, start = crossings(bonds.ends, bonds.state, bonds.weight, normal, lines_m)
     crossed *= is_between(bonds.points, bonds.ends, normal, lines_m, first, start, crossed[0])
-    line, runs = runs_of(crossed, start, strictness * LEAST_APART)
+    line, runs = find_runs(crossed, start, strictness * LEAST_APART)
     length = runs[:, 1] - runs[:, 0]
     is_long = (
         (runs[:, 2] > 0)
@@ -343,18 +351,18 @@ def crossings(ends, state, weight, normal, lines_m):
     n, c, s = len(ends), normal[0] / lines_m, normal[1] / lines_m
     v, u, along = np.empty((2, n)), np.empty((2, n)), lines_m / STRETCH_M
     for e in range(2):
-        x, y, across, beside = ends[:, e, 0], ends[:, e, 1], v[e], u[e]
+        x, y, across, position_along = ends[:, e, 0], ends[:, e, 1], v[e], u[e]
         for b in range(n):
-            across[b], beside[b] = c * x[b] + s * y[b], (c * y[b] - s * x[b]) * along
+            across[b], position_along[b] = c * x[b] + s * y[b], (c * y[b] - s * x[b]) * along
     first, start = math.floor(v.min()), math.floor(u.min())
     crossed = np.zeros(
         (3, int(math.floor(v.max()) - first) + 1, int(math.floor(u.max()) - start) + 1)
     )
     for b in range(n):
-        low, high = (0, 1) if v[0, b] < v[1, b] else (1, 0)
-        v_low, u_low = v[low, b], u[low, b]
-        slope = (u[high, b] - u_low) / max(v[high, b] - v_low, 1e-9)
-        for line in range(math.ceil(v_low), math.floor(v[high, b]) + 1):
+        lower, upper = (0, 1) if v[0, b] < v[1, b] else (1, 0)
+        v_low, u_low = v[lower, b], u[lower, b]
+        slope = (u[upper, b] - u_low) / max(v[upper, b] - v_low, 1e-9)
+        for line in range(math.ceil(v_low), math.floor(v[upper, b]) + 1):
             crossed[state[b], int(line - first), int(u_low + (line - v_low) * slope - start)] += (
                 weight[b]
             )
@@ -362,75 +370,78 @@ def crossings(ends, state, weight, normal, lines_m):
 
 
 @compiled
-def is_between(points, ends, normal, lines_m, first, start, like):
+def is_between(points, ends, normal, lines_m, first, start, template):
     """Whether something lies on both sides of each line, away from it, in each stretch, as a table
-    (lines, stretches) `like` this: along the border of a block there is nothing to be cut.
+    (lines, stretches) `template` this: along the border of a block there is nothing to be cut.
     """
-    beside, seen = np.zeros((2, *like.shape), np.bool_), np.zeros(points.max() + 1, np.bool_)
+    near_line, is_visited = (
+        np.zeros((2, *template.shape), np.bool_),
+        np.zeros(points.max() + 1, np.bool_),
+    )
     for b in range(len(ends)):
         for e in range(2):
-            if seen[points[b, e]]:
+            if is_visited[points[b, e]]:
                 continue
-            seen[points[b, e]] = True
+            is_visited[points[b, e]] = True
             v = ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]
             stretch = int(
                 (ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1] - start) / STRETCH_M
             )
             for side in range(2):
-                low = v - AWAY_M - REACH_M if side else v + AWAY_M
-                last = math.floor((low + REACH_M) / lines_m) - first
+                lower = v - AWAY_M - BOND_REACH_M if side else v + AWAY_M
+                last = math.floor((lower + BOND_REACH_M) / lines_m) - first
                 for line in range(
-                    max(math.ceil(low / lines_m) - first, 0), min(last + 1, like.shape[0])
+                    max(math.ceil(lower / lines_m) - first, 0), min(last + 1, template.shape[0])
                 ):
-                    beside[side, int(line), stretch] = True
-    return beside[0] & beside[1]
+                    near_line[side, int(line), stretch] = True
+    return near_line[0] & near_line[1]
 
 
 @compiled
-def runs_of(crossed, start, least_apart):
+def find_runs(crossed, start, least_apart):
     """Line (m,) and low, high, whether hardly any bond holds, and gain (m, 4) of each run of
     stretches that bonds cross; a run goes on beyond a single stretch that none crosses.
     """
     line, runs, m = np.empty(crossed[0].size, np.int64), np.empty((crossed[0].size, 4)), 0
     for k in range(crossed.shape[1]):
-        low, high, count, apart, gain = -1, -1, 0, 0, 0.0
+        lower, upper, count, gap, gain = -1, -1, 0, 0, 0.0
         for stretch in range(crossed.shape[2] + 2):
             if stretch < crossed.shape[2] and crossed[:, k, stretch].sum() > 0.0:
-                held, loose, unknown = crossed[:, k, stretch]
-                low, high, count = stretch if count == 0 else low, stretch + 1, count + 1
-                gain += STRETCH_M * (loose - HOLD * held) / (held + loose + unknown)
-                apart += loose > HOLD * held
-            elif count > 0 and stretch > high:
-                line[m], runs[m, 2], runs[m, 3] = k, apart >= least_apart * count, gain
-                runs[m, 0], runs[m, 1] = start + low * STRETCH_M, start + high * STRETCH_M
-                low, high, count, apart, gain, m = -1, -1, 0, 0, 0.0, m + 1
+                fixed, loose, unknown = crossed[:, k, stretch]
+                lower, upper, count = stretch if count == 0 else lower, stretch + 1, count + 1
+                gain += STRETCH_M * (loose - HOLD * fixed) / (fixed + loose + unknown)
+                gap += loose > HOLD * fixed
+            elif count > 0 and stretch > upper:
+                line[m], runs[m, 2], runs[m, 3] = k, gap >= least_apart * count, gain
+                runs[m, 0], runs[m, 1] = start + lower * STRETCH_M, start + upper * STRETCH_M
+                lower, upper, count, gap, gain, m = -1, -1, 0, 0, 0.0, m + 1
     return line[:m], runs[:m]
 
 
-def sides_of(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
+def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
     """What `area` falls into where it is cut: all that goes on around its ends, or across it
     elsewhere, stays together.
     """
-    far = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
-    low, high = cut.middle @ cut.along - far, cut.middle @ cut.along + far
+    distant = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
+    lower, upper = cut.middle @ cut.along - distant, cut.middle @ cut.along + distant
     halves = [
-        [cut.at(low), cut.at(high), cut.at(high, side * far), cut.at(low, side * far)]
+        [cut.at(lower), cut.at(upper), cut.at(upper, side * distant), cut.at(lower, side * distant)]
         for side in (-1, 1)
     ]
     halves = [shapely.intersection(area, shapely.Polygon(half)) for half in halves]
     parts = [part for half in halves for part in shapely.get_parts(half) if part.area > 0.0]
-    group, held = list(range(len(parts))), cut.runs[cut.runs[:, 2] == 0]
+    group, fixed = list(range(len(parts))), cut.runs[cut.runs[:, 2] == 0]
     for segment in shapely.get_parts(
-        shapely.intersection(area, shapely.LineString([cut.at(low), cut.at(high)]))
+        shapely.intersection(area, shapely.LineString([cut.at(lower), cut.at(upper)]))
     ):
         u = shapely.get_coordinates(segment) @ cut.along
-        if not segment.length or not ((held[:, 0] < u.max()) & (held[:, 1] > u.min())).any():
+        if not segment.length or not ((fixed[:, 0] < u.max()) & (fixed[:, 1] > u.min())).any():
             continue
         across = [shapely.Point(cut.at(u.mean(), side * 0.01)) for side in (-1, 1)]
-        one, other = (group[int(np.argmin(shapely.distance(parts, point)))] for point in across)
-        group = [one if number == other else number for number in group]
+        item, other = (group[int(np.argmin(shapely.distance(parts, point)))] for point in across)
+        group = [item if number == other else number for number in group]
     return [
-        joined([p for p, g in zip(parts, group, strict=True) if g == number])
+        join_areas([p for p, g in zip(parts, group, strict=True) if g == number])
         for number in sorted(set(group))
     ]
 
@@ -440,13 +451,17 @@ def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geo
     is_large = [roof_m2(side, roofs) >= LEAST_HOUSE_M2 for side in sides]
     houses = [[side] for side, large in zip(sides, is_large, strict=True) if large]
     if len(houses) < 2:
-        return [joined(sides)]
+        return [join_areas(sides)]
     for side, large in zip(sides, is_large, strict=True):
         if not large:
             houses[int(np.argmin([side.distance(house[0]) for house in houses]))].append(side)
-    return [joined(house) for house in houses]
+    return [join_areas(house) for house in houses]
 
 
-def joined(areas: list[shapely.Geometry]) -> shapely.Geometry:
+def join_areas(areas: list[shapely.Geometry]) -> shapely.Geometry:
     """The union of polygons that share nothing but border."""
-    return with_area(shapely.union_all(areas, grid_size=GRID_M)) if len(areas) > 1 else areas[0]
+    return (
+        with_area(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
+        if len(areas) > 1
+        else areas[0]
+    )

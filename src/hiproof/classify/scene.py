@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
-from ..log import counted
+from ..log import count_things
 from ..model import PointCloud
 from .buildings import BUILDING, classify
 
@@ -23,39 +23,41 @@ def roofs_by_shape(
 
     `on_error` is called with the indices of the points of a square in which the search fails.
     """
-    asked = np.flatnonzero(~np.isin(cloud.classes, tuple(NO_ROOFS)))
+    indices = np.flatnonzero(~np.isin(cloud.classes, tuple(NO_ROOFS)))
     n_failed = 0
 
     def skip_square(inside: np.ndarray, error: Exception) -> None:
         nonlocal n_failed
         n_failed += 1
-        on_error(asked[inside], error)
+        on_error(indices[inside], error)
 
-    classes = classify(cloud.xyz[asked], skip_square)
-    roofs = asked[(classes == BUILDING) & ~np.isin(cloud.classes[asked], ground_classes)]
+    classes = classify(cloud.xyz[indices], skip_square)
+    roofs = indices[(classes == BUILDING) & ~np.isin(cloud.classes[indices], ground_classes)]
     return (
         roofs
         if n_failed
-        else some(roofs, cloud, "none of which lies on a smooth surface above the ground")
+        else require_roofs(roofs, cloud, "none of which lies on a smooth surface above the ground")
     )
 
 
-def points_that_may_be_roofs(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
+def select_roof_candidates(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
     """Ascending indices of all points but those of classes that hold no roofs.
 
     Raises InputError where there are none.
     """
-    asked = np.flatnonzero(~np.isin(cloud.classes, (*NO_ROOFS, *ground_classes)))
-    return some(asked, cloud, "all of them ground, water, noise, low vegetation or bridges")
+    indices = np.flatnonzero(~np.isin(cloud.classes, (*NO_ROOFS, *ground_classes)))
+    return require_roofs(
+        indices, cloud, "all of them ground, water, noise, low vegetation or bridges"
+    )
 
 
-def some(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndarray:
+def require_roofs(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndarray:
     """The `roofs`, or InputError where there are none."""
     if len(roofs):
         return roofs
     where = ", ".join(cloud.sources) or "the cloud"
     raise InputError(
-        f"expected buildings in {where}, got {counted(len(cloud), 'point')} {why_not}; give "
+        f"expected buildings in {where}, got {count_things(len(cloud), 'point')} {why_not}; give "
         "--footprints, or name the class that "
         "holds roofs with --building-class"
     )

@@ -15,13 +15,13 @@ import shapely
 
 from ..errors import ErrorReport, InputError, InputWarning, report_error
 from ..geometry.components import label_components
-from ..log import counted
+from ..log import count_things
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
 from .cells import plan_density
 from .cut_out import is_cut_out
-from .houses import told_apart
-from .scene import points_that_may_be_roofs, roofs_by_shape
+from .houses import separate_houses
+from .scene import roofs_by_shape, select_roof_candidates
 
 # steps, so that neighbouring tiles of one survey choose the same gap
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
@@ -55,7 +55,7 @@ class FoundBuilding:
     error: ErrorReport | None = None
 
 
-class Place(NamedTuple):
+class RoofPoints(NamedTuple):
     """Points (ascending indices) of one building with their area; or of a place where the search
     failed.
     """
@@ -78,14 +78,16 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
     with the group, or the square of the cloud, where it happens.
     """
     read = (settings or Settings()).read
-    roof, is_cut_out, failed = roof_points_of(cloud, read)
-    found = named([*places_of(roof, cloud.xyz, read, is_cut_out), *failed], cloud.xyz)
-    return [dataclasses.replace(one, is_cut_out=is_cut_out) for one in found]
+    roof, is_cut_out, failed = select_roof_points(cloud, read)
+    places = name_places(
+        [*divide_roof_points(roof, cloud.xyz, read, is_cut_out), *failed], cloud.xyz
+    )
+    return [dataclasses.replace(item, is_cut_out=is_cut_out) for item in places]
 
 
-def places_of(
+def divide_roof_points(
     roof: np.ndarray, xyz: np.ndarray, read: ReadSettings, is_cut_out: bool
-) -> list[Place]:
+) -> list[RoofPoints]:
     """Divide the `roof` points (indices) among buildings."""
     if not len(roof):
         return []
@@ -93,13 +95,15 @@ def places_of(
     if is_cut_out and is_single(xy):
         return houses_or_error(roof, xyz, adapted_gap(xy), split_houses=False)
     gap_m = read.split_gap_m or adapted_gap(xy)
-    groups = large_enough([roof[group] for group in connected_groups(xy, gap_m)], xyz, read)
+    groups = select_large_groups([roof[group] for group in connected_groups(xy, gap_m)], xyz, read)
     return [
         house for group in groups for house in houses_or_error(group, xyz, gap_m, read.split_houses)
     ]
 
 
-def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) -> list[np.ndarray]:
+def select_large_groups(
+    groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings
+) -> list[np.ndarray]:
     """Those of the groups that are large enough for a building; an InputWarning counts the
     others.
     """
@@ -111,7 +115,8 @@ def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) 
     left_out = len(groups) - len(large)
     if left_out:
         warnings.warn(
-            f"{counted(left_out, 'group')} of building points left out as too small (fewer than "
+            f"{count_things(left_out, 'group')} of building points left out as too small (fewer "
+            "than "
             f"{read.split_min_points} points "
             f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
             InputWarning,
@@ -119,37 +124,39 @@ def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) 
     return large
 
 
-def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool, list[Place]]:
+def select_roof_points(
+    cloud: PointCloud, read: ReadSettings
+) -> tuple[np.ndarray, bool, list[RoofPoints]]:
     """Ascending indices of the points that may be roofs, whether they are roofs alone, cut out
     beforehand, and the places where the search for them failed.
     """
     if read.roofs == "alone":
-        return points_that_may_be_roofs(cloud, read.ground_classes), True, []
+        return select_roof_candidates(cloud, read.ground_classes), True, []
     index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
     if index is not None:
         return index, False, []
     unclassified, is_chosen = (
-        never_classified(cloud),
+        select_unclassified(cloud),
         read.building_classes != ReadSettings().building_classes,
     )
     if read.roofs == "class" or (read.roofs == "auto" and is_chosen):
         if unclassified is None or not is_single(cloud.xyz[unclassified, :2]):
             raise InputError(without_building_class(cloud, read.building_classes))
         return unclassified, True, []
-    if unclassified is not None and holds_roofs_alone(cloud.xyz[unclassified]):
+    if unclassified is not None and is_roofs_only(cloud.xyz[unclassified]):
         return unclassified, True, []
-    failed: list[Place] = []
+    failed: list[RoofPoints] = []
     roofs = roofs_by_shape(
         cloud,
         read.ground_classes,
         lambda index, error: failed.append(failed_place(index, cloud.xyz, error)),
     )
     if read.roofs == "auto":
-        said = (
+        text = (
             f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs "
             "were found by shape"
         )
-        warnings.warn(said, InputWarning)
+        warnings.warn(text, InputWarning)
     return roofs, False, failed
 
 
@@ -165,7 +172,7 @@ def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray |
     return index if len(index) else None
 
 
-def never_classified(cloud: PointCloud) -> np.ndarray | None:
+def select_unclassified(cloud: PointCloud) -> np.ndarray | None:
     """Ascending indices of all points that are no noise, None where there are none, or any has a
     class.
     """
@@ -181,10 +188,10 @@ def is_single(xy: np.ndarray) -> bool:
     """
     if len(xy) > SINGLE_POINTS or np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
         return False
-    return max(map(len, roughly_connected(xy))) >= SINGLE_SHARE * len(xy)
+    return max(map(len, group_roughly(xy))) >= SINGLE_SHARE * len(xy)
 
 
-def holds_roofs_alone(xyz: np.ndarray) -> bool:
+def is_roofs_only(xyz: np.ndarray) -> bool:
     """Whether the points (n, 3) are one roof or several, each a group by itself, that were cut out
     beforehand.
 
@@ -194,29 +201,29 @@ def holds_roofs_alone(xyz: np.ndarray) -> bool:
     if is_single(xyz[:, :2]):
         return is_cut_out(xyz) is not False
     roofs = others = 0
-    for group in roughly_connected(xyz[:, :2]):
+    for group in group_roughly(xyz[:, :2]):
         wide = np.ptp(xyz[group, :2], axis=0).max() > BLOCK_EXTENT_M
-        found = False if wide else is_cut_out(xyz[group])
-        roofs += len(group) if found else 0
-        others += len(group) if found is False else 0
+        result = False if wide else is_cut_out(xyz[group])
+        roofs += len(group) if result else 0
+        others += len(group) if result is False else 0
         if others > (1.0 - SINGLE_SHARE) * len(xyz):
             return False
     return roofs > 0.5 * len(xyz)
 
 
-def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
+def without_building_class(cloud: PointCloud, targets: tuple[int, ...]) -> str:
     if cloud.classification is None:
         got = (
-            f"{counted(len(cloud), 'point')} without classes, too many or too scattered for a "
+            f"{count_things(len(cloud), 'point')} without classes, too many or too scattered for a "
             "single building"
         )
     else:
         counts = sorted(Counter(cloud.classification.tolist()).items())
         got = "classes " + ", ".join(
-            f"{number} ({counted(count, 'point')})" for number, count in counts
+            f"{number} ({count_things(count, 'point')})" for number, count in counts
         )
     return (
-        f"expected points of class {classes_text(wanted)} (building), got {got}; name the class "
+        f"expected points of class {classes_text(targets)} (building), got {got}; name the class "
         "that holds the roofs with "
         "--building-class, give --footprints, or classify the cloud first"
     )
@@ -226,11 +233,11 @@ def adapted_gap(xy: np.ndarray) -> float:
     """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points
     are sparse.
     """
-    needed = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
-    return next((gap for gap in GAPS_M if gap >= needed), GAPS_M[-1])
+    required = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
+    return next((gap for gap in GAPS_M if gap >= required), GAPS_M[-1])
 
 
-def roughly_connected(xy: np.ndarray) -> list[np.ndarray]:
+def group_roughly(xy: np.ndarray) -> list[np.ndarray]:
     """The groups of `xy` (n, 2) that are connected across twice the gap between buildings: a roof
     may have holes.
     """
@@ -250,60 +257,60 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     columns = int(cells[:, 0].max()) + 3
     occupied, cell_of = np.unique(cells[:, 1] * columns + cells[:, 0], return_inverse=True)
     links = []
-    for right, up in ((1, 0), (2, 0), (-1, 1), (0, 1), (1, 1), (0, 2)):
-        wanted = occupied + up * columns + right
-        at = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
-        first = np.flatnonzero(occupied[at] == wanted)
-        links.append(np.column_stack([first, at[first]]))
+    for right, vertical in ((1, 0), (2, 0), (-1, 1), (0, 1), (1, 1), (0, 2)):
+        targets = occupied + vertical * columns + right
+        smallest = np.minimum(np.searchsorted(occupied, targets), len(occupied) - 1)
+        first = np.flatnonzero(occupied[smallest] == targets)
+        links.append(np.column_stack([first, smallest[first]]))
     group_of = label_components(len(occupied), np.concatenate(links).T)[cell_of]
     order = np.argsort(group_of, kind="stable")
     return np.split(order, np.cumsum(np.bincount(group_of))[:-1])
 
 
-def named(places: list[Place], xyz: np.ndarray) -> list[FoundBuilding]:
+def name_places(places: list[RoofPoints], xyz: np.ndarray) -> list[FoundBuilding]:
     """Give each place the id B_<x>_<y> of the metre that holds the middle of its box."""
-    used: Counter[str] = Counter()
-    found = []
+    in_use: Counter[str] = Counter()
+    result = []
     for index, area, error in places:
         xy = xyz[index, :2]
         x, y = np.floor((xy.min(axis=0) + xy.max(axis=0)) / 2).astype(int)
         id = f"B_{x}_{y}"
-        used[id] += 1
-        id = id if used[id] == 1 else f"{id}_{used[id]}"
-        found.append(FoundBuilding(id, index, area, error=error))
-    return found
+        in_use[id] += 1
+        id = id if in_use[id] == 1 else f"{id}_{in_use[id]}"
+        result.append(FoundBuilding(id, index, area, error=error))
+    return result
 
 
 def houses_or_error(
     group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
-) -> list[Place]:
+) -> list[RoofPoints]:
     """Divide a group of points into houses, or keep it whole with the error that this ended in."""
     try:
         return [
-            Place(index, shapely.make_valid(area))
-            for index, area in houses_of(group, xyz, gap_m, split_houses)
+            RoofPoints(index, shapely.make_valid(area))
+            for index, area in find_houses(group, xyz, gap_m, split_houses)
         ]
     except Exception as error:
         return [failed_place(group, xyz, error)]
 
 
-def failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> Place:
+def failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> RoofPoints:
     """The box of the points `index` with the error that happened there."""
     xy = xyz[index, :2]
-    return Place(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
+    return RoofPoints(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
 
 
-def houses_of(
+def find_houses(
     group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
 ) -> list[tuple[np.ndarray, shapely.Geometry]]:
     """Points (indices) and area of each house of a group of points, or of the whole group."""
     area = cell_area(xyz[group, :2], gap_m / 2)
     if not split_houses:
         return [(group, area)]
-    houses, left = [], np.ones(len(group), bool)
-    for house in told_apart(xyz[group], area, gap_m):
-        inside = left & shapely.intersects_xy(house, *xyz[group, :2].T)
-        left &= ~inside
+    houses, remainder = [], np.ones(len(group), bool)
+    for house in separate_houses(xyz[group], area, gap_m):
+        inside = remainder & shapely.intersects_xy(house, *xyz[group, :2].T)
+        remainder &= ~inside
         houses.append((group[inside], house))
     return [(index, house) for index, house in houses if len(index)]
 
@@ -319,5 +326,7 @@ def hull_area(xy: np.ndarray) -> float:
 
 def cell_area(xy: np.ndarray, cell_m: float) -> shapely.Geometry:
     """Union of the cells of the world's grid that hold points of `xy` (n, 2)."""
-    low = np.unique(np.floor(xy / cell_m), axis=0)
-    return shapely.coverage_union_all(shapely.box(*(low * cell_m).T, *((low + 1) * cell_m).T))
+    distinct = np.unique(np.floor(xy / cell_m), axis=0)
+    return shapely.coverage_union_all(
+        shapely.box(*(distinct * cell_m).T, *((distinct + 1) * cell_m).T)
+    )

@@ -15,7 +15,7 @@ from ..read.thin import hashes
 VOXEL_M = 0.5
 NEIGHBOURS = 12  # points that tell how smooth the surface around one is
 SMOOTH_M = 0.1  # a plane with larger residuals is no surface, and a point farther off is not on it
-TURN_DEG = 10.0  # neighbours of one surface have planes that differ by less
+SMOOTH_TURN_DEG = 10.0  # neighbours of one surface have planes that differ by less
 LARGEST_M2 = 50.0  # surfaces of that size and larger are all alike
 
 
@@ -45,33 +45,33 @@ class Surfaces:
         return values[self.neighbours].mean(axis=1)
 
 
-def surfaces_of(xyz: np.ndarray) -> Surfaces:
+def find_surfaces(xyz: np.ndarray) -> Surfaces:
     """The surfaces that points (n, 3), in world metres, lie on; the same whatever order they come
     in.
 
     >>> x, y = np.meshgrid(np.arange(0, 8, 0.5), np.arange(0, 8, 0.5))
-    >>> found = surfaces_of(np.column_stack([x.ravel(), y.ravel(), 0.5 * x.ravel()]))
+    >>> found = find_surfaces(np.column_stack([x.ravel(), y.ravel(), 0.5 * x.ravel()]))
     >>> bool(found.roughness_m.max() < 1e-6), bool(found.extent_m2.min() > 40)
     (True, True)
     """
     from scipy.spatial import cKDTree
 
-    chosen, voxel = one_a_voxel(xyz)
-    middles = xyz[chosen] - np.floor(xyz.min(axis=0))
+    selection, voxel = thin_to_voxels(xyz)
+    middles = xyz[selection] - np.floor(xyz.min(axis=0))
     k = min(NEIGHBOURS, len(middles))
     distance, neighbours = cKDTree(middles).query(middles, k=[*range(1, k + 1)])
-    centre, normal, residual = planes_through(middles[neighbours])
+    centre, normal, residual = fit_planes(middles[neighbours])
     best = neighbours[np.arange(len(middles)), residual[neighbours].argmin(axis=1)]
     centre, normal, residual = centre[best], normal[best], residual[best]
-    beside = np.abs(((middles - centre) * normal).sum(axis=1))
+    plane_distances = np.abs(((middles - centre) * normal).sum(axis=1))
     own_m2 = np.clip(np.pi * distance[:, -1] ** 2 / k, VOXEL_M**2, 4.0)
-    smooth = (residual < SMOOTH_M) & (beside < SMOOTH_M)
-    surface = connected(middles, normal, smooth, neighbours)
+    smooth = (residual < SMOOTH_M) & (plane_distances < SMOOTH_M)
+    surface = connect_voxels(middles, normal, smooth, neighbours)
     extent = np.minimum(np.bincount(surface, own_m2)[surface], LARGEST_M2)
-    return Surfaces(voxel, xyz[chosen], neighbours, residual, normal, smooth, own_m2, extent)
+    return Surfaces(voxel, xyz[selection], neighbours, residual, normal, smooth, own_m2, extent)
 
 
-def one_a_voxel(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def thin_to_voxels(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the voxel
     (n,) of each point.
     """
@@ -86,7 +86,7 @@ def one_a_voxel(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return order[first], of_point
 
 
-def planes_through(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def fit_planes(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Centre (v, 3), unit normal (v, 3) and residual (v,), one sigma, of the plane through each
     group of points (v, k, 3).
     """
@@ -96,17 +96,17 @@ def planes_through(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return centre, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
 
 
-def connected(
+def connect_voxels(
     xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbours: np.ndarray
 ) -> np.ndarray:
     """Number (v,) of the surface of each voxel: neighbours are of one where both are smooth and lie
     in each other's plane.
     """
-    one, other = np.repeat(np.arange(len(xyz)), neighbours.shape[1]), neighbours.ravel()
-    both = smooth[one] & smooth[other]
-    one, other = one[both], other[both]
-    between = xyz[other] - xyz[one]
-    same = np.abs((normal[one] * normal[other]).sum(axis=1)) > np.cos(np.radians(TURN_DEG))
-    for end in (one, other):
+    item, other = np.repeat(np.arange(len(xyz)), neighbours.shape[1]), neighbours.ravel()
+    mask = smooth[item] & smooth[other]
+    item, other = item[mask], other[mask]
+    between = xyz[other] - xyz[item]
+    same = np.abs((normal[item] * normal[other]).sum(axis=1)) > np.cos(np.radians(SMOOTH_TURN_DEG))
+    for end in (item, other):
         same &= np.abs((between * normal[end]).sum(axis=1)) < SMOOTH_M
-    return label_components(len(xyz), np.stack([one[same], other[same]]))
+    return label_components(len(xyz), np.stack([item[same], other[same]]))

@@ -61,8 +61,8 @@ def addresses_in(arguments: list[str]) -> Iterator[str]:
         yield argument
         if argument.startswith("--") and "=" in argument:
             yield argument.partition("=")[2]
-        more = list(takewhile(lambda other: not other.startswith("-"), arguments[index + 1 :]))
+        additions = list(takewhile(lambda other: not other.startswith("-"), arguments[index + 1 :]))
         if argument.lower().startswith(("password=", "pwd=")):
-            yield " ".join([argument, *takewhile(lambda other: "=" not in other, more)])
-        elif CUT_OFF.search(argument) and any("@" in other for other in more):
-            yield " ".join([argument, *more])
+            yield " ".join([argument, *takewhile(lambda other: "=" not in other, additions)])
+        elif CUT_OFF.search(argument) and any("@" in other for other in additions):
+            yield " ".join([argument, *additions])

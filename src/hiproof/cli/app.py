@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from .. import __version__
-from ..masking import masked
+from ..masking import mask
 from .attributes import attributes
 from .build import build
 from .check import check
@@ -36,16 +36,16 @@ class MaskingGroup(TyperGroup):
     """The commands, whose complaints about wrong usage hold no password of an argument."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        with complaints_masked():
+        with mask_complaints():
             return super().parse_args(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        with complaints_masked():
+        with mask_complaints():
             return super().invoke(ctx)
 
 
 @contextmanager
-def complaints_masked() -> Iterator[None]:
+def mask_complaints() -> Iterator[None]:
     """Mask what click, which some versions of typer hold inside, says of wrong usage: it names
     arguments as they are.
     """
@@ -53,8 +53,8 @@ def complaints_masked() -> Iterator[None]:
         yield
     except Exception as error:
         if hasattr(error, "format_message"):
-            told = masked(error.format_message())
-            error.format_message = lambda: told
+            message = mask(error.format_message())
+            error.format_message = lambda: message
         raise
 
 
@@ -68,8 +68,8 @@ app = typer.Typer(
 )
 
 
-def version(wanted: bool) -> None:
-    if wanted:
+def version(targets: bool) -> None:
+    if targets:
         print(f"hiproof {__version__}")
         raise typer.Exit
 

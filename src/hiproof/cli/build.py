@@ -7,22 +7,22 @@ from typing import Annotated, Any
 
 import typer
 
-from ..log import counted
+from ..log import count_things
 from .options import with_settings
 
 
-def print_shapes(wanted: bool) -> None:
-    if wanted:
+def print_shapes(targets: bool) -> None:
+    if targets:
         from ..primitives.catalogue import CATALOGUE
-        from ..primitives.parameters import names_of
+        from ..primitives.parameters import list_parameters
 
         for name in CATALOGUE:
-            typer.echo(f"{name}: {', '.join(names_of(name))}")
+            typer.echo(f"{name}: {', '.join(list_parameters(name))}")
         raise typer.Exit
 
 
-def print_schema(wanted: bool) -> None:
-    if wanted:
+def print_schema(targets: bool) -> None:
+    if targets:
         from ..parametric.schema import schema_text
 
         typer.echo(schema_text(), nl=False)
@@ -66,10 +66,10 @@ def build(
 
     with Bar() as bar:
         built = build_file(parameters, out, lambda done: bar.update("build", done, None), changes)
-    for id, why in built.not_built:
-        typer.echo(f"not built: building {id}: {why}", err=True)
+    for id, reason in built.not_built:
+        typer.echo(f"not built: building {id}: {reason}", err=True)
     typer.echo(
-        f"{counted(built.buildings, 'building')}: "
+        f"{count_things(built.buildings, 'building')}: "
         + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common())
     )
     if built.by_quality:

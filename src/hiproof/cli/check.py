@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from ..log import counted
-from ..read.damage import LeftOut
+from ..log import count_things
+from ..read.damage import SkippedBuildings
 
 
 def check(
@@ -33,7 +33,7 @@ def count_invalid(files: list[Path], planarity_m: float) -> int:
     for path in files:
         codes: Counter[int] = Counter()
         total = bad = 0
-        left_out = LeftOut()
+        left_out = SkippedBuildings()
         for id, solid in read_solids(path, left_out):
             total += 1
             findings = check_solid(solid, planarity_m=planarity_m)
@@ -44,9 +44,9 @@ def count_invalid(files: list[Path], planarity_m: float) -> int:
                     f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3])
                 )
         by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
-        by_code += left_out.told()
+        by_code += left_out.describe()
         typer.echo(
-            f"{path}: {counted(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}"
+            f"{path}: {count_things(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}"
         )
         invalid += bad + left_out.count
     return invalid

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ..log import counted
+from ..log import count_things
 
 
 def edit(
@@ -34,15 +34,16 @@ def edit(
     Ctrl-C ends it.
     """
     from ..edit.desk import Desk
-    from ..edit.edits import FILE
+    from ..edit.edits import EDITS_FILE
     from ..edit.server import Server, Service
 
     service = Service(Desk(folder, who or user_name(), clouds))
     with Server(service, port) as server:
         desk = service.desk
         typer.echo(
-            f"{counted(len(desk.run.rows), 'building')}, the most doubtful first; edits go into "
-            f"{folder / FILE}"
+            f"{count_things(len(desk.run.rows), 'building')}, the most doubtful first; edits go "
+            "into "
+            f"{folder / EDITS_FILE}"
         )
         if desk.points.missing:
             typer.echo(desk.points.missing, err=True)

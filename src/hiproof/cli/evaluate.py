@@ -11,11 +11,11 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError, OutputError
-from ..log import counted
-from ..read.damage import LeftOut
+from ..log import count_things
+from ..read.damage import SkippedBuildings
 from ..write.files import elsewhere
 
-SHOWN = {
+SHOWN_FIGURES = {
     "psd_mean": "PSD",
     "psd_std": "std",
     "rmse": "RMSE",
@@ -62,7 +62,7 @@ def evaluate(
     from ..evaluate.run import evaluate_run
     from ..write.files import atomic_file
 
-    left_out = LeftOut()
+    left_out = SkippedBuildings()
     run = evaluate_run(folder, clouds or (), footprints, reference, layer, left_out)
     left_out.refuse_all(model.is_damaged for model in run.models)
     if not run.clouds:
@@ -84,12 +84,14 @@ def evaluate(
     print_summary(summarise(run.figures), reference is not None)
     typer.echo(
         f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: "
-        f"{counted(len(run.figures), 'building')}{left_out.told()}"
+        f"{count_things(len(run.figures), 'building')}{left_out.describe()}"
     )
     unmeasured = sum(math.isnan(figures.quality.psd_mean) for figures in run.figures)
     if unmeasured:
-        told = counted(unmeasured, "building")
-        typer.echo(f"no distances of {told} (no model, or no points): their means are the others'")
+        entries = count_things(unmeasured, "building")
+        typer.echo(
+            f"no distances of {entries} (no model, or no points): their means are the others'"
+        )
     if left_out.exit_code:
         raise typer.Exit(left_out.exit_code)
 
@@ -101,14 +103,14 @@ def print_summary(summary: dict, has_reference: bool) -> None:
     from rich.console import Console
 
     console = Console(soft_wrap=True, markup=False)  # a roof type from outside may look like markup
-    console.print(table_of(summary, SHOWN, "mean over buildings", CAPTION))
+    console.print(make_table(summary, SHOWN_FIGURES, "mean over buildings", CAPTION))
     if has_reference:
         console.print(
-            table_of(summary, COMPARED, "mean difference from the reference", DIFFERENCES)
+            make_table(summary, COMPARED, "mean difference from the reference", DIFFERENCES)
         )
 
 
-def table_of(summary: dict, columns: dict[str, str], title: str, caption: str) -> Any:
+def make_table(summary: dict, columns: dict[str, str], title: str, caption: str) -> Any:
     """A line a roof type."""
     from rich.table import Column, Table
 

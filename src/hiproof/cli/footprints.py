@@ -35,11 +35,11 @@ def footprints(
     from ..city.request import Request
     from ..read.pointcloud import expand_paths
     from ..settings import Settings
-    from .reconstruct import settings_beside
+    from .reconstruct import find_settings_file
 
     if out.suffix.lower() != ".gpkg":
         raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")
-    config = config or settings_beside(*clouds)
+    config = config or find_settings_file(*clouds)
     settings = Settings.from_toml(config) if config else Settings()
     files = tuple(map(str, expand_paths(tuple(clouds))))
     request = Request(

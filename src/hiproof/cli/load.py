@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from ..log import counted
-from ..read.damage import LeftOut
+from ..log import count_things
+from ..read.damage import SkippedBuildings
 
 
 def load(
@@ -27,9 +27,9 @@ def load(
     """
     from ..view.loading import load_postgis
 
-    left_out = LeftOut()
+    left_out = SkippedBuildings()
     count = load_postgis(folder, database, prefix, left_out)
     tables = f"{prefix}_buildings, {prefix}_roofs and {prefix}_parts"
-    typer.echo(f"{counted(count, 'building')} loaded into {tables}{left_out.told()}")
+    typer.echo(f"{count_things(count, 'building')} loaded into {tables}{left_out.describe()}")
     if left_out.exit_code:
         raise typer.Exit(left_out.exit_code)

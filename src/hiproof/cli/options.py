@@ -13,7 +13,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from ..errors import SettingsError
-from ..settings import Settings, shown, toml_value
+from ..settings import Settings, format_value, toml_value
 
 
 class Declared(NamedTuple):
@@ -45,26 +45,29 @@ def with_options(command: Callable[..., None], sections: tuple[str, ...]) -> Cal
     """`command` with the options of the settings in `sections`, of all where none is named; see
     `with_settings`.
     """
-    chosen = [one for one in declared_settings() if not sections or one.section in sections]
-    declared = [one for one in chosen if one.field.metadata["option"]]
+    selection = [item for item in declared_settings() if not sections or item.section in sections]
+    declared = [item for item in selection if item.field.metadata["option"]]
     by_name: dict[str, list[Declared]] = {}
-    for one in declared:
-        by_name.setdefault(one.parameter, []).append(one)
-    own = [
+    for item in declared:
+        by_name.setdefault(item.parameter, []).append(item)
+    command_parameters = [
         p
         for p in inspect.signature(command, eval_str=True).parameters.values()
         if p.name != "changes"
     ]
-    parameters = [*own, *(parameter_of(name, same) for name, same in by_name.items())]
+    parameters = [
+        *command_parameters,
+        *(make_parameter(name, same) for name, same in by_name.items()),
+    ]
 
-    def typed(**values: Any) -> None:
-        given = {name: values.pop(name) for name in by_name}
-        command(**values, changes=changes_of(declared, given))
+    def run_command(**values: Any) -> None:
+        arguments = {name: values.pop(name) for name in by_name}
+        command(**values, changes=collect_changes(declared, arguments))
 
-    typed.__name__, typed.__doc__ = command.__name__, command.__doc__
-    typed.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    typed.__annotations__ = {p.name: p.annotation for p in parameters}
-    return typed
+    run_command.__name__, run_command.__doc__ = command.__name__, command.__doc__
+    run_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run_command.__annotations__ = {p.name: p.annotation for p in parameters}
+    return run_command
 
 
 def declared_settings() -> list[Declared]:
@@ -77,20 +80,20 @@ def declared_settings() -> list[Declared]:
     ]
 
 
-def parameter_of(name: str, same: list[Declared]) -> inspect.Parameter:
+def make_parameter(name: str, same: list[Declared]) -> inspect.Parameter:
     """The parameter `name` for those settings that are set together, None where it is not given."""
-    told = same[-1].field.metadata
-    metavar = "|".join(map(str, told["choices"])) or None
+    metadata = same[-1].field.metadata
+    metavar = "|".join(map(str, metadata["choices"])) or None
     option = typer.Option(
-        help="; ".join(help_of(one.field) for one in same),
+        help="; ".join(format_help(item.field) for item in same),
         metavar=metavar,
         rich_help_panel=same[0].heading,
     )
-    kind: Any = Annotated[KINDS[same[0].field.type] | None, option]
+    kind: Any = Annotated[OPTION_TYPES[same[0].field.type] | None, option]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
 
 
-KINDS: dict[Any, Any] = {
+OPTION_TYPES: dict[Any, Any] = {
     "bool": bool,
     "int": int,
     "float": float,
@@ -104,30 +107,34 @@ joined by commas.
 """
 
 
-def help_of(field: dataclasses.Field) -> str:
+def format_help(field: dataclasses.Field) -> str:
     """A setting's meaning and default."""
     default = toml_value(field.default).strip("[]").replace('"', "")
     return field.metadata["help"] + (f" (default: {default})" if default else "")
 
 
-def changes_of(declared: list[Declared], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Settings by section and name, of the options `given`; those that are None are left out."""
+def collect_changes(
+    declared: list[Declared], arguments: dict[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Settings by section and name, of the options `arguments`; those that are None are
+    left out.
+    """
     changes: dict[str, dict[str, Any]] = {}
-    for one in declared:
-        value = given[one.parameter]
+    for item in declared:
+        value = arguments[item.parameter]
         if value is not None:
-            several_texts = one.field.type == "tuple[str, ...]"
+            several_texts = item.field.type == "tuple[str, ...]"
             value = [text.strip() for text in value.split(",")] if several_texts else value
-            changes.setdefault(one.section, {})[one.field.name] = value
+            changes.setdefault(item.section, {})[item.field.name] = value
     return changes
 
 
-def box_of(text: str) -> tuple[float, float, float, float]:
+def parse_box(text: str) -> tuple[float, float, float, float]:
     """The box that `--bbox` names.
 
     Raises SettingsError for anything else than four numbers in order.
 
-    >>> box_of("85000,446000, 85100,446050")
+    >>> parse_box("85000,446000, 85100,446050")
     (85000.0, 446000.0, 85100.0, 446050.0)
     """
     try:
@@ -139,6 +146,6 @@ def box_of(text: str) -> tuple[float, float, float, float]:
             return xmin, ymin, xmax, ymax
     raise SettingsError(
         "expected --bbox as xmin,ymin,xmax,ymax with xmin < xmax and ymin < ymax, got "
-        f"{shown(text)}; "
+        f"{format_value(text)}; "
         "try --bbox 85000,446000,85500,446500"
     )

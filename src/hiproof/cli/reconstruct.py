@@ -10,9 +10,9 @@ import typer
 from ..errors import SettingsError
 from ..log import LOGGER, Level, start
 from ..settings import Settings
-from .options import box_of, with_settings
+from .options import parse_box, with_settings
 
-BESIDE = "hiproof.toml"
+SETTINGS_FILE = "hiproof.toml"
 
 
 @with_settings()
@@ -90,8 +90,8 @@ def reconstruct(
     from .running import run_request
 
     start(log_level, log_file)
-    box = None if bbox is None else box_of(bbox)
-    config = config or settings_beside(*clouds, footprints)
+    box = None if bbox is None else parse_box(bbox)
+    config = config or find_settings_file(*clouds, footprints)
     request = Request(
         clouds=tuple(map(str, expand_paths(tuple(clouds)))),
         out=out,
@@ -110,7 +110,7 @@ def reconstruct(
     raise typer.Exit(run_request(request))
 
 
-def settings_beside(*inputs: str | None) -> Path | None:
+def find_settings_file(*inputs: str | None) -> Path | None:
     """The settings file in the folder of any input, which the log names; None where there is none.
 
     Raises SettingsError where there are two: which of them counts is not to be guessed.
@@ -120,12 +120,12 @@ def settings_beside(*inputs: str | None) -> Path | None:
     named = [name for name in inputs if name and "://" not in name and not is_overture(name)]
     paths = [Path(name) for name in named]
     folders = dict.fromkeys((path if path.is_dir() else path.parent).absolute() for path in paths)
-    found = [folder / BESIDE for folder in folders if (folder / BESIDE).is_file()]
-    if len(found) > 1:
-        names = ", ".join(map(str, found))
+    result = [folder / SETTINGS_FILE for folder in folders if (folder / SETTINGS_FILE).is_file()]
+    if len(result) > 1:
+        names = ", ".join(map(str, result))
         raise SettingsError(
-            f"expected one {BESIDE} beside the data, got {names}; name one with --config"
+            f"expected one {SETTINGS_FILE} beside the data, got {names}; name one with --config"
         )
-    if found:
-        LOGGER.warning("settings are those of %s; name others with --config", found[0])
-    return found[0] if found else None
+    if result:
+        LOGGER.warning("settings are those of %s; name others with --config", result[0])
+    return result[0] if result else None

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from ..errors import OutputError
-from ..log import counted
-from ..read.damage import LeftOut
+from ..log import count_things
+from ..read.damage import SkippedBuildings
 from ..write.files import elsewhere
 
 
@@ -36,7 +36,7 @@ def report(
     from ..evaluate.report import write_report
     from ..evaluate.run import evaluate_run
 
-    path, left_out = out or Path(folder) / "report.html", LeftOut()
+    path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
     run = evaluate_run(
         folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True
     )
@@ -48,6 +48,6 @@ def report(
             elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error
         ) from error
     size = f"{path.stat().st_size / 1e6:.1f} MB"
-    typer.echo(f"{path}: {counted(len(run.models), 'building')}, {size}{left_out.told()}")
+    typer.echo(f"{path}: {count_things(len(run.models), 'building')}, {size}{left_out.describe()}")
     if left_out.exit_code:
         raise typer.Exit(left_out.exit_code)

@@ -23,13 +23,13 @@ def repro(
     Exit code: 0 the building has an outcome, 1 the failure repeats, 2 the folder cannot be used.
     """
     from ..city.repro import solve_bundle
-    from ..masking import masked
+    from ..masking import mask
     from ..status import Status
 
     start(log_level)
     building, trace = solve_bundle(folder, out)
     if trace:
-        typer.echo(masked(trace), err=True)
+        typer.echo(mask(trace), err=True)
     typer.echo(f"building {building.id}: {building.detail or building.status.value}")
     typer.echo(f"files: {out}")
     raise typer.Exit(1 if building.status is Status.INTERNAL_ERROR else 0)

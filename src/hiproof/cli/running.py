@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from ..city.run import Request, Summary, reconstruct_area
 from ..compiled import news
-from ..log import counted
+from ..log import count_things
 from ..status import Grade, Status
 
 
@@ -48,10 +48,10 @@ class Bar:
         news.listener = self.lines
         self.bar.stop()
 
-    def update(self, step: str, done: int, total: int | None) -> None:
+    def update(self, step: str, finished: int, total: int | None) -> None:
         if step not in self.tasks:
             self.tasks[step] = self.bar.add_task(self.STEPS.get(step, step), total=total)
-        self.bar.update(self.tasks[step], completed=done, total=total)
+        self.bar.update(self.tasks[step], completed=finished, total=total)
 
 
 def graded_words(by_quality: Mapping[str, int]) -> str:
@@ -73,7 +73,7 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
 
     console = Console(soft_wrap=True, markup=False)  # names from outside may look like markup
     show = show or console.print
-    table = Table("buildings", "outcome", title=counted(summary.buildings, "building"))
+    table = Table("buildings", "outcome", title=count_things(summary.buildings, "building"))
     for code, number in summary.by_status.items():
         table.add_row(str(number), Status[code.upper()].value)
     show(table)
@@ -94,7 +94,7 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
         show(f"mean over buildings: {share} lie within 0.2 m of the roof")
     if summary.doubts:
         doubtful = (
-            f"{counted(count, 'building')} ({doubt.told})"
+            f"{count_things(count, 'building')} ({doubt.told})"
             for doubt, count in summary.doubts.items()
         )
         show("read the detail of " + ", ".join(doubtful))
@@ -103,10 +103,10 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
     show(
         "time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items())
     )
-    for name, why in summary.broken_inputs:
-        show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
-    for id, why in summary.failures:
-        show(Text.assemble(("internal error:", "red"), f" building {id}: {why}"))
+    for name, reason in summary.broken_inputs:
+        show(Text.assemble(("could not be read:", "red"), f" {name}: {reason}"))
+    for id, reason in summary.failures:
+        show(Text.assemble(("internal error:", "red"), f" building {id}: {reason}"))
     if summary.bundles:
         show(Text(f"please report these, with the folders of the buildings in {summary.bundles}"))
     show(Text("models: " + ", ".join(map(str, summary.models))))

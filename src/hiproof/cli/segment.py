@@ -42,7 +42,7 @@ def segment(
     read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
     settings = Settings().replace({"read": read, "segment": {"weights": weights, "device": device}})
     failures = segment_files(clouds, out, settings)
-    for path, why in failures.items():
-        typer.echo(f"{path}: {why}", err=True)
+    for path, reason in failures.items():
+        typer.echo(f"{path}: {reason}", err=True)
     if failures:
         raise typer.Exit(1)

@@ -44,9 +44,12 @@ def describe(ledger: Ledger) -> list[str]:
     """Progress, failures by kind, throughput and time left, a line each."""
     tasks = ledger.tasks()
     lines = []
-    for kind, what in (("sort", "point files read"), ("solve", "work tiles solved")):
-        own = [task for task in tasks if task.kind == kind]
-        lines.append(f"{what}: {sum(task.state in CLOSED for task in own)} of {len(own)}")
+    for kind, subject in (("sort", "point files read"), ("solve", "work tiles solved")):
+        selected_tasks = [task for task in tasks if task.kind == kind]
+        lines.append(
+            f"{subject}: {sum(task.state in CLOSED for task in selected_tasks)} of "
+            f"{len(selected_tasks)}"
+        )
     solve = [task for task in tasks if task.kind == "solve"]
     total, done = (
         sum(task.buildings for task in solve),
@@ -57,10 +60,10 @@ def describe(ledger: Ledger) -> list[str]:
     by_time = sorted((task.finished or 0.0, task.buildings) for task in done)
     if len(done) > 1 and (seconds := by_time[-1][0] - by_time[0][0]) > 0:
         rate = (finished - by_time[0][1]) / seconds
-        left = (
+        text = (
             f", about {(total - finished) / rate:.0f} s left" if finished < total and rate else ""
         )
-        lines.append(f"throughput: {rate:.1f} buildings a second{left}")
+        lines.append(f"throughput: {rate:.1f} buildings a second{text}")
     lines += [f"{number} {status}" for status, number in ledger.counts("status").items()]
     if graded := ledger.counts("quality"):
         lines.append(f"quality: {graded_words(graded)}")

@@ -32,7 +32,7 @@ def train(
     """
     from ..learn import TrainSettings, train
 
-    given = {
+    arguments = {
         "samples": samples,
         "epoch": epoch,
         "types": tuple(types.split(",")) if types else None,
@@ -41,7 +41,7 @@ def train(
         seed=seed,
         device=device,
         threads=threads,
-        **{name: value for name, value in given.items() if value is not None},
+        **{name: value for name, value in arguments.items() if value is not None},
     )
     path = train(list(data), out, settings, report=typer.echo)
     typer.echo(f"wrote {path}")

@@ -35,11 +35,11 @@ def view(
     """
     import webbrowser
 
-    from ..view.server import server_of
+    from ..view.server import make_server
 
     with (
-        tiles_of(folder) as tiles,
-        server_of(tiles, f"hiproof: {folder.resolve().name}", port) as server,
+        open_tiles(folder) as tiles,
+        make_server(tiles, f"hiproof: {folder.resolve().name}", port) as server,
     ):
         typer.echo(f"{server.address} shows {folder}; Ctrl-C ends")
         if browser:
@@ -48,7 +48,7 @@ def view(
 
 
 @contextmanager
-def tiles_of(folder: Path) -> Iterator[Path]:
+def open_tiles(folder: Path) -> Iterator[Path]:
     """Yield the folder's own tiles, or those of the run in it, made where they are missing or older
     than the models.
 

@@ -16,7 +16,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from .kept import Kept
-from .linking import pipeline_of, without_literals
+from .linking import make_pipeline, without_literals
 
 
 class Dispatcher(CPUDispatcher):
@@ -26,7 +26,7 @@ class Dispatcher(CPUDispatcher):
 
     def __init__(self, function: Callable, kept: Kept, options: dict[str, Any]):
         options = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True} | options
-        super().__init__(function, targetoptions=options, pipeline_class=pipeline_of(kept.stamp))
+        super().__init__(function, targetoptions=options, pipeline_class=make_pipeline(kept.stamp))
         self._cache = kept
         self.entries: dict[tuple, Any] = {}
 
@@ -53,16 +53,16 @@ class Dispatcher(CPUDispatcher):
         with global_compiler_lock:
             if args not in self.entries:
                 self.load(sig)
-                self.entries[args] = self.wrapped(sig, self.overloads[args])
+                self.entries[args] = self.make_entry(sig, self.overloads[args])
                 self._insert([kind._code for kind in args], self.entries[args], False)
             return self.entries[args]
 
-    def wrapped(self, signature: Any, result: Any) -> Any:
+    def make_entry(self, signature: Any, result: Any) -> Any:
         """The entry of a function for calls from Python, its wrapper read from disk or compiled."""
         context = self.targetctx.subtarget(enable_nrt=self.targetoptions.get("_nrt", True))
         described, environment = result.fndesc, result.environment
-        if found := self._cache.load_wrapper(signature, context):
-            environment.consts[:], machine_code = found
+        if wrapper := self._cache.load_wrapper(signature, context):
+            environment.consts[:], machine_code = wrapper
             codegen = context.codegen()
             codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(machine_code))
             codegen._engine._defined_symbols.add(described.llvm_cpython_wrapper_name)

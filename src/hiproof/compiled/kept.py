@@ -30,7 +30,7 @@ from numba.core.serialize import dumps
 from ..errors import NotKeptWarning
 from . import linking, news, runtime
 from .kinds import KIND, runs_kind
-from .stamp import PYTHON, stamp_of
+from .stamp import PYTHON, compute_stamp
 
 WRAPPER = "-python"  # marks the file of a function's wrapper for calls from Python
 
@@ -42,7 +42,7 @@ class Kept:
 
     def __init__(self, function: Callable, file: Path):
         self.function, self.name = function, f"{function.__module__}.{function.__qualname__}"
-        self.module, self.stamp = file.stem, stamp_of(file)
+        self.module, self.stamp = file.stem, compute_stamp(file)
         self.start = f"{file.stem}.{function.__qualname__}-{self.stamp}"
         self.folders = folders(function, str(file))
 
@@ -74,7 +74,7 @@ class Kept:
         news.tell()
         if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
             linking.settle(result, self.function, signature)
-            context, code = result.target_context, reduced(result)
+            context, code = result.target_context, reduce_result(result)
             self.write("", signature, context, code, *linking.links(result))
 
     def load_wrapper(self, signature: Any, context: Any) -> tuple[list, bytes] | None:
@@ -90,10 +90,10 @@ class Kept:
         """What is kept of a `part` of the code, that for this machine's own processor first."""
         for file in self.places(part, signature, context.codegen().magic_tuple()):
             try:
-                kept, *content = pickle.loads(file.read_bytes())
+                selection, *content = pickle.loads(file.read_bytes())
             except Exception:  # not there, or damaged, of which pickle makes errors of any kind
                 continue
-            if kept == signature:
+            if selection == signature:
                 yield content
 
     def write(self, part: str, signature: Any, context: Any, *content: Any) -> None:
@@ -102,14 +102,14 @@ class Kept:
         if folder is None:
             return
         file = folder / self.file_name(part, signature, context.codegen().magic_tuple())
-        beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
+        sibling_path = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
-            beside.write_bytes(dumps((signature, *content)))
-            beside.replace(file)
+            sibling_path.write_bytes(dumps((signature, *content)))
+            sibling_path.replace(file)
         except OSError:  # a full disk, a folder that went away
             warn_not_kept()
             with suppress(OSError):
-                beside.unlink()
+                sibling_path.unlink()
             return
         remove_outdated(folder, self.module, self.stamp)
 
@@ -138,22 +138,22 @@ def start_runtime(context: Any) -> None:
     """Have numba's runtime in this process, from disk or compiled."""
     if runtime.is_started():
         return
-    kept, signature = Kept(start_runtime, Path(runtime.__file__)), ()
-    for code in kept.read("", signature, context):
+    selection, signature = Kept(start_runtime, Path(runtime.__file__)), ()
+    for code in selection.read("", signature, context):
         with suppress(TypeError, ValueError, RuntimeError):  # damaged inside
             return runtime.start(context, *code)
-    kept.write("", signature, context, *runtime.compile_runtime(context))
+    selection.write("", signature, context, *runtime.compile_runtime(context))
 
 
-def reduced(result: Any) -> tuple:
+def reduce_result(result: Any) -> tuple:
     """Return what is pickled of a result.
 
     The annotation, half of it all, is for people who look into numba. Environments of copied
     functions that hold no constant are read by no code; loading them would import half of numba.
     """
     *code, _, reload, environments = result._reduce()
-    kept = tuple(environment for environment in environments if environment.consts)
-    return *code, "", reload, kept
+    selected_environments = tuple(environment for environment in environments if environment.consts)
+    return *code, "", reload, selected_environments
 
 
 def folders(function: Callable, file: str) -> tuple[Path, ...]:

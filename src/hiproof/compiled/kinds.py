@@ -15,10 +15,10 @@ from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
 KIND = "x86-64-v3"  # AVX2: Intel since 2013, AMD since 2015
 # beyond those of any x86-64 processor with AVX
-FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+CPU_FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
 
-def own_processor() -> str:
+def read_processor() -> str:
     """What is compiled for: this machine's processor, or the kind that numba's own variable
     names.
     """
@@ -35,4 +35,4 @@ def runs_kind() -> bool:
     if platform.machine() not in ("x86_64", "AMD64"):
         return False
     features = get_host_cpu_features()
-    return all(features.get(name) for name in FEATURES)
+    return all(features.get(name) for name in CPU_FEATURES)

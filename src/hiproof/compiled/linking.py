@@ -57,7 +57,7 @@ class Loaded(JITCodeLibrary):
         return self._shared_module
 
 
-def pipeline_of(stamp: str) -> type[compiler.Compiler]:
+def make_pipeline(stamp: str) -> type[compiler.Compiler]:
     """numba's compiler for functions of a source file with this `stamp`, which is part of their
     symbols.
     """
@@ -76,8 +76,8 @@ def pipeline_of(stamp: str) -> type[compiler.Compiler]:
 
 def without_literals(args: tuple, kws: dict) -> tuple[tuple, dict]:
     """Drop constants from the types of a call, so that nothing is compiled apart for them."""
-    named = {name: types.unliteral(kind) for name, kind in kws.items()}
-    return tuple(map(types.unliteral, args)), named
+    names = {name: types.unliteral(kind) for name, kind in kws.items()}
+    return tuple(map(types.unliteral, args)), names
 
 
 def settle(result: Any, function: Callable, signature: Any) -> None:
@@ -119,7 +119,7 @@ def rebuilt(
     for callee in calls:
         callee.load()
     (
-        (name, _, kept),
+        (name, _, selection),
         described,
         constants,
         signature,
@@ -131,7 +131,7 @@ def rebuilt(
     ) = code
     codegen = context.codegen()
     codegen._engine._defined_symbols.add(described.llvm_func_name)
-    library = Loaded(codegen, name, *kept)
+    library = Loaded(codegen, name, *selection)
     library.calls, library.is_called_as = calls, is_called_as
     for environment in environments:
         codegen.set_env(environment.env_name, environment)

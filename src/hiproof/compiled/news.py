@@ -22,13 +22,13 @@ ready: set[str] = set()
 processes = 1  # that compile at the moment
 
 
-def headline(done: int, total: int) -> str:
+def headline(finished: int, total: int) -> str:
     """What is going on and how long it takes at most.
 
     >>> headline(20, 220)
     'compiling for this machine, once for each version: up to 200 functions, about 70 s'
     """
-    number = total - done
+    number = total - finished
     seconds = 10 * -(-number * SECONDS_A_FUNCTION // (10 * processes))
     return (
         f"compiling for this machine, once for each version: up to {number} functions, about "

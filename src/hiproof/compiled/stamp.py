@@ -29,12 +29,12 @@ DECIDING = ("__init__.py", "dispatcher.py", "linking.py")
 
 
 @functools.cache
-def stamp_of(file: Path) -> str:
+def compute_stamp(file: Path) -> str:
     """Sixteen hexadecimal digits. Files that cannot be read raise OSError."""
     return digest(closure(file))
 
 
-def stamp_of_all() -> str:
+def compute_common_stamp() -> str:
     """One stamp of everything that hiproof's compiled functions stand on."""
     return digest(set().union(*map(closure, compiled_files())))
 
@@ -42,31 +42,31 @@ def stamp_of_all() -> str:
 @functools.cache
 def count_compiled() -> int:
     """How many functions hiproof compiles."""
-    return sum(text_of(file).count(b"\n@compiled") for file in compiled_files())
+    return sum(read_text(file).count(b"\n@compiled") for file in compiled_files())
 
 
 def compiled_files() -> list[Path]:
-    return [file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in text_of(file)]
+    return [file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in read_text(file)]
 
 
 def digest(files: Iterable[Path]) -> str:
     """One stamp of several files, whatever their order and wherever their package lies."""
-    said = hashlib.sha256(" ".join([PYTHON, *map(version_of, VERSIONS)]).encode())
+    hasher = hashlib.sha256(" ".join([PYTHON, *map(read_version, VERSIONS)]).encode())
     for file in sorted(files, key=place_in_package):
-        said.update(digest_of(file))
-    return said.hexdigest()[:16]
+        hasher.update(digest_file(file))
+    return hasher.hexdigest()[:16]
 
 
 @functools.cache
-def digest_of(file: Path) -> bytes:
+def digest_file(file: Path) -> bytes:
     """Digests of a file's place and of its text, one after the other."""
     return b"".join(
-        hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), text_of(file))
+        hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), read_text(file))
     )
 
 
 @functools.cache
-def version_of(library: str) -> str:
+def read_version(library: str) -> str:
     # slow to import, and the command line's help needs no stamp
     from importlib.metadata import version
 
@@ -74,7 +74,7 @@ def version_of(library: str) -> str:
 
 
 @functools.cache
-def text_of(file: Path) -> bytes:
+def read_text(file: Path) -> bytes:
     return file.read_bytes()
 
 
@@ -84,31 +84,31 @@ def closure(file: Path) -> set[Path]:
     How code is kept changes nothing of it, so of this folder only the decorator and the linking
     count, which no import names.
     """
-    found: set[Path] = set()
+    result: set[Path] = set()
     open_ends = [file, *(HERE / name for name in DECIDING)]
     while open_ends:
-        at = open_ends.pop()
-        if at not in found and (at.parent != HERE or at.name in DECIDING):
-            found.add(at)
-            open_ends.extend(imported(at))
-    return found
+        position = open_ends.pop()
+        if position not in result and (position.parent != HERE or position.name in DECIDING):
+            result.add(position)
+            open_ends.extend(list_imports(position))
+    return result
 
 
 @functools.cache
-def imported(file: Path) -> frozenset[Path]:
+def list_imports(file: Path) -> frozenset[Path]:
     """The files of the two packages that import statements at the top of `file` name."""
-    found: set[Path] = set()
-    for statement in IMPORT.finditer(text_of(file).decode()):
-        for path in named(file, statement):
-            found.update(
+    result: set[Path] = set()
+    for statement in IMPORT.finditer(read_text(file).decode()):
+        for path in resolve_import(file, statement):
+            result.update(
                 source
                 for source in (path.with_name(path.name + ".py"), path / "__init__.py")
                 if source.is_file()
             )
-    return frozenset(found)
+    return frozenset(result)
 
 
-def named(file: Path, statement: re.Match) -> Iterator[Path]:
+def resolve_import(file: Path, statement: re.Match) -> Iterator[Path]:
     """The modules and packages, as paths without ending, that one import statement may mean."""
     if statement["modules"]:
         for name in re.findall(r"[\w.]+", statement["modules"]):
@@ -131,13 +131,13 @@ def starts(file: Path, package: str) -> Iterator[Path]:
     """Where absolute imports of `package` are looked up: beside the file's own package and beside
     hiproof.
     """
-    for top in {top_of(file), PACKAGE}:
+    for top in {find_top_folder(file), PACKAGE}:
         if top.name == package:
             yield top.parent
 
 
 @functools.cache
-def top_of(file: Path) -> Path:
+def find_top_folder(file: Path) -> Path:
     """The outermost folder of the package that `file` belongs to; for a file outside packages,
     itself without ending.
     """
@@ -150,4 +150,4 @@ def top_of(file: Path) -> Path:
 @functools.cache
 def place_in_package(file: Path) -> str:
     """The file's path from where its package lies, with forward slashes."""
-    return file.relative_to(top_of(file).parent).as_posix()
+    return file.relative_to(find_top_folder(file).parent).as_posix()

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.point_in_polygon import flips
-from .joined import join, root_of
+from .joined import find_root, join
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
@@ -27,7 +27,7 @@ COLLINEAR_UNITS = 5.0
 
 
 @compiled
-def grown(array):
+def grow_array(array):
     """A copy of `array` with twice the rows."""
     larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
     larger[: len(array)] = array
@@ -35,12 +35,12 @@ def grown(array):
 
 
 @compiled
-def appended(rows, count, a, b):
+def append_row(rows, count, a, b):
     """`rows` (m, 2), of which `count` are used, with (a, b) as one more, and the count with it; a
     copy where all were used.
     """
     if count == len(rows):
-        rows = grown(rows)
+        rows = grow_array(rows)
     rows[count, 0], rows[count, 1] = a, b
     return rows, count + 1
 
@@ -68,7 +68,7 @@ def is_beside(p, a, b, reach):
 
 
 @compiled
-def first_vertex_beside(xy, count, a, b, reach):
+def find_vertex_near_segment(xy, count, a, b, reach):
     """The vertex beside segment ab (other than its ends) nearest to a, -1 if there is none."""
     r = np.int64(reach) + 1
     x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
@@ -95,7 +95,7 @@ def turn(a, b, c):
 
 
 @compiled
-def first_crossing(xy, edges, count, a, b):
+def find_first_crossing(xy, edges, count, a, b):
     """The first live edge that properly crosses segment ab, -1 if there is none."""
     x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
     y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
@@ -174,21 +174,21 @@ def node(segments, reach):
         if a == b:
             continue
         while top + 1 + edge_count > len(stack):  # what may be taken back, and the segment itself
-            stack = grown(stack)
-        v = first_vertex_beside(xy, count, a, b, reach)
+            stack = grow_array(stack)
+        v = find_vertex_near_segment(xy, count, a, b, reach)
         if v >= 0:
-            stack, top = appended(stack, top, v, b)
-            stack, top = appended(stack, top, a, v)
+            stack, top = append_row(stack, top, v, b)
+            stack, top = append_row(stack, top, a, v)
             continue
         if has_edge(edges, edge_count, a, b):
             continue
-        e = first_crossing(xy, edges, edge_count, a, b)
+        e = find_first_crossing(xy, edges, edge_count, a, b)
         if e < 0:
-            edges, edge_count = appended(edges, edge_count, a, b)
+            edges, edge_count = append_row(edges, edge_count, a, b)
             continue
         x, y = crossing_point(xy[a], xy[b], xy[edges[e, 0]], xy[edges[e, 1]])
-        xy, count = appended(xy, count, x, y)
-        stack, top = appended(stack, top, a, b)
+        xy, count = append_row(xy, count, x, y)
+        stack, top = append_row(stack, top, a, b)
         top = taken_back(xy, count - 1, e, edges, edge_count, stack, top, reach)
     live = edges[:edge_count, 0] >= 0
     return xy[:count].copy(), edges[:edge_count][live]
@@ -238,13 +238,13 @@ def next_half_edges(edges, order, start):
     follow = np.empty(len(order), np.int64)
     for v in range(len(start) - 1):
         for k in range(start[v], start[v + 1]):
-            before = k - 1 if k > start[v] else start[v + 1] - 1
-            follow[order[k] ^ 1] = order[before]
+            previous = k - 1 if k > start[v] else start[v + 1] - 1
+            follow[order[k] ^ 1] = order[previous]
     return follow
 
 
 @compiled
-def face_left_of(xy, edges, x, y):
+def find_face_left(xy, edges, x, y):
     """Half-edge first hit by the ray from (x, y) towards -x, with that point on its left; -1 if
     none. y is no integer.
     """
@@ -276,16 +276,16 @@ def trace_faces(xy, edges, follow):
     for first in range(size):
         if walk[first] >= 0:
             continue
-        h, area2, low = first, 0.0, edges[first >> 1, first & 1]
-        x0, y0 = xy[low, 0], xy[low, 1]
+        h, area2, lower = first, 0.0, edges[first >> 1, first & 1]
+        x0, y0 = xy[lower, 0], xy[lower, 1]
         while walk[h] < 0:
             walk[h] = walks
             a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
             area2 += float(xy[a, 0] - x0) * (xy[b, 1] - y0) - float(xy[b, 0] - x0) * (xy[a, 1] - y0)
-            if xy[a, 0] < xy[low, 0] or (xy[a, 0] == xy[low, 0] and xy[a, 1] < xy[low, 1]):
-                low = a
+            if xy[a, 0] < xy[lower, 0] or (xy[a, 0] == xy[lower, 0] and xy[a, 1] < xy[lower, 1]):
+                lower = a
             h = follow[h]
-        walk_area[walks], lowest[walks] = 0.5 * area2, low
+        walk_area[walks], lowest[walks] = 0.5 * area2, lower
         walks += 1
     face_of_walk = np.zeros(walks, np.int64)
     area = np.zeros(walks + 1)
@@ -296,8 +296,8 @@ def trace_faces(xy, edges, follow):
             faces += 1
     for w in np.argsort(xy[lowest[:walks], 0], kind="mergesort"):
         if walk_area[w] <= 0:
-            low = lowest[w]
-            hit = face_left_of(xy, edges, xy[low, 0] - 0.5, xy[low, 1] + 0.5)
+            lower = lowest[w]
+            hit = find_face_left(xy, edges, xy[lower, 0] - 0.5, xy[lower, 1] + 0.5)
             face_of_walk[w] = 0 if hit < 0 else face_of_walk[walk[hit]]
             area[face_of_walk[w]] += walk_area[w]
     return face_of_walk[walk], area[:faces].copy()
@@ -353,10 +353,10 @@ def face_points(xy, edges, face, faces):
 
 
 @compiled
-def covers(soup, low, high, x, y):
+def covers(soup, lower, upper, x, y):
     """Whether the polygon of soup[low:high] holds (x, y), by parity."""
     inside = False
-    for e in range(low, high):
+    for e in range(lower, upper):
         if flips(soup[e, 0], soup[e, 1], soup[e, 2], soup[e, 3], x, y):
             inside = not inside
     return inside
@@ -376,13 +376,13 @@ def active_plane(x, y, soup, soup_start, planes, plane_start):
     for k in range(len(plane_start) - 1):
         if not covers(soup, soup_start[k + 1], soup_start[k + 2], x, y):
             continue
-        low, low_z = -1, np.inf
+        lower, low_z = -1, np.inf
         for j in range(plane_start[k], plane_start[k + 1]):
             z = planes[j, 0] * x + planes[j, 1] * y + planes[j, 2]
             if z < low_z - 1e-3:
-                low, low_z = j, z
+                lower, low_z = j, z
         if low_z > best_z + 1e-3:
-            best, best_z = low, low_z
+            best, best_z = lower, low_z
     return best
 
 
@@ -404,14 +404,14 @@ def label_faces(
 
 
 @compiled
-def regions_of(edges, face, label):
+def join_regions(edges, face, label):
     """Region (f,) of each face: faces joined over edges that have the same label on both sides."""
     parent = np.arange(len(label))
     for e in range(len(edges)):
         if label[face[2 * e]] == label[face[2 * e + 1]]:
             join(parent, face[2 * e], face[2 * e + 1])
     for f in range(len(label)):
-        parent[f] = root_of(parent, f)
+        parent[f] = find_root(parent, f)
     return parent
 
 
@@ -433,9 +433,9 @@ def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_w
     region's. One that would carry its plane on to where no roof is around keeps out, unless nobody
     could see the region.
     """
-    length, kept = edge_lengths(xy, edges), np.zeros(len(label), np.bool_)
+    length, selection = edge_lengths(xy, edges), np.zeros(len(label), np.bool_)
     for _ in range(len(label)):
-        region = regions_of(edges, face, label)
+        region = join_regions(edges, face, label)
         size, border = np.zeros(len(label)), np.zeros(len(label))
         open_to, is_patch = np.zeros(len(label), np.bool_), np.ones(len(label), np.bool_)
         for f in range(1, len(label)):
@@ -455,7 +455,7 @@ def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_w
                 and open_to[r]
                 and (size[r] < min_area or 2 * size[r] < min_width * border[r])
             )
-            if sliver and not kept[r]:
+            if sliver and not selection[r]:
                 sooner = is_patch[smallest] and not is_patch[r]
                 if (
                     smallest < 0
@@ -469,20 +469,20 @@ def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_w
             size[smallest] < min_area
             or 2 * size[smallest] < min(min_width, UNSEEN_UNITS) * border[smallest]
         )
-        into = heir_of(xy, edges, face, label, region, length, planes, smallest, unseen)
+        heir = choose_heir(xy, edges, face, label, region, length, planes, smallest, unseen)
         for f in range(len(label)):
             if region[f] == smallest:
-                kept[f] = into == OUTSIDE
-                label[f] = label[f] if kept[f] else into
+                selection[f] = heir == OUTSIDE
+                label[f] = label[f] if selection[f] else heir
 
 
 @compiled
-def heir_of(xy, edges, face, label, region, length, planes, sliver, anyone):
+def choose_heir(xy, edges, face, label, region, length, planes, sliver, anyone):
     """The label of the region that shares the longest border with a sliver, of those whose planes
     stay over it within the heights around it (or `anyone`'s); OUTSIDE where there is none.
     """
     shared, fits = np.zeros(len(label)), np.ones(len(label), np.bool_)
-    low, high = np.inf, -np.inf
+    lower, upper = np.inf, -np.inf
     for e in range(len(edges)):
         a, b = region[face[2 * e]], region[face[2 * e + 1]]
         if a == b or (a != sliver and b != sliver):
@@ -492,15 +492,15 @@ def heir_of(xy, edges, face, label, region, length, planes, sliver, anyone):
         for r in (sliver, other):
             if label[r] >= 0:
                 for end in range(2):
-                    z = height_of(planes[label[r]], xy[edges[e, end]])
-                    low, high = min(low, z), max(high, z)
+                    z = evaluate_height(planes[label[r]], xy[edges[e, end]])
+                    lower, upper = min(lower, z), max(upper, z)
     for e in range(len(edges)):
         if (region[face[2 * e]] == sliver) != (region[face[2 * e + 1]] == sliver):
             for r in range(1, len(label)):
                 if shared[r] > 0.0 and label[r] >= 0:
                     for end in range(2):
-                        z = height_of(planes[label[r]], xy[edges[e, end]])
-                        fits[r] = fits[r] and low - BEYOND_UNITS < z < high + BEYOND_UNITS
+                        z = evaluate_height(planes[label[r]], xy[edges[e, end]])
+                        fits[r] = fits[r] and lower - BEYOND_UNITS < z < upper + BEYOND_UNITS
     if label[sliver] < 0 or (anyone and not (fits & (shared > 0.0)).any()):
         fits[:] = True
     best = np.argmax(np.where(fits, shared, 0.0))
@@ -508,7 +508,7 @@ def heir_of(xy, edges, face, label, region, length, planes, sliver, anyone):
 
 
 @compiled(inline="always")
-def height_of(plane, place):
+def evaluate_height(plane, place):
     return plane[0] * place[0] + plane[1] * place[1] + plane[2]
 
 
@@ -525,21 +525,21 @@ def keep_largest_component(edges, face, area, label):
     size = np.zeros(len(label))
     for f in range(1, len(label)):
         if label[f] != OUTSIDE:
-            size[root_of(parent, f)] += area[f]
+            size[find_root(parent, f)] += area[f]
     largest = np.argmax(size)
     for f in range(1, len(label)):
-        if root_of(parent, f) != largest:
+        if find_root(parent, f) != largest:
             label[f] = OUTSIDE
 
 
 @compiled
-def renumbered(xy, edges, side):
+def renumber_vertices(xy, edges, side):
     """The edges that are left (first vertex not negative), their sides, and the vertices they use,
     numbered anew.
     """
     number = np.full(len(xy), -1, np.int64)
     out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
-    count, kept = 0, 0
+    count, selection = 0, 0
     for e in range(len(edges)):
         if edges[e, 0] < 0:
             continue
@@ -548,10 +548,10 @@ def renumbered(xy, edges, side):
             if number[v] < 0:
                 number[v], out_xy[count] = count, xy[v]
                 count += 1
-            out_edges[kept, end] = number[v]
-        out_side[kept] = side[e]
-        kept += 1
-    return out_xy[:count].copy(), out_edges[:kept].copy(), out_side[:kept].copy()
+            out_edges[selection, end] = number[v]
+        out_side[selection] = side[e]
+        selection += 1
+    return out_xy[:count].copy(), out_edges[:selection].copy(), out_side[:selection].copy()
 
 
 @compiled
@@ -564,20 +564,20 @@ def dissolve(xy, edges, side):
     COLLINEAR_UNITS of the line between its two neighbours, counting what was already dropped along
     them.
     """
-    kept = 0
+    count = 0
     for e in range(len(edges)):
         if side[e, 0] != side[e, 1]:
-            edges[kept], side[kept] = edges[e], side[e]
-            kept += 1
-    edges, side = edges[:kept].copy(), side[:kept].copy()
+            edges[count], side[count] = edges[e], side[e]
+            count += 1
+    edges, side = edges[:count].copy(), side[:count].copy()
     degree, touching = np.zeros(len(xy), np.int64), np.zeros((len(xy), 2), np.int64)
-    for e in range(kept):
+    for e in range(count):
         for end in range(2):
             v = edges[e, end]
             if degree[v] < 2:
                 touching[v, degree[v]] = e
             degree[v] += 1
-    drift = np.zeros(kept)
+    drift = np.zeros(count)
     changed = True
     while changed:
         changed = False
@@ -603,7 +603,7 @@ def dissolve(xy, edges, side):
             degree[v] = 0
             touching[b, 0 if touching[b, 0] == g else 1] = e
             changed = True
-    return renumbered(xy, edges, side)
+    return renumber_vertices(xy, edges, side)
 
 
 @compiled
@@ -641,13 +641,13 @@ def plan_cells(
 
 
 @compiled
-def inside_intervals(soup, low, high, px, py, dx, dy):
+def inside_intervals(soup, lower, upper, px, py, dx, dy):
     """Sorted parameters (even in number) at which the line (px, py) + t (dx, dy) enters and leaves
     a polygon.
     """
-    cuts = np.empty(high - low)
+    cuts = np.empty(upper - lower)
     count = 0
-    for e in range(low, high):
+    for e in range(lower, upper):
         side_a = dx * (soup[e, 1] - py) - dy * (soup[e, 0] - px)
         side_b = dx * (soup[e, 3] - py) - dy * (soup[e, 2] - px)
         if (side_a > 0) != (side_b > 0):
@@ -662,9 +662,9 @@ def inside_intervals(soup, low, high, px, py, dx, dy):
 
 
 @compiled
-def clip_to_lowest(planes, low, high, j, px, py, dx, dy, t_low, t_high):
+def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
     """Narrow [t_low, t_high] to where plane j is the lowest of planes[low:high] along the line."""
-    for k in range(low, high):
+    for k in range(lower, upper):
         if k == j:
             continue
         a, b, c = planes[k] - planes[j]
@@ -695,13 +695,13 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                     if steep < 1e-7:
                         continue
                     px, py, dx, dy = -c * a / steep**2, -c * b / steep**2, -b / steep, a / steep
-                    low, high = clip_to_lowest(
+                    lower, upper = clip_to_lowest(
                         planes, plane_start[p], plane_start[p + 1], i, px, py, dx, dy, -1e9, 1e9
                     )
-                    low, high = clip_to_lowest(
-                        planes, plane_start[q], plane_start[q + 1], j, px, py, dx, dy, low, high
+                    lower, upper = clip_to_lowest(
+                        planes, plane_start[q], plane_start[q + 1], j, px, py, dx, dy, lower, upper
                     )
-                    if high - low < 1:
+                    if upper - lower < 1:
                         continue
                     in_p = inside_intervals(
                         soup, soup_start[p + 1], soup_start[p + 2], px, py, dx, dy
@@ -711,11 +711,14 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                     )
                     for k in range(0, len(in_p) - 1, 2):
                         for m in range(0, len(in_q) - 1, 2):
-                            t0, t1 = max(low, in_p[k], in_q[m]), min(high, in_p[k + 1], in_q[m + 1])
+                            t0, t1 = (
+                                max(lower, in_p[k], in_q[m]),
+                                min(upper, in_p[k + 1], in_q[m + 1]),
+                            )
                             if t1 - t0 < 1:
                                 continue
                             if count == len(out):
-                                out = grown(out)
+                                out = grow_array(out)
                             out[count, 0], out[count, 1] = (
                                 np.rint(px + t0 * dx),
                                 np.rint(py + t0 * dy),

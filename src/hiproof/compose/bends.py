@@ -36,9 +36,9 @@ def bent_faces(
         return faces
     corners, flat, start = in_their_planes(faces, vertices, index, ring_start, face_start, normals)
     polygons = []
-    for face, low in zip(faces, start[:-1], strict=True):
+    for face, lower in zip(faces, start[:-1], strict=True):
         bounds = ring_start[face_start[face] : face_start[face + 1] + 1]
-        outer, *holes = (flat[low + a : low + b] for a, b in pairwise(bounds - bounds[0]))
+        outer, *holes = (flat[lower + a : lower + b] for a, b in pairwise(bounds - bounds[0]))
         polygons.append(shapely.Polygon(outer, holes))
     triangles, owner = shapely.get_parts(
         shapely.constrained_delaunay_triangles(polygons), return_index=True
@@ -58,25 +58,25 @@ def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
         start[k + 1] = start[k] + ring_start[face_start[face + 1]] - ring_start[face_start[face]]
     corners, flat = np.empty((start[-1], 3)), np.empty((start[-1], 2))
     for k in range(len(faces)):
-        low, normal = ring_start[face_start[faces[k]]], normals[faces[k]]
-        aside = np.zeros(3)
-        aside[np.argmin(np.abs(normal))] = 1.0
-        u = np.cross(normal, aside)
+        lower, normal = ring_start[face_start[faces[k]]], normals[faces[k]]
+        perpendicular = np.zeros(3)
+        perpendicular[np.argmin(np.abs(normal))] = 1.0
+        u = np.cross(normal, perpendicular)
         u /= np.sqrt(dot(u, u))
         v = np.cross(normal, u)
         for i in range(start[k], start[k + 1]):
-            corners[i] = vertices[index[low + i - start[k]]]
+            corners[i] = vertices[index[lower + i - start[k]]]
             flat[i, 0], flat[i, 1] = dot(corners[i], u), dot(corners[i], v)
     return corners, flat, start
 
 
 @compiled
-def corner_at(x, y, flat, low, high):
+def corner_at(x, y, flat, lower, upper):
     """The vertex of flat[low:high] that lies at (x, y)."""
-    for i in range(low, high):
+    for i in range(lower, upper):
         if flat[i, 0] == x and flat[i, 1] == y:
             return i
-    return low
+    return lower
 
 
 @compiled
@@ -84,17 +84,17 @@ def triangle_normals(places, owner, corners, flat, start, normals):
     """Unit normals (t, 3) of triangles given by their `places` (t, 4, 2) in their face's plane;
     zero without an area.
     """
-    found = np.zeros((len(places), 3))
+    result = np.zeros((len(places), 3))
     for t in range(len(places)):
-        low, high = start[owner[t]], start[owner[t] + 1]
-        a = corners[corner_at(places[t, 0, 0], places[t, 0, 1], flat, low, high)]
-        b = corners[corner_at(places[t, 1, 0], places[t, 1, 1], flat, low, high)]
-        c = corners[corner_at(places[t, 2, 0], places[t, 2, 1], flat, low, high)]
+        lower, upper = start[owner[t]], start[owner[t] + 1]
+        a = corners[corner_at(places[t, 0, 0], places[t, 0, 1], flat, lower, upper)]
+        b = corners[corner_at(places[t, 1, 0], places[t, 1, 1], flat, lower, upper)]
+        c = corners[corner_at(places[t, 2, 0], places[t, 2, 1], flat, lower, upper)]
         normal = np.cross(b - a, c - a)
         size = np.sqrt(dot(normal, normal))
         if size > 0:
-            found[t] = normal / (size if dot(normal, normals[owner[t]]) > 0 else -size)
-    return found
+            result[t] = normal / (size if dot(normal, normals[owner[t]]) > 0 else -size)
+    return result
 
 
 @compiled
@@ -104,15 +104,15 @@ def are_bent(places, owner, corners, flat, start, normals):
     `owner` (t,) is the face of each triangle.
     """
     bent = np.zeros(len(normals), np.bool_)
-    found = triangle_normals(places, owner, corners, flat, start, normals)
-    for t in range(len(found)):
+    result = triangle_normals(places, owner, corners, flat, start, normals)
+    for t in range(len(result)):
         if (
-            dot(found[t], normals[owner[t]]) >= SURELY_FLAT_COSINE
-            or not found[t].any()
+            dot(result[t], normals[owner[t]]) >= SURELY_FLAT_COSINE
+            or not result[t].any()
             or bent[owner[t]]
         ):
             continue  # two triangles within 10 degrees of the face are within 20 of one another
-        for s in range(len(found)):
-            if owner[s] == owner[t] and found[s].any() and dot(found[s], found[t]) < FLAT_COSINE:
+        for s in range(len(result)):
+            if owner[s] == owner[t] and result[s].any() and dot(result[s], result[t]) < FLAT_COSINE:
                 bent[owner[t]] = True
     return bent

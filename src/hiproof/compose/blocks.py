@@ -35,8 +35,8 @@ def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
     ]
     top = Face(tuple(tuple(index + count for index in ring) for ring in numbers), ROOF, 0)
     bottom = Face(tuple(ring[::-1] for ring in numbers), GROUND)
-    low, high = (np.column_stack([plan, np.full(count, z)]) for z in (z_low, z_high))
-    return Solid(np.concatenate([low, high]), (top, *walls, bottom))
+    lower, upper = (np.column_stack([plan, np.full(count, z)]) for z in (z_low, z_high))
+    return Solid(np.concatenate([lower, upper]), (top, *walls, bottom))
 
 
 def blocks(
@@ -66,6 +66,6 @@ def blocks(
         tuple(flat), shapely.transform(whole, lambda xy: xy - origin[:2]), LocalFrame(origin)
     )
     try:
-        return compose(roof, z_low).moved(origin)
+        return compose(roof, z_low).move(origin)
     except CompositionError:
         return None

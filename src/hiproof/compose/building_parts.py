@@ -18,7 +18,7 @@ import shapely
 from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import GRID_M
 from .check import check_solid
-from .shell import compacted
+from .shell import compact_solid
 
 LEAST_PART_M2 = 4.0
 """Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders
@@ -71,31 +71,31 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
     >>> [(part.members, part.solid.volume) for part in building_parts(compose(roof, 0.0))]
     [((0,), 60.0), ((1,), 120.0)]
     """
-    place_of = places_of(solid)
+    place_of = place_vertices(solid)
     roofs = [index for index, face in enumerate(solid.faces) if face.kind == ROOF]
     borders = plan_borders(solid, roofs, place_of)
     groups = without_small(joined_at_edges(roofs, borders), solid, borders)
     if len(groups) < 2:
         return ()
     parts = sorted(
-        (part_of(solid, group, borders, place_of) for group in groups),
+        (cut_part(solid, group, borders, place_of) for group in groups),
         key=lambda part: min(part.members),
     )
     return () if any(check_solid(part.solid, planarity_m) for part in parts) else tuple(parts)
 
 
-def whole_of(parts: Solid) -> Solid:
+def join_parts(parts: Solid) -> Solid:
     """The one solid of which `parts`, the shells of building parts over common vertices, were cut.
 
     Its roof faces come first, in the order in which they stand in `parts`; its walls are not joined
     along straight stretches.
     """
-    place_of = places_of(parts)
+    place_of = place_vertices(parts)
     roofs = [index for index, face in enumerate(parts.faces) if face.kind == ROOF]
-    return part_of(parts, set(roofs), plan_borders(parts, roofs, place_of), place_of).solid
+    return cut_part(parts, set(roofs), plan_borders(parts, roofs, place_of), place_of).solid
 
 
-def places_of(solid: Solid) -> list[Place]:
+def place_vertices(solid: Solid) -> list[Place]:
     """The place of every vertex."""
     return [(round(x / GRID_M), round(y / GRID_M)) for x, y in solid.vertices[:, :2].tolist()]
 
@@ -106,30 +106,30 @@ def plan_borders(solid: Solid, roofs: list[int], place_of: list[Place]) -> Borde
         (place_of[start], place_of[end]): Border(index, start, end)
         for index in roofs
         for ring in solid.faces[index].rings
-        for start, end in edges_of(ring)
+        for start, end in list_edges(ring)
     }
 
 
-def edges_of(ring: tuple[int, ...]) -> Iterable[tuple[int, int]]:
+def list_edges(ring: tuple[int, ...]) -> Iterable[tuple[int, int]]:
     return zip(ring, (*ring[1:], ring[0]), strict=True)
 
 
 def joined_at_edges(roofs: list[int], borders: Borders) -> list[set[int]]:
     """Roof faces in groups: those of one share edges in space, one after the other."""
     group_of = {index: {index} for index in roofs}
-    for (a, b), here in borders.items():
+    for (a, b), current in borders.items():
         there = borders.get((b, a))
-        if there and (here.start, here.end) == (there.end, there.start):
-            unite(group_of, here.face, there.face)
+        if there and (current.start, current.end) == (there.end, there.start):
+            unite(group_of, current.face, there.face)
     return distinct(group_of)
 
 
-def unite(group_of: dict[int, set[int]], one: int, other: int) -> None:
+def unite(group_of: dict[int, set[int]], item: int, other: int) -> None:
     """Make the groups of two faces one."""
-    if group_of[one] is not group_of[other]:
-        group_of[one] |= group_of[other]
+    if group_of[item] is not group_of[other]:
+        group_of[item] |= group_of[other]
         for index in group_of[other]:
-            group_of[index] = group_of[one]
+            group_of[index] = group_of[item]
 
 
 def distinct(group_of: dict[int, set[int]]) -> list[set[int]]:
@@ -140,14 +140,16 @@ def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> lis
     """The groups, each smaller than LEAST_PART_M2 taken in by the neighbour with which it shares
     the longest border, smallest first.
     """
-    area = {index: solid.plan_of(solid.faces[index]).area for group in groups for index in group}
+    area = {
+        index: solid.project_face(solid.faces[index]).area for group in groups for index in group
+    }
     group_of = {index: group for group in groups for index in group}
     while len(groups := distinct(group_of)) > 1:
         smallest = min(groups, key=lambda group: (sum(area[index] for index in group), min(group)))
         shared: dict[int, float] = {}
-        for (a, b), here in borders.items():
+        for (a, b), current in borders.items():
             there = borders.get((b, a))
-            if here.face in smallest and there and there.face not in smallest:
+            if current.face in smallest and there and there.face not in smallest:
                 key = min(group_of[there.face])
                 shared[key] = shared.get(key, 0.0) + float(np.hypot(b[0] - a[0], b[1] - a[1]))
         if sum(area[index] for index in smallest) >= LEAST_PART_M2 or not shared:
@@ -156,36 +158,44 @@ def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> lis
     return groups
 
 
-def part_of(solid: Solid, group: set[int], borders: Borders, place_of: list[Place]) -> BuildingPart:
+def cut_part(
+    solid: Solid, group: set[int], borders: Borders, place_of: list[Place]
+) -> BuildingPart:
     """The part under the roof faces `group`: these, the steps between them, walls down to the
     ground around them, and the ground.
     """
-    own = {edge: border for edge, border in borders.items() if border.face in group}
-    vertices, levels = with_base(solid, {border.start for border in own.values()}, place_of)
-    rings = closed_rings([(b, a) for a, b in own if (b, a) not in own])
-    walls = [Face((ring,), WALL) for edge in own if (ring := wall_ring(edge, own, levels))]
+    part_borders = {edge: border for edge, border in borders.items() if border.face in group}
+    vertices, levels = with_base(
+        solid, {border.start for border in part_borders.values()}, place_of
+    )
+    rings = closed_rings([(b, a) for a, b in part_borders if (b, a) not in part_borders])
+    walls = [
+        Face((ring,), WALL)
+        for edge in part_borders
+        if (ring := make_wall_ring(edge, part_borders, levels))
+    ]
     ground = Face(tuple(tuple(levels[place][0] for place in ring) for ring in rings), GROUND)
     faces = [*(solid.faces[index] for index in sorted(group)), *walls, ground]
     outer, *holes = (np.array(ring) * GRID_M for ring in rings)
     return BuildingPart(
-        compacted(vertices, faces), shapely.Polygon(outer, holes), members_of(solid, group)
+        compact_solid(vertices, faces), shapely.Polygon(outer, holes), list_members(solid, group)
     )
 
 
 def with_base(
-    solid: Solid, used: set[int], place_of: list[Place]
+    solid: Solid, in_use: set[int], place_of: list[Place]
 ) -> tuple[np.ndarray, dict[Place, list[int]]]:
-    """The solid's vertices (n, 3) and new ones on the ground below those `used`, and all of them
+    """The solid's vertices (n, 3) and new ones on the ground below those `in_use`, and all of them
     over each place, from below.
     """
     z_base = min(
         solid.vertices[index, 2]
-        for face in solid.of_kind(GROUND)
+        for face in solid.select_faces(GROUND)
         for ring in face.rings
         for index in ring
     )
     levels: dict[Place, list[int]] = {}
-    for vertex in sorted(used, key=lambda vertex: solid.vertices[vertex, 2]):
+    for vertex in sorted(in_use, key=lambda vertex: solid.vertices[vertex, 2]):
         levels.setdefault(place_of[vertex], []).append(vertex)
     below = [[*solid.vertices[over[0], :2], z_base] for over in levels.values()]
     for number, over in enumerate(levels.values(), len(solid.vertices)):
@@ -193,22 +203,25 @@ def with_base(
     return np.concatenate([solid.vertices, np.array(below)]), levels
 
 
-def wall_ring(
-    edge: tuple[Place, Place], own: Borders, levels: dict[Place, list[int]]
+def make_wall_ring(
+    edge: tuple[Place, Place], part_borders: Borders, levels: dict[Place, list[int]]
 ) -> tuple[int, ...]:
     """The wall below a border, down to its neighbour or to the ground, through every level on its
     way; none where it lies lower.
     """
     a, b = edge
-    here, there = own[edge], own.get((b, a))
+    current, there = part_borders[edge], part_borders.get((b, a))
     low_a, low_b = (levels[a][0], levels[b][0]) if there is None else (there.end, there.start)
-    at_a, at_b = between(levels[a], low_a, here.start), between(levels[b], low_b, here.end)
+    at_a, at_b = (
+        select_between(levels[a], low_a, current.start),
+        select_between(levels[b], low_b, current.end),
+    )
     return (*at_b, *reversed(at_a)) if len(at_a) + len(at_b) > 2 and at_a and at_b else ()
 
 
-def between(levels: list[int], low: int, high: int) -> list[int]:
+def select_between(levels: list[int], lower: int, upper: int) -> list[int]:
     """The vertices of a place from one to another that lies no lower."""
-    return levels[levels.index(low) : levels.index(high) + 1]
+    return levels[levels.index(lower) : levels.index(upper) + 1]
 
 
 def closed_rings(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
@@ -223,10 +236,10 @@ def closed_rings(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
     return sorted(rings, key=lambda ring: -shapely.Polygon(ring).area if len(ring) > 2 else 0.0)
 
 
-def members_of(solid: Solid, group: set[int]) -> tuple[int, ...]:
+def list_members(solid: Solid, group: set[int]) -> tuple[int, ...]:
     """Roof parts of the faces `group`, that of the largest area in plan first."""
     area: dict[int, float] = {}
     for index in sorted(group):
         face = solid.faces[index]
-        area[face.part] = area.get(face.part, 0.0) + solid.plan_of(face).area
+        area[face.part] = area.get(face.part, 0.0) + solid.project_face(face).area
     return tuple(sorted(area, key=lambda part: (-area[part], part)))

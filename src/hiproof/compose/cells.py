@@ -73,10 +73,10 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
         )
     xy = np.rint(xy / GRID_M)
     soup = np.concatenate((xy[:-1], xy[1:]), axis=1)
-    kept = (ring[:-1] == ring[1:]) & ((soup[:, 0] != soup[:, 2]) | (soup[:, 1] != soup[:, 3]))
-    owner = polygon_of_part[part_of_ring[ring[:-1][kept]]]
-    soup, ends = soup[kept], np.searchsorted(owner, np.arange(len(polygons) + 1)).tolist()
-    return [soup[low:high] for low, high in itertools.pairwise(ends)]
+    mask = (ring[:-1] == ring[1:]) & ((soup[:, 0] != soup[:, 2]) | (soup[:, 1] != soup[:, 3]))
+    owner = polygon_of_part[part_of_ring[ring[:-1][mask]]]
+    soup, ends = soup[mask], np.searchsorted(owner, np.arange(len(polygons) + 1)).tolist()
+    return [soup[lower:upper] for lower, upper in itertools.pairwise(ends)]
 
 
 def plan_problem(roof: Roof) -> PlanProblem:
@@ -97,7 +97,7 @@ def plan_problem(roof: Roof) -> PlanProblem:
             "back to a flat block"
         )
     borders, planes, part = zip(*pieces, strict=True)
-    counts = [len(own) for own in planes]
+    counts = [len(plane) for plane in planes]
     stacked = np.concatenate(planes)
     if not np.isfinite(stacked).all():
         raise CompositionError(
@@ -174,13 +174,13 @@ def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
     face, _ = trace_faces(cells.xy, cells.edges, follow)
     label = cells.side.ravel()
     for gap in np.unique(face[label == UNCOVERED]):
-        around = np.flatnonzero((face == gap) & (face[np.arange(len(face)) ^ 1] != gap))
-        soup = cells.xy[cells.edges[around >> 1]].reshape(-1, 4).astype(float)
-        problem = with_gap_covered(problem, soup, label[around ^ 1])
+        indices = np.flatnonzero((face == gap) & (face[np.arange(len(face)) ^ 1] != gap))
+        soup = cells.xy[cells.edges[indices >> 1]].reshape(-1, 4).astype(float)
+        problem = cover_gap(problem, soup, label[indices ^ 1])
     return problem
 
 
-def with_gap_covered(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
+def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
     """The problem with one more piece over the polygon `gap` (m, 4), whose edges border cells
     labelled `neighbour` (m,).
     """
@@ -193,13 +193,13 @@ def with_gap_covered(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarra
         piece_of_plane[neighbour[roofed]], length[roofed], minlength=len(problem.plane_start) - 1
     )
     piece = int(shared.argmax()) if shared.any() else nearest_piece(problem, gap)
-    low, high = problem.plane_start[piece], problem.plane_start[piece + 1]
+    lower, upper = problem.plane_start[piece], problem.plane_start[piece + 1]
     return PlanProblem(
         [*problem.soups, gap],
-        np.concatenate((problem.planes, problem.planes[low:high])),
-        np.append(problem.plane_start, problem.plane_start[-1] + high - low),
-        np.concatenate((problem.group, problem.group[low:high])),
-        np.concatenate((problem.part, problem.part[low:high])),
+        np.concatenate((problem.planes, problem.planes[lower:upper])),
+        np.append(problem.plane_start, problem.plane_start[-1] + upper - lower),
+        np.concatenate((problem.group, problem.group[lower:upper])),
+        np.concatenate((problem.part, problem.part[lower:upper])),
         problem.patches,
     )
 

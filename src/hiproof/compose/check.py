@@ -31,7 +31,7 @@ CODES = {
     307: "is oriented against its neighbour",
     405: "the shell is oriented inwards",
 }
-FARTHEST_M = 1e9  # coordinates beyond it are of no system in use, and their products overflow
+EARTH_M = 1e9  # coordinates beyond it are of no system in use, and their products overflow
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Finding:
     message: str
 
 
-def finding(code: int, face: int = -1, other: int = -1) -> Finding:
+def make_finding(code: int, face: int = -1, other: int = -1) -> Finding:
     """The finding with its sentence."""
     text = CODES[code]
     subject = f"face {face} {text}" if face >= 0 else text
@@ -69,14 +69,10 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
     301
     """
     vertices = np.ascontiguousarray(solid.vertices, float).reshape(-1, 3)
-    index, ring_start, face_start = solid.flattened()
+    index, ring_start, face_start = solid.flatten()
     if len(index) == 0:
-        return (finding(301),)
-    if (
-        not (np.abs(vertices) <= FARTHEST_M).all()
-        or index.min() < 0
-        or index.max() >= len(vertices)
-    ):
+        return (make_finding(301),)
+    if not (np.abs(vertices) <= EARTH_M).all() or index.min() < 0 or index.max() >= len(vertices):
         return (
             Finding(
                 101,
@@ -85,7 +81,7 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
                 "damaged",
             ),
         )
-    read = tuple(finding(code, face) for code, face in solid.defects)
+    read = tuple(make_finding(code, face) for code, face in solid.defects)
     local = vertices - vertices[index].mean(axis=0)
     index = weld(local, SAME_POINT_M)[index]
     rows, normals, offsets, flatness, risky = check_faces(
@@ -96,4 +92,6 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
     rows = [*rows, *((204, face, -1) for face in bent)]
     if len(rows) == 0:
         rows = check_shell(local, index, ring_start, face_start, normals, offsets, flatness)
-    return read + tuple(finding(int(code), int(face), int(other)) for code, face, other in rows)
+    return read + tuple(
+        make_finding(int(code), int(face), int(other)) for code, face, other in rows
+    )

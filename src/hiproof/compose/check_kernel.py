@@ -13,10 +13,10 @@ from ..compiled import compiled
 from ..geometry.area_vectors import dot, enclosed_volume, newell
 from ..geometry.point_in_polygon import flips
 from .bends import SURELY_FLAT_COSINE
-from .joined import join, root_of
+from .joined import find_root, join
 
 SAME_POINT_M = 1e-3  # m; val3dity's snap tolerance
-TOUCH_M = 1e-9  # m; numerically on the segment
+ON_SEGMENT_M = 1e-9  # m; numerically on the segment
 # vertices up to which all triples of a ring are looked at: they grow with the cube
 MOST_VERTICES_IN_THREES = 40
 # shorter than one: what is further apart along it is further apart in space
@@ -40,7 +40,7 @@ def weld(vertices, tolerance):
             if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < tolerance * tolerance:
                 join(same, v, w)
     for v in range(len(same)):
-        same[v] = root_of(same, v)
+        same[v] = find_root(same, v)
     return same
 
 
@@ -72,11 +72,11 @@ def crosses(a, b, c, d):
 
 
 @compiled
-def inside_ring(p, flat, index, low, high):
+def is_inside_ring(p, flat, index, lower, upper):
     """Whether the plan point p lies in the ring, by parity."""
     inside = False
-    for k in range(low, high):
-        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
+    for k in range(lower, upper):
+        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
         if flips(a[0], a[1], b[0], b[1], p[0], p[1]):
             inside = not inside
     return inside
@@ -87,13 +87,15 @@ def depth_in_face(p, flat, index, ring_start, first, last):
     """Distance of the plan point p from the border of a face, negative outside."""
     inside, nearest = False, np.inf
     for r in range(first, last):
-        low, high = ring_start[r], ring_start[r + 1]
-        if inside_ring(p, flat, index, low, high):
+        lower, upper = ring_start[r], ring_start[r + 1]
+        if is_inside_ring(p, flat, index, lower, upper):
             inside = not inside
-        for k in range(low, high):
+        for k in range(lower, upper):
             nearest = min(
                 nearest,
-                distance_to_segment(p, flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]),
+                distance_to_segment(
+                    p, flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
+                ),
             )
     return nearest if inside else -nearest
 
@@ -103,30 +105,36 @@ def segments_touch(a, b, c, d):
     """Whether the plan segments ab and cd cross, or an end of one lies on the other."""
     return (
         crosses(a, b, c, d)
-        or min(distance_to_segment(c, a, b), distance_to_segment(d, a, b)) <= TOUCH_M
-        or min(distance_to_segment(a, c, d), distance_to_segment(b, c, d)) <= TOUCH_M
+        or min(distance_to_segment(c, a, b), distance_to_segment(d, a, b)) <= ON_SEGMENT_M
+        or min(distance_to_segment(a, c, d), distance_to_segment(b, c, d)) <= ON_SEGMENT_M
     )
 
 
 @compiled
-def ring_is_simple(flat, index, low, high):
+def is_simple_ring(flat, index, lower, upper):
     """Whether a ring neither crosses nor touches nor folds back on itself (vertices already
     welded).
     """
-    size = high - low
+    size = upper - lower
     for i in range(size):
-        a, b = index[low + i], index[low + (i + 1) % size]
-        c = index[low + (i + 2) % size]
-        if distance_to_segment(flat[c], flat[a], flat[b]) <= TOUCH_M:
+        a, b = index[lower + i], index[lower + (i + 1) % size]
+        c = index[lower + (i + 2) % size]
+        if distance_to_segment(flat[c], flat[a], flat[b]) <= ON_SEGMENT_M:
             return False
-        if distance_to_segment(flat[a], flat[b], flat[c]) <= TOUCH_M:
+        if distance_to_segment(flat[a], flat[b], flat[c]) <= ON_SEGMENT_M:
             return False
-        west, east = min(flat[a, 0], flat[b, 0]) - TOUCH_M, max(flat[a, 0], flat[b, 0]) + TOUCH_M
-        south, north = min(flat[a, 1], flat[b, 1]) - TOUCH_M, max(flat[a, 1], flat[b, 1]) + TOUCH_M
+        west, east = (
+            min(flat[a, 0], flat[b, 0]) - ON_SEGMENT_M,
+            max(flat[a, 0], flat[b, 0]) + ON_SEGMENT_M,
+        )
+        south, north = (
+            min(flat[a, 1], flat[b, 1]) - ON_SEGMENT_M,
+            max(flat[a, 1], flat[b, 1]) + ON_SEGMENT_M,
+        )
         for j in range(i + 2, size):
             if i == 0 and j == size - 1:
                 continue
-            c, d = index[low + j], index[low + j + 1 if j + 1 < size else low]
+            c, d = index[lower + j], index[lower + j + 1 if j + 1 < size else lower]
             if (flat[c, 0] < west and flat[d, 0] < west) or (
                 flat[c, 0] > east and flat[d, 0] > east
             ):
@@ -141,39 +149,39 @@ def ring_is_simple(flat, index, low, high):
 
 
 @compiled
-def same_ring(index, low, high, low2, high2):
+def are_same_ring(index, lower, upper, low2, high2):
     """Whether two rings hold the same vertices."""
-    if high - low != high2 - low2:
+    if upper - lower != high2 - low2:
         return False
-    for k in range(low, high):
-        found = False
+    for k in range(lower, upper):
+        result = False
         for m in range(low2, high2):
-            found = found or index[k] == index[m]
-        if not found:
+            result = result or index[k] == index[m]
+        if not result:
             return False
     return True
 
 
 @compiled
-def rings_meet(flat, index, low, high, low2, high2):
+def rings_meet(flat, index, lower, upper, low2, high2):
     """(whether two rings cross or share a stretch, in how many points they touch)."""
     touches = 0
-    for k in range(low, high):
-        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
+    for k in range(lower, upper):
+        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
         on_other, middle_on_other = False, False
         middle = 0.5 * (a + b)
         for m in range(low2, high2):
             c, d = flat[index[m]], flat[index[m + 1 if m + 1 < high2 else low2]]
             if crosses(a, b, c, d):
                 return True, touches
-            on_other = on_other or distance_to_segment(a, c, d) <= TOUCH_M
-            middle_on_other = middle_on_other or distance_to_segment(middle, c, d) <= TOUCH_M
-            if distance_to_segment(c, a, b) <= TOUCH_M:
-                apart = (
-                    np.hypot(c[0] - a[0], c[1] - a[1]) > TOUCH_M
-                    and np.hypot(c[0] - b[0], c[1] - b[1]) > TOUCH_M
+            on_other = on_other or distance_to_segment(a, c, d) <= ON_SEGMENT_M
+            middle_on_other = middle_on_other or distance_to_segment(middle, c, d) <= ON_SEGMENT_M
+            if distance_to_segment(c, a, b) <= ON_SEGMENT_M:
+                gap = (
+                    np.hypot(c[0] - a[0], c[1] - a[1]) > ON_SEGMENT_M
+                    and np.hypot(c[0] - b[0], c[1] - b[1]) > ON_SEGMENT_M
                 )
-                touches += apart
+                touches += gap
         if on_other and middle_on_other:
             return True, touches
         touches += on_other
@@ -181,12 +189,12 @@ def rings_meet(flat, index, low, high, low2, high2):
 
 
 @compiled
-def ring_in_ring(flat, index, low, high, low2, high2):
+def is_ring_in_ring(flat, index, lower, upper, low2, high2):
     """Whether the first ring lies in the second, by its first vertex or edge middle that is not on
     the second's border.
     """
-    for k in range(low, high):
-        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
+    for k in range(lower, upper):
+        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
         for p in (a, 0.5 * (a + b)):
             nearest = np.inf
             for m in range(low2, high2):
@@ -196,69 +204,69 @@ def ring_in_ring(flat, index, low, high, low2, high2):
                         p, flat[index[m]], flat[index[m + 1 if m + 1 < high2 else low2]]
                     ),
                 )
-            if nearest > TOUCH_M:
-                return inside_ring(p, flat, index, low2, high2)
+            if nearest > ON_SEGMENT_M:
+                return is_inside_ring(p, flat, index, low2, high2)
     return False
 
 
 @compiled
-def check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f):
+def check_inner_rings(flat, index, ring_start, first, last, signed, result, count, f):
     """Codes 201, 202, 205, 206, 207, 208 of one face;
 
     `signed` are the rings' areas along the face's normal.
     """
     parent = np.arange(last - first)
     for r in range(first + 1, last):
-        low, high = ring_start[r], ring_start[r + 1]
+        lower, upper = ring_start[r], ring_start[r + 1]
         code = 0
         for s in range(first, r):
             low2, high2 = ring_start[s], ring_start[s + 1]
-            if same_ring(index, low, high, low2, high2):
+            if are_same_ring(index, lower, upper, low2, high2):
                 code = 202
                 break
-            meet, touches = rings_meet(flat, index, low, high, low2, high2)
+            meet, touches = rings_meet(flat, index, lower, upper, low2, high2)
             if meet:
                 code = 201
                 break
             if touches > 1 or (
-                touches == 1 and root_of(parent, r - first) == root_of(parent, s - first)
+                touches == 1 and find_root(parent, r - first) == find_root(parent, s - first)
             ):
                 code = 205
                 break
             if touches == 1:
                 join(parent, r - first, s - first)
-            if s == first and not ring_in_ring(flat, index, low, high, low2, high2):
+            if s == first and not is_ring_in_ring(flat, index, lower, upper, low2, high2):
                 code = 206
                 break
             if s > first and (
-                ring_in_ring(flat, index, low, high, low2, high2)
-                or ring_in_ring(flat, index, low2, high2, low, high)
+                is_ring_in_ring(flat, index, lower, upper, low2, high2)
+                or is_ring_in_ring(flat, index, low2, high2, lower, upper)
             ):
                 code = 207
                 break
         if code == 0 and signed[r - first] > 0:
             code = 208
         if code:
-            found[count, 0], found[count, 1], found[count, 2] = code, f, -1
+            result[count, 0], result[count, 1], result[count, 2] = code, f, -1
             count += 1
     return count
 
 
 @compiled
-def may_bend(vertices, index, low, high, normal):
+def may_bend(vertices, index, lower, upper, normal):
     """Whether some three of a face's vertices span a triangle over 10 degrees off its `normal`.
 
     Where none do, no two triangles of any triangulation are over 20 degrees apart. Large faces are
     not asked.
     """
-    if high - low > MOST_VERTICES_IN_THREES:
+    if upper - lower > MOST_VERTICES_IN_THREES:
         return True
-    for i in range(low, high - 2):
+    for i in range(lower, upper - 2):
         p = vertices[index[i]]
-        for j in range(i + 1, high - 1):
+        for j in range(i + 1, upper - 1):
             q = vertices[index[j]]
             ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-            for k in range(j + 1, high):
+            for k in range(j + 1, upper):
                 r = vertices[index[k]]
                 wx, wy, wz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
                 x, y, z = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
@@ -275,11 +283,11 @@ def ring_lengths_code(index, ring_start, first, last):
     """
     code = 101 if first == last else 0
     for r in range(first, last):
-        low, high = ring_start[r], ring_start[r + 1]
-        if high - low < 3:
+        lower, upper = ring_start[r], ring_start[r + 1]
+        if upper - lower < 3:
             return 101
-        for k in range(low, high):
-            if index[k] == index[k + 1 if k + 1 < high else low]:
+        for k in range(lower, upper):
+            if index[k] == index[k + 1 if k + 1 < upper else lower]:
                 code = 102
     return code
 
@@ -292,7 +300,7 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
     faces = len(face_start) - 1
     normals, offsets, flatness = np.zeros((faces, 3)), np.zeros(faces), np.zeros(faces)
     risky = np.zeros(faces, np.bool_)
-    found, count = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64), 0
+    result, count = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64), 0
     flat = np.empty((len(vertices), 2))
     for f in range(faces):
         first, last = face_start[f], face_start[f + 1]
@@ -306,22 +314,22 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
         if code == 0 and size < 1e-7:
             code = 104
         if code:
-            found[count, 0], found[count, 1], found[count, 2] = code, f, -1
+            result[count, 0], result[count, 1], result[count, 2] = code, f, -1
             count += 1
             continue
-        low, high = ring_start[first], ring_start[last]
-        normals[f], offsets[f], flatness[f] = best_plane(vertices, index, low, high, area / size)
+        lower, upper = ring_start[first], ring_start[last]
+        normals[f], offsets[f], flatness[f] = best_plane(vertices, index, lower, upper, area / size)
         if flatness[f] > planarity:
-            found[count, 0], found[count, 1], found[count, 2] = 203, f, -1
+            result[count, 0], result[count, 1], result[count, 2] = 203, f, -1
             count += 1
         else:
-            risky[f] = high - low > 3 and may_bend(vertices, index, low, high, normals[f])
-        project(flat, vertices, index, low, high, np.argmax(np.abs(normals[f])))
+            risky[f] = upper - lower > 3 and may_bend(vertices, index, lower, upper, normals[f])
+        project(flat, vertices, index, lower, upper, np.argmax(np.abs(normals[f])))
         simple = True
         for r in range(first, last):
-            simple = simple and ring_is_simple(flat, index, ring_start[r], ring_start[r + 1])
+            simple = simple and is_simple_ring(flat, index, ring_start[r], ring_start[r + 1])
         if not simple:
-            found[count, 0], found[count, 1], found[count, 2] = 104, f, -1
+            result[count, 0], result[count, 1], result[count, 2] = 104, f, -1
             count += 1
         elif last - first > 1:
             signed = np.empty(last - first)
@@ -329,12 +337,14 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
                 signed[r - first] = dot(
                     newell(vertices, index, ring_start[r], ring_start[r + 1]), normals[f]
                 )
-            count = check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f)
-    return found[:count].copy(), normals, offsets, flatness, risky
+            count = check_inner_rings(
+                flat, index, ring_start, first, last, signed, result, count, f
+            )
+    return result[:count].copy(), normals, offsets, flatness, risky
 
 
 @compiled
-def best_plane(vertices, index, low, high, normal):
+def best_plane(vertices, index, lower, upper, normal):
     """The plane by least squares through index[low:high]: (unit normal, offset, how far vertices
     lie off it).
 
@@ -342,16 +352,16 @@ def best_plane(vertices, index, low, high, normal):
     is long and thin.
     """
     centre = np.zeros(3)
-    for k in range(low, high):
+    for k in range(lower, upper):
         centre += vertices[index[k]]
-    centre /= high - low
-    aside = np.zeros(3)
-    aside[np.argmin(np.abs(normal))] = 1.0
-    u = np.cross(normal, aside)
+    centre /= upper - lower
+    perpendicular = np.zeros(3)
+    perpendicular[np.argmin(np.abs(normal))] = 1.0
+    u = np.cross(normal, perpendicular)
     u /= np.sqrt(dot(u, u))
     v = np.cross(normal, u)
     uu = uv = vv = ud = vd = 0.0
-    for k in range(low, high):
+    for k in range(lower, upper):
         p = vertices[index[k]] - centre
         pu, pv, pd = dot(p, u), dot(p, v), dot(p, normal)
         uu, uv, vv, ud, vd = uu + pu * pu, uv + pu * pv, vv + pv * pv, ud + pu * pd, vd + pv * pd
@@ -364,7 +374,7 @@ def best_plane(vertices, index, low, high, normal):
         )
         normal = normal / np.sqrt(dot(normal, normal))
     farthest = 0.0
-    for k in range(low, high):
+    for k in range(lower, upper):
         farthest = max(farthest, abs(dot(vertices[index[k]] - centre, normal)))
     return normal, dot(centre, normal), farthest
 
@@ -379,10 +389,10 @@ def largest_axes(normals):
 
 
 @compiled
-def project(flat, vertices, index, low, high, axis):
+def project(flat, vertices, index, lower, upper, axis):
     """Write into flat (n, 2) the vertices index[low:high] without their coordinate along `axis`."""
     first, second = 1 if axis == 0 else 0, 1 if axis == 2 else 2
-    for k in range(low, high):
+    for k in range(lower, upper):
         flat[index[k], 0], flat[index[k], 1] = vertices[index[k], first], vertices[index[k], second]
 
 
@@ -395,9 +405,9 @@ def directed_edges(index, ring_start, face_start):
     count = 0
     for f in range(len(face_start) - 1):
         for r in range(face_start[f], face_start[f + 1]):
-            low, high = ring_start[r], ring_start[r + 1]
-            for k in range(low, high):
-                a, b = index[k], index[k + 1 if k + 1 < high else low]
+            lower, upper = ring_start[r], ring_start[r + 1]
+            for k in range(lower, upper):
+                a, b = index[k], index[k + 1 if k + 1 < upper else lower]
                 edges[count, 0], edges[count, 1] = min(a, b), max(a, b)
                 edges[count, 2], edges[count, 3] = 1 if a < b else -1, f
                 count += 1
@@ -406,7 +416,7 @@ def directed_edges(index, ring_start, face_start):
 
 
 @compiled
-def check_edges(edges, faces, found, count):
+def check_edges(edges, faces, result, count):
     """Codes 302, 303, 307 (every edge twice, in opposite directions) and 305 (one component)."""
     parent = np.arange(faces)
     start, clean = 0, True
@@ -424,19 +434,19 @@ def check_edges(edges, faces, found, count):
         if uses != 2 or balance != 0:
             clean = False
             code = 302 if uses == 1 else 303 if uses > 2 else 307
-            found[count, 0], found[count, 1] = code, edges[start, 3]
-            found[count, 2] = edges[start + 1, 3] if uses > 1 else -1
+            result[count, 0], result[count, 1] = code, edges[start, 3]
+            result[count, 2] = edges[start + 1, 3] if uses > 1 else -1
             count += 1
         start = stop
     for f in range(faces):
-        if root_of(parent, f) != 0:
-            found[count, 0], found[count, 1], found[count, 2] = 305, f, -1
+        if find_root(parent, f) != 0:
+            result[count, 0], result[count, 1], result[count, 2] = 305, f, -1
             return count + 1, False
     return count, clean
 
 
 @compiled
-def check_umbrellas(index, ring_start, face_start, found, count):
+def check_umbrellas(index, ring_start, face_start, result, count):
     """Code 303 where the faces around a vertex form more than one fan.
 
     Only for shells whose edges are all paired.
@@ -447,13 +457,16 @@ def check_umbrellas(index, ring_start, face_start, found, count):
     corners = len(index)
     parent = np.arange(corners)
     face_of = np.empty(corners, np.int64)
-    before, after = np.empty(corners, np.int64), np.empty(corners, np.int64)
+    previous, following = np.empty(corners, np.int64), np.empty(corners, np.int64)
     for f in range(len(face_start) - 1):
         for r in range(face_start[f], face_start[f + 1]):
-            low, high = ring_start[r], ring_start[r + 1]
-            for k in range(low, high):
+            lower, upper = ring_start[r], ring_start[r + 1]
+            for k in range(lower, upper):
                 face_of[k] = f
-                before[k], after[k] = k - 1 if k > low else high - 1, k + 1 if k + 1 < high else low
+                previous[k], following[k] = (
+                    k - 1 if k > lower else upper - 1,
+                    k + 1 if k + 1 < upper else lower,
+                )
     by_vertex = np.argsort(index, kind="mergesort")
     start = 0
     while start < corners:
@@ -464,15 +477,15 @@ def check_umbrellas(index, ring_start, face_start, found, count):
             k = by_vertex[i]
             for j in range(start, stop):
                 m = by_vertex[j]
-                if index[after[k]] == index[before[m]]:
+                if index[following[k]] == index[previous[m]]:
                     join(parent, k, m)
-        root = root_of(parent, by_vertex[start])
+        root = find_root(parent, by_vertex[start])
         touching = False
         for i in range(start + 1, stop):  # corners at a vertex come in the order of their faces
             touching = touching or face_of[by_vertex[i]] == face_of[by_vertex[i - 1]]
         for i in range(start + 1, stop):
-            if not touching and root_of(parent, by_vertex[i]) != root:
-                found[count, 0], found[count, 1], found[count, 2] = (
+            if not touching and find_root(parent, by_vertex[i]) != root:
+                result[count, 0], result[count, 1], result[count, 2] = (
                     303,
                     face_of[by_vertex[i]],
                     face_of[by_vertex[start]],
@@ -484,25 +497,25 @@ def check_umbrellas(index, ring_start, face_start, found, count):
 
 
 @compiled
-def holds_vertex(index, low, high, v):
-    for k in range(low, high):
+def holds_vertex(index, lower, upper, v):
+    for k in range(lower, upper):
         if index[k] == v:
             return True
     return False
 
 
 @compiled
-def holds_edge(index, low, high, a, b):
+def holds_edge(index, lower, upper, a, b):
     """Whether the ring index[low:high] runs from a to b or from b to a."""
-    for k in range(low, high):
-        after = index[k + 1 if k + 1 < high else low]
-        if (index[k] == a and after == b) or (index[k] == b and after == a):
+    for k in range(lower, upper):
+        following = index[k + 1 if k + 1 < upper else lower]
+        if (index[k] == a and following == b) or (index[k] == b and following == a):
             return True
     return False
 
 
 @compiled
-def above(vertices, v, normal, offset):
+def measure_above(vertices, v, normal, offset):
     """Height of vertex v over a plane."""
     return (
         vertices[v, 0] * normal[0]
@@ -513,36 +526,42 @@ def above(vertices, v, normal, offset):
 
 
 @compiled
-def is_outside(vertices, a, b, low, high, slack):
+def is_outside(vertices, a, b, lower, upper, slack):
     """Whether the edge from a to b lies beyond one side of a box."""
     for axis in range(3):
         p, q = vertices[a, axis], vertices[b, axis]
-        if min(p, q) > high[axis] + slack or max(p, q) < low[axis] - slack:
+        if min(p, q) > upper[axis] + slack or max(p, q) < lower[axis] - slack:
             return True
     return False
 
 
 @compiled
 def edges_pierce(
-    vertices, index, ring_start, face_start, f, g, normal, offset, low, high, flat, slack
+    vertices, index, ring_start, face_start, f, g, normal, offset, lower, upper, flat, slack
 ):
     """Whether an edge of face g meets face f elsewhere than in shared vertices.
 
-    `normal` and `offset` are those of f, `low` and `high` its box; `slack` is how far off its plane
-    counts.
+    `normal` and `offset` are those of f, `lower` and `upper` its box; `slack` is how far off its
+    plane counts.
     """
     first, last = face_start[f], face_start[f + 1]
     begin, end = ring_start[first], ring_start[last]
     for r in range(face_start[g], face_start[g + 1]):
         for k in range(ring_start[r], ring_start[r + 1]):
             a, b = index[k], index[k + 1 if k + 1 < ring_start[r + 1] else ring_start[r]]
-            if is_outside(vertices, a, b, low, high, slack):
+            if is_outside(vertices, a, b, lower, upper, slack):
                 continue
-            da, db = above(vertices, a, normal, offset), above(vertices, b, normal, offset)
+            da, db = (
+                measure_above(vertices, a, normal, offset),
+                measure_above(vertices, b, normal, offset),
+            )
             if min(da, db) > slack or max(da, db) < -slack:
                 continue
             lands = abs(da) <= slack and not holds_vertex(index, begin, end, a)
-            if lands and depth_in_face(flat[a], flat, index, ring_start, first, last) > -TOUCH_M:
+            if (
+                lands
+                and depth_in_face(flat[a], flat, index, ring_start, first, last) > -ON_SEGMENT_M
+            ):
                 return True
             if abs(da) <= slack and abs(db) <= slack:
                 if lies_across(flat, index, ring_start, first, last, a, b, slack):
@@ -567,9 +586,9 @@ def lies_across(flat, index, ring_start, first, last, a, b, slack):
         if holds_edge(index, ring_start[r], ring_start[r + 1], a, b):
             return False
     for r in range(first, last):
-        low, high = ring_start[r], ring_start[r + 1]
-        for k in range(low, high):
-            c, d = index[k], index[k + 1 if k + 1 < high else low]
+        lower, upper = ring_start[r], ring_start[r + 1]
+        for k in range(lower, upper):
+            c, d = index[k], index[k + 1 if k + 1 < upper else lower]
             if c in (a, b) or d in (a, b):
                 continue
             if crosses(p, q, flat[c], flat[d]):
@@ -583,9 +602,9 @@ def face_boxes(vertices, index, ring_start, face_start):
     faces = len(face_start) - 1
     low_box, high_box = np.empty((faces, 3)), np.empty((faces, 3))
     for f in range(faces):
-        low, high = ring_start[face_start[f]], ring_start[face_start[f + 1]]
-        low_box[f] = high_box[f] = vertices[index[low]]
-        for k in range(low, high):
+        lower, upper = ring_start[face_start[f]], ring_start[face_start[f + 1]]
+        low_box[f] = high_box[f] = vertices[index[lower]]
+        for k in range(lower, upper):
             low_box[f] = np.minimum(low_box[f], vertices[index[k]])
             high_box[f] = np.maximum(high_box[f], vertices[index[k]])
     return low_box, high_box
@@ -596,18 +615,18 @@ def sweep_axis(low_box, high_box):
     """The axis along which faces are shortest compared with the whole: sweeping along it meets the
     fewest pairs.
     """
-    best, fewest = 0, np.inf
+    best, minimum = 0, np.inf
     for axis in range(3):
         whole = high_box[:, axis].max() - low_box[:, axis].min()
         overlaps = (high_box[:, axis] - low_box[:, axis]).sum() / whole if whole > 0 else np.inf
-        if overlaps < fewest:
-            best, fewest = axis, overlaps
+        if overlaps < minimum:
+            best, minimum = axis, overlaps
     return best
 
 
 @compiled
 def check_intersections(
-    vertices, index, ring_start, face_start, normals, offsets, flatness, found, count
+    vertices, index, ring_start, face_start, normals, offsets, flatness, result, count
 ):
     """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; only those
     whose boxes meet are compared.
@@ -623,39 +642,39 @@ def check_intersections(
             f, g = order[i], order[j]
             if low_box[g, axis] > high_box[f, axis] + widest:
                 break
-            for one, other in ((f, g), (g, f)):
-                low, high = low_box[one], high_box[one]
-                if count == len(found) or apart(
-                    low, high, low_box[other], high_box[other], slack[one]
+            for item, other in ((f, g), (g, f)):
+                lower, upper = low_box[item], high_box[item]
+                if count == len(result) or are_apart(
+                    lower, upper, low_box[other], high_box[other], slack[item]
                 ):
                     continue
-                for face in (one, other):
+                for face in (item, other):
                     begin, end = ring_start[face_start[face]], ring_start[face_start[face + 1]]
-                    project(flat, vertices, index, begin, end, axis_of[one])
+                    project(flat, vertices, index, begin, end, axis_of[item])
                 if edges_pierce(
                     vertices,
                     index,
                     ring_start,
                     face_start,
-                    one,
+                    item,
                     other,
-                    normals[one],
-                    offsets[one],
-                    low,
-                    high,
+                    normals[item],
+                    offsets[item],
+                    lower,
+                    upper,
                     flat,
-                    slack[one],
+                    slack[item],
                 ):
-                    found[count, 0], found[count, 1], found[count, 2] = 306, one, other
+                    result[count, 0], result[count, 1], result[count, 2] = 306, item, other
                     count += 1
     return count
 
 
 @compiled
-def apart(low, high, low2, high2, slack):
+def are_apart(lower, upper, low2, high2, slack):
     """Whether two boxes are further apart than `slack` along some axis."""
     for axis in range(3):
-        if low2[axis] > high[axis] + slack or low[axis] > high2[axis] + slack:
+        if low2[axis] > upper[axis] + slack or lower[axis] > high2[axis] + slack:
             return True
     return False
 
@@ -664,18 +683,18 @@ def apart(low, high, low2, high2, slack):
 def check_shell(vertices, index, ring_start, face_start, normals, offsets, flatness):
     """Findings (k, 3) of a shell of sound faces, whose lie is what `check_faces` returned."""
     faces = len(face_start) - 1
-    found = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64)
+    result = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64)
     if faces < 4:
-        found[0, 0], found[0, 1], found[0, 2] = 301, -1, -1
-        return found[:1]
+        result[0, 0], result[0, 1], result[0, 2] = 301, -1, -1
+        return result[:1]
     edges = directed_edges(index, ring_start, face_start)
-    count, clean = check_edges(edges, faces, found, 0)
+    count, clean = check_edges(edges, faces, result, 0)
     if clean:
-        count = check_umbrellas(index, ring_start, face_start, found, count)
+        count = check_umbrellas(index, ring_start, face_start, result, count)
     count = check_intersections(
-        vertices, index, ring_start, face_start, normals, offsets, flatness, found, count
+        vertices, index, ring_start, face_start, normals, offsets, flatness, result, count
     )
     if count == 0 and enclosed_volume(vertices, index, ring_start, face_start) <= 0:
-        found[0, 0], found[0, 1], found[0, 2] = 405, -1, -1
-        return found[:1]
-    return found[:count]
+        result[0, 0], result[0, 1], result[0, 2] = 405, -1, -1
+        return result[:1]
+    return result[:count]

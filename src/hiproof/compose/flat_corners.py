@@ -64,11 +64,11 @@ def turn_flat_corners_in(xy, edges, side, ties, reach):
     follow = next_half_edges(edges, *half_edge_order(xy, edges))
     label = side.ravel()
     for h in range(len(follow)):
-        after = follow[h]
+        following = follow[h]
         a, v, b = (
             edges[h >> 1, h & 1],
-            edges[after >> 1, after & 1],
-            edges[after >> 1, 1 - (after & 1)],
+            edges[following >> 1, following & 1],
+            edges[following >> 1, 1 - (following & 1)],
         )
         if label[h] == OUTSIDE or a == b or borders_outside(edges, side, v):
             continue

@@ -8,7 +8,7 @@ from ..compiled import compiled
 
 
 @compiled
-def root_of(parent, i):
+def find_root(parent, i):
     """The root of the set of `i`; `parent` (n,) is shortened on the way."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -19,5 +19,5 @@ def root_of(parent, i):
 @compiled
 def join(parent, i, j):
     """Make the sets of `i` and `j` one, whose root is the lower of both."""
-    a, b = root_of(parent, i), root_of(parent, j)
+    a, b = find_root(parent, i), find_root(parent, j)
     parent[max(a, b)] = min(a, b)

@@ -17,7 +17,7 @@ ASIDE_UNITS = (6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 
 
 @compiled
-def height(planes, label, x, y):
+def evaluate_plane(planes, label, x, y):
     return planes[label, 0] * x + planes[label, 1] * y + planes[label, 2]
 
 
@@ -53,13 +53,17 @@ def crossing_place(xy, edges, side, planes, e, x, y, reach):
     best, best_x, best_y = np.inf, x, y
     if abs(across) < 0.3:
         return best_x, best_y
-    for aside in ASIDE_UNITS:
+    for aside_unit in ASIDE_UNITS:
         for way in (-1.0, 1.0):
-            step = way * aside / abs(across) / size
+            step = way * aside_unit / abs(across) / size
             at_x, at_y = np.rint(x - step * gy), np.rint(y + step * gx)
-            z0, z1 = height(planes, left, at_x, at_y), height(planes, right, at_x, at_y)
+            z0, z1 = (
+                evaluate_plane(planes, left, at_x, at_y),
+                evaluate_plane(planes, right, at_x, at_y),
+            )
             off = (
-                max(abs(z0 - np.rint(0.5 * (z0 + z1))), abs(z1 - np.rint(0.5 * (z0 + z1)))) / aside
+                max(abs(z0 - np.rint(0.5 * (z0 + z1))), abs(z1 - np.rint(0.5 * (z0 + z1))))
+                / aside_unit
             )
             if off < best and has_room(xy, edges, e, at_x, at_y, reach):
                 best, best_x, best_y = off, at_x, at_y
@@ -87,16 +91,16 @@ def split_at_crossings(xy, edges, side, planes, reach):
         if left == OUTSIDE or right == OUTSIDE:
             continue
         a, b = xy[edges[e, 0]], xy[edges[e, 1]]
-        at_a = height(planes, left, a[0], a[1]) - height(planes, right, a[0], a[1])
-        at_b = height(planes, left, b[0], b[1]) - height(planes, right, b[0], b[1])
+        at_a = evaluate_plane(planes, left, a[0], a[1]) - evaluate_plane(planes, right, a[0], a[1])
+        at_b = evaluate_plane(planes, left, b[0], b[1]) - evaluate_plane(planes, right, b[0], b[1])
         if at_a * at_b >= 0 or abs(at_a) <= gap or abs(at_b) <= gap:
             continue
         t = at_a / (at_a - at_b)
         length = np.hypot(float(b[0] - a[0]), float(b[1] - a[1]))
         if t * length < reach or (1 - t) * length < reach:
             v = edges[e, 0] if t < 0.5 else edges[e, 1]
-            z0 = height(planes, left, xy[v, 0], xy[v, 1])
-            z1 = height(planes, right, xy[v, 0], xy[v, 1])
+            z0 = evaluate_plane(planes, left, xy[v, 0], xy[v, 1])
+            z1 = evaluate_plane(planes, right, xy[v, 0], xy[v, 1])
             ties[tied, 0], ties[tied, 1], ties[tied, 2] = v, min(z0, z1), max(z0, z1)
             tied += 1
             continue
@@ -118,10 +122,10 @@ def split_at_crossings(xy, edges, side, planes, reach):
 
 
 @compiled
-def tied(ties, v, low, high):
+def is_tied(ties, v, lower, upper):
     """Whether some tie at vertex v spans the gap from low to high."""
     for k in range(len(ties)):
-        if ties[k, 0] == v and ties[k, 1] <= low and high <= ties[k, 2]:
+        if ties[k, 0] == v and ties[k, 1] <= lower and upper <= ties[k, 2]:
             return True
     return False
 
@@ -142,19 +146,23 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
     vertices = np.empty((len(label) + len(xy), 3))
     count = 0
     for v in range(len(xy)):
-        around = order[start[v] : start[v + 1]]
-        z = np.empty(len(around))
-        for k in range(len(around)):
-            here = label[around[k]]
-            z[k] = z_ground if here == OUTSIDE else height(planes, here, xy[v, 0], xy[v, 1])
+        surroundings = order[start[v] : start[v + 1]]
+        z = np.empty(len(surroundings))
+        for k in range(len(surroundings)):
+            current = label[surroundings[k]]
+            z[k] = (
+                z_ground
+                if current == OUTSIDE
+                else evaluate_plane(planes, current, xy[v, 0], xy[v, 1])
+            )
         ranking = np.argsort(z)
         first = 0
-        for k in range(len(around)):
-            top = k + 1 == len(around)
+        for k in range(len(surroundings)):
+            top = k + 1 == len(surroundings)
             if not top:
-                low, high = z[ranking[k]], z[ranking[k + 1]]
-                top = high - low > LEVEL_GAP_M * 1e4 and not tied(ties, v, low, high)
-            level[around[ranking[k]]] = count
+                lower, upper = z[ranking[k]], z[ranking[k + 1]]
+                top = upper - lower > LEVEL_GAP_M * 1e4 and not is_tied(ties, v, lower, upper)
+            level[surroundings[ranking[k]]] = count
             if top:
                 vertices[count, 0], vertices[count, 1] = xy[v, 0], xy[v, 1]
                 vertices[count, 2] = np.rint(0.5 * (z[ranking[first]] + z[ranking[k]]))
@@ -173,15 +181,15 @@ def first_saddle(order, start, level, face, label):
         size = start[v + 1] - start[v]
         turns, last, first = 0, 0, 0
         for k in range(size):
-            here, after = order[start[v] + k], order[start[v] + (k + 1) % size]
-            sign = np.sign(level[after] - level[here])
+            current, following = order[start[v] + k], order[start[v] + (k + 1) % size]
+            sign = np.sign(level[following] - level[current])
             if sign != 0:
                 turns += last != 0 and sign != last
                 first = sign if first == 0 else first
                 last = sign
-            if label[here] != OUTSIDE and face[here] != face[after]:
+            if label[current] != OUTSIDE and face[current] != face[following]:
                 for m in range(2, size):
-                    if face[order[start[v] + (k + m) % size]] == face[here]:
+                    if face[order[start[v] + (k + m) % size]] == face[current]:
                         return v
         turns += last != first
         if turns > 2:

@@ -22,12 +22,12 @@ def compose_readable(roof: Roof, z_ground_local: float, settings: Settings) -> S
 
     Raises CompositionError, as `compose` does, also for parts that the reader would refuse.
     """
-    seen: dict[tuple, int] = {}
+    visited: dict[tuple, int] = {}
     for index, part in enumerate(roof.parts):
         try:
             if part.type in CATALOGUE:  # A shape of your own has no rules for its parameters.
                 refuse_no_shape(part.type, part.parameters, f"part {index}")
-            refuse_wrong_part(part, index, roof, seen)
+            refuse_wrong_part(part, index, roof, visited)
         except InputError as error:
             failure = CompositionError(str(error))
             failure.parts = (index,)
@@ -38,9 +38,9 @@ def compose_readable(roof: Roof, z_ground_local: float, settings: Settings) -> S
 def refuse_wrong_parts(roof: Roof) -> None:
     """Raise InputError, one sentence, for too many parts or a wrong one."""
     refuse_many(roof.parts)
-    seen: dict[tuple, int] = {}
+    visited: dict[tuple, int] = {}
     for index, part in enumerate(roof.parts):
-        refuse_wrong_part(part, index, roof, seen)
+        refuse_wrong_part(part, index, roof, visited)
 
 
 def refuse_many(parts: Sequence) -> None:
@@ -51,11 +51,11 @@ def refuse_many(parts: Sequence) -> None:
         )
 
 
-def refuse_wrong_part(part: Part, index: int, roof: Roof, seen: dict[tuple, int]) -> None:
-    """Raise InputError for a part without finite planes, off the outline, or equal to one `seen`
+def refuse_wrong_part(part: Part, index: int, roof: Roof, visited: dict[tuple, int]) -> None:
+    """Raise InputError for a part without finite planes, off the outline, or equal to one `visited`
     before.
 
-    `seen` holds the numbers of earlier parts by their content; the part is added to it.
+    `visited` holds the numbers of earlier parts by their content; the part is added to it.
     """
     if not all(np.isfinite(piece.planes).all() for piece in part.pieces):
         raise InputError(
@@ -71,7 +71,7 @@ def refuse_wrong_part(part: Part, index: int, roof: Roof, seen: dict[tuple, int]
         (part.kappa, *part.translation.tolist()),
         tuple(piece.outline.wkb for piece in part.pieces),
     )
-    same = seen.setdefault((part.type, tuple(part.parameters.items()), place, outlines), index)
+    same = visited.setdefault((part.type, tuple(part.parameters.items()), place, outlines), index)
     if same != index:
         raise InputError(
             f"expected parts that differ, got part {index} the same as part {same}; remove one"

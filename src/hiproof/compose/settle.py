@@ -18,7 +18,7 @@ import shapely
 
 from ..errors import FitError
 from ..model import Building, Part, Piece, Quality, Roof
-from ..primitives.family import planes_of
+from ..primitives.family import compute_planes
 
 DIGITS = 6  # of parameters: micrometres and millionths of a degree
 PLAN_DIGITS = 4  # of outlines and the terrain: tenths of a millimetre, as solids are composed
@@ -37,12 +37,12 @@ def settled_part(part: Part) -> Part:
     """The part with parameters, position, rotation and pieces as written, its planes made
     of them.
     """
-    parameters = {name: settled(value) for name, value in part.parameters.items()}
-    kappa = math.radians(settled(math.degrees(part.kappa)))
-    translation = np.array([settled(value) for value in part.translation])
+    parameters = {name: round_number(value) for name, value in part.parameters.items()}
+    kappa = math.radians(round_number(math.degrees(part.kappa)))
+    translation = np.array([round_number(value) for value in part.translation])
     outlines = [rounded_outline(piece.outline) for piece in part.pieces]
     try:
-        pieces = pieces_of(part.type, parameters, kappa, translation, outlines)
+        pieces = make_pieces(part.type, parameters, kappa, translation, outlines)
     except (FitError, KeyError):  # a shape of somebody's own, which parameters do not make
         pieces = tuple(
             Piece(o, piece.planes) for o, piece in zip(outlines, part.pieces, strict=True)
@@ -50,7 +50,7 @@ def settled_part(part: Part) -> Part:
     return Part(part.type, pieces, parameters, kappa, translation, settled_sigma(part.sigma))
 
 
-def pieces_of(
+def make_pieces(
     kind: str,
     parameters: Mapping[str, float],
     kappa: float,
@@ -65,7 +65,7 @@ def pieces_of(
     if kind == "flat":
         planes = np.array([[0.0, 0.0, translation[2]]])
     else:
-        planes = planes_of(kind, parameters, kappa, translation)
+        planes = compute_planes(kind, parameters, kappa, translation)
     if kind != "shed":
         return tuple(Piece(outline, planes) for outline in outlines)
     across = np.array([-math.sin(kappa), math.cos(kappa)])
@@ -85,12 +85,14 @@ def settled_sigma(sigma: Mapping[str, float]) -> dict[str, float]:
     degree.
     """
     return {
-        name: math.radians(settled(math.degrees(value))) if name == "kappa" else settled(value)
+        name: math.radians(round_number(math.degrees(value)))
+        if name == "kappa"
+        else round_number(value)
         for name, value in sigma.items()
     }
 
 
-def settled(value: float, digits: int = DIGITS) -> float:
+def round_number(value: float, digits: int = DIGITS) -> float:
     """A rounded number; minus zero is zero, NaN and infinities stay."""
     return round(float(value), digits) + 0.0
 
@@ -103,21 +105,21 @@ def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
     """The outline rounded; where that makes it cross itself, the largest valid polygon on the same
     grid.
     """
-    found = rounded_outline(outline)
-    if found.is_valid:
-        return found
+    result = rounded_outline(outline)
+    if result.is_valid:
+        return result
     on_grid = shapely.get_parts(shapely.set_precision(outline, 10.0**-PLAN_DIGITS))
     return rounded_outline(max(on_grid, key=lambda polygon: polygon.area, default=outline))
 
 
-def settled_building(building: Building) -> Building:
+def round_building(building: Building) -> Building:
     """The building with its figures and probabilities as written."""
     values: dict[str, Any] = {f.name: getattr(building.quality, f.name) for f in fields(Quality)}
-    values |= {name: settled(value) for name, value in values.items() if name != "points"}
+    values |= {name: round_number(value) for name, value in values.items() if name != "points"}
     return replace(
         building,
         quality=Quality(**values),
-        objective=settled(building.objective),
-        recognised={name: settled(value) for name, value in building.recognised.items()},
-        types={name: settled(value) for name, value in building.types.items()},
+        objective=round_number(building.objective),
+        recognised={name: round_number(value) for name, value in building.recognised.items()},
+        types={name: round_number(value) for name, value in building.types.items()},
     )

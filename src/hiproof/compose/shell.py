@@ -87,10 +87,11 @@ def raise_shell(
     runs = wall_runs(rises, follow, label, xyz) if merge_walls else [[h] for h in rises]
     skip = {rises[h][0] for run in runs for h in run[1:]}
     faces += [
-        Face((tuple([v for v in wall_ring(run, rises) if v not in skip]),), WALL) for run in runs
+        Face((tuple([v for v in make_wall_ring(run, rises) if v not in skip]),), WALL)
+        for run in runs
     ]
     faces.append(ground_face(follow, level, label, skip, xyz))
-    return compacted(np.round(levels.vertices * GRID_M, 4), faces)
+    return compact_solid(np.round(levels.vertices * GRID_M, 4), faces)
 
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
@@ -101,20 +102,20 @@ def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.
     return float((a * corners[:, 0] + b * corners[:, 1] + c).min())
 
 
-def walks(follow: list[int], chosen: list[bool]) -> list[list[int]]:
+def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
     """Closed walks of the chosen half-edges, each as a list of half-edges."""
-    seen = [False] * len(follow)
-    found = []
+    visited = [False] * len(follow)
+    result = []
     for first in range(len(follow)):
-        if seen[first] or not chosen[first]:
+        if visited[first] or not selection[first]:
             continue
         walk, h = [], first
-        while not seen[h]:
-            seen[h] = True
+        while not visited[h]:
+            visited[h] = True
             walk.append(h)
             h = follow[h]
-        found.append(walk)
-    return found
+        result.append(walk)
+    return result
 
 
 def simple_loops(ring: list[int]) -> list[list[int]]:
@@ -154,7 +155,7 @@ def roof_faces(
     """A RoofSurface a cell: its outer walk counter-clockwise from above, then its holes."""
     rings_of: dict[int, list[list[int]]] = {}
     label_of = {}
-    for walk in walks(follow, [here != OUTSIDE for here in label]):
+    for walk in walks(follow, [current != OUTSIDE for current in label]):
         label_of[face[walk[0]]] = label[walk[0]]
         rings_of.setdefault(face[walk[0]], []).extend(simple_loops([level[h] for h in walk]))
     faces = []
@@ -173,7 +174,7 @@ def ground_face(
     `skip` are ground vertices in the middle of a straight wall, which nothing else needs.
     """
     rings = []
-    for walk in walks(follow, [here == OUTSIDE for here in label]):
+    for walk in walks(follow, [current == OUTSIDE for current in label]):
         rings += simple_loops([level[h] for h in walk if level[h] not in skip])
     if len(rings) > 1:
         rings.sort(key=lambda ring: signed_area(ring, xyz))
@@ -207,13 +208,15 @@ def wall_runs(
     one wall.
     """
     outer = {follow[h ^ 1] ^ 1: h for h in rises if label[h ^ 1] == OUTSIDE}
-    after = {before: h for before, h in outer.items() if is_straight([before, h], rises, xyz)}
+    next_edges = {
+        previous: h for previous, h in outer.items() if is_straight([previous, h], rises, xyz)
+    }
     runs = [[h] for h in rises if label[h ^ 1] != OUTSIDE]
-    starts = set(outer.values()) - set(after.values())
+    starts = set(outer.values()) - set(next_edges.values())
     for first in sorted(starts):
         run = [first]
-        while run[-1] in after:
-            following = after[run[-1]]
+        while run[-1] in next_edges:
+            following = next_edges[run[-1]]
             if is_straight([*run, following], rises, xyz):
                 run.append(following)
             else:
@@ -239,31 +242,31 @@ def is_straight(
     return True
 
 
-def wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> list[int]:
+def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> list[int]:
     """Ring of the wall over a run of plan edges, counter-clockwise seen from its right, through
     every level on the way.
     """
     low_u, high_u, _, _ = rises[run[0]]
     _, _, low_v, high_v = rises[run[-1]]
     ring = [low_u, *range(low_v, high_v)]
-    for h, before in zip(reversed(run), [*reversed(run[:-1]), None], strict=True):
+    for h, previous in zip(reversed(run), [*reversed(run[:-1]), None], strict=True):
         ring.append(rises[h][3])
-        if before is not None:
-            start, end = rises[h][1], rises[before][3]
+        if previous is not None:
+            start, end = rises[h][1], rises[previous][3]
             ring += range(start, end, 1 if end > start else -1)
     ring += range(high_u, low_u, -1)
     return list(dict.fromkeys(ring))
 
 
-def compacted(vertices: np.ndarray, faces: list[Face]) -> Solid:
+def compact_solid(vertices: np.ndarray, faces: list[Face]) -> Solid:
     """Solid with those of the `vertices` (n, 3) that faces use."""
-    used = sorted({v for face in faces for ring in face.rings for v in ring})
-    number = {vertex: index for index, vertex in enumerate(used)}
+    in_use = sorted({v for face in faces for ring in face.rings for v in ring})
+    number = {vertex: index for index, vertex in enumerate(in_use)}
     faces = [
         Face(tuple([tuple([number[v] for v in ring]) for ring in face.rings]), face.kind, face.part)
         for face in faces
     ]
-    return Solid(vertices[used], tuple(faces))
+    return Solid(vertices[in_use], tuple(faces))
 
 
 @dataclass(frozen=True)
@@ -303,17 +306,17 @@ def sectors_at(
     v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels
 ) -> Sectors:
     """The sectors around plan vertex v."""
-    around = levels.order[levels.start[v] : levels.start[v + 1]]
-    arms = (xy[edges[around >> 1, 1 - (around & 1)]] - xy[v]).astype(float)
+    surroundings = levels.order[levels.start[v] : levels.start[v + 1]]
+    arms = (xy[edges[surroundings >> 1, 1 - (surroundings & 1)]] - xy[v]).astype(float)
     angle = np.arctan2(arms[:, 1], arms[:, 0])
     opening = np.mod(np.roll(angle, -1) - angle, 2 * np.pi)
-    label = side.ravel()[around]
+    label = side.ravel()[surroundings]
     return Sectors(
         xy[v].astype(float),
         angle.tolist(),
         opening.tolist(),
-        levels.level[around].tolist(),
-        levels.face[around].tolist(),
+        levels.level[surroundings].tolist(),
+        levels.face[surroundings].tolist(),
         label.tolist(),
     )
 
@@ -328,9 +331,9 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
     size = len(sectors.level)
     peaks = []
     for first, count in sectors.runs(sectors.level):
-        before, after = first - 1, (first + count) % size
-        if max(sectors.level[before], sectors.level[after]) < sectors.level[first]:
-            higher = before if sectors.level[before] >= sectors.level[after] else after
+        previous, following = first - 1, (first + count) % size
+        if max(sectors.level[previous], sectors.level[following]) < sectors.level[first]:
+            higher = previous if sectors.level[previous] >= sectors.level[following] else following
             peaks.append((sectors.width((first, count)), (first, count), sectors.label[higher]))
     if len(peaks) < 2:
         peaks = pinches(sectors)
@@ -346,19 +349,19 @@ def pinches(sectors: Sectors) -> list[tuple[float, tuple[int, int], int]]:
     """(width, run, label) of what a cell that meets itself encloses on either side, as far as it is
     roofed.
     """
-    found = []
+    result = []
     for cell in {
         face for face, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE
     }:
         runs = sectors.runs([int(face == cell) for face in sectors.face])
-        between = [run for run in runs if sectors.face[run[0]] != cell]
-        if len(between) < 2:
+        selected_runs = [run for run in runs if sectors.face[run[0]] != cell]
+        if len(selected_runs) < 2:
             continue
         label = sectors.label[sectors.face.index(cell)]
-        for first, count in between:
+        for first, count in selected_runs:
             roofed = all(
                 sectors.label[(first + j) % len(sectors.label)] != OUTSIDE for j in range(count)
             )
             if roofed:
-                found.append((sectors.width((first, count)), (first, count), label))
-    return found
+                result.append((sectors.width((first, count)), (first, count), label))
+    return result

@@ -55,12 +55,12 @@ def simpler_roofs(
     if len(roof.parts) < 2:
         return
     for k in failing or range(len(roof.parts)):
-        part, others = roof.parts[k], (roof.parts[:k], roof.parts[k + 1 :])
+        part, neighbours = roof.parts[k], (roof.parts[:k], roof.parts[k + 1 :])
         name = f"part {k + 1} ({part.type})"
-        for stand_in, what in (((), "left out"), ((level_part(part, points),), "made level")):
+        for stand_in, subject in (((), "left out"), ((level_part(part, points),), "made level")):
             if not (stand_in and part.type == "flat"):
-                simpler = replace(roof, parts=(*others[0], *stand_in, *others[1]))
-                yield share_near(simpler, points), simpler, f"{name} was {what}"
+                simpler = replace(roof, parts=(*neighbours[0], *stand_in, *neighbours[1]))
+                yield compute_share_near(simpler, points), simpler, f"{name} was {subject}"
 
 
 def level_part(part: Part, points: np.ndarray) -> Part:
@@ -77,7 +77,7 @@ def level_part(part: Part, points: np.ndarray) -> Part:
     return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], height]))
 
 
-def share_near(roof: Roof, points: np.ndarray) -> float:
+def compute_share_near(roof: Roof, points: np.ndarray) -> float:
     """Return the share of points (n, 3) that lie on the roof."""
     off = np.abs(roof.height_at(points[:, :2]) - points[:, 2])
     return float(np.mean(off < NEAR_M)) if len(points) else 0.0

@@ -53,7 +53,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     >>> house = shapely.box(0, 0, 10, 8)
     >>> gable = Piece(house, np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]]))
     >>> solid = compose(Roof((Part("gable", (gable,)),), house, LocalFrame(np.zeros(3))), 0.0)
-    >>> [len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface",
+    >>> [len(solid.select_faces(kind)) for kind in ("RoofSurface", "WallSurface",
     ...     "GroundSurface")], solid.volume
     ([2, 4, 1], 480.0)
     """
@@ -93,8 +93,8 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
 
 def parts_at_fault(solid: Solid, findings: tuple[Finding, ...]) -> tuple[int, ...]:
     """The numbers of the roof parts whose faces have a finding, in ascending order."""
-    found = {solid.faces[finding.face].part for finding in findings if finding.face >= 0}
-    return tuple(sorted(found - {-1}))
+    parts = {solid.faces[finding.face].part for finding in findings if finding.face >= 0}
+    return tuple(sorted(parts - {-1}))
 
 
 def compose_at(
@@ -143,7 +143,7 @@ def terrain_intersection(
     for ring in [outline.exterior, *outline.interiors]:
         xy = shapely.get_coordinates(shapely.segmentize(ring, spacing_m))
         z = np.asarray(terrain_height_at(xy), float)
-        known = np.isfinite(z)
-        z = np.where(known, z, z[known].mean() if known.any() else z_floor)
+        mask = np.isfinite(z)
+        z = np.where(mask, z, z[mask].mean() if mask.any() else z_floor)
         lines.append(np.column_stack((xy, z)))
     return tuple(lines)

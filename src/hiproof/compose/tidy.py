@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from .arrangement import OUTSIDE, is_beside, renumbered, turn
-from .levels import height
+from .arrangement import OUTSIDE, is_beside, renumber_vertices, turn
+from .levels import evaluate_plane
 
 # units of the grid, 3 mm: beside a shorter edge no face can be flat to val3dity's 20 degrees
 SHORT_UNITS = 30.0
@@ -15,38 +15,38 @@ SHORT_UNITS = 30.0
 @compiled
 def edges_at(edges, v):
     """The first two edges that end in vertex v (-1: none), and how many do."""
-    found, count = (-1, -1), 0
+    result, count = (-1, -1), 0
     for e in range(len(edges)):
         if edges[e, 0] == v or edges[e, 1] == v:
-            found = (e, found[1]) if count == 0 else (found[0], e) if count == 1 else found
+            result = (e, result[1]) if count == 0 else (result[0], e) if count == 1 else result
             count += 1
-    return found[0], found[1], count
+    return result[0], result[1], count
 
 
 @compiled
 def gap_at(xy, side, planes, e, v):
     """How far apart the planes left and right of edge e are over vertex v."""
     return abs(
-        height(planes, side[e, 0], xy[v, 0], xy[v, 1])
-        - height(planes, side[e, 1], xy[v, 0], xy[v, 1])
+        evaluate_plane(planes, side[e, 0], xy[v, 0], xy[v, 1])
+        - evaluate_plane(planes, side[e, 1], xy[v, 0], xy[v, 1])
     )
 
 
 @compiled
-def is_clear(xy, edges, gone, stays, far, reach):
+def is_clear(xy, edges, missing, stays, distant, reach):
     """Whether edge (gone, far) can become (stays, far): no vertex in the triangle between them or
     within reach of it.
     """
     for e in range(len(edges)):
         for v in edges[e]:
-            if v < 0 or v in (gone, stays, far):
+            if v < 0 or v in (missing, stays, distant):
                 continue
-            if is_beside(xy[v], xy[stays], xy[far], reach):
+            if is_beside(xy[v], xy[stays], xy[distant], reach):
                 return False
             a, b, c = (
-                turn(xy[gone], xy[stays], xy[v]),
-                turn(xy[stays], xy[far], xy[v]),
-                turn(xy[far], xy[gone], xy[v]),
+                turn(xy[missing], xy[stays], xy[v]),
+                turn(xy[stays], xy[distant], xy[v]),
+                turn(xy[distant], xy[missing], xy[v]),
             )
             if (a >= 0) == (b >= 0) and (b >= 0) == (c >= 0):
                 return False
@@ -70,14 +70,18 @@ def without_short_edges(xy, edges, side, planes, reach):
             continue
         if gap_at(xy, side, planes, e, u) < gap_at(xy, side, planes, e, v):
             u, v = v, u
-        for gone, stays in ((u, v), (v, u)):
-            first, second, count = edges_at(edges, gone)
+        for missing, stays in ((u, v), (v, u)):
+            first, second, count = edges_at(edges, missing)
             other = second if first == e else first
-            end = 0 if edges[other, 0] == gone else 1
-            far = edges[other, 1 - end]
-            if count != 2 or far == stays or not is_clear(xy, edges, gone, stays, far, reach):
+            end = 0 if edges[other, 0] == missing else 1
+            distant = edges[other, 1 - end]
+            if (
+                count != 2
+                or distant == stays
+                or not is_clear(xy, edges, missing, stays, distant, reach)
+            ):
                 continue
             edges[other, end] = stays
             edges[e, 0] = edges[e, 1] = -1
             break
-    return renumbered(xy, edges, side)
+    return renumber_vertices(xy, edges, side)

@@ -13,32 +13,45 @@ import numpy as np
 
 from ..model import Building
 from ..write.attribute_list import ANGLES
-from .view import TILT_DEG, colours_of, lightness, seen_faces, shaded, sphere_of, turn_of
+from .view import (
+    TILT_DEG,
+    bound_sphere,
+    choose_turn,
+    lightness,
+    list_colours,
+    select_seen_faces,
+    shade_colour,
+)
 
-SIZE = (360, 260)  # pixels, width and height: beside a notebook's table
-MARGIN = 12  # pixels left free on each side
+VIEW_SIZE = (360, 260)  # pixels, width and height: beside a notebook's table
+VIEW_MARGIN = 12  # pixels left free on each side
 SHOWN_PARTS = 12  # rows of the table; more would push the picture off the screen
 MM = 3  # digits of coordinates sent to the page: millimetres
 
 
-def html_of(building: Building) -> str:
+def render_building(building: Building) -> str:
     """The building as HTML: its view where it has a solid, status, and the parameters of
     its parts.
     """
     head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
-    view = view_of(building) if building.built is not None else ""
+    view = render_view(building) if building.built is not None else ""
     style = "font-family:sans-serif;font-size:12px"
     return f'<div style="{style}">{view}<div>{head}</div>{parts_table(building)}</div>'
 
 
-def view_of(building: Building) -> str:
+def render_view(building: Building) -> str:
     """The solid as SVG, and the script that turns it."""
-    solid, colours, turn = building.solid, colours_of(building), turn_of(building)
-    middle, radius = sphere_of(solid)
+    solid, colours, turn = building.solid, list_colours(building), choose_turn(building)
+    middle, radius = bound_sphere(solid)
     corners = np.round(solid.vertices - middle, MM)
-    scale = (min(SIZE) / 2 - MARGIN) / max(radius, 1e-6)  # so that it fits whichever way it turns
+    scale = (min(VIEW_SIZE) / 2 - VIEW_MARGIN) / max(
+        radius, 1e-6
+    )  # so that it fits whichever way it turns
     faces = [
-        {"r": [list(ring) for ring in face.rings], "c": shaded(colour, lightness(solid, face))}
+        {
+            "r": [list(ring) for ring in face.rings],
+            "c": shade_colour(colour, lightness(solid, face)),
+        }
         for face, colour in zip(solid.faces, colours, strict=True)
     ]
     data = json.dumps(
@@ -47,13 +60,13 @@ def view_of(building: Building) -> str:
     )
     name = "hiproof-" + hashlib.sha256((building.id + data).encode()).hexdigest()[:12]
     polygons = "".join(
-        path_of(face.rings, shaded(face.colour, face.light), scale)
-        for face in seen_faces(solid, colours, turn)
+        render_path(face.rings, shade_colour(face.colour, face.light), scale)
+        for face in select_seen_faces(solid, colours, turn)
     )
-    box = f"{-SIZE[0] / 2} {-SIZE[1] / 2} {SIZE[0]} {SIZE[1]}"
+    box = f"{-VIEW_SIZE[0] / 2} {-VIEW_SIZE[1] / 2} {VIEW_SIZE[0]} {VIEW_SIZE[1]}"
     script = (files("hiproof.draw") / "turn.js").read_text(encoding="utf-8")
     return (
-        f'<svg id="{name}" width="{SIZE[0]}" height="{SIZE[1]}" viewBox="{box}" '
+        f'<svg id="{name}" width="{VIEW_SIZE[0]}" height="{VIEW_SIZE[1]}" viewBox="{box}" '
         'style="cursor:grab;touch-action:none" tabindex="0" role="application" '
         f'aria-label="model of {escape(building.id, quote=True)}; arrow keys turn it">'
         f"{polygons}</svg>"
@@ -61,7 +74,7 @@ def view_of(building: Building) -> str:
     )
 
 
-def path_of(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
+def render_path(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
     """A face as an SVG path."""
     d = "".join(
         "M" + "L".join(f"{x * scale:.1f} {y * scale:.1f}" for x, y in ring) + "Z" for ring in rings
@@ -75,9 +88,9 @@ def parts_table(building: Building) -> str:
         table_row(str(number), escape(part.type), parameters_text(part))
         for number, part in enumerate(building.parts[:SHOWN_PARTS])
     )
-    more = len(building.parts) - SHOWN_PARTS
-    rest = table_row("", f"and {more} more", "") if more > 0 else ""
-    return f'<table style="font-size:12px">{rows}{rest}</table>' if rows else ""
+    additions = len(building.parts) - SHOWN_PARTS
+    row = table_row("", f"and {additions} more", "") if additions > 0 else ""
+    return f'<table style="font-size:12px">{rows}{row}</table>' if rows else ""
 
 
 def table_row(*cells: str) -> str:
@@ -87,9 +100,9 @@ def table_row(*cells: str) -> str:
 
 def parameters_text(part) -> str:
     """Parameters as a person reads them: degrees for angles, else metres."""
-    told = []
+    entries = []
     for name, value in part.parameters.items():
         unit = "°" if name.startswith(ANGLES) else "" if name == "teeth" else " m"
         sigma = f" ± {part.sigma[name]:.2f}" if name in part.sigma else ""
-        told.append(f"{escape(name)} {value:.2f}{sigma}{unit}")
-    return ", ".join(told)
+        entries.append(f"{escape(name)} {value:.2f}{sigma}{unit}")
+    return ", ".join(entries)

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from ..extras import needed
-from ..log import counted
+from ..extras import import_extra
+from ..log import count_things
 from ..model import Building, as_xyz
 from ..write.colours import RESIDUAL_STOPS
-from .view import TILT_DEG, colours_of, lightness, shaded, turn_of
+from .view import TILT_DEG, choose_turn, lightness, list_colours, shade_colour
 
 NEAR_M = 0.2  # m; within it a point counts as explained, as in share_within_20cm
 NEAR_COLOUR, FAR_COLOUR = RESIDUAL_STOPS[0][1], RESIDUAL_STOPS[-1][1]
-MOST_POINTS = 5000  # points drawn; more make a black patch
+MOST_PLOT_POINTS = 5000  # points drawn; more make a black patch
 
 
 def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -> Any:
@@ -26,15 +26,15 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     points of another shape and where matplotlib (extra `report`) is missing.
     """
     model = building.model
-    ax = ax if ax is not None else new_axes(turn_of(building))
+    ax = ax if ax is not None else new_axes(choose_turn(building))
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     origin = model.roof.frame.origin
     vertices = model.solid.vertices - origin
     faces = model.solid.faces
     colours = [
-        shaded(c, lightness(model.solid, f))
-        for c, f in zip(colours_of(building), faces, strict=True)
+        shade_colour(c, lightness(model.solid, f))
+        for c, f in zip(list_colours(building), faces, strict=True)
     ]
     polygons = [vertices[list(face.rings[0])] for face in faces]
     ax.add_collection3d(
@@ -42,36 +42,40 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
             polygons, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.75
         )
     )
-    shown = vertices
+    visible = vertices
     if points is not None and len(points):
         points = as_xyz(points)
         points = points[np.isfinite(points).all(axis=1)]  # others are in no place
-        local = points[:: max(1, len(points) // MOST_POINTS)] - origin
+        local = points[:: max(1, len(points) // MOST_PLOT_POINTS)] - origin
         gap = local[:, 2] - model.roof.height_at(local[:, :2])
-        near = np.abs(gap) <= NEAR_M
-        for chosen, colour, label in (
-            (near, NEAR_COLOUR, "within 0.2 m"),
-            (~near, FAR_COLOUR, "further"),
+        mask = np.abs(gap) <= NEAR_M
+        for selection, colour, label in (
+            (mask, NEAR_COLOUR, "within 0.2 m"),
+            (~mask, FAR_COLOUR, "further"),
         ):
             ax.scatter(
-                *local[chosen].T,
+                *local[selection].T,
                 s=2,
                 color=colour,
-                label=f"{label}: {counted(chosen.sum(), 'point')}",
+                label=f"{label}: {count_things(selection.sum(), 'point')}",
                 depthshade=False,
             )
         ax.legend(loc="upper left", fontsize="small")
-        shown = np.concatenate([vertices, local])
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        visible = np.concatenate([vertices, local])
+    smallest, largest = visible.min(axis=0), visible.max(axis=0)
+    ax.set(
+        xlim=(smallest[0], largest[0]),
+        ylim=(smallest[1], largest[1]),
+        zlim=(smallest[2], largest[2]),
+    )
     ax.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=f"{building.id}: {building.type}")
-    ax.set_box_aspect(np.maximum(high - low, 0.1))
+    ax.set_box_aspect(np.maximum(largest - smallest, 0.1))
     return ax
 
 
 def new_axes(turn_deg: float) -> Any:
     """Three-dimensional axes in a figure of their own, seen as the view of a notebook is."""
-    plt = needed("matplotlib.pyplot", "report", "plots")
+    plt = import_extra("matplotlib.pyplot", "report", "plots")
     ax = plt.figure(figsize=(7, 6)).add_subplot(projection="3d")
     # seen from the south where nothing is turned
     ax.view_init(elev=TILT_DEG, azim=-90.0 - turn_deg)

@@ -15,14 +15,24 @@ import numpy as np
 from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
-from .view import SeenFace, colours_of, projected, seen_faces, shaded, sphere_of
+from .view import (
+    SeenFace,
+    bound_sphere,
+    list_colours,
+    project_points,
+    select_seen_faces,
+    shade_colour,
+)
 
-WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
+DRAWN_WIDTH, DRAWN_LENGTH, DRAWN_RISE, DRAWN_WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
 # degrees; a view from the front left in which no side hides a parameter
-TURN_DEG, TILT_DEG = -38.0, 30.0
-SCALE, MARGIN = 26.0, 46.0  # pixels a metre; pixels of margin, for the names beside the roof
+FIGURE_TURN_DEG, FIGURE_TILT_DEG = -38.0, 30.0
+FIGURE_SCALE, FIGURE_MARGIN = (
+    26.0,
+    46.0,
+)  # pixels a metre; pixels of margin, for the names beside the roof
 ASIDE = 1.1  # m from the roof to a line outside it
-LINE, TEXT = "#8c1c13", "#1a1a1a"
+LINE_COLOUR, TEXT_COLOUR = "#8c1c13", "#1a1a1a"
 
 
 @dataclass(frozen=True)
@@ -42,12 +52,12 @@ class Measure:
 
 def typical_parameters(kind: str) -> dict[str, float]:
     """Parameters of an ordinary roof of a type."""
-    return CATALOGUE[kind].typical(WIDTH, LENGTH, RISE)
+    return CATALOGUE[kind].typical(DRAWN_WIDTH, DRAWN_LENGTH, DRAWN_RISE)
 
 
-def typical_building(kind: str) -> Building:
+def make_typical_building(kind: str) -> Building:
     """An ordinary roof of a type on low walls."""
-    u, v = LENGTH / 2, WIDTH / 2
+    u, v = DRAWN_LENGTH / 2, DRAWN_WIDTH / 2
     part = {"type": kind, "parameters": typical_parameters(kind), "position": [0.0, 0.0, 0.0]}
     ring = [[-u, -v], [u, -v], [u, v], [-u, v], [-u, -v]]
     return build(
@@ -55,7 +65,7 @@ def typical_building(kind: str) -> Building:
             "id": kind,
             "origin": [0.0, 0.0, 0.0],
             "outline": [ring],
-            "z_ground": -WALL,
+            "z_ground": -DRAWN_WALL,
             "parts": [part],
         }
     )
@@ -70,10 +80,10 @@ def measures(kind: str) -> list[Measure]:
     parameters = typical_parameters(kind)
     vertices = CATALOGUE[kind].vertices(parameters)
     highest = vertices[vertices[:, 2] > vertices[:, 2].max() - 1e-9]
-    return [measure_of(name, parameters, highest) for name in parameters]
+    return [place_measure(name, parameters, highest) for name in parameters]
 
 
-def measure_of(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
+def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
     """One parameter `name` among all, `p`;
 
     `highest` (k, 3) are the corners of the roof's ridge or top.
@@ -84,8 +94,8 @@ def measure_of(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
     (x0, y0, _), (x1, y1, _) = highest.min(axis=0), highest.max(axis=0)
     half_break, z_break = p.get("break_width", 0) / 2, p.get("break_height", 0)
     ends = {
-        "width": ((u + ASIDE, -v, -WALL), (u + ASIDE, v, -WALL)),
-        "length": ((-u, -v - ASIDE, -WALL), (u, -v - ASIDE, -WALL)),
+        "width": ((u + ASIDE, -v, -DRAWN_WALL), (u + ASIDE, v, -DRAWN_WALL)),
+        "length": ((-u, -v - ASIDE, -DRAWN_WALL), (u, -v - ASIDE, -DRAWN_WALL)),
         "height": ((x1, y0, 0), (x1, y0, h)),
         "end_height": ((-u, -v, 0), (-u, -v, p.get("end_height", 0))),
         "ridge_length": ((x0, y0, h), (x1, y1, h)),
@@ -105,51 +115,58 @@ def measure_of(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
 
 def primitive_svg(kind: str) -> str:
     """The figure of a roof type."""
-    building = typical_building(kind)
-    colours = colours_of(building)
-    centre, _ = sphere_of(building.solid)
+    building = make_typical_building(kind)
+    colours = list_colours(building)
+    centre, _ = bound_sphere(building.solid)
     lines = measures(kind)
     page = {
         id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None]
         for m in lines
     }
-    corners = SCALE * projected(building.solid.vertices - centre, TURN_DEG, TILT_DEG)[:, :2]
+    corners = (
+        FIGURE_SCALE
+        * project_points(building.solid.vertices - centre, FIGURE_TURN_DEG, FIGURE_TILT_DEG)[:, :2]
+    )
     spots = np.array([*corners, *(point for points in page.values() for point in points)])
-    (x0, y0), (x1, y1) = spots.min(axis=0) - MARGIN, spots.max(axis=0) + MARGIN
+    (x0, y0), (x1, y1) = spots.min(axis=0) - FIGURE_MARGIN, spots.max(axis=0) + FIGURE_MARGIN
     text = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x0:.0f} {y0:.0f} {x1 - x0:.0f} '
         f'{y1 - y0:.0f}" '
         f'width="{x1 - x0:.0f}" height="{y1 - y0:.0f}" font-family="sans-serif" font-size="13">',
         f"<title>{kind}</title>",
         '<rect x="-2000" y="-2000" width="4000" height="4000" fill="white"/>',
-        *(face_path(face) for face in seen_faces(building.solid, colours, TURN_DEG, TILT_DEG)),
-        *(drawn(m, page[id(m)]) for m in lines),
+        *(
+            face_path(face)
+            for face in select_seen_faces(building.solid, colours, FIGURE_TURN_DEG, FIGURE_TILT_DEG)
+        ),
+        *(draw_measure(m, page[id(m)]) for m in lines),
         "</svg>",
     ]
     return "\n".join(text) + "\n"
 
 
 def on_page(point: np.ndarray) -> np.ndarray:
-    return SCALE * projected(point[None], TURN_DEG, TILT_DEG)[0, :2]
+    return FIGURE_SCALE * project_points(point[None], FIGURE_TURN_DEG, FIGURE_TILT_DEG)[0, :2]
 
 
 def face_path(face: SeenFace) -> str:
     d = "".join(
-        "M" + "L".join(f"{SCALE * x:.1f} {SCALE * y:.1f}" for x, y in ring) + "Z"
+        "M" + "L".join(f"{FIGURE_SCALE * x:.1f} {FIGURE_SCALE * y:.1f}" for x, y in ring) + "Z"
         for ring in face.rings
     )
     return (
-        f'<path d="{d}" fill="{shaded(face.colour, face.light)}" stroke="#333" stroke-width="1" '
+        f'<path d="{d}" fill="{shade_colour(face.colour, face.light)}" stroke="#333" '
+        'stroke-width="1" '
         'fill-opacity="0.8"/>'
     )
 
 
-def drawn(measure: Measure, page: list[np.ndarray]) -> str:
+def draw_measure(measure: Measure, page: list[np.ndarray]) -> str:
     """A line with its name beside it; the name alone of what has no length in the figure."""
     if len(page) < 2 or measure.length < 1e-9:
         x, y = page[0]
-        said = f"{measure.name} = 0" if measure.end is not None else measure.name
-        return label(x, y, said)
+        text = f"{measure.name} = 0" if measure.end is not None else measure.name
+        return label(x, y, text)
     (x0, y0), (x1, y1) = page
     across = np.array([y1 - y0, x0 - x1]) / max(math.hypot(x1 - x0, y1 - y0), 1e-9) * 4
     ends = "".join(
@@ -158,7 +175,8 @@ def drawn(measure: Measure, page: list[np.ndarray]) -> str:
         for x, y in page
     )
     line = (
-        f'<g stroke="{LINE}" stroke-width="2" fill="none"><path d="M{x0:.1f} {y0:.1f}L{x1:.1f} '
+        f'<g stroke="{LINE_COLOUR}" stroke-width="2" fill="none"><path d="M{x0:.1f} '
+        f"{y0:.1f}L{x1:.1f} "
         f'{y1:.1f}"/>{ends}</g>'
     )
     # so that it stays clear of others at the same end
@@ -168,7 +186,8 @@ def drawn(measure: Measure, page: list[np.ndarray]) -> str:
 
 def label(x: float, y: float, text: str) -> str:
     return (
-        f'<text x="{x:.1f}" y="{y - 4:.1f}" text-anchor="middle" fill="{TEXT}" stroke="white" '
+        f'<text x="{x:.1f}" y="{y - 4:.1f}" text-anchor="middle" fill="{TEXT_COLOUR}" '
+        'stroke="white" '
         'stroke-width="3" '
         f'paint-order="stroke">{text}</text>'
     )

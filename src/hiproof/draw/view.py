@@ -11,7 +11,7 @@ import numpy as np
 
 from ..geometry.rings import ring_normal
 from ..model import ROOF, Building, Solid
-from ..write.meshes.viewed import look_of
+from ..write.meshes.viewed import choose_look
 
 # degrees; from the front left and above, so that two walls and the roof show
 TURN_DEG, TILT_DEG = -35.0, 35.0
@@ -27,7 +27,7 @@ class SeenFace:
     is_roof: bool
 
 
-def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
+def project_points(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
     """Page coordinates and nearness (n, 3) of points seen from a `tilt_deg` above the horizon,
     turned by `turn_deg`.
     """
@@ -39,45 +39,45 @@ def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
     )
 
 
-def sphere_of(solid: Solid) -> tuple[np.ndarray, float]:
+def bound_sphere(solid: Solid) -> tuple[np.ndarray, float]:
     """Return the middle (3,) of a solid and the largest distance (m) of a corner from it."""
-    low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    middle = (low + high) / 2
+    smallest, largest = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    middle = (smallest + largest) / 2
     return middle, float(np.linalg.norm(solid.vertices - middle, axis=1).max())
 
 
-def turn_of(building: Building) -> float:
+def choose_turn(building: Building) -> float:
     """Degrees to turn a building by, so that it is seen from a corner whichever way its main part
     stands.
     """
     return TURN_DEG - math.degrees(building.parts[building.model.main].kappa)
 
 
-def colours_of(building: Building) -> list[str]:
+def list_colours(building: Building) -> list[str]:
     """A colour a face: that of its part's type for roofs."""
     types = {number: part.type for number, part in enumerate(building.parts)}
-    return [look_of(face, types).colour for face in building.solid.faces]
+    return [choose_look(face, types).colour for face in building.solid.faces]
 
 
-def seen_faces(
+def select_seen_faces(
     solid: Solid, colours: list[str], turn_deg: float = TURN_DEG, tilt_deg: float = TILT_DEG
 ) -> list[SeenFace]:
     """The faces that look towards the eye, the farthest first."""
-    page = projected(solid.vertices - sphere_of(solid)[0], turn_deg, tilt_deg)
-    seen = []
+    page = project_points(solid.vertices - bound_sphere(solid)[0], turn_deg, tilt_deg)
+    visited = []
     for face, colour in zip(solid.faces, colours, strict=True):
         outer = page[list(face.rings[0])]
         ahead = np.roll(outer, -1, axis=0)
         area = float((outer[:, 0] * ahead[:, 1] - ahead[:, 0] * outer[:, 1]).sum())
         if area < -1e-9:  # y points down, so what is counter-clockwise in space turns the other way
             rings = tuple(page[list(ring), :2] for ring in face.rings)
-            seen.append(
+            visited.append(
                 (
                     float(outer[:, 2].mean()),
                     SeenFace(rings, colour, lightness(solid, face), face.kind == ROOF),
                 )
             )
-    return [face for _, face in sorted(seen, key=lambda pair: pair[0])]
+    return [face for _, face in sorted(visited, key=lambda pair: pair[0])]
 
 
 def lightness(solid: Solid, face) -> float:
@@ -87,10 +87,10 @@ def lightness(solid: Solid, face) -> float:
     return float(0.72 + 0.28 * normal @ np.array([-0.4, -0.5, 0.77]))
 
 
-def shaded(colour: str, light: float) -> str:
+def shade_colour(colour: str, light: float) -> str:
     """A colour (#rrggbb) made darker.
 
-    >>> shaded("#ff8000", 0.5)
+    >>> shade_colour("#ff8000", 0.5)
     '#804000'
     """
     return "#" + "".join(

@@ -19,17 +19,17 @@ from ..errors import HiproofError, InputError, InputWarning
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
 from ..parametric.building import build
-from ..parametric.record import list_at, number, outline_of, text_at
+from ..parametric.record import list_at, number, read_outline, text_at
 from ..primitives.catalogue import CATALOGUE
 from ..read.damage import finite
-from ..write.meshes.page_mesh import packed
+from ..write.meshes.page_mesh import pack_values
 from ..write.parameters import building_record
 from ..write.values import plain_text
-from .actions import edited
-from .edits import FILE, Edits
-from .folder import Row, RunFolder
+from .actions import apply_edit
+from .edits import EDITS_FILE, Edits
+from .folder import BuildingRow, RunFolder
 from .points import RunPoints
-from .seen import drawn, seen
+from .seen import describe_building, select_points
 
 MOST_ROWS = 500  # of the list at once; others are found by their id
 MOST_NOTE = 500  # characters of a note or a name; a sentence or two
@@ -53,12 +53,12 @@ class Desk:
         """The most doubtful buildings, of those whose id holds `find`."""
         self.run.refresh()
         self.edits.of("")
-        found = [row for row in self.run.rows if find in row.id]
-        rows = [self.row(row) for row in found[:MOST_ROWS]]
+        result = [row for row in self.run.rows if find in row.id]
+        rows = [self.row(row) for row in result[:MOST_ROWS]]
         accepted = sum(id in self.run.by_id for id in self.edits.records)
-        return {"rows": rows, "found": len(found), "all": len(self.run.rows), "accepted": accepted}
+        return {"rows": rows, "found": len(result), "all": len(self.run.rows), "accepted": accepted}
 
-    def row(self, row: Row) -> dict[str, Any]:
+    def row(self, row: BuildingRow) -> dict[str, Any]:
         return {
             "id": row.id,
             "type": row.type,
@@ -78,24 +78,26 @@ class Desk:
     def building(self, id: str) -> dict[str, Any]:
         """A building as it is now: its mesh and parts, or a sentence why there are none."""
         record, override, version = self.record(id)
-        told = {name: (override or {}).get(name) for name in ("who", "when", "note")}
-        found = {
+        authorship = {name: (override or {}).get(name) for name in ("who", "when", "note")}
+        result = {
             "id": id,
             "version": version,
-            "accepted": told if override else None,
+            "accepted": authorship if override else None,
             "parts": finite(record.get("parts")),
         }
-        found["said"] = {name: (override or {}).get(name) for name in SAID}
-        found |= {
+        result["said"] = {name: (override or {}).get(name) for name in SAID}
+        result |= {
             "outcome": record.get("detail") or "",
             "reasons": self.run.by_id[id].doubt.reasons,
         }
         if not record.get("parts"):
-            return found | {"error": record.get("detail") or "no model"}
+            return result | {"error": record.get("detail") or "no model"}
         try:
-            return found | seen(build(record, self.run.head.compose), np.zeros((0, 3)))
+            return result | describe_building(
+                build(record, self.run.head.compose), np.zeros((0, 3))
+            )
         except HiproofError as error:
-            return found | {"error": str(error)}
+            return result | {"error": str(error)}
 
     def cloud(self, id: str) -> dict[str, Any]:
         """The points drawn of a building, about the origin of its roof;
@@ -103,11 +105,11 @@ class Desk:
         `missing` says why there are none.
         """
         record = self.record(id)[0]
-        points = self.points.of(id, outline_of(record))
+        points = self.points.of(id, read_outline(record))
         missing = self.points.missing or (
             "" if len(points) else "the run has no points of this building"
         )
-        places = packed(drawn(points) - record["origin"], "<f4") if len(points) else ""
+        places = pack_values(select_points(points) - record["origin"], "<f4") if len(points) else ""
         return {"places": places, "count": len(points), "missing": missing}
 
     def draft(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -130,27 +132,31 @@ class Desk:
         (`dragged`) it is not measured.
         """
         record = self.draft(id, body)
-        points = self.points.of(id, outline_of(record))
-        found = edited(
+        points = self.points.of(id, read_outline(record))
+        edit = apply_edit(
             record, body.get("asked"), points, self.run.settings, not body.get("dragged")
         )
-        return seen(found, drawn(points))
+        return describe_building(edit, select_points(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Every type that part `part` may have, refitted: the share of points it explains, the best
         first.
         """
         record = self.draft(id, body)
-        points, tried = self.points.of(id, outline_of(record)), []
+        points, candidates = self.points.of(id, read_outline(record)), []
         for kind in CATALOGUE:
-            asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
+            requested = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:
-                changed = building_record(edited(record, asked, points, self.run.settings, False))
-                found = edited(changed, {"action": "refit"}, points, self.run.settings)
+                changed = building_record(
+                    apply_edit(record, requested, points, self.run.settings, False)
+                )
+                edit = apply_edit(changed, {"action": "refit"}, points, self.run.settings)
             except HiproofError:
                 continue
-            tried.append({"type": kind, "share": number_or_none(found.quality.share_within_20cm)})
-        return {"types": sorted(tried, key=lambda row: -(row["share"] or 0.0))}
+            candidates.append(
+                {"type": kind, "share": number_or_none(edit.quality.share_within_20cm)}
+            )
+        return {"types": sorted(candidates, key=lambda row: -(row["share"] or 0.0))}
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Keep what the page has as an override of the building, if it is still of the `version`
@@ -158,29 +164,33 @@ class Desk:
         """
         override = {
             "id": id,
-            **(self.left_out(id) if body.get("leave_out") is True else self.accepted(id, body)),
+            **(
+                self.make_exclusion(id)
+                if body.get("leave_out") is True
+                else self.make_override(id, body)
+            ),
         }
-        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+        current = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         note = plain_text(text_at(body, "note")).strip()[:MOST_NOTE]
-        override |= {"who": self.who, "when": now} | ({"note": note} if note else {})
-        return {"version": self.edits.put(id, override, text_at(body, "version")), "when": now}
+        override |= {"who": self.who, "when": current} | ({"note": note} if note else {})
+        return {"version": self.edits.put(id, override, text_at(body, "version")), "when": current}
 
-    def accepted(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+    def make_override(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """What an override says of a building as the page has it, which must be one that can be
         built.
         """
         nothing = np.zeros((0, 3))
-        found = building_record(
-            edited(self.draft(id, body), {"action": "show"}, nothing, self.run.settings)
+        record = building_record(
+            apply_edit(self.draft(id, body), {"action": "show"}, nothing, self.run.settings)
         )
-        said = (
+        override = (
             BELONGS
             if body.get("z_ground") is not None
             else [name for name in BELONGS if name != "z_ground"]
         )
-        return {name: found[name] for name in said}
+        return {name: record[name] for name in override}
 
-    def left_out(self, id: str) -> dict[str, Any]:
+    def make_exclusion(self, id: str) -> dict[str, Any]:
         """What an override says of a building, which must be one of the run, that no model is to be
         made of.
         """
@@ -194,7 +204,7 @@ class Desk:
 
 
 @functools.cache
-def drawing(kind: str) -> str:
+def render_drawing(kind: str) -> str:
     """The figure of a roof type with its parameters, as SVG. Raises InputError for no type."""
     if kind not in CATALOGUE:
         raise InputError(
@@ -213,15 +223,16 @@ def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str,
     Where edits were accepted already, these hold them.
     """
     record = run_record(folder)
-    told, path = (
+    overrides, path = (
         (record.get("inputs") or {}).get("overrides"),
         found_inputs(record, moved_to).overrides,
     )
-    if not told or (folder / FILE).exists():
+    if not overrides or (folder / EDITS_FILE).exists():
         return {}
     if path is None:
         warnings.warn(
-            f"{folder}: the overrides that the run obeyed are gone ({told}): a run with {FILE} "
+            f"{folder}: the overrides that the run obeyed are gone ({overrides}): a run with "
+            f"{EDITS_FILE} "
             "will do without them; bring them back, "
             "or say with --clouds FOLDER where the run's files lie now",
             InputWarning,

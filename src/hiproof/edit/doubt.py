@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..log import counted
+from ..log import count_things
 from ..status import Doubt as Remark
 from ..status import Grade, Status
 from ..write.attribute_list import ANGLES
@@ -21,35 +21,36 @@ REMARKED = 0.3
 
 
 @dataclass(frozen=True)
-class Doubt:
+class BuildingDoubt:
     """`amount` is 0 where nothing speaks against the model; `reasons` are short phrases."""
 
     amount: float
     reasons: tuple[str, ...]
 
 
-def doubt_of(record: Mapping[str, Any]) -> Doubt:
+def measure_doubt(record: Mapping[str, Any]) -> BuildingDoubt:
     """The doubt about a building, from its object in parameters.jsonl.
 
-    >>> doubt_of({"status": "modelled", "quality": "poor", "parts": [],
+    >>> measure_doubt({"status": "modelled", "quality": "poor", "parts": [],
     ...     "residuals": {"share_within_20cm": 0.6}})
-    Doubt(amount=1.4, reasons=('poor',))
+    BuildingDoubt(amount=1.4, reasons=('poor',))
     """
-    found = [
-        share_off(record),
+    result = [
+        score_residuals(record),
         unsure_grade(record),
         unsure_status(record),
-        remarked(record),
-        unexplained(record),
+        score_remarks(record),
+        score_unexplained(record),
     ]
-    found += [loose_parts(record), close_call(record)]
-    told = [pair for pair in found if pair is not None]
-    return Doubt(
-        round(sum(amount for amount, _ in told), 4), tuple(reason for _, reason in told if reason)
+    result += [loose_parts(record), close_call(record)]
+    scores = [pair for pair in result if pair is not None]
+    return BuildingDoubt(
+        round(sum(amount for amount, _ in scores), 4),
+        tuple(reason for _, reason in scores if reason),
     )
 
 
-def share_off(record: Mapping[str, Any]) -> tuple[float, str] | None:
+def score_residuals(record: Mapping[str, Any]) -> tuple[float, str] | None:
     """Points away from the roof; buildings that fit well are still sorted by it."""
     share = (record.get("residuals") or {}).get("share_within_20cm")
     if share is None:
@@ -74,15 +75,15 @@ def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
     )
 
 
-def remarked(record: Mapping[str, Any]) -> tuple[float, str] | None:
+def score_remarks(record: Mapping[str, Any]) -> tuple[float, str] | None:
     """What the run says in the detail that it is not sure of: two surfaces, places without points,
     an assumed ground, ...
     """
-    told = [remark.told for remark in Remark if remark.value in (record.get("detail") or "")]
-    return (REMARKED, ", ".join(told)) if told else None
+    phrases = [remark.told for remark in Remark if remark.value in (record.get("detail") or "")]
+    return (REMARKED, ", ".join(phrases)) if phrases else None
 
 
-def unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
+def score_unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
     """Area whose points lie more than half a metre off the roof."""
     area, rings = record.get("unexplained_area_m2"), record.get("outline")
     if not area or not rings:
@@ -98,7 +99,7 @@ def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
     loose = sum(is_loose(part.get("sigma") or {}) for part in parts)
     if not loose:
         return None
-    return 0.3 * loose / len(parts), f"{loose} of {counted(len(parts), 'part')} on few points"
+    return 0.3 * loose / len(parts), f"{loose} of {count_things(len(parts), 'part')} on few points"
 
 
 def is_loose(sigma: Mapping[str, float]) -> bool:

@@ -20,10 +20,10 @@ from typing import Any
 
 from ..city.overrides import read_overrides
 from ..errors import HiproofError, InputError, OutputError
-from ..parametric.override import override_of
+from ..parametric.override import read_override
 from ..write.files import atomic
 
-FILE = "edits.jsonl"
+EDITS_FILE = "edits.jsonl"
 WAIT_S = 30  # seconds for another window to finish its write, which takes milliseconds
 UNTOUCHED = "run"  # the version of a building that the file does not name
 
@@ -45,7 +45,7 @@ class Edits:
     """
 
     def __init__(self, folder: Path, obeyed: dict[str, dict[str, Any]] | None = None) -> None:
-        self.path, self.obeyed = folder / FILE, obeyed or {}
+        self.path, self.obeyed = folder / EDITS_FILE, obeyed or {}
         if self.path.is_symlink():
             raise InputError(f"expected a file of its own at {self.path}, got a link; remove it")
         self.lock = threading.Lock()
@@ -55,7 +55,7 @@ class Edits:
 
     def refresh(self) -> None:
         """Read the file where somebody else has changed it."""
-        stamp = stamp_of(self.path)
+        stamp = read_stamp(self.path)
         if stamp is None:
             self.records = dict(self.obeyed)
         elif stamp != self.stamp:
@@ -67,7 +67,7 @@ class Edits:
         with self.lock:
             self.refresh()
             record = self.records.get(id)
-            return record, version_of(record)
+            return record, compute_version(record)
 
     def put(self, id: str, record: dict[str, Any] | None, version: str) -> str:
         """Keep an override of the building in place of that of `version`, or with None drop it; the
@@ -77,25 +77,25 @@ class Edits:
         override, OutputError where the file cannot be written.
         """
         if record is not None:
-            override_of(record)
-        with self.lock, alone(self.path):
+            read_override(record)
+        with self.lock, lock_edits(self.path):
             self.refresh()
-            known = self.records.get(id)
-            if version_of(known) != version:
-                raise OtherVersion(told_of(id, known), version_of(known))
+            stored = self.records.get(id)
+            if compute_version(stored) != version:
+                raise OtherVersion(explain_conflict(id, stored), compute_version(stored))
             records = {key: value for key, value in self.records.items() if key != id}
             if record is not None:
                 records[id] = record
-            with atomic(self.path) as beside:
-                beside.write_text(
+            with atomic(self.path) as temporary:
+                temporary.write_text(
                     "".join(json.dumps(r, allow_nan=False) + "\n" for r in records.values())
                 )
-            self.records, self.stamp = records, stamp_of(self.path)
-            return version_of(record)
+            self.records, self.stamp = records, read_stamp(self.path)
+            return compute_version(record)
 
 
 @contextmanager
-def alone(path: Path) -> Iterator[None]:
+def lock_edits(path: Path) -> Iterator[None]:
     """Nobody else, in whatever process, changes the file at `path` within the block;
 
     SQLite locks, as for runs.
@@ -115,31 +115,31 @@ def alone(path: Path) -> Iterator[None]:
         ) from error
 
 
-def version_of(record: dict[str, Any] | None) -> str:
+def compute_version(record: dict[str, Any] | None) -> str:
     """A name for what is said of a building: another for every other override."""
     if record is None:
         return UNTOUCHED
     return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()[:20]
 
 
-def told_of(id: str, record: dict[str, Any] | None) -> str:
+def explain_conflict(id: str, record: dict[str, Any] | None) -> str:
     """Who was faster, in a sentence."""
     if record is None:
         return (
             f"expected building {id} as it was accepted, got it taken back in another window; look "
             "at it again"
         )
-    who, when = record.get("who") or "somebody", record.get("when") or "meanwhile"
+    user, when = record.get("who") or "somebody", record.get("when") or "meanwhile"
     return (
-        f"expected building {id} as this window knows it, got one that {who} accepted ({when}); "
+        f"expected building {id} as this window knows it, got one that {user} accepted ({when}); "
         "look at theirs first"
     )
 
 
-def stamp_of(path: Path) -> tuple[int, int, int] | None:
+def read_stamp(path: Path) -> tuple[int, int, int] | None:
     """What tells a file from the one that stood there before; None where there is none."""
     try:
-        found = os.stat(path)
+        result = os.stat(path)
     except FileNotFoundError:
         return None
-    return found.st_mtime_ns, found.st_size, found.st_ino
+    return result.st_mtime_ns, result.st_size, result.st_ino

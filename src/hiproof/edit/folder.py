@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..parametric.file import DAMAGED, head_of, object_of, objects
+from ..parametric.file import DAMAGED, objects, parse_object, read_head
 from ..parametric.record import refuse_other_kinds
-from ..read.damage import LeftOut, excerpt
+from ..read.damage import SkippedBuildings, excerpt
 from ..settings import Settings
 from ..write.parameters import FileHead
-from .doubt import Doubt, doubt_of
-from .edits import stamp_of
+from .doubt import BuildingDoubt, measure_doubt
+from .edits import read_stamp
 
-PARAMETERS = "parameters.jsonl"
+PARAMETERS_FILE = "parameters.jsonl"
 MOST_DOUBT = 100.0  # more than all reasons together
 
 
 @dataclass(frozen=True)
-class Row:
+class BuildingRow:
     """A building in the list: where its line starts in the file, and what speaks for looking at
     it."""
 
@@ -30,30 +30,30 @@ class Row:
     type: str | None
     status: str
     share: float | None
-    doubt: Doubt
+    doubt: BuildingDoubt
 
 
 class RunFolder:
     """The buildings of a finished run. Raises InputError for a folder that holds none."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder, self.path = folder, folder / PARAMETERS
+        self.folder, self.path = folder, folder / PARAMETERS_FILE
         if not self.path.is_file():
             raise InputError(
                 "expected the folder of a finished `hiproof reconstruct` or `hiproof build`, got "
                 f"{folder} without "
-                f"{PARAMETERS}; check the path"
+                f"{PARAMETERS_FILE}; check the path"
             )
         self.stamp: tuple[int, int, int] | None = None
         self.refresh()
 
     def refresh(self) -> None:
         """Read the file where a run has written it anew."""
-        stamp = stamp_of(self.path)
+        stamp = read_stamp(self.path)
         if stamp == self.stamp:
             return
         self.head, rows = read_rows(self.path)
-        self.settings = settings_of(self.folder, self.head)
+        self.settings = read_settings(self.folder, self.head)
         self.rows = sorted(rows, key=lambda row: -row.doubt.amount)
         self.by_id, self.stamp = {row.id: row for row in rows}, stamp
 
@@ -70,7 +70,7 @@ class RunFolder:
             file.seek(row.start)
             line = file.readline()
         try:
-            record = object_of(line.decode(errors="replace").rstrip(), str(self.path))
+            record = parse_object(line.decode(errors="replace").rstrip(), str(self.path))
         except InputError:
             record = None
         if not isinstance(record, dict) or record.get("id") != id:
@@ -80,12 +80,12 @@ class RunFolder:
         return record
 
 
-def settings_of(folder: Path, head: FileHead) -> Settings:
+def read_settings(folder: Path, head: FileHead) -> Settings:
     """How the run composed its solids and what it called poor, as far as its files tell."""
     return replace(Settings(), compose=head.compose)
 
 
-def read_rows(path: Path) -> tuple[FileHead, list[Row]]:
+def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
     """The head of the parameters at `path`, and a row a building."""
     starts: list[int] = []
 
@@ -96,13 +96,15 @@ def read_rows(path: Path) -> tuple[FileHead, list[Row]]:
             place += len(line)
             yield line.decode()
 
-    left_out = LeftOut()
+    left_out = SkippedBuildings()
     try:
         with path.open("rb") as file:
-            found = objects(lines(file), path, left_out)
-            head = head_of(next(found, None), path)
-            known = ((number, record) for number, record in found if record is not DAMAGED)
-            rows = [row_of(number, record, starts[number - 1], path) for number, record in known]
+            result = objects(lines(file), path, left_out)
+            head = read_head(next(result, None), path)
+            undamaged = ((number, record) for number, record in result if record is not DAMAGED)
+            rows = [
+                read_row(number, record, starts[number - 1], path) for number, record in undamaged
+            ]
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"expected parameters that hiproof wrote at {path}, got: {error}; check the file"
@@ -110,7 +112,7 @@ def read_rows(path: Path) -> tuple[FileHead, list[Row]]:
     return head, rows
 
 
-def row_of(number: int, record: Any, start: int, path: Path) -> Row:
+def read_row(number: int, record: Any, start: int, path: Path) -> BuildingRow:
     """The row of a building's object; one that cannot be read is the most doubtful."""
     if not isinstance(record, dict) or not isinstance(record.get("id"), str):
         raise InputError(
@@ -119,15 +121,20 @@ def row_of(number: int, record: Any, start: int, path: Path) -> Row:
     try:
         refuse_other_kinds(record)
     except InputError as error:
-        return Row(
+        return BuildingRow(
             record["id"],
             start,
             None,
             "damaged",
             None,
-            Doubt(MOST_DOUBT, (f"cannot be read: {error}",)),
+            BuildingDoubt(MOST_DOUBT, (f"cannot be read: {error}",)),
         )
     share = (record.get("residuals") or {}).get("share_within_20cm")
-    return Row(
-        record["id"], start, record.get("type"), record.get("status", ""), share, doubt_of(record)
+    return BuildingRow(
+        record["id"],
+        start,
+        record.get("type"),
+        record.get("status", ""),
+        share,
+        measure_doubt(record),
     )

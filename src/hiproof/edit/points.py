@@ -77,19 +77,23 @@ class RunPoints:
             return np.zeros((0, 3))
         try:
             with self.lock:  # one file is read once, however many windows ask
-                found = self.of_job(job.index)
+                result = self.of_job(job.index)
         except (HiproofError, OSError) as error:
-            self.missing = told_unreadable(error)
+            self.missing = explain_unreadable(error)
             return np.zeros((0, 3))
-        return stages.usable(found, outline)[0]
+        return stages.usable(result, outline)[0]
 
     def read_job(self, index: int) -> np.ndarray:
         """Points (n, 3) in and around the area of a building, as many as the run would use."""
         job: Job = self.plan.jobs[index]
         surroundings = self.surroundings(self.tile_of[index])
-        found = surroundings.roof_of(surroundings.moved(job)[0]).points
-        most = self.plan.settings.city.max_points_a_building
-        return found if len(found) <= most else thin_to_count(stages.distinct(found), most)
+        points = surroundings.select_roof_points(surroundings.move(job)[0]).points
+        max_points_a_building = self.plan.settings.city.max_points_a_building
+        return (
+            points
+            if len(points) <= max_points_a_building
+            else thin_to_count(stages.distinct(points), max_points_a_building)
+        )
 
     def read_tile(self, tile: str) -> Surroundings:
         """All points that the buildings of a work tile may need; of files of which it is known
@@ -120,9 +124,9 @@ def missing_reader() -> str:
     try:
         import_rasterio()
     except InputError as error:
-        return told_unreadable(error)
+        return explain_unreadable(error)
     return ""
 
 
-def told_unreadable(error: Exception) -> str:
+def explain_unreadable(error: Exception) -> str:
     return f"the run's points cannot be read: all but refitting works ({error})"

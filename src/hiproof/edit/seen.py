@@ -12,15 +12,15 @@ import numpy as np
 
 from ..errors import HiproofError
 from ..model import Building
-from ..parametric.change import rise_of, with_sizes
-from ..write.meshes.page_mesh import packed, solid_mesh
+from ..parametric.change import measure_rise, with_sizes
+from ..write.meshes.page_mesh import pack_values, solid_mesh
 from ..write.parameters import building_record, number
 
-MOST_POINTS = 4000  # drawn
-FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p95", "density")
+MOST_PAGE_POINTS = 4000  # drawn
+PAGE_FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p95", "density")
 
 
-def seen(building: Building, points: np.ndarray) -> dict[str, Any]:
+def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
     """The building as JSON, everything about the origin of its roof;
 
     `points` (n, 3) are the world points drawn.
@@ -31,29 +31,31 @@ def seen(building: Building, points: np.ndarray) -> dict[str, Any]:
     return {
         "parts": parts,
         "origin": roof.frame.origin.tolist(),
-        "handles": [handles_of(part) for part in parts],
+        "handles": [place_handles(part) for part in parts],
         "type": building.type,
         "status": building.status.code,
         "detail": building.detail,
-        "figures": figures_of(building),
-        "mesh": mesh_of(building),
-        "gaps": packed(np.nan_to_num(local[:, 2] - roof.height_at(local[:, :2]), nan=9.0), "<f4"),
+        "figures": list_figures(building),
+        "mesh": make_mesh(building),
+        "gaps": pack_values(
+            np.nan_to_num(local[:, 2] - roof.height_at(local[:, :2]), nan=9.0), "<f4"
+        ),
     }
 
 
-def drawn(points: np.ndarray) -> np.ndarray:
+def select_points(points: np.ndarray) -> np.ndarray:
     """An even selection (m, 3) of the points, as many as the page draws."""
-    return points[:: max(1, -(-len(points) // MOST_POINTS))]
+    return points[:: max(1, -(-len(points) // MOST_PAGE_POINTS))]
 
 
-def handles_of(part: dict[str, Any]) -> dict[str, Any]:
+def place_handles(part: dict[str, Any]) -> dict[str, Any]:
     """Where a hand takes hold of a part: its rectangle, its eave and its ridge, about the
     origin.
     """
     try:
         sized = with_sizes(part)
         width, length = (sized["parameters"][name] for name in ("width", "length"))
-        rise = rise_of(part)
+        rise = measure_rise(part)
     except (HiproofError, KeyError, ZeroDivisionError):  # a shape of somebody's own has no handles
         return {}
     x, y, z = sized["position"]
@@ -68,24 +70,24 @@ def handles_of(part: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def figures_of(building: Building) -> dict[str, float | None]:
+def list_figures(building: Building) -> dict[str, float | None]:
     """The numbers under the model, null where they cannot be told."""
     quality = dataclasses.asdict(building.quality)
     return {
-        **{name: number(quality[name], 4) for name in FIGURES},
+        **{name: number(quality[name], 4) for name in PAGE_FIGURES},
         "volume_m3": number(building.solid.volume, 1),
         "ridge_height": number(building.solid.vertices[:, 2].max(), 3),
         "z_ground": number(building.z_ground, 3),
     }
 
 
-def mesh_of(building: Building) -> dict[str, str]:
+def make_mesh(building: Building) -> dict[str, str]:
     """Triangles of the solid about the origin, the part that each roofs (-1: a wall), and the
     roof's edges.
     """
-    mesh = solid_mesh(building.solid.moved(-building.roof.frame.origin))
+    mesh = solid_mesh(building.solid.move(-building.roof.frame.origin))
     return {
-        "corners": packed(mesh.corners, "<f4"),
-        "part": packed(mesh.part, "<i4"),
-        "edges": packed(mesh.edges, "<f4"),
+        "corners": pack_values(mesh.corners, "<f4"),
+        "part": pack_values(mesh.part, "<i4"),
+        "edges": pack_values(mesh.edges, "<f4"),
     }

@@ -19,7 +19,7 @@ from ..log import LOGGER
 from ..loopback import HTML, LOOPBACK, Answer, Headers, LoopbackHandler, LoopbackServer, refusal
 from ..primitives.catalogue import CATALOGUE
 from ..write.colours import page_colours
-from .desk import Desk, drawing
+from .desk import Desk, render_drawing
 from .edits import OtherVersion
 
 JSON, SCRIPT, STYLE, SVG = (
@@ -28,7 +28,7 @@ JSON, SCRIPT, STYLE, SVG = (
     "text/css; charset=utf-8",
     "image/svg+xml",
 )
-ASSETS = {
+EDIT_ASSETS = {
     "": ("hiproof.edit", "assets/edit.html", HTML),
     "page.css": ("hiproof.evaluate", "assets/page.css", STYLE),
     "edit.css": ("hiproof.edit", "assets/edit.css", STYLE),
@@ -47,7 +47,7 @@ class Service:
     def __init__(self, desk: Desk, token: str | None = None) -> None:
         self.desk, self.token, self.port = desk, token or secrets.token_urlsafe(24), 0
         self.read: dict[str, Callable[[Mapping[str, str]], Any]] = {
-            "start": lambda q: started(desk),
+            "start": lambda q: describe_start(desk),
             "buildings": lambda q: desk.buildings(q.get("find", "")),
             "building": lambda q: desk.building(q.get("id", "")),
             "points": lambda q: desk.cloud(q.get("id", "")),
@@ -75,61 +75,61 @@ class Service:
                 key: values[-1]
                 for key, values in parse_qs(split.query, keep_blank_values=True).items()
             }
-            return self.asset(name, query) if method == "GET" else self.changed(name, body)
+            return self.asset(name, query) if method == "GET" else self.change(name, body)
         except OtherVersion as error:
-            return said(409, str(error), version=error.version)
+            return make_answer(409, str(error), version=error.version)
         except OutputError as error:
-            return said(500, str(error))
+            return make_answer(500, str(error))
         except HiproofError as error:
-            return said(422, str(error))
+            return make_answer(422, str(error))
         except Exception as error:
             LOGGER.error(
                 "failed on %s %s; please report this", method, unquote(target)[-80:], exc_info=True
             )
-            return said(
+            return make_answer(
                 500,
                 f"hiproof failed on this ({type(error).__name__}: {error}); nothing was written",
             )
 
     def refusal(self, method: str, target: str, headers: Headers) -> Answer | None:
         """An answer to those who may not ask, None to those who may."""
-        if told := refusal(headers, self.port):
-            return said(403, told)
+        if entries := refusal(headers, self.port):
+            return make_answer(403, entries)
         first = urlsplit(target).path.split("/")[1:2]
         if not first or not secrets.compare_digest(first[0].encode(), self.token.encode()):
-            return said(
+            return make_answer(
                 403,
                 "expected the token in the address, got another; use the address that was printed",
             )
         if method == "POST" and headers.get("Content-Type", "").split(";")[0] != JSON:
-            return said(415, "expected JSON, got something else")
+            return make_answer(415, "expected JSON, got something else")
         return None
 
     def asset(self, name: str, query: Mapping[str, str]) -> Answer:
         """What is read: a file of the page, a figure, or JSON."""
-        if name in ASSETS:
-            package, file, kind = ASSETS[name]
+        if name in EDIT_ASSETS:
+            package, file, kind = EDIT_ASSETS[name]
             return Answer(200, (files(package) / file).read_bytes(), kind)
         if name == "drawing":
-            return Answer(200, drawing(query.get("type", "")).encode(), SVG)
+            return Answer(200, render_drawing(query.get("type", "")).encode(), SVG)
         if name not in self.read:
-            return said(404, "expected something of this page, got another name")
+            return make_answer(404, "expected something of this page, got another name")
         return as_json(self.read[name](query))
 
-    def changed(self, name: str, body: bytes) -> Answer:
+    def change(self, name: str, body: bytes) -> Answer:
         """What is asked with a body: {"id": ..., ...}."""
         if name not in self.write:
-            return said(404, "expected something of this page, got another name")
+            return make_answer(404, "expected something of this page, got another name")
         try:
-            asked = json.loads(body)
+            requested = json.loads(body)
         except (ValueError, RecursionError) as error:
             raise InputError(f"expected JSON, got what cannot be read: {error}") from error
-        if not isinstance(asked, dict) or not isinstance(asked.get("id"), str):
+        if not isinstance(requested, dict) or not isinstance(requested.get("id"), str):
             raise InputError("expected an object with the id of a building, got something else")
-        return as_json(self.write[name](asked["id"], asked))
+        return as_json(self.write[name](requested["id"], requested))
 
 
-def started(desk: Desk) -> dict[str, Any]:
+def describe_start(desk: Desk) -> dict[str, Any]:
     """What the page knows from the start."""
     return {
         "folder": str(desk.run.folder),
@@ -144,11 +144,11 @@ def as_json(value: Any, code: int = 200) -> Answer:
     return Answer(code, json.dumps(value, separators=(",", ":"), allow_nan=False).encode(), JSON)
 
 
-def said(code: int, sentence: str, **more: Any) -> Answer:
+def make_answer(code: int, sentence: str, **more: Any) -> Answer:
     return as_json({"error": sentence, **more}, code)
 
 
-class Handler(LoopbackHandler):
+class EditHandler(LoopbackHandler):
     """A request and its answer; all that decides stands in `Service`."""
 
     server: Server
@@ -156,13 +156,13 @@ class Handler(LoopbackHandler):
     def answer(self, method: str, body: bytes) -> Answer:
         return self.server.service.answer(method, self.path, self.headers, body)
 
-    def refused(self, code: int, sentence: str) -> Answer:
-        return said(code, sentence)
+    def refuse(self, code: int, sentence: str) -> Answer:
+        return make_answer(code, sentence)
 
 
 class Server(LoopbackServer):
     """The service at a port. Raises InputError where that is taken."""
 
     def __init__(self, service: Service, port: int = 0) -> None:
-        super().__init__(Handler, port)
+        super().__init__(EditHandler, port)
         self.service, service.port = service, self.server_port

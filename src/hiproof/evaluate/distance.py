@@ -37,7 +37,7 @@ def point_surface_distances(
     [3.0, 5.0]
     """
     points = checked_points(points)
-    return nearest_distances(points, *flattened(polygons))
+    return nearest_distances(points, *flatten_polygons(polygons))
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
@@ -49,14 +49,14 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     [2.0, inf]
     """
     points = checked_points(points)
-    return vertical_gaps(points, *flattened(polygons))
+    return vertical_gaps(points, *flatten_polygons(polygons))
 
 
 def surface_and_vertical_distances(
     points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
 ) -> tuple[np.ndarray, np.ndarray]:
     """`point_surface_distances` and `vertical_distances` of the same points and polygons."""
-    points, flat = checked_points(points), flattened(polygons)
+    points, flat = checked_points(points), flatten_polygons(polygons)
     return nearest_distances(points, *flat), vertical_gaps(points, *flat)
 
 
@@ -65,7 +65,7 @@ def checked_points(points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(as_xyz(points))
 
 
-def flattened(
+def flatten_polygons(
     polygons: Sequence[Ring | Sequence[Ring]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All vertices (m, 3), where each ring starts in them, and each polygon in the rings (both with
@@ -90,11 +90,13 @@ def flattened(
 
 @compiled
 def nearest_distances(points, vertices, ring_start, polygon_start):
-    """Distance (n,) of each point (n, 3) to the nearest polygon, these as `flattened` has them."""
+    """Distance (n,) of each point (n, 3) to the nearest polygon, these as `flatten_polygons` has
+    them.
+    """
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
         rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
-        normal, origin, is_flat = plane_of(vertices, rings)
+        normal, origin, is_flat = fit_ring_plane(vertices, rings)
         first, second = plan_axes(normal)
         for i in range(points.shape[0]):
             p = points[i]
@@ -123,7 +125,7 @@ def vertical_gaps(points, vertices, ring_start, polygon_start):
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
         rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
-        normal, origin, is_flat = plane_of(vertices, rings)
+        normal, origin, is_flat = fit_ring_plane(vertices, rings)
         if not is_flat or abs(normal[2]) < 1e-6:
             continue
         for i in range(points.shape[0]):
@@ -138,7 +140,7 @@ def vertical_gaps(points, vertices, ring_start, polygon_start):
 
 
 @compiled
-def plane_of(vertices, rings):
+def fit_ring_plane(vertices, rings):
     """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without
     area.
     """

@@ -21,11 +21,11 @@ import shapely
 
 from ..frames import LocalFrame
 from ..model import ROOF, Quality, Solid
-from ..write.values import rounded
-from .metrics import iou, plan_outline, quality, share_near, well_inside
+from ..write.values import round_value
+from .metrics import compute_share_within_20cm, iou, plan_outline, quality, well_inside
 from .models import BuildingModel
 
-TEXTS = ("id", "type", "status", "quality", "ref_id")
+TEXT_COLUMNS = ("id", "type", "status", "quality", "ref_id")
 """Columns that are no figures."""
 
 
@@ -84,7 +84,7 @@ def evaluate_building(
     world metres.
     """
     if model.solid is None:
-        share = share_near(
+        share = compute_share_within_20cm(
             np.full(len(points), np.inf), well_inside(points, footprint or shapely.Polygon())
         )
         missed = Quality(points=len(points), share_within_20cm=share)
@@ -92,7 +92,7 @@ def evaluate_building(
     from ..write.roof_figures import roof_figures
 
     frame = LocalFrame.around(model.solid.vertices)
-    solid = model.solid.moved(-frame.origin)
+    solid = model.solid.move(-frame.origin)
     local = frame.to_local(points).reshape(-1, 3)
     outline = None if footprint is None else shapely.transform(footprint, frame.to_local)
     return BuildingFigures(
@@ -100,7 +100,7 @@ def evaluate_building(
         model.roof_type,
         model.status,
         quality(solid, local, outline),
-        roof_figures(solid).volume_m3 if solid.of_kind(ROOF) else float("nan"),
+        roof_figures(solid).volume_m3 if solid.select_faces(ROOF) else float("nan"),
         None
         if reference is None or reference.solid is None
         else compare(model.solid, reference.id, reference.solid),
@@ -112,15 +112,15 @@ def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
     """Differences of two solids in one frame; the azimuth's is the smaller angle, signed."""
     from ..write.roof_figures import roof_figures
 
-    if not (solid.of_kind(ROOF) and reference.of_kind(ROOF)):
+    if not (solid.select_faces(ROOF) and reference.select_faces(ROOF)):
         return Comparison(reference_id)
-    ours, theirs = roof_figures(solid), roof_figures(reference)
-    turn = (ours.azimuth_deg - theirs.azimuth_deg + 180) % 360 - 180
-    volume = ours.volume_m3 - theirs.volume_m3
+    figures, theirs = roof_figures(solid), roof_figures(reference)
+    turn = (figures.azimuth_deg - theirs.azimuth_deg + 180) % 360 - 180
+    volume = figures.volume_m3 - theirs.volume_m3
     return Comparison(
         reference_id,
-        ours.h_ridge - theirs.h_ridge,
-        ours.slope_deg - theirs.slope_deg,
+        figures.h_ridge - theirs.h_ridge,
+        figures.slope_deg - theirs.slope_deg,
         turn,
         volume,
         volume / theirs.volume_m3 if theirs.volume_m3 > 0 else float("nan"),
@@ -148,16 +148,16 @@ def points_by_outline(
 
 
 def match_by_id_or_overlap(
-    models: Sequence[BuildingModel], others: Sequence[tuple[str, shapely.Geometry]]
+    models: Sequence[BuildingModel], neighbours: Sequence[tuple[str, shapely.Geometry]]
 ) -> list[int | None]:
     """Index of the other area that stands for each model: the one of the same id, unless another
     overlaps it in plan more than twice as much: ids that are numbers name other buildings in
     another file.
     """
-    by_id = {id: i for i, (id, _) in enumerate(others)}
-    areas = np.array([area for _, area in others], dtype=object)
+    by_id = {id: i for i, (id, _) in enumerate(neighbours)}
+    areas = np.array([area for _, area in neighbours], dtype=object)
     tree = shapely.STRtree(areas)
-    found: list[int | None] = []
+    result: list[int | None] = []
     for model in models:
         match = by_id.get(model.id)
         if len(areas) and model.solid is not None:
@@ -166,8 +166,8 @@ def match_by_id_or_overlap(
             overlaps = shapely.area(shapely.intersection(outline, areas[candidates]))
             if overlaps.any() and overlaps[candidates == match].sum() < 0.5 * overlaps.max():
                 match = int(candidates[np.argmax(overlaps)])
-        found.append(match)
-    return found
+        result.append(match)
+    return result
 
 
 def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
@@ -189,11 +189,11 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
         values = np.array([row.get(name, np.nan) for row in rows], float)
         values = values[np.isfinite(values)]
         if len(values):
-            middle, high = np.percentile(values, (50, 90))
+            middle, upper = np.percentile(values, (50, 90))
             summaries[name] = {
-                "mean": rounded(values.mean()),
-                "median": rounded(middle),
-                "p90": rounded(high),
+                "mean": round_value(values.mean()),
+                "median": round_value(middle),
+                "p90": round_value(upper),
             }
     return summaries
 
@@ -201,7 +201,7 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
 def figure_names(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Numeric columns, in the order of the fullest row."""
     names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    return [name for name in names if name not in TEXTS]
+    return [name for name in names if name not in TEXT_COLUMNS]
 
 
 def to_csv(figures: Sequence[BuildingFigures]) -> str:
@@ -215,21 +215,21 @@ def to_csv(figures: Sequence[BuildingFigures]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows({name: known(value) for name, value in row.items()} for row in rows)
+    writer.writerows({name: round_figure(value) for name, value in row.items()} for row in rows)
     return text.getvalue()
 
 
 def to_json(figures: Sequence[BuildingFigures]) -> str:
     """The summary and every row; null where there is no figure."""
-    rows = [{name: known(value) for name, value in f.row().items()} for f in figures]
+    rows = [{name: round_figure(value) for name, value in f.row().items()} for f in figures]
     return (
         json.dumps({"summary": summarise(figures), "buildings": rows}, indent=1, allow_nan=False)
         + "\n"
     )
 
 
-def known(value: Any) -> Any:
+def round_figure(value: Any) -> Any:
     """A figure rounded, None where it is none; text as it is."""
     if isinstance(value, float):
-        return rounded(value) if np.isfinite(value) else None
+        return round_value(value) if np.isfinite(value) else None
     return value

@@ -48,9 +48,9 @@ class RunInputs:
         """A sentence about clouds that are gone, empty where none is."""
         if not self.gone:
             return ""
-        more = f" and {len(self.gone) - 1} more" if len(self.gone) > 1 else ""
+        text = f" and {len(self.gone) - 1} more" if len(self.gone) > 1 else ""
         return (
-            f"the run's points are gone ({self.gone[0]}{more} {'are' if more else 'is'} not there)"
+            f"the run's points are gone ({self.gone[0]}{text} {'are' if text else 'is'} not there)"
         )
 
 
@@ -62,28 +62,28 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
     >>> found.clouds, found.gone, found.footprints
     (('https://example.org/a.laz',), ('no/such.laz',), None)
     """
-    told = record.get("inputs") or {}
-    started_in = told.get("started_in")
+    inputs = record.get("inputs") or {}
+    started_in = inputs.get("started_in")
 
     def place(path: Any) -> str | None:
-        return place_of(path, started_in, moved_to) if path and isinstance(path, str) else None
+        return locate_input(path, started_in, moved_to) if path and isinstance(path, str) else None
 
-    named = [cloud for cloud in told.get("clouds") or [] if isinstance(cloud, str)]
-    clouds = [(cloud, place(cloud)) for cloud in named]
+    names = [cloud for cloud in inputs.get("clouds") or [] if isinstance(cloud, str)]
+    clouds = [(cloud, place(cloud)) for cloud in names]
     return RunInputs(
-        tuple(found for _, found in clouds if found),
-        tuple(cloud for cloud, found in clouds if not found),
-        place(told.get("footprints")),
-        told.get("layer"),
-        told.get("id_attribute"),
-        told.get("where"),
-        tuple(told["bbox"]) if told.get("bbox") else None,
-        place(told.get("terrain")),
-        place(told.get("overrides")),
+        tuple(result for _, result in clouds if result),
+        tuple(cloud for cloud, result in clouds if not result),
+        place(inputs.get("footprints")),
+        inputs.get("layer"),
+        inputs.get("id_attribute"),
+        inputs.get("where"),
+        tuple(inputs["bbox"]) if inputs.get("bbox") else None,
+        place(inputs.get("terrain")),
+        place(inputs.get("overrides")),
     )
 
 
-def place_of(path: str, started_in: str | None, moved_to: Path | None) -> str | None:
+def locate_input(path: str, started_in: str | None, moved_to: Path | None) -> str | None:
     """Where a file lies that a run started in the folder `started_in` called `path`;
 
     None where it is not there.

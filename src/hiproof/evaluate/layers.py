@@ -15,15 +15,15 @@ import numpy as np
 import shapely
 
 from ..model import Roof
-from ..model.heights import highest_of
+from ..model.heights import find_highest
 from .metrics import NEAR_M, Inner, well_inside
 
-CELL_POINTS = 8.0
+LAYER_CELL_POINTS = 8.0
 """Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large
 as what stands on a roof.
 """
 
-FEWEST_POINTS = 30
+FEWEST_LAYER_POINTS = 30
 """Points well inside the outline below which nothing is said: some four cells, in which a chimney
 is as large as a roof.
 """
@@ -61,17 +61,17 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
     """
     if not len(points):
         return 1.0
-    some = points[
+    subset = points[
         np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2
     ]
     places = places_in(outline)
-    x, y = some.T.copy()  # side by side they are told from the places in a third of the time
+    x, y = subset.T.copy()  # side by side they are told from the places in a third of the time
     gap, north = places[:, :1] - x, places[:, 1:] - y
     gap *= gap  # in place: these are the largest arrays of a building
     north *= north
     gap += north
     return (
-        float(np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(some)))
+        float(np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(subset)))
         if len(places)
         else 0.0
     )
@@ -79,16 +79,18 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
 
 def places_in(outline: shapely.Polygon) -> np.ndarray:
     """Some PLACES places (m, 2), evenly spread over the outline."""
-    apart = math.sqrt(outline.area / PLACES)
+    gap = math.sqrt(outline.area / PLACES)
     west, south, east, north = outline.bounds
     x, y = np.meshgrid(
-        np.arange(west + 0.5 * apart, east, apart), np.arange(south + 0.5 * apart, north, apart)
+        np.arange(west + 0.5 * gap, east, gap), np.arange(south + 0.5 * gap, north, gap)
     )
     inside = shapely.intersects_xy(outline, x.ravel(), y.ravel())
     return np.column_stack([x.ravel()[inside], y.ravel()[inside]])
 
 
-def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> tuple[float, float]:
+def find_second_surface(
+    points: np.ndarray, roof: Roof, inner: Inner | None = None
+) -> tuple[float, float]:
     """Share of the `points` (n, 3), in the roof's frame, where they lie on two surfaces, and how
     far apart these are [m]; zeros where that is not clear.
 
@@ -97,23 +99,23 @@ def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> 
     """
     inner = inner or well_inside(points, roof.outline)
     points = points.compress(inner.holds, axis=0)
-    dz = points[:, 2] - highest_of(roof.parts, points[:, :2])[0]
-    if not (known := np.isfinite(dz)).all():
-        points, dz = points[known], dz[known]
-    if len(points) < FEWEST_POINTS:
+    dz = points[:, 2] - find_highest(roof.parts, points[:, :2])[0]
+    if not (mask := np.isfinite(dz)).all():
+        points, dz = points[mask], dz[mask]
+    if len(points) < FEWEST_LAYER_POINTS:
         return 0.0, 0.0
-    counts, smaller, apart, within = split_cells(
-        points, dz, math.sqrt(CELL_POINTS * inner.area_m2 / len(points))
+    counts, smaller, gap, within = split_cells(
+        points, dz, math.sqrt(LAYER_CELL_POINTS * inner.area_m2 / len(points))
     )
-    asked = counts >= LEAST_POINTS_A_CELL
+    is_dense = counts >= LEAST_POINTS_A_CELL
     two = (
-        asked
+        is_dense
         & (within < MOST_WITHIN)
-        & (apart > NEAR_M)
+        & (gap > NEAR_M)
         & (smaller >= np.maximum(2, SMALLER_GROUP * counts))
     )
-    share = counts[two].sum() / max(counts[asked].sum(), 1)
-    return (float(share), float(np.median(apart[two]))) if share > LEAST_SHARE else (0.0, 0.0)
+    share = counts[two].sum() / max(counts[is_dense].sum(), 1)
+    return (float(share), float(np.median(gap[two]))) if share > LEAST_SHARE else (0.0, 0.0)
 
 
 def split_cells(
@@ -145,6 +147,6 @@ def split_cells(
     best = np.empty(len(start), np.int64)
     best[cell[highest]] = highest  # the last of several
     variance = np.add.reduceat(values**2, start) / counts
-    apart = np.sqrt(between[best]) * counts / np.sqrt(lower[best] * np.maximum(higher[best], 1))
+    gap = np.sqrt(between[best]) * counts / np.sqrt(lower[best] * np.maximum(higher[best], 1))
     within = 1.0 - np.divide(between[best], variance, out=np.zeros(len(start)), where=variance > 0)
-    return counts, np.minimum(lower, higher)[best], apart, within
+    return counts, np.minimum(lower, higher)[best], gap, within

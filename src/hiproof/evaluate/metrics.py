@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ..geometry.rings import GRID_M
+from ..geometry.rings import OVERLAY_GRID_M
 from ..model import ROOF, Fit, Quality, Solid
 from ..read.cell_kernel import cell_keys
 from ..read.thin import cell_range, occupied_cells
@@ -63,7 +63,9 @@ def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
     own frame.
     """
     if isinstance(model, Solid):
-        return [[model.vertices[list(ring)] for ring in face.rings] for face in model.of_kind(ROOF)]
+        return [
+            [model.vertices[list(ring)] for ring in face.rings] for face in model.select_faces(ROOF)
+        ]
     if isinstance(model, Fit):
         return [[model.vertices[list(face)]] for face in model.faces]
     return [[polygon] if isinstance(polygon, np.ndarray) else list(polygon) for polygon in model]
@@ -84,7 +86,7 @@ def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
     # the grid, without which GEOS may lose a polygon, takes four times as long; those of a shell
     # lie side by side, and none is lost
     side_by_side = abs(union.area - sum(p.area for p in polygons)) < LOST_M2
-    return union if side_by_side else shapely.union_all(polygons, grid_size=GRID_M)
+    return union if side_by_side else shapely.union_all(polygons, grid_size=OVERLAY_GRID_M)
 
 
 def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:
@@ -139,13 +141,13 @@ def quality(
             "psd_std": float(distances.std()),
             "rmse": float(np.sqrt(np.mean(distances**2))),
             "p95": percentile(distances, 0.95),
-            "share_within_20cm": share_near(dz, inner),
+            "share_within_20cm": compute_share_within_20cm(dz, inner),
             "unexplained_area_m2": unexplained_area(points, dz),
         }
     return Quality(points=len(points), **figures)
 
 
-def share_near(dz: np.ndarray, inner: Inner) -> float:
+def compute_share_within_20cm(dz: np.ndarray, inner: Inner) -> float:
     """Share of the points well inside an outline with |dz| (n,) below 0.2 m;
 
     NaN for fewer than ten.
@@ -164,11 +166,11 @@ def percentile(values: np.ndarray, share: float) -> float:
     NumPy's own takes ten times as long.
     """
     place = share * (len(values) - 1)
-    low = int(place)
-    below, above = np.partition(values, (low, min(low + 1, len(values) - 1)))[
-        [low, min(low + 1, len(values) - 1)]
+    lower = int(place)
+    below, above = np.partition(values, (lower, min(lower + 1, len(values) - 1)))[
+        [lower, min(lower + 1, len(values) - 1)]
     ]
-    return float(above - (above - below) * (1 - (place - low)))
+    return float(above - (above - below) * (1 - (place - lower)))
 
 
 def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
@@ -181,16 +183,16 @@ def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
     columns, rows = math.ceil(east) - west, math.ceil(north) - south
     row, column = np.divmod(np.arange(rows * columns), columns)
     shapely.prepare(outline)
-    wanted = shapely.intersects_xy(
+    mask = shapely.intersects_xy(
         outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M
     )
-    if not wanted.any():
+    if not mask.any():
         return float("nan")
     column, row = np.floor(xy[:, 0] / CELL_M) - west, np.floor(xy[:, 1] / CELL_M) - south
-    near = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-    seen = np.zeros(rows * columns, bool)
-    seen[(row[near] * columns + column[near]).astype(np.int64)] = True
-    return float(1 - seen[wanted].mean())
+    nearby = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    visited = np.zeros(rows * columns, bool)
+    visited[(row[nearby] * columns + column[nearby]).astype(np.int64)] = True
+    return float(1 - visited[mask].mean())
 
 
 def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
@@ -198,10 +200,10 @@ def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
     metre off the roof.
     """
     xy = np.ascontiguousarray(xy, float)
-    low, (columns, rows) = cell_range(xy, CELL_M)
-    _, cell, total = occupied_cells(cell_keys(xy, CELL_M, *low, columns), columns * rows)
-    away = np.bincount(cell, weights=dz > UNEXPLAINED_M)
-    return float(np.count_nonzero(away > total / 2) * CELL_M**2)
+    lower, (columns, rows) = cell_range(xy, CELL_M)
+    _, cell, total = occupied_cells(cell_keys(xy, CELL_M, *lower, columns), columns * rows)
+    counts = np.bincount(cell, weights=dz > UNEXPLAINED_M)
+    return float(np.count_nonzero(counts > total / 2) * CELL_M**2)
 
 
 def observed_outline(points: np.ndarray) -> shapely.Polygon | None:

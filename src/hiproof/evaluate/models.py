@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..compose.building_parts import whole_of
+from ..compose.building_parts import join_parts
 from ..compose.check import check_solid
 from ..errors import InputError
 from ..formats import FORMATS, TILE_FOLDER
@@ -21,12 +21,12 @@ from ..model import GROUND, ROOF, Face, Solid
 from ..read.cityjson import UNUSABLE, Feature, features, unusable
 from ..read.damage import Damaged, excerpt, finite, refuse
 from ..read.plausible import is_plausible
-from ..read.shells import Surface, list_of, read_geometries, read_shell
+from ..read.shells import ShellSurface, read_geometries, read_shell, require_list
 from ..write.attribute_list import OWN
 from ..write.meshes.triangles import faces_triangles
 
 RUN_MODELS = FORMATS["cityjson"].file
-PART, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
+PART_ATTRIBUTE, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
 """What hiproof tells of a roof surface: its part's number and type."""
 
 # Of a building, so that their numbers fit the columns and tables of all formats.
@@ -88,8 +88,8 @@ def run_models(folder: Path) -> Path:
 
 def read_models(
     path: str | Path,
-    otherwise: Units = METRES,
-    known: Units | None = None,
+    alternative: Units = METRES,
+    crs_units: Units | None = None,
     damaged: Damaged = refuse,
     must_be_valid: bool = False,
 ) -> Iterator[BuildingModel]:
@@ -97,45 +97,54 @@ def read_models(
     joined, in metres.
 
     Solids of the highest level of detail count, and building parts that hiproof cut come as the
-    whole that they were. `otherwise` are the units of a file that names no CRS, `known` those of
-    one of which more is known than it names. A building whose text or solid is of no use is told to
-    `damaged`, which refuses the file by default, and comes without a solid, so that the order
-    stays; with `must_be_valid` so does one whose solid is invalid by ISO 19107. Raises InputError
-    for files that cannot be read as CityJSON, or that are in degrees.
+    whole that they were. `alternative` are the units of a file that names no CRS, `crs_units`
+    those of one of which more is known than it names. A building whose text or solid is of no use
+    is told to `damaged`, which refuses the file by default, and comes without a solid, so that the
+    order stays; with `must_be_valid` so does one whose solid is invalid by ISO 19107. Raises
+    InputError for files that cannot be read as CityJSON, or that are in degrees.
     """
-    for feature in features(Path(path), otherwise, known, damaged):
+    for feature in features(Path(path), alternative, crs_units, damaged):
         if feature.is_damaged:
             yield BuildingModel(feature.place, is_damaged=True)
         for id, city_object in feature.objects.items():
             try:
                 if isinstance(city_object, dict) and city_object.get("type") != "Building":
                     continue
-                yield usable(building_of(id, city_object, feature), must_be_valid)
+                yield usable(read_building(id, city_object, feature), must_be_valid)
             except (*UNUSABLE, shapely.GEOSException) as error:
                 damaged(unusable(id, feature, error))
                 yield BuildingModel(id, is_damaged=True)
 
 
-def building_of(id: str, city_object: Any, feature: Feature) -> BuildingModel:
+def read_building(id: str, city_object: Any, feature: Feature) -> BuildingModel:
     """Read a building with its parts. Raises one of UNUSABLE."""
-    own = read_geometries(city_object)
-    children = list_of(city_object.get("children") or [], "children")
+    geometries = read_geometries(city_object)
+    children = require_list(city_object.get("children") or [], "children")
     family = [
         city_object,
         *(feature.objects[child] for child in children if child in feature.objects),
     ]
-    solids = [solids_of(own), *(solids_of(read_geometries(child)) for child in family[1:])]
-    level = max((level_of_detail(solid) for own in solids for solid in own), default=0.0)
+    solids = [
+        select_solids(geometries),
+        *(select_solids(read_geometries(child)) for child in family[1:]),
+    ]
+    level = max((read_level(solid) for geometries in solids for solid in geometries), default=0.0)
     surfaces = [
-        surface for own in solids for surface in surfaces_at(own, level, len(feature.vertices))
+        surface
+        for geometries in solids
+        for surface in surfaces_at(geometries, level, len(feature.vertices))
     ]
     attributes = plain_attributes(city_object.get("attributes"))
     part_types = {
-        part_of(s): str(s.semantics[PART_TYPE]) for s in surfaces if PART_TYPE in s.semantics
+        read_part_number(s): str(s.semantics[PART_TYPE])
+        for s in surfaces
+        if PART_TYPE in s.semantics
     }
-    faces = tuple(Face(s.rings, s.kind, part_of(s) if s.kind == ROOF else -1) for s in surfaces)
+    faces = tuple(
+        Face(s.rings, s.kind, read_part_number(s) if s.kind == ROOF else -1) for s in surfaces
+    )
     solid = compact(feature.vertices, faces) if faces else None
-    model = BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
+    model = BuildingModel(id, attributes, join_shells(solid, family) if solid is not None else None)
     return replace(model, part_types={0: model.roof_type} | part_types)
 
 
@@ -158,34 +167,38 @@ def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
             return model
     except (shapely.GEOSException, KeyError):
         findings = check_solid(model.solid)
-    told = findings[0].message if findings else "faces that cannot be cut into triangles"
-    raise ValueError(f"an invalid solid: {told}")
+    message = findings[0].message if findings else "faces that cannot be cut into triangles"
+    raise ValueError(f"an invalid solid: {message}")
 
 
-def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
+def join_shells(solid: Solid, family: list[dict[str, Any]]) -> Solid:
     """`solid` as one shell where it is several, those of building parts that hiproof cut: without
     the walls between them."""
-    own = [member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})]
-    if not own or len(solid.of_kind(GROUND)) < 2:
+    part_solids = [
+        member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})
+    ]
+    if not part_solids or len(solid.select_faces(GROUND)) < 2:
         return solid
-    return whole_of(solid)
+    return join_parts(solid)
 
 
-def solids_of(geometries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def select_solids(geometries: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [geometry for geometry in geometries if geometry.get("type") == "Solid"]
 
 
-def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> list[Surface]:
+def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> list[ShellSurface]:
     """Read the surfaces of the first of `solids` of the level of detail `level`."""
-    solid = next((solid for solid in solids if level_of_detail(solid) == level), None)
+    solid = next((solid for solid in solids if read_level(solid) == level), None)
     if solid is None:
         return []
     semantics = solid.get("semantics") or {}
-    values = list_of(semantics.get("values") or [None], "semantic values")[0]
-    outer = list_of(
-        list_of(solid.get("boundaries"), "the boundaries of a solid")[0], "its outer shell"
+    values = require_list(semantics.get("values") or [None], "semantic values")[0]
+    outer = require_list(
+        require_list(solid.get("boundaries"), "the boundaries of a solid")[0], "its outer shell"
     )
-    if not outer or (values is not None and len(list_of(values, "semantic values")) != len(outer)):
+    if not outer or (
+        values is not None and len(require_list(values, "semantic values")) != len(outer)
+    ):
         raise ValueError(
             f"a solid of {len(outer)} faces"
             + (f", and semantics of {len(values)}" if values else "")
@@ -193,15 +206,15 @@ def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> li
     return read_shell(outer, values, semantics.get("surfaces") or [], vertices)
 
 
-def part_of(surface: Surface) -> int:
+def read_part_number(surface: ShellSurface) -> int:
     """The number of the part that a roof surface belongs to, 0 where the file does not tell."""
-    number = surface.semantics.get(PART, 0)
+    number = surface.semantics.get(PART_ATTRIBUTE, 0)
     if type(number) is not int or not 0 <= number < MOST_PART_NUMBER:
         raise ValueError(f"{excerpt(number)} as the number of a part")
     return number
 
 
-def level_of_detail(geometry: dict[str, Any]) -> float:
+def read_level(geometry: dict[str, Any]) -> float:
     try:
         level = float(geometry["lod"])
     except (KeyError, TypeError, ValueError, OverflowError):
@@ -213,15 +226,15 @@ def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
     """A solid with only the vertices its faces use, each of which must be a place; ValueError
     otherwise."""
     rings = [ring for face in faces for ring in (face.rings or ((),))]
-    least = min(len(set(ring)) for ring in rings)
-    if least < 3:
-        raise ValueError(f"a ring of {least} points")
-    used = sorted({index for ring in rings for index in ring})
-    if not is_plausible(vertices[used]).all():
+    smallest = min(len(set(ring)) for ring in rings)
+    if smallest < 3:
+        raise ValueError(f"a ring of {smallest} points")
+    in_use = sorted({index for ring in rings for index in ring})
+    if not is_plausible(vertices[in_use]).all():
         raise ValueError("coordinates of no place on Earth")
-    place = {index: i for i, index in enumerate(used)}
+    place = {index: i for i, index in enumerate(in_use)}
     renumbered = (
         Face(tuple(tuple(place[i] for i in ring) for ring in face.rings), face.kind, face.part)
         for face in faces
     )
-    return Solid(vertices[used], tuple(renumbered))
+    return Solid(vertices[in_use], tuple(renumbered))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..log import counted
+from ..log import count_things
 from ..masking import masked_values
 from ..status import Grade, Status
 from .evaluation import summarise
@@ -38,7 +38,7 @@ DISTRIBUTIONS = (
     ("density", "points per square metre", ""),
     ("volume_m3", "volume", "m³"),
 )
-TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
+TABLE_FIGURES = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
 
 
 def write_report(
@@ -59,52 +59,53 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
     the worst and an even selection of the others.
     """
     worst = worst_indices(run)
-    shown = shown_indices(run, worst, most_shown)
-    places = run.only(shown)
+    buildings = choose_buildings(run, worst, most_shown)
+    places = run.only(buildings)
     record = json.dumps(masked_values(run.record), indent=1, ensure_ascii=False)
     sections = {
         "title": escape(title),
-        "style": asset("page.css") + asset("report.css"),
-        "lead": lead(run, len(shown)),
+        "style": read_asset("page.css") + read_asset("report.css"),
+        "lead": lead(run, len(buildings)),
         "statuses": status_table(run),
         "qualities": grade_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
-        "worst": worst_buildings(run, worst, shown),
+        "worst": worst_buildings(run, worst, buildings),
         "record": f'<pre tabindex="0" role="region" aria-label="run.json">{escape(record)}</pre>',
-        "data": embedded(report_data(places, places_on_map(places))),
-        "script": asset("viewer.js") + asset("report.js"),
+        "data": embed_json(report_data(places, places_on_map(places))),
+        "script": read_asset("viewer.js") + read_asset("report.js"),
     }
-    page = asset("report.html")
+    page = read_asset("report.html")
     for name, content in sections.items():
         page = page.replace(f"<!--{name}-->", content)
     return page
 
 
-def asset(name: str) -> str:
+def read_asset(name: str) -> str:
     return (files("hiproof.evaluate") / "assets" / name).read_text(encoding="utf-8")
 
 
-def embedded(data: Any) -> str:
+def embed_json(data: Any) -> str:
     """JSON that may stand inside a script element."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def lead(run: EvaluatedRun, shown: int) -> str:
+def lead(run: EvaluatedRun, visible: int) -> str:
     """The sentences at the top."""
     version = run.record.get("hiproof") or run.record.get("version") or __version__
     modelled = sum(model.solid is not None for model in run.models)
     points = sum(map(len, run.points))
     measured = (
-        f"measured against {counted(points, 'point')}"
+        f"measured against {count_things(points, 'point')}"
         if points
         else "no points given: residuals are those of the run"
     )
-    part = f" Map and 3D view show {shown:,} of them." if shown < len(run.models) else ""
-    made = f"Made by hiproof {escape(str(version))}."
+    part = f" Map and 3D view show {visible:,} of them." if visible < len(run.models) else ""
+    text = f"Made by hiproof {escape(str(version))}."
     return (
-        f"{counted(len(run.models), 'building')}, {modelled:,} with a model, {measured}.{part} "
-        f"{made}"
+        f"{count_things(len(run.models), 'building')}, {modelled:,} with a model, "
+        f"{measured}.{part} "
+        f"{text}"
     )
 
 
@@ -140,12 +141,12 @@ def sentence(code: str) -> str:
 
 def figure_table(run: EvaluatedRun) -> str:
     """Mean figures by roof type."""
-    head = head_row("type", "buildings", *(name.replace("_", " ") for name in TABLE))
+    head = head_row("type", "buildings", *(name.replace("_", " ") for name in TABLE_FIGURES))
     rows = ""
     for kind, figures in summarise(run.figures).items():
         cells = "".join(
             f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>"
-            for name in TABLE
+            for name in TABLE_FIGURES
         )
         head_cell = f'<th scope="row">{escape(kind)}</th>'
         rows += f"<tr>{head_cell}<td>{figures['buildings']}</td>{cells}</tr>"
@@ -176,18 +177,18 @@ def worst_indices(run: EvaluatedRun) -> list[int]:
     return [int(i) for i in np.lexsort((-rmse, share, grades)) if np.isfinite(rmse[i])][:WORST]
 
 
-def shown_indices(run: EvaluatedRun, worst: list[int], most: int) -> list[int]:
+def choose_buildings(run: EvaluatedRun, worst: list[int], limit: int) -> list[int]:
     """Indices in order: all buildings, or the worst and an even selection of all."""
     count = len(run.models)
-    if count <= most:
+    if count <= limit:
         return list(range(count))
-    even = np.linspace(0, count - 1, max(most - len(worst), 0)).astype(int)
+    even = np.linspace(0, count - 1, max(limit - len(worst), 0)).astype(int)
     return sorted({*even.tolist(), *worst})
 
 
-def worst_buildings(run: EvaluatedRun, worst: list[int], shown: list[int]) -> str:
+def worst_buildings(run: EvaluatedRun, worst: list[int], visible: list[int]) -> str:
     """A card for each of the worst; a click selects it by its place among the shown."""
-    place = {index: position for position, index in enumerate(shown)}
+    place = {index: position for position, index in enumerate(visible)}
     cards = "".join(worst_card(run, index, place[index]) for index in worst)
     return cards or "<p>No points were given, so there are no residuals.</p>"
 
@@ -198,7 +199,7 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
         return ""
     origin = model.solid.vertices.min(axis=0)
     pictures = building_pictures(
-        model.solid.moved(-origin), points - origin, psd(model.solid, points), model.part_types
+        model.solid.move(-origin), points - origin, psd(model.solid, points), model.part_types
     )
     text = (
         f"{escape(model.grade)} {escape(model.roof_type)}, "

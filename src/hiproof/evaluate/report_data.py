@@ -10,14 +10,14 @@ import shapely
 
 from ..status import Status
 from ..write.colours import GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, page_colours
-from ..write.meshes.page_mesh import packed, solid_mesh
-from .evaluation import TEXTS
+from ..write.meshes.page_mesh import pack_values, solid_mesh
+from .evaluation import TEXT_COLUMNS
 from .metrics import plan_outline, psd
 from .models import BuildingModel
 from .run import EvaluatedRun
 
 POINTS_PER_BUILDING = 150  # points drawn of a building; enough to see where a roof is wrong
-MOST_POINTS = 600_000  # points in the page, 7 MB: what a browser still opens at once
+MOST_REPORT_POINTS = 600_000  # points in the page, 7 MB: what a browser still opens at once
 
 
 def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
@@ -45,8 +45,8 @@ def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None])
     corners += [
         np.array([*outline.bounds[:2], np.inf]) for outline in outlines if outline is not None
     ]
-    low = np.min(corners, axis=0) if corners else np.zeros(3)
-    return np.where(np.isfinite(low), np.floor(low), 0.0)
+    smallest = np.min(corners, axis=0) if corners else np.zeros(3)
+    return np.where(np.isfinite(smallest), np.floor(smallest), 0.0)
 
 
 def building_data(
@@ -60,7 +60,7 @@ def building_data(
     residual: Any = figures.quality.psd_mean
     if not np.isfinite(residual):
         residual = model.attributes.get("hiproof_psd_mean")
-    measured = {name: value for name, value in figures.row().items() if name not in TEXTS}
+    measured = {name: value for name, value in figures.row().items() if name not in TEXT_COLUMNS}
     return {
         "id": model.id,
         "type": model.roof_type,
@@ -112,7 +112,7 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
     solids = [
         (index, model.solid) for index, model in enumerate(run.models) if model.solid is not None
     ]
-    meshes = [solid_mesh(solid.moved(-origin)) for _, solid in solids]
+    meshes = [solid_mesh(solid.move(-origin)) for _, solid in solids]
     owners = [
         np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)
     ]
@@ -121,12 +121,12 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
         for (index, _), mesh in zip(solids, meshes, strict=True)
     ]
     return {
-        "corners": packed(
+        "corners": pack_values(
             np.concatenate([np.empty((0, 3, 3)), *(mesh.corners for mesh in meshes)]), "<f4"
         ),
-        "owner": packed(np.concatenate([np.empty(0), *owners]), "<u4"),
-        "roof": packed(np.concatenate([np.empty(0), *roofs]), "u1"),
-        "edges": packed(
+        "owner": pack_values(np.concatenate([np.empty(0), *owners]), "<u4"),
+        "roof": pack_values(np.concatenate([np.empty(0), *roofs]), "u1"),
+        "edges": pack_values(
             np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"
         ),
     }
@@ -147,16 +147,19 @@ def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
     """Points (n, 3) thinned to every k-th of each building, with their distances to the roof in
     metres (n,).
     """
-    most = max(1, min(POINTS_PER_BUILDING, MOST_POINTS // max(len(run.models), 1)))
+    largest = max(1, min(POINTS_PER_BUILDING, MOST_REPORT_POINTS // max(len(run.models), 1)))
     places, distances = [np.empty((0, 3))], [np.empty(0)]
     for model, points in zip(run.models, run.points, strict=True):
-        points = points[:: max(1, -(-len(points) // most))]
+        points = points[:: max(1, -(-len(points) // largest))]
         places.append(points - origin)
         distances.append(
             psd(model.solid, points) if model.solid is not None else np.full(len(points), np.inf)
         )
     nearness = np.nan_to_num(np.concatenate(distances), posinf=9.0)
-    return {"places": packed(np.concatenate(places), "<f4"), "distances": packed(nearness, "<f4")}
+    return {
+        "places": pack_values(np.concatenate(places), "<f4"),
+        "distances": pack_values(nearness, "<f4"),
+    }
 
 
 def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:

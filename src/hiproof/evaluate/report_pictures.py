@@ -10,10 +10,10 @@ import numpy as np
 from ..geometry.rings import ring_normal
 from ..model import GROUND, ROOF, Solid
 from ..write.colours import RESIDUAL_STOPS
-from ..write.meshes.viewed import look_of
+from ..write.meshes.viewed import choose_look
 
-MOST_POINTS = 400  # dots in a small picture; more would cover the model
-WIDTH, HEIGHT = 300, 210  # pixels; three pictures stand side by side on a laptop
+MOST_PICTURE_POINTS = 400  # dots in a small picture; more would cover the model
+CHART_WIDTH, CHART_HEIGHT = 300, 210  # pixels; three pictures stand side by side on a laptop
 
 # of all quantities shown, below what they are known by: values so near each other are one
 NARROWEST = 1e-3
@@ -36,10 +36,12 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
             f"<figure><figcaption>{escape(heading)}: {short(values.mean())} for "
             "all</figcaption></figure>"
         )
-    low, high = float(values.min()), float(np.percentile(values, 98))
-    high = max(high, low + NARROWEST)
-    counts, edges = np.histogram(np.clip(values, low, high), bins=bins, range=(low, high))
-    step, top = WIDTH / bins, HEIGHT - 40
+    smallest, upper = float(values.min()), float(np.percentile(values, 98))
+    upper = max(upper, smallest + NARROWEST)
+    counts, edges = np.histogram(
+        np.clip(values, smallest, upper), bins=bins, range=(smallest, upper)
+    )
+    step, top = CHART_WIDTH / bins, CHART_HEIGHT - 40
     bars = "".join(
         f'<rect x="{i * step:.1f}" y="{top - top * n / counts.max():.1f}" width="{step - 1:.1f}" '
         f'height="{top * n / counts.max():.1f}"><title>{edges[i]:.3f} to {edges[i + 1]:.3f}: '
@@ -48,17 +50,18 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
         if n
     )
     middle = float(np.median(values))
-    x = WIDTH * (np.clip(middle, low, high) - low) / (high - low)
+    x = CHART_WIDTH * (np.clip(middle, smallest, upper) - smallest) / (upper - smallest)
     axis = (
-        f'<text x="0" y="{top + 16}">{short(low)}</text>'
-        f'<text x="{WIDTH}" y="{top + 16}" '
-        f'text-anchor="end">{short(high)}{" and more" if values.max() > high else ""}</text>'
+        f'<text x="0" y="{top + 16}">{short(smallest)}</text>'
+        f'<text x="{CHART_WIDTH}" y="{top + 16}" '
+        f'text-anchor="end">{short(upper)}{" and more" if values.max() > upper else ""}</text>'
         f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{top}" class="median"/>'
-        f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, mean '
+        f'<text x="{CHART_WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, '
+        "mean "
         f"{short(values.mean())}</text>"
     )
     body = (
-        f'<svg viewBox="0 -4 {WIDTH} {HEIGHT}" class="histogram" role="img" '
+        f'<svg viewBox="0 -4 {CHART_WIDTH} {CHART_HEIGHT}" class="histogram" role="img" '
         f'aria-label="{escape(heading, quote=True)}">{bars}{axis}</svg>'
     )
     return f"<figure>{body}<figcaption>{escape(heading)}</figcaption></figure>"
@@ -77,21 +80,21 @@ def building_pictures(
     The side view looks along the level direction of the largest roof face, so that slopes show as
     lines. Roofs have the colour of their part's type, by number in `part_types`.
     """
-    if len(points) > MOST_POINTS:
-        keep = np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)
+    if len(points) > MOST_PICTURE_POINTS:
+        keep = np.linspace(0, len(points) - 1, MOST_PICTURE_POINTS).astype(int)
         points, distances = points[keep], distances[keep]
     across = slope_direction(solid)
     along = np.array([-across[1], across[0], 0.0])
-    colours = [look_of(face, part_types).colour for face in solid.faces]
+    colours = [choose_look(face, part_types).colour for face in solid.faces]
     above = (
         0.8 * across + 0.6 * along,
         0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)],
     )
     side = (across, np.array([0.0, 0.0, 1.0]))
-    seen = (("from above", above), ("from the side", side))
+    visited = (("from above", above), ("from the side", side))
     return "".join(
-        projection(solid, colours, points, distances, right, up, label)
-        for label, (right, up) in seen
+        projection(solid, colours, points, distances, right, vertical, label)
+        for label, (right, vertical) in visited
     )
 
 
@@ -100,7 +103,7 @@ def slope_direction(solid: Solid) -> np.ndarray:
     are level.
     """
     normals = np.array(
-        [ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.of_kind(ROOF)]
+        [ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.select_faces(ROOF)]
     )
     if not len(normals):
         return np.array([1.0, 0.0, 0.0])
@@ -116,24 +119,25 @@ def projection(
     points: np.ndarray,
     distances: np.ndarray,
     right: np.ndarray,
-    up: np.ndarray,
+    vertical: np.ndarray,
     label: str,
 ) -> str:
-    """An SVG of faces, each in its colour, and points seen along one direction, `right` and `up`
-    (3,) being the picture's axes. Screen readers read its `label`.
+    """An SVG of faces, each in its colour, and points seen along one direction, `right` and
+    `vertical` (3,) being the picture's axes. Screen readers read its `label`.
     """
-    axes = np.column_stack([right, -up])
+    axes = np.column_stack([right, -vertical])
     corners, dots = solid.vertices @ axes, points @ axes
     everything = np.concatenate([corners, dots])
-    low, high = everything.min(axis=0), everything.max(axis=0)
+    smallest, largest = everything.min(axis=0), everything.max(axis=0)
     scale = min(
-        (WIDTH - 16) / max(high[0] - low[0], 1e-6), (HEIGHT - 16) / max(high[1] - low[1], 1e-6)
+        (CHART_WIDTH - 16) / max(largest[0] - smallest[0], 1e-6),
+        (CHART_HEIGHT - 16) / max(largest[1] - smallest[1], 1e-6),
     )
 
     def place(xy: np.ndarray) -> np.ndarray:
-        return (xy - (low + high) / 2) * scale + [WIDTH / 2, HEIGHT / 2]
+        return (xy - (smallest + largest) / 2) * scale + [CHART_WIDTH / 2, CHART_HEIGHT / 2]
 
-    towards = np.cross(right, up)
+    towards = np.cross(right, vertical)
     faces = sorted(
         (
             (face, colour)
@@ -151,7 +155,7 @@ def projection(
         for i, (_, stop) in enumerate(RESIDUAL_STOPS)
     )
     return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" class="model" role="img" '
+        f'<svg viewBox="0 0 {CHART_WIDTH} {CHART_HEIGHT}" class="model" role="img" '
         f'aria-label="{label}"><g '
         f'class="faces">{shapes}</g>'
         f'<g class="dots">{cloud}</g></svg>'

@@ -14,8 +14,8 @@ import shapely
 
 from ..errors import InputError, InputWarning, SettingsError
 from ..frames import Units
-from ..read.cityjson import parsed, read_text
-from ..read.crs import parse_crs, units_of
+from ..read.cityjson import parse_object, read_text
+from ..read.crs import find_units, parse_crs
 from ..read.damage import Damaged, excerpt, refuse
 from ..settings import Settings
 from ..write.naming import FileUnits
@@ -100,32 +100,36 @@ def evaluate_run(
     cannot be read.
     """
     record = run_record(folder)
-    known = found_inputs(record)
-    if not clouds and known.gone:
-        left = "measured against the others alone" if known.files else "nothing to measure against"
+    inputs = found_inputs(record)
+    if not clouds and inputs.gone:
+        text = "measured against the others alone" if inputs.files else "nothing to measure against"
         warnings.warn(
-            f"{folder}: {known.told_gone}, {left}; name them after the folder", InputWarning
+            f"{folder}: {inputs.told_gone}, {text}; name them after the folder", InputWarning
         )
-    clouds = clouds or known.files
-    asked: dict[str, Any] = {}
+    clouds = clouds or inputs.files
+    options: dict[str, Any] = {}
     if footprints is None:
-        footprints, layer = known.footprint_file, layer or known.layer
-        asked = {"id_attribute": known.id_attribute, "where": known.where, "bbox": known.bbox}
+        footprints, layer = inputs.footprint_file, layer or inputs.layer
+        options = {
+            "id_attribute": inputs.id_attribute,
+            "where": inputs.where,
+            "bbox": inputs.bbox,
+        }
     models = tuple(
         read_models(
             run_models(folder), run_units(record), way_to_models(record), damaged, must_be_valid
         )
     )
-    outlines = footprint_of_each(models, footprints, layer, record, asked)
+    outlines = match_footprints(models, footprints, layer, record, options)
     areas = [
-        outline if outline is not None else own_outline(m)
+        outline if outline is not None else outline_of_solid(m)
         for m, outline in zip(models, outlines, strict=True)
     ]
     if clouds and any(area is not None for area in areas):
         points = points_by_outline(building_points(clouds, record, areas), areas)
     else:
         points = [np.empty((0, 3))] * len(models)
-    references = reference_of_each(models, reference)
+    references = match_references(models, reference)
     figures = [
         evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)
     ]
@@ -138,7 +142,7 @@ def run_record(folder: Path) -> dict[str, Any]:
     """Content of run.json, empty where the folder has none. Raises InputError where it is no record
     of a run."""
     path = Path(folder) / "run.json"
-    record = parsed(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
+    record = parse_object(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
     try:
         refuse_other_kinds(record)
         run_settings(record)
@@ -160,14 +164,14 @@ def refuse_other_kinds(record: dict[str, Any]) -> None:
         is_odd = isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value))
         if value is not None and (is_odd or not isinstance(value, kind)):
             raise InputError(
-                f"expected {words_of(kind)} as {'.'.join(names)}, got {excerpt(value)}"
+                f"expected {name_kind(kind)} as {'.'.join(names)}, got {excerpt(value)}"
             )
     bbox = (record.get("inputs") or {}).get("bbox")
     if bbox and (len(bbox) != 4 or not all(type(side) in NUMBER for side in bbox)):
         raise InputError(f"expected four numbers as inputs.bbox, got {excerpt(bbox)}")
 
 
-def words_of(kind: Any) -> str:
+def name_kind(kind: Any) -> str:
     """Name a kind of JSON value."""
     return {dict: "an object", list: "a list", NUMBER: "a finite number"}.get(kind, "text")
 
@@ -175,8 +179,8 @@ def words_of(kind: Any) -> str:
 def run_settings(record: dict[str, Any]) -> Settings:
     """The settings a run was made with, as far as this version knows them."""
     read = (record.get("settings") or {}).get("read") or {}
-    known = {name: read[name] for name in ("building_classes", "crs", "unit") if read.get(name)}
-    return Settings.from_dict({"read": known})
+    overrides = {name: read[name] for name in ("building_classes", "crs", "unit") if read.get(name)}
+    return Settings.from_dict({"read": overrides})
 
 
 def run_crs(record: dict[str, Any]) -> Any:
@@ -204,21 +208,23 @@ def building_points(
     return cloud.xyz[np.isin(cloud.classification, settings.read.building_classes)]
 
 
-def footprint_of_each(
+def match_footprints(
     models: Sequence[BuildingModel],
     path: str | None,
     layer: str | int | None,
     record: dict[str, Any],
-    asked: dict[str, Any],
+    options: dict[str, Any],
 ) -> list[Any]:
-    """The footprint polygon of each model, None without one; `asked` is what else `read_footprints`
-    is told."""
+    """The footprint polygon of each model, None without one;
+
+    `options` is what else `read_footprints` is told.
+    """
     if path is None:
         return [None] * len(models)
     from ..read.footprints import read_footprints
 
     footprints = read_footprints(
-        path, layer, target_crs=run_crs(record), settings=run_settings(record), **asked
+        path, layer, target_crs=run_crs(record), settings=run_settings(record), **options
     )
     areas = [(f.id, shapely.make_valid(f.polygon)) for f in footprints]
     matches = match_by_id_or_overlap(models, areas)
@@ -227,14 +233,14 @@ def footprint_of_each(
 
 def run_units(record: dict[str, Any]) -> Units:
     """Units of the coordinates a run was made from; metres where nothing is known of it."""
-    return units_of(run_crs(record), "the run", run_settings(record).read.unit)
+    return find_units(run_crs(record), "the run", run_settings(record).read.unit)
 
 
 def way_to_models(record: dict[str, Any]) -> Units | None:
     """From the world metres of a run's clouds to its models, where these are in another CRS; None
     where they are not."""
-    asked = run_out_crs(record)
-    return FileUnits.of(run_crs(record), run_units(record), asked).cityjson if asked else None
+    out_crs = run_out_crs(record)
+    return FileUnits.of(run_crs(record), run_units(record), out_crs).cityjson if out_crs else None
 
 
 def run_out_crs(record: dict[str, Any]) -> str:
@@ -243,26 +249,26 @@ def run_out_crs(record: dict[str, Any]) -> str:
     return ((record.get("settings") or {}).get("write") or {}).get("out_crs") or ""
 
 
-def reference_of_each(
+def match_references(
     models: Sequence[BuildingModel], path: str | None
 ) -> list[BuildingModel | None]:
     """The building of the reference file that stands for each model; one line where none does for
     any."""
     if path is None:
         return [None] * len(models)
-    others = [
+    neighbours = [
         (model, outline)
         for model in read_models(path)
-        if (outline := own_outline(model)) is not None
+        if (outline := outline_of_solid(model)) is not None
     ]
-    matches = match_by_id_or_overlap(models, [(other.id, outline) for other, outline in others])
+    matches = match_by_id_or_overlap(models, [(other.id, outline) for other, outline in neighbours])
     if models and not any(match is not None for match in matches):
         warnings.warn(
             f"{path}: no building of it stands where one of the run does; check its CRS",
             InputWarning,
         )
-    return [None if match is None else others[match][0] for match in matches]
+    return [None if match is None else neighbours[match][0] for match in matches]
 
 
-def own_outline(model: BuildingModel) -> shapely.Geometry | None:
+def outline_of_solid(model: BuildingModel) -> shapely.Geometry | None:
     return None if model.solid is None else plan_outline(model.solid)

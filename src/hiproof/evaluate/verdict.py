@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..log import counted
+from ..log import count_things
 from ..model import WALL, Model
-from ..model.heights import highest_of
+from ..model.heights import find_highest
 from ..status import Doubt, Grade
 from .distance import point_surface_distances
 from .layers import unseen_share
@@ -87,19 +87,22 @@ class Verdict(NamedTuple):
     reasons: tuple[str, ...] = ()
 
 
-def verdict_of(model: Model, points: np.ndarray, unused: np.ndarray | None = None) -> Verdict:
+def judge_model(model: Model, points: np.ndarray, unused: np.ndarray | None = None) -> Verdict:
     """The verdict on a model by its `points` (n, 3) inside the outline, in the frame of its roof.
 
     `unused` (m, 3) are further points that were thinned out or called noise. They count where they
     lie together off the roof.
     """
-    return judged(evidence_of(model, points, np.zeros((0, 3)) if unused is None else unused))
+    return judge_evidence(
+        collect_evidence(model, points, np.zeros((0, 3)) if unused is None else unused)
+    )
 
 
-def judged(evidence: Evidence) -> Verdict:
+def judge_evidence(evidence: Evidence) -> Verdict:
     """The verdict by the evidence.
 
-    >>> judged(Evidence(100, 0.99, 0.0, Cluster(41, 30.2, 6.0), Cluster(), 0.0, 80.0)).reasons
+    >>> judge_evidence(Evidence(100, 0.99, 0.0, Cluster(41, 30.2, 6.0), Cluster(), 0.0,
+    ...     80.0)).reasons
     ('41 points up to 30 m above the model',)
     """
     findings = [*share_findings(evidence), *cluster_findings(evidence), *part_findings(evidence)]
@@ -115,12 +118,12 @@ Finding = tuple[bool, str]
 
 def share_findings(evidence: Evidence) -> list[Finding]:
     """Points off the roof, and places without points."""
-    found = []
+    result = []
     if not evidence.points:
-        found.append((True, "all its points lie on its walls, none on its roof"))
+        result.append((True, "all its points lie on its walls, none on its roof"))
     elif evidence.near < LEAST_NEAR:
         share = math.floor(100 * evidence.near)
-        found.append(
+        result.append(
             (
                 evidence.near < POOR_NEAR,
                 f"only {share} % of its points lie within 0.2 m of the roof",
@@ -129,8 +132,8 @@ def share_findings(evidence: Evidence) -> list[Finding]:
     if evidence.unseen > MOST_UNSEEN:
         share = round(100 * evidence.unseen)
         words = f"{share} % {Doubt.PLACES_WITHOUT_POINTS.value}; the roof there is a guess"
-        found.append((evidence.unseen > POOR_UNSEEN, words))
-    return found
+        result.append((evidence.unseen > POOR_UNSEEN, words))
+    return result
 
 
 def cluster_findings(evidence: Evidence) -> list[Finding]:
@@ -139,7 +142,7 @@ def cluster_findings(evidence: Evidence) -> list[Finding]:
     return [
         (
             cluster.area_m2 > POOR_CLUSTER * evidence.area_m2,
-            f"{counted(cluster.points, 'point')} up to "
+            f"{count_things(cluster.points, 'point')} up to "
             f"{cluster.height_m:.{0 if cluster.height_m >= 10 else 1}f} m"
             f" {doubt.value}",
         )
@@ -158,28 +161,28 @@ def part_findings(evidence: Evidence) -> list[Finding]:
     )
 
 
-def evidence_of(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidence:
-    """What `points` (n, 3) and `unused` ones (m, 3) say of a model; see `verdict_of`."""
+def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidence:
+    """What `points` (n, 3) and `unused` ones (m, 3) say of a model; see `judge_model`."""
     roof, everything = model.roof, np.concatenate([points, unused])
-    z_roof, part = highest_of(roof.parts, everything[:, :2])
+    z_roof, part = find_highest(roof.parts, everything[:, :2])
     dz = everything[:, 2] - z_roof
     on_roof = np.abs(dz) < NEAR_M
     is_off = ~on_roof
     is_off[is_off] = point_surface_distances(everything[is_off], wall_rings(model)) >= FACADE_M
     counts, area_m2 = on_roof | is_off, roof.outline.area
-    used = np.arange(len(everything)) < len(points)
-    roof_points = points[counts[used]]
-    support = np.bincount(part[on_roof & used], minlength=len(roof.parts))
-    shown_m2 = np.array(model.shown_m2)
+    mask = np.arange(len(everything)) < len(points)
+    roof_points = points[counts[mask]]
+    support = np.bincount(part[on_roof & mask], minlength=len(roof.parts))
+    shown_m2 = np.array(model.visible_m2)
     is_guess = (shown_m2 > SMALL_PART_M2) & (support < FEWEST_ON_PART)
     spacing_m = math.sqrt(area_m2 / max(np.count_nonzero(counts), 1))
     clusters = [
-        largest_cluster(everything[far], np.abs(dz[far]), spacing_m)
-        for far in (is_off & (dz > LEVEL_M) & np.isfinite(dz), is_off & (dz < -LEVEL_M))
+        largest_cluster(everything[distant], np.abs(dz[distant]), spacing_m)
+        for distant in (is_off & (dz > LEVEL_M) & np.isfinite(dz), is_off & (dz < -LEVEL_M))
     ]
     return Evidence(
         points=len(roof_points),
-        near=float(on_roof[used].sum() / max(len(roof_points), 1)),
+        near=float(on_roof[mask].sum() / max(len(roof_points), 1)),
         unseen=unseen_share(roof_points, roof.outline),
         above=clusters[0],
         below=clusters[1],
@@ -191,7 +194,9 @@ def evidence_of(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidenc
 def wall_rings(model: Model) -> list[list[np.ndarray]]:
     """The walls of a model as lists of rings (m, 3), in the frame of its roof."""
     vertices = model.solid.vertices - model.roof.frame.origin
-    return [[vertices[list(ring)] for ring in face.rings] for face in model.solid.of_kind(WALL)]
+    return [
+        [vertices[list(ring)] for ring in face.rings] for face in model.solid.select_faces(WALL)
+    ]
 
 
 def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) -> Cluster:
@@ -200,7 +205,7 @@ def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) 
 
     Tall and lower points are apart, so that a bird over a chimney makes no tower of it.
     """
-    found, is_tall = Cluster(), height_m >= TALL_M
+    result, is_tall = Cluster(), height_m >= TALL_M
     for band, least_m2 in ((is_tall, 0.0), (~is_tall, LEVEL_M2)):
         heights = height_m[band]
         for members in clusters_in_plan(points[band], max(LINK_SPACINGS * spacing_m, LINK_M)):
@@ -208,8 +213,8 @@ def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) 
                 len(members), float(heights[members].max()), len(members) * spacing_m**2
             )
             if cluster.points >= FEWEST_IN_CLUSTER and cluster.area_m2 >= least_m2:
-                found = max(found, cluster)
-    return found
+                result = max(result, cluster)
+    return result
 
 
 def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[list[int]]:
@@ -223,8 +228,8 @@ def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[list[int]]:
         waiting = [(column, row)]
         while waiting:
             column, row = waiting.pop()
-            around = ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
-            for cell in [cell for cell in around if cell in members]:
+            surroundings = ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+            for cell in [cell for cell in surroundings if cell in members]:
                 group += members.pop(cell)
                 waiting.append(cell)
         groups.append(group)

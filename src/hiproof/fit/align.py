@@ -23,8 +23,8 @@ from ..compiled import compiled
 from ..geometry.grid import count_cells
 from ..geometry.rings import counterclockwise, ring_edges
 from .outline.cost import cost_at_depth
-from .outline.lines import lines_through
-from .outline.settle import side_offsets, span_of
+from .outline.lines import make_lines
+from .outline.settle import compute_span, side_offsets
 from .union.plan import signed_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
@@ -83,10 +83,10 @@ class Shift:
     def is_clear(self) -> bool:
         """Whether the footprint should be moved."""
         length = float(np.hypot(*self.xy))
-        known = length > 0 and float(np.hypot(*(self.sigma * self.xy / length)))
+        is_determined = length > 0 and float(np.hypot(*(self.sigma * self.xy / length)))
         return bool(
             LEAST_SHIFT_M <= length <= FARTHEST_M
-            and length > SIGMAS * known
+            and length > SIGMAS * is_determined
             and self.disagreement < MOST_DISAGREEMENT_M
         )
 
@@ -110,7 +110,7 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
     ring = counterclockwise(shapely.get_exterior_ring(shapely.simplify(footprint, PITCH_M)))[:-1]
     if len(xy) < LEAST_POINTS or len(ring) < 3:
         return Shift()
-    xy, lines = np.ascontiguousarray(xy), lines_through(ring)
+    xy, lines = np.ascontiguousarray(xy), make_lines(ring)
     density = len(xy) / max(shapely.Polygon(ring).area, 1.0)
     shift = by_sides(xy, ring, lines, np.zeros(2), 0.0, density)
     if shift is not None and shift.is_none:
@@ -148,13 +148,13 @@ def settled_shift(
     """The shift by the sides of a footprint that is grown by `overhang` (m), from where it holds
     most points on.
     """
-    shift = Shift(most_points(xy, footprint, overhang))
+    shift = Shift(count_points_within(xy, footprint, overhang))
     for _ in range(ROUNDS):
-        found = by_sides(xy, ring, lines, shift.xy, overhang, density)
-        if found is None:
+        sides = by_sides(xy, ring, lines, shift.xy, overhang, density)
+        if sides is None:
             return Shift()
-        is_settled = np.abs(found.xy - shift.xy).max() < 0.02
-        shift = found
+        is_settled = np.abs(sides.xy - shift.xy).max() < 0.02
+        shift = sides
         if is_settled:
             break
     return shift
@@ -165,22 +165,24 @@ def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
     a few of them say no.
     """
     shapely.prepare(footprint)
-    for some in (xy[::FEW], xy):
-        outside = ~shapely.contains_xy(footprint, some[:, 0], some[:, 1])
+    for subset in (xy[::FEW], xy):
+        outside = ~shapely.contains_xy(footprint, subset[:, 0], subset[:, 1])
         if np.count_nonzero(outside) / len(xy) >= LEAST_OUTSIDE:
             return False
     return True
 
 
-def most_points(xy: np.ndarray, footprint: shapely.Polygon, overhang: float) -> np.ndarray:
+def count_points_within(xy: np.ndarray, footprint: shapely.Polygon, overhang: float) -> np.ndarray:
     """The shift (2,) at which the footprint, grown by `overhang` (m), holds most of `xy`, the least
     of those that hold as many: coarse, then fine.
     """
-    low = np.array(footprint.bounds[:2]) - STRAY_FROM_M - overhang
+    lower = np.array(footprint.bounds[:2]) - STRAY_FROM_M - overhang
     count = np.ceil(
-        (np.array(footprint.bounds[2:]) + STRAY_FROM_M + overhang - low) / (2 * PITCH_M)
+        (np.array(footprint.bounds[2:]) + STRAY_FROM_M + overhang - lower) / (2 * PITCH_M)
     ).astype(int)
-    x, y = (start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(low, count, strict=True))
+    x, y = (
+        start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(lower, count, strict=True)
+    )
     depth = (
         signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
         + overhang
@@ -189,15 +191,17 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon, overhang: float) -> 
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
     for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
-        tried = best + moves_around(step, reach)
-        tried = tried[np.hypot(*tried.T) <= FARTHEST_M]
-        cost = slid_costs(few, costs, low, 2 * PITCH_M, tried) + 0.1 * (tried**2).sum(axis=1)
-        best = tried[int(np.argmin(cost))]
+        candidates = best + list_moves(step, reach)
+        candidates = candidates[np.hypot(*candidates.T) <= FARTHEST_M]
+        cost = slid_costs(few, costs, lower, 2 * PITCH_M, candidates) + 0.1 * (candidates**2).sum(
+            axis=1
+        )
+        best = candidates[int(np.argmin(cost))]
     return best
 
 
 @functools.cache
-def moves_around(step: float, reach: float) -> np.ndarray:
+def list_moves(step: float, reach: float) -> np.ndarray:
     """Moves (m, 2), `step` apart, up to `reach` along either axis."""
     moves = np.arange(-reach, reach + 0.5 * step, step)
     return np.array(list(product(moves, moves)))
@@ -213,23 +217,23 @@ def costs_at(depth):
 
 
 @compiled
-def slid_costs(xy, costs, low, pitch, moves):
+def slid_costs(xy, costs, lower, pitch, moves):
     """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first
-    node lies at `low`.
+    node lies at `lower`.
     """
-    found, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
+    result, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
     (rows, columns), flat = costs.shape, costs.ravel()
     east, north, place = moves[:, 0].copy(), moves[:, 1].copy(), np.empty(len(moves), np.int64)
     # all moves of a point at once: four times as fast as all points of a move
     for k in range(len(xy)):
         x, y = xy[k]
         for m in range(len(moves)):
-            i = int((x - east[m] - low[0]) * nodes_a_metre + 0.5)
-            j = int((y - north[m] - low[1]) * nodes_a_metre + 0.5)
+            i = int((x - east[m] - lower[0]) * nodes_a_metre + 0.5)
+            j = int((y - north[m] - lower[1]) * nodes_a_metre + 0.5)
             place[m] = min(max(i, 0), rows - 1) * columns + min(max(j, 0), columns - 1)
         for m in range(len(moves)):
-            found[m] += flat[place[m]]
-    return found
+            result[m] += flat[place[m]]
+    return result
 
 
 def by_sides(
@@ -249,18 +253,18 @@ def by_sides(
     from_lines = normals @ start + overhang
     distances, ends = lines[:, 1] + from_lines, ends + start
     free = free_sides(xy, normals, distances, ends) & (length >= LEAST_SIDE_M)
-    told = length[free]
-    least = LEAST_FREE_OVERHUNG if overhang else LEAST_FREE
-    if len(told) < LEAST_SIDES or told.sum() <= least * length.sum():
+    lengths = length[free]
+    minimum = LEAST_FREE_OVERHUNG if overhang else LEAST_FREE
+    if len(lengths) < LEAST_SIDES or lengths.sum() <= minimum * length.sum():
         return None
-    normals, sigma = normals[free], SIDE_M * np.sqrt(SIDE_LENGTH_M / told)
-    wanted = side_offsets(xy, normals, distances[free], ends[free], density) + from_lines[free]
-    design = np.column_stack([normals, np.ones(len(told))])
+    normals, sigma = normals[free], SIDE_M * np.sqrt(SIDE_LENGTH_M / lengths)
+    targets = side_offsets(xy, normals, distances[free], ends[free], density) + from_lines[free]
+    design = np.column_stack([normals, np.ones(len(lengths))])
     weight = 1.0 / sigma**2
     inverse = np.linalg.inv((design.T * weight) @ design + PRIOR)
-    solution = inverse @ (design.T @ (weight * wanted))
-    gap = wanted - design @ solution
-    disagreement = math.sqrt(float((gap**2 * told).sum() / told.sum()))
+    solution = inverse @ (design.T @ (weight * targets))
+    gap = targets - design @ solution
+    disagreement = math.sqrt(float((gap**2 * lengths).sum() / lengths.sum()))
     spread = np.sqrt(np.diag(inverse)) * max(1.0, math.sqrt(float((weight * gap**2).mean())))
     return Shift(solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement)
 
@@ -270,13 +274,13 @@ def free_sides(xy, normals, distances, ends):
     """Which of the footprint's sides (m,) have points behind them and hardly any before, where
     roofs of neighbours would go on.
     """
-    before, behind = np.zeros(len(normals)), np.zeros(len(normals))
+    previous, behind = np.zeros(len(normals)), np.zeros(len(normals))
     for m in range(len(normals)):
         x, y = normals[m]
-        low, high = span_of(normals[m], ends[m])
+        lower, upper = compute_span(normals[m], ends[m])
         for k in range(len(xy)):
             depth = distances[m] - x * xy[k, 0] - y * xy[k, 1]
-            if -FREE_TO_M < depth < FREE_TO_M and low <= x * xy[k, 1] - y * xy[k, 0] <= high:
-                before[m] += depth < -FREE_FROM_M
+            if -FREE_TO_M < depth < FREE_TO_M and lower <= x * xy[k, 1] - y * xy[k, 0] <= upper:
+                previous[m] += depth < -FREE_FROM_M
                 behind[m] += depth > FREE_FROM_M
-    return (behind >= FREE_TO_M - FREE_FROM_M) & (before <= FREE_SHARE * behind)
+    return (behind >= FREE_TO_M - FREE_FROM_M) & (previous <= FREE_SHARE * behind)

@@ -25,7 +25,7 @@ NODE_M, MOST_NODES = 0.5, 200
 grows with their cube.
 """
 
-GROUND_REACH_M = 0.9
+BARE_REACH_M = 0.9
 """Distance (m) to ground points within which ground is seen: city runs know one in a
 square metre.
 """
@@ -96,27 +96,27 @@ def find_bare_ground(
     more) points of the ground; all in one frame in metres.
     """
     inner = shapely.buffer(shapely.simplify(outline, NEEDLESS_M), -LEAST_WIDTH_M / 2)
-    seen = (
+    mask = (
         shapely.intersects_xy(inner, ground[:, 0], ground[:, 1])
         if len(ground)
         else np.zeros(0, bool)
     )
-    if count_cells(np.floor(ground[seen, :2])) < LEAST_SEEN * LEAST_AREA_M2 / 2 or len(roof) == 0:
+    if count_cells(np.floor(ground[mask, :2])) < LEAST_SEEN * LEAST_AREA_M2 / 2 or len(roof) == 0:
         return None
     angle = main_direction(outline)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    scene = Scene.of(
+    scene = ClassifiedPoints.of(
         shapely.transform(outline, lambda xy: xy @ turn), roof[:, :2] @ turn, ground[:, :2] @ turn
     )
     pieces = list(scene.pieces())
     if not pieces:
         return None
-    left = without(scene.outline, pieces)
-    area = scene.outline.area - left.area
-    parts = sorted(shapely.get_parts(left), key=shapely.area, reverse=True)
+    remainder = subtract_pieces(scene.outline, pieces)
+    area = scene.outline.area - remainder.area
+    parts = sorted(shapely.get_parts(remainder), key=shapely.area, reverse=True)
     is_one = (
         bool(parts)
-        and parts[0].area > 0.9 * left.area
+        and parts[0].area > 0.9 * remainder.area
         and parts[0].area > (1 - MOST_CUT) * scene.outline.area
     )
     if not is_one:
@@ -125,20 +125,20 @@ def find_bare_ground(
     return BareGround(back, scene.outline.area - parts[0].area)
 
 
-def without(outline: shapely.Polygon, pieces: list[shapely.Polygon]) -> shapely.Geometry:
+def subtract_pieces(outline: shapely.Polygon, pieces: list[shapely.Polygon]) -> shapely.Geometry:
     """The outline less the pieces and less what would be left thinner than THIN_M beside them."""
-    left = shapely.difference(outline, shapely.union_all(pieces))
-    thick = shapely.buffer(left, -THIN_M / 2, join_style="mitre")
+    remainder = shapely.difference(outline, shapely.union_all(pieces))
+    thick = shapely.buffer(remainder, -THIN_M / 2, join_style="mitre")
     thick = shapely.buffer(thick, THIN_M / 2 + 1e-6, join_style="mitre", mitre_limit=3.0)
     # what was thin before is the outline's own, and stays
-    thin = shapely.difference(left, thick)
-    near = shapely.buffer(shapely.union_all(pieces), 1e-3)
-    own = [part for part in shapely.get_parts(thin) if not shapely.intersects(part, near)]
-    return shapely.union_all([shapely.intersection(left, thick), *own])
+    thin = shapely.difference(remainder, thick)
+    buffer = shapely.buffer(shapely.union_all(pieces), 1e-3)
+    members = [part for part in shapely.get_parts(thin) if not shapely.intersects(part, buffer)]
+    return shapely.union_all([shapely.intersection(remainder, thick), *members])
 
 
 @dataclass
-class Scene:
+class ClassifiedPoints:
     """Places in the footprint's main directions, `node` (m) apart: `value` (rows, columns) 1 for
     bare ground, negative for roof and unseen places, 0 outside; `x`, `y` their coordinates.
     """
@@ -153,11 +153,11 @@ class Scene:
     value: np.ndarray
 
     @classmethod
-    def of(cls, outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray) -> Scene:
+    def of(cls, outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray) -> ClassifiedPoints:
         """All places over the outline, classified."""
-        low, high = np.array(outline.bounds).reshape(2, 2)
-        node = max(NODE_M, float((high - low).max()) / MOST_NODES)
-        x, y = (np.arange(low[k] + node / 2, high[k], node) for k in (0, 1))
+        lower, upper = np.array(outline.bounds).reshape(2, 2)
+        node = max(NODE_M, float((upper - lower).max()) / MOST_NODES)
+        x, y = (np.arange(lower[k] + node / 2, upper[k], node) for k in (0, 1))
         grid_x, grid_y = np.meshgrid(x, y)
         places = np.column_stack([grid_x.ravel(), grid_y.ravel()])
         inside = shapely.intersects_xy(outline, places[:, 0], places[:, 1])
@@ -165,8 +165,8 @@ class Scene:
         from scipy.spatial import cKDTree  # a tenth of a second, which most runs need not spend
 
         to_roof = cKDTree(roof).query(places[inside], distance_upper_bound=FARTHEST_ROOF_M)[0]
-        to_ground = cKDTree(ground).query(places[inside], distance_upper_bound=GROUND_REACH_M)[0]
-        spacing = float(np.clip(typical_spacing(roof), NEAREST_ROOF_M, FARTHEST_ROOF_M))
+        to_ground = cKDTree(ground).query(places[inside], distance_upper_bound=BARE_REACH_M)[0]
+        spacing = float(np.clip(estimate_spacing(roof), NEAREST_ROOF_M, FARTHEST_ROOF_M))
         is_roof = to_roof < spacing
         bare = np.where(is_roof, -ROOF_COST, np.where(np.isfinite(to_ground), 1.0, -UNSEEN_COST))
         value[inside] = bare
@@ -180,13 +180,13 @@ class Scene:
             inside = block != 0
             if total * self.node**2 < LEAST_AREA_M2 * LEAST_SEEN or not inside.any():
                 return
-            seen, roof = (
+            visible, roof = (
                 (block == 1.0).sum() / inside.sum(),
                 (block == -ROOF_COST).sum() / inside.sum(),
             )
             self.value[top:bottom, left:right] = np.where(inside, -ROOF_COST, 0.0)
             corners = self.x[left], self.y[top], self.x[right - 1], self.y[bottom - 1]
-            if seen < LEAST_SEEN or roof > MOST_ROOF:
+            if visible < LEAST_SEEN or roof > MOST_ROOF:
                 continue
             box = np.array(corners) + self.node / 2 * np.array([-1, -1, 1, 1])
             piece = shapely.box(*(self.side(box, k) for k in range(4)))
@@ -200,13 +200,13 @@ class Scene:
         beside it, out of the outline where none does up to its end, else where it is.
         """
         axis, sign = k % 2, -1.0 if k < 2 else 1.0
-        low, high = box[1 - axis] + 0.25 * self.spacing, box[3 - axis] - 0.25 * self.spacing
+        lower, upper = box[1 - axis] + 0.25 * self.spacing, box[3 - axis] - 0.25 * self.spacing
         across = self.roof[:, 1 - axis]
         # positive outwards
-        along = sign * (self.roof[(across > low) & (across < high), axis] - box[k])
-        near = np.sort(along[(along > -RUN_ON_M / 2) & (along < RUN_ON_M + self.spacing)])
+        along = sign * (self.roof[(across > lower) & (across < upper), axis] - box[k])
+        nearby = np.sort(along[(along > -RUN_ON_M / 2) & (along < RUN_ON_M + self.spacing)])
         begins = first_dense(
-            near, self.spacing, DENSE * (box[3 - axis] - box[1 - axis]) / self.spacing
+            nearby, self.spacing, DENSE * (box[3 - axis] - box[1 - axis]) / self.spacing
         )
         to_end = sign * (self.outline.bounds[k] - box[k])
         if begins is not None:
@@ -214,20 +214,20 @@ class Scene:
         return float(self.outline.bounds[k] + sign * BEYOND_M if to_end <= RUN_ON_M else box[k])
 
 
-def first_dense(sorted_along: np.ndarray, spacing: float, fewest: float) -> float | None:
+def first_dense(sorted_along: np.ndarray, spacing: float, largest: float) -> float | None:
     """Where, from inside out, points begin to lie as densely as a roof's;
 
     None where they do not.
     """
-    fewest = max(2, math.ceil(fewest))
-    if len(sorted_along) < fewest:
+    largest = max(2, math.ceil(largest))
+    if len(sorted_along) < largest:
         return None
-    width = sorted_along[fewest - 1 :] - sorted_along[: len(sorted_along) - fewest + 1]
+    width = sorted_along[largest - 1 :] - sorted_along[: len(sorted_along) - largest + 1]
     dense = np.flatnonzero(width <= spacing)
     return float(sorted_along[dense[0]]) if len(dense) else None
 
 
-def typical_spacing(roof: np.ndarray) -> float:
+def estimate_spacing(roof: np.ndarray) -> float:
     """Distance (m) between roof points, were they even: from the square metres that hold any."""
     cells = count_cells(np.floor(roof))
     return math.sqrt(max(cells, 1) / len(roof))
@@ -247,7 +247,7 @@ def largest_sum(value: np.ndarray) -> tuple[int, int, int, int, float]:
         gain = strips - lowest
         row, column = np.unravel_index(np.argmax(gain), gain.shape)
         if gain[row, column] > best[4] + 1e-9:
-            before = np.hstack([0.0, strips[row, :column]])
-            left = int(np.argmin(before[: column + 1]))
-            best = (top, top + 1 + int(row), left, int(column) + 1, float(gain[row, column]))
+            previous = np.hstack([0.0, strips[row, :column]])
+            remainder = int(np.argmin(previous[: column + 1]))
+            best = (top, top + 1 + int(row), remainder, int(column) + 1, float(gain[row, column]))
     return best

@@ -23,7 +23,7 @@ def nearest(points, i, indices, distances):
 
     Searches outwards on both sides of `i` and ends a side where x alone is too far.
     """
-    indices[0], distances[0], found, farthest = i, 0.0, 1, np.inf
+    indices[0], distances[0], count, farthest = i, 0.0, 1, np.inf
     for direction in (-1, 1):
         j = i + direction
         while 0 <= j < len(points):
@@ -36,17 +36,17 @@ def nearest(points, i, indices, distances):
                 break
             squared = dx * dx + dy * dy + dz * dz
             if squared < farthest:
-                if found < len(indices):
-                    found += 1
-                k = found - 1
+                if count < len(indices):
+                    count += 1
+                k = count - 1
                 while k > 0 and distances[k - 1] > squared:
                     distances[k], indices[k] = distances[k - 1], indices[k - 1]
                     k -= 1
                 distances[k], indices[k] = squared, j
-                if found == len(indices):
-                    farthest = distances[found - 1]
+                if count == len(indices):
+                    farthest = distances[count - 1]
             j += direction
-    return found
+    return count
 
 
 @compiled
@@ -87,8 +87,8 @@ def slope_direction(points, queries, neighbours):
     indices, distances = np.empty(neighbours, np.int64), np.empty(neighbours)
     count = 0
     for i in range(0, len(points), stride):
-        found = nearest(points, i, indices, distances)
-        a, b, squared = local_slope(points, indices[:found])
+        result = nearest(points, i, indices, distances)
+        a, b, squared = local_slope(points, indices[:result])
         slope = math.hypot(a, b)
         if 0.08 < slope < 2.5:
             azimuths[count], weights[count] = (
@@ -122,8 +122,8 @@ def rectangle_direction(points, trim, angles):
         c, s = math.cos(k * math.pi / (2 * angles)), math.sin(k * math.pi / (2 * angles))
         for i in range(len(points)):
             across[i] = c * points[i, 0] + s * points[i, 1]
-        low, high = trimmed_range(across, trim)
-        extents[k] = high - low
+        lower, upper = trimmed_range(across, trim)
+        extents[k] = upper - lower
     areas = extents[:angles] * extents[angles:]
     return np.argmin(areas) * math.pi / (2 * angles)
 
@@ -157,17 +157,18 @@ def quarter_gap(angle):
     return angle - np.floor(angle / (0.5 * math.pi) + 0.5) * (0.5 * math.pi)
 
 
-def support_of(
-    tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float
+def measure_support(
+    candidates: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float
 ) -> np.ndarray:
-    """Weight (k,) of those of the directions `angle` (n,) that lie near each one `tried` (k,), all
-    modulo 90 degrees.
+    """Weight (k,) of those of the directions `angle` (n,) that lie near each one `candidates` (k,),
+    all modulo 90 degrees.
 
-    >>> support_of(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0, 3.0,
+    >>> measure_support(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0,
+    ...     3.0,
     ...     1.0]), 0.01)
     array([5., 1.])
     """
-    gaps = quarter_gap(angle[None, :] - tried[:, None])
+    gaps = quarter_gap(angle[None, :] - candidates[:, None])
     return (weight * np.exp(-0.5 * (gaps / spread_rad) ** 2)).sum(axis=1)
 
 
@@ -183,10 +184,10 @@ def main_direction(outline: shapely.Polygon) -> float:
     candidates = angle[length > 0.5] if (length > 0.5).any() else angle
     if len(candidates) > 200:
         candidates = np.radians(np.arange(0.0, 90.0, 0.5))
-    peak = candidates[np.argmax(support_of(candidates, angle, length, PEAK_RAD))]
-    off = quarter_gap(angle - peak)
-    weight = length * (np.abs(off) < NEAR_PEAK_RAD)
-    return float(peak + (weight * off).sum() / max(weight.sum(), 1e-12))
+    peak = candidates[np.argmax(measure_support(candidates, angle, length, PEAK_RAD))]
+    gap = quarter_gap(angle - peak)
+    weight = length * (np.abs(gap) < NEAR_PEAK_RAD)
+    return float(peak + (weight * gap).sum() / max(weight.sum(), 1e-12))
 
 
 def outline_rectangle(outline: shapely.Polygon, kappa: float) -> np.ndarray:

@@ -349,11 +349,11 @@ def solve_damped(hessian, gradient, damping, size, step, factor):
 
 
 @compiled
-def freeze_at_bounds(theta, low, high, size, gradient, hessian):
+def freeze_at_bounds(theta, lower, upper, size, gradient, hessian):
     """Take the parameters whose bound stops them out of the step: the active set."""
     for k in range(size):
-        if (theta[k] <= low[k] and gradient[k] >= 0.0) or (
-            theta[k] >= high[k] and gradient[k] <= 0.0
+        if (theta[k] <= lower[k] and gradient[k] >= 0.0) or (
+            theta[k] >= upper[k] and gradient[k] <= 0.0
         ):
             gradient[k] = 0.0
             hessian[k, :] = 0.0
@@ -362,7 +362,7 @@ def freeze_at_bounds(theta, low, high, size, gradient, hessian):
 
 
 @compiled
-def take_step(theta, step, low, high, size, moved):
+def take_step(theta, step, lower, upper, size, moved):
     """`moved` = theta + step, shortened to the step caps and kept within the bounds."""
     share = 1.0
     for k in range(size):
@@ -371,11 +371,11 @@ def take_step(theta, step, low, high, size, moved):
             share = cap / abs(step[k])
     for k in range(SIZE):
         move = share * step[k] if k < size else 0.0
-        moved[k] = min(max(theta[k] + move, low[k]), high[k])
+        moved[k] = min(max(theta[k] + move, lower[k]), upper[k])
 
 
 @compiled
-def minimise(problem, tables, kind, theta, low, high, noise, iterations, tolerance):
+def minimise(problem, tables, kind, theta, lower, upper, noise, iterations, tolerance):
     """Levenberg-Marquardt within the box [low, high]; `theta` (9,) is moved in place.
 
     A parameter with low = high is fixed. Ends after `iterations` or when a step gains less than
@@ -387,19 +387,19 @@ def minimise(problem, tables, kind, theta, low, high, noise, iterations, toleran
     gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     gradient_new, hessian_new = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     step, factor, moved = np.zeros(SIZE), np.zeros((SIZE, SIZE)), theta.copy()
-    take_step(theta, step, low, high, size, theta)
+    take_step(theta, step, lower, upper, size, theta)
     value, inliers, squares = evaluate(
         problem, tables, kind, theta, noise, space, gradient, hessian
     )
     evaluations, damping = 1, 1e-3
     for _ in range(iterations):
-        freeze_at_bounds(theta, low, high, size, gradient, hessian)
+        freeze_at_bounds(theta, lower, upper, size, gradient, hessian)
         gain = -1.0
         for _ in range(6):
             if not solve_damped(hessian, gradient, damping, size, step, factor):
                 damping = max(10 * damping, 1e-3)
                 continue
-            take_step(theta, step, low, high, size, moved)
+            take_step(theta, step, lower, upper, size, moved)
             value_new, inliers_new, squares_new = evaluate(
                 problem, tables, kind, moved, noise, space, gradient_new, hessian_new
             )
@@ -480,7 +480,7 @@ def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, ro
 
 
 @compiled
-def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
+def sharpen_sides(problem, tables, kind, theta, lower, upper, noise, prior, taus):
     """Re-fit with harder and harder sides, keeping the best;
 
     `theta` in place. Returns (value, noise, evaluations).
@@ -492,10 +492,10 @@ def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
     for tau in taus:
         noise = Noise(noise.sigma, tau, noise.eps)
         _, inliers, squares, first = minimise(
-            problem, tables, kind, moved, low, high, noise, 10, 0.01
+            problem, tables, kind, moved, lower, upper, noise, 10, 0.01
         )
         noise = learn_noise(len(problem.points), inliers, squares, noise, prior)
-        value, _, _, second = minimise(problem, tables, kind, moved, low, high, noise, 6, 0.01)
+        value, _, _, second = minimise(problem, tables, kind, moved, lower, upper, noise, 6, 0.01)
         total += first + second
         if value < best:
             best, best_noise, worse = value, noise, 0
@@ -596,10 +596,10 @@ def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, g
     shifts = np.empty((2, grid))
     for axis in range(2):
         gap = 2.0 * theta[HALF_LENGTH - axis] / max(inliers, 1.0)
-        low, high = -(2.0 * noise.tau + 1.5 * gap), 2.0 * noise.tau + 7.0 * gap
-        low = max(low, -0.5 * theta[HALF_LENGTH - axis])
+        lower, upper = -(2.0 * noise.tau + 1.5 * gap), 2.0 * noise.tau + 7.0 * gap
+        lower = max(lower, -0.5 * theta[HALF_LENGTH - axis])
         for k in range(grid):
-            shifts[axis, k] = low + (high - low) * k / (grid - 1)
+            shifts[axis, k] = lower + (upper - lower) * k / (grid - 1)
     table = tabulate_sides(problem, tables, kind, theta, noise, shifts, new_space())
     centre_u, growth_u, var_u, var_length = side_posterior(
         table[0], table[1], shifts[0], theta[HALF_LENGTH], inliers, centre_precision[0]
@@ -621,18 +621,18 @@ def mode(values, bin_m, counts):
 
     `counts` is working space.
     """
-    low, high = values.min(), values.max()
-    bins = min(int((high - low) / bin_m) + 2, len(counts))
+    smallest, largest = values.min(), values.max()
+    bins = min(int((largest - smallest) / bin_m) + 2, len(counts))
     counts[:bins] = 0
     for value in values:
-        k = int((value - low) / bin_m)
+        k = int((value - smallest) / bin_m)
         if k < bins:
             counts[k] += 1
     best = 0
     for k in range(bins - 1):
         if counts[k] + counts[k + 1] > counts[best] + counts[best + 1]:
             best = k
-    return counts[best] + counts[best + 1], low + (best + 1) * bin_m
+    return counts[best] + counts[best + 1], smallest + (best + 1) * bin_m
 
 
 @compiled
@@ -684,11 +684,11 @@ def vote_each(problem, tables, rectangles):
     limit = len(rectangles) * tables.turns.sum()
     kinds, thetas, votes = np.empty(limit, np.int64), np.zeros((limit, SIZE)), np.empty(limit)
     space, heights, counts = new_space(), np.empty(len(problem.points)), np.zeros(400, np.int64)
-    found = 0
+    count = 0
     for rectangle in rectangles:
         for kind in range(len(tables.size)):
             for turn in range(tables.turns[kind]):
-                theta = thetas[found]
+                theta = thetas[count]
                 theta[:Q0] = rectangle
                 theta[KAPPA] += turn * math.pi / 2
                 if turn % 2 == 1:
@@ -696,7 +696,7 @@ def vote_each(problem, tables, rectangles):
                         rectangle[HALF_LENGTH],
                         rectangle[HALF_WIDTH],
                     )
-                kinds[found] = kind
-                votes[found] = vote(problem, tables, kind, theta, space, heights, counts)
-                found += 1
-    return kinds[:found], thetas[:found], votes[:found]
+                kinds[count] = kind
+                votes[count] = vote(problem, tables, kind, theta, space, heights, counts)
+                count += 1
+    return kinds[:count], thetas[:count], votes[:count]

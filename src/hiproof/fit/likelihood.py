@@ -49,7 +49,7 @@ ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15
 # of the fine fit, that a type must have over the one it derives from to be considered
 LEAST_GAIN_NATS = 0.2
 SIDE_GRID = 28  # cells a side over which its posterior mean is summed
-PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
+PLAN_INDICES = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ class Candidates:
     values: np.ndarray
     evaluations: int = 0
 
-    def chosen(self, rows: np.ndarray) -> Candidates:
+    def select(self, rows: np.ndarray) -> Candidates:
         return Candidates(self.kinds[rows], self.thetas[rows], self.values[rows], self.evaluations)
 
-    def within(self, slack: float) -> Candidates:
+    def select_within(self, slack: float) -> Candidates:
         """Those at most `slack` nats behind the best."""
-        return self.chosen(self.values <= self.values.min() + slack)
+        return self.select(self.values <= self.values.min() + slack)
 
     def joined(self, other: Candidates) -> Candidates:
         return Candidates(
@@ -112,12 +112,12 @@ class Search:
 
     def box(self, candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Bounds (m, 9) of each candidate; a given plan is a box without width."""
-        low, high = self.low[candidates.kinds], self.high[candidates.kinds]
+        lower, upper = self.low[candidates.kinds], self.high[candidates.kinds]
         if not self.whole.plan_is_free:
-            low[:, :Q0] = high[:, :Q0] = candidates.thetas[:, :Q0]
-        return low, high
+            lower[:, :Q0] = upper[:, :Q0] = candidates.thetas[:, :Q0]
+        return lower, upper
 
-    def minimised(
+    def minimise(
         self,
         problem: Problem,
         candidates: Candidates,
@@ -139,16 +139,16 @@ class Search:
         )
         return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations)
 
-    def coarsely_fitted(self, candidates: Candidates) -> Candidates:
+    def fit_coarsely(self, candidates: Candidates) -> Candidates:
         """The best two of each type after coarse steps on the thinned points."""
-        return self.best_of_type(
-            self.minimised(self.thinned, candidates, COARSE, 4, 0.5), 2, self.slack
+        return self.select_best(
+            self.minimise(self.thinned, candidates, COARSE, 4, 0.5), 2, self.slack
         )
 
-    def roughly_fitted(self, candidates: Candidates) -> Candidates:
+    def fit_roughly(self, candidates: Candidates) -> Candidates:
         """The best two of each type after medium steps on the thinned points."""
-        return self.best_of_type(
-            self.minimised(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack
+        return self.select_best(
+            self.minimise(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack
         )
 
     @property
@@ -158,38 +158,38 @@ class Search:
         """
         return 3.0 + 0.05 * len(self.thinned.points)
 
-    def best_of_type(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
+    def select_best(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
         """The `count` best of each type that are within `slack` nats of its best, types in the
         tables' order.
         """
         families, values = self.family[candidates.kinds].tolist(), candidates.values.tolist()
         ranked = sorted(zip(families, values, range(len(values)), strict=True))
-        kept: list[int] = []
+        selection: list[int] = []
         rank: dict[int, int] = {}
         best: dict[int, float] = {}
         for family, value, row in ranked:
             rank[family] = rank.get(family, 0) + 1
             if rank[family] <= count and value <= best.setdefault(family, value) + slack:
-                kept.append(row)
-        return candidates.chosen(np.array(kept, int))
+                selection.append(row)
+        return candidates.select(np.array(selection, int))
 
-    def that_gain(self, candidates: Candidates) -> Candidates:
+    def select_gaining(self, candidates: Candidates) -> Candidates:
         """Those but for types that explain no more than one that they derive from.
 
         A gable is also a hip whose ends stand upright; learning the noise of every such type would
         take most of the time.
         """
         shapes = [self.shapes[kind] for kind in candidates.kinds]
-        own = {
+        by_name = {
             shape.name: value
             for shape, value in zip(shapes, candidates.values, strict=True)
             if shape.vote
         }
         simpler = [
-            min([own.get(start.source, np.inf) for start in shape.starts], default=np.inf)
+            min([by_name.get(start.source, np.inf) for start in shape.starts], default=np.inf)
             for shape in shapes
         ]
-        return candidates.chosen(candidates.values < np.array(simpler) - LEAST_GAIN_NATS)
+        return candidates.select(candidates.values < np.array(simpler) - LEAST_GAIN_NATS)
 
 
 def fit_likelihood(
@@ -209,7 +209,7 @@ def fit_likelihood(
 
     def estimate(coarse_points: int) -> Estimate:
         search = new_search(points, types, outline is None, coarse_points)
-        return searched(search, types, outline, side_taus, log_prior)
+        return search_types(search, types, outline, side_taus, log_prior)
 
     first = estimate(COARSE_POINTS)
     if all(np.less(first.noise, DOUBTFUL)) or len(points) <= COARSE_POINTS:
@@ -217,7 +217,7 @@ def fit_likelihood(
     return min(first, estimate(MORE_POINTS * COARSE_POINTS), key=lambda one: min(one.bics.values()))
 
 
-def searched(
+def search_types(
     search: Search,
     types: tuple[str, ...],
     outline: shapely.Polygon | None,
@@ -225,34 +225,34 @@ def searched(
     log_prior: dict[str, float] | None,
 ) -> Estimate:
     """The most evident roof of `types` from the starts that the thinned points vote for."""
-    basic = search.roughly_fitted(vote_starts(search, outline))
+    basic = search.fit_roughly(vote_starts(search, outline))
     candidates = basic.joined(
-        search.roughly_fitted(search.coarsely_fitted(derived_starts(search, basic)))
+        search.fit_roughly(search.fit_coarsely(derived_starts(search, basic)))
     )
-    candidates = candidates.chosen(
+    candidates = candidates.select(
         np.array([search.shapes[kind].name in types for kind in candidates.kinds])
     )
-    candidates = candidates.within(
+    candidates = candidates.select_within(
         ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points)
     )
-    candidates = search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
-    candidates = search.that_gain(candidates).within(
+    candidates = search.select_best(search.minimise(search.whole, candidates, FINE, 6, 0.3), 1)
+    candidates = search.select_gaining(candidates).select_within(
         SLACK_NATS + SLACK_NATS_A_POINT * len(search.whole.points)
     )
     candidates, noises = learn(search, candidates)
     winner, bics = choose(search, candidates, log_prior or {})
     return finish(
-        search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus
+        search, candidates.select(np.array([winner])), Noise(*noises[winner]), bics, side_taus
     )
 
 
 @cache
-def needed_for(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+def list_needed_types(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     """(`types` and those their starts derive from, the number of its type for each of their
     variants).
     """
-    needed = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
-    names = tuple(name for name in CATALOGUE if name in needed)
+    mask = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
+    names = tuple(name for name in CATALOGUE if name in mask)
     families = [(shape.name, shape.theta_size) for shape in variants(names)]
     return names, np.array([list(dict.fromkeys(families)).index(family) for family in families])
 
@@ -261,16 +261,16 @@ def new_search(
     points: np.ndarray, types: tuple[str, ...], plan_is_free: bool, coarse_points: int
 ) -> Search:
     """The problem of `points` (n, 4), thinned to about `coarse_points`, and all shapes needed."""
-    names, family = needed_for(types)
+    names, family = list_needed_types(types)
     z_low, z_high = height_range(points[:, 2])
     plan_area = (plan_extents(points[:, :2]) + 2 * OUTLIER_REACH_M).prod() if plan_is_free else 1.0
     log_background = -float(np.log(plan_area * (max(z_high - z_low, 1.0) + OUTLIER_REACH_M)))
-    low, high = (bound.copy() for bound in bounds(names))
-    low[:, Q0], high[:, Q0] = z_low - 1.0, z_high + 1.5
+    lower, upper = (bound.copy() for bound in bounds(names))
+    lower[:, Q0], upper[:, Q0] = z_low - 1.0, z_high + 1.5
     stride = max(1, round(len(points) / coarse_points))
     whole = Problem(points, log_background, plan_is_free)
     thinned = whole._replace(points=np.ascontiguousarray(points[::stride]))
-    return Search(whole, thinned, tables(names), variants(names), family, low, high)
+    return Search(whole, thinned, tables(names), variants(names), family, lower, upper)
 
 
 def height_range(z: np.ndarray) -> tuple[float, float]:
@@ -306,8 +306,8 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
     )
     kinds, thetas, votes = kernel.vote_each(search.thinned, search.tables, rectangles)
     few_votes_less = 0.2 * len(search.thinned.points)
-    candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 8, few_votes_less)
-    return search.coarsely_fitted(candidates)
+    candidates = search.select_best(Candidates(kinds, thetas, -votes), 8, few_votes_less)
+    return search.fit_coarsely(candidates)
 
 
 def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
@@ -331,7 +331,7 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
 
 def derived_starts(search: Search, basic: Candidates) -> Candidates:
     """Starts of the types that derive from simpler ones, from the best `basic` fit of each."""
-    basic = search.best_of_type(basic, 1)
+    basic = search.select_best(basic, 1)
     theta_of = {
         search.shapes[kind].name: theta
         for kind, theta in zip(basic.kinds, basic.thetas, strict=True)
@@ -399,35 +399,35 @@ def finish(
     covariance.
     """
     kind, theta, value = int(winner.kinds[0]), winner.thetas[0].copy(), float(winner.values[0])
-    (low,), (high,) = search.box(winner)
+    (lower,), (upper,) = search.box(winner)
     evaluations = winner.evaluations
     variances = np.zeros(4)
     if search.whole.plan_is_free:
         if side_taus:
-            value, noise, more = kernel.sharpen_sides(
+            value, noise, additions = kernel.sharpen_sides(
                 search.whole,
                 search.tables,
                 kind,
                 theta,
-                low,
-                high,
+                lower,
+                upper,
                 noise,
                 SIGMA_PRIOR,
                 np.array(side_taus),
             )
-            evaluations += more
-        variances, more = settle_sides(search, kind, theta, low, high, noise)
-        evaluations += more
+            evaluations += additions
+        variances, additions = settle_sides(search, kind, theta, lower, upper, noise)
+        evaluations += additions
     shape = search.shapes[kind]
     canonical = shape.canonical_theta(theta)
     # the axes are exchanged, and their variances with them
     if abs(np.sin(canonical[KAPPA] - theta[KAPPA])) > 0.5:
         variances = variances[[1, 0, 3, 2]]
-    covariance = covariance_of(search, kind, canonical, noise, variances)
+    covariance = estimate_covariance(search, kind, canonical, noise, variances)
     return Estimate(shape, canonical, covariance, noise, value, bics, evaluations)
 
 
-def settle_sides(search, kind, theta, low, high, noise) -> tuple[np.ndarray, int]:
+def settle_sides(search, kind, theta, lower, upper, noise) -> tuple[np.ndarray, int]:
     """Posterior means of the four sides, then heights, slopes and direction with them held;
 
     `theta` in place.
@@ -445,15 +445,15 @@ def settle_sides(search, kind, theta, low, high, noise) -> tuple[np.ndarray, int
     variances = kernel.mean_sides(
         search.whole, search.tables, kind, theta, noise, centre_precision, inliers, SIDE_GRID
     )
-    low, high = low.copy(), high.copy()
-    low[PLAN] = high[PLAN] = theta[PLAN]
+    lower, upper = lower.copy(), upper.copy()
+    lower[PLAN_INDICES] = upper[PLAN_INDICES] = theta[PLAN_INDICES]
     _, _, _, evaluations = kernel.minimise(
-        search.whole, search.tables, kind, theta, low, high, noise, 4, 1e-3
+        search.whole, search.tables, kind, theta, lower, upper, noise, 4, 1e-3
     )
     return variances, evaluations
 
 
-def covariance_of(
+def estimate_covariance(
     search: Search, kind: int, theta: np.ndarray, noise: Noise, variances: np.ndarray
 ) -> np.ndarray:
     """Covariance (9, 9) of theta: the sides' own `variances` carried through the heights' inverse
@@ -464,16 +464,16 @@ def covariance_of(
     turn = np.eye(4)
     turn[:2, :2] = [[c, -s], [s, c]]
     first = KAPPA if search.whole.plan_is_free else Q0
-    heights = [k for k in range(first, search.tables.size[kind]) if k not in PLAN]
+    heights = [k for k in range(first, search.tables.size[kind]) if k not in PLAN_INDICES]
     by_heights = np.linalg.inv(hessian[np.ix_(heights, heights)] + 1e-6 * np.eye(len(heights)))
     covariance = np.zeros((9, 9))
     if not search.whole.plan_is_free:
         covariance[np.ix_(heights, heights)] = by_heights
         return covariance
-    response = -by_heights @ hessian[np.ix_(heights, PLAN)]
+    response = -by_heights @ hessian[np.ix_(heights, PLAN_INDICES)]
     of_plan = turn @ np.diag(variances) @ turn.T
-    covariance[np.ix_(PLAN, PLAN)] = of_plan
-    covariance[np.ix_(heights, PLAN)] = response @ of_plan
-    covariance[np.ix_(PLAN, heights)] = (response @ of_plan).T
+    covariance[np.ix_(PLAN_INDICES, PLAN_INDICES)] = of_plan
+    covariance[np.ix_(heights, PLAN_INDICES)] = response @ of_plan
+    covariance[np.ix_(PLAN_INDICES, heights)] = (response @ of_plan).T
     covariance[np.ix_(heights, heights)] = by_heights + response @ of_plan @ response.T
     return covariance

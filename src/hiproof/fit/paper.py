@@ -22,7 +22,7 @@ from ..frames import LocalFrame
 from ..geometry.alpha_shape import SPACINGS, alpha_shape, default_radius
 from ..model import Fit
 from ..primitives import Primitive, get
-from ..primitives.contract import placed
+from ..primitives.contract import place_vertices
 from ..settings import Settings
 
 BETA = 0.1  # weight of the outline in the objective, the paper's own
@@ -31,7 +31,7 @@ ALPHA_SPACINGS = 4.0
 this comes closest to its figures.
 """
 SMALLEST_M = 0.1  # m; no length of a roof is smaller
-TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "pyramid", "mansard", "shed")
+PAPER_TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "pyramid", "mansard", "shed")
 """Those that the paper names, tried where none are asked for."""
 IMPROPER = 1.0
 """Added to J where the vertices form no roof (a ridge longer than the eaves): larger than any
@@ -63,10 +63,10 @@ def fit_paper(
         if outline is None
         else shapely.transform(outline, frame.to_local)
     )
-    names = types or (settings or Settings()).fit.types or TYPES
-    tried = [best_variant(get(name), xyz, boundary) for name in names]
-    values = {fitted.shape.name: fitted.value for fitted in tried}
-    return min(tried, key=lambda fitted: fitted.value).outcome(xyz, frame, values)
+    names = types or (settings or Settings()).fit.types or PAPER_TYPES
+    candidates = [best_variant(get(name), xyz, boundary) for name in names]
+    values = {fitted.shape.name: fitted.value for fitted in candidates}
+    return min(candidates, key=lambda fitted: fitted.value).outcome(xyz, frame, values)
 
 
 def observed_outline(xy: np.ndarray) -> shapely.Polygon:
@@ -93,16 +93,16 @@ class PaperFit:
         turn matters.
         """
         corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(self.boundary))[:4]
-        low, high = np.percentile(self.xyz[:, 2], (0, 100))
+        lower, upper = np.percentile(self.xyz[:, 2], (0, 100))
         side = corners[1] - corners[0]
         lengths = np.linalg.norm(side), np.linalg.norm(corners[3] - corners[0])
         starts = []
         for quarter in range(2 if self.shape.half_turn_symmetric else 4):
             length, width = float(lengths[quarter % 2]), float(lengths[1 - quarter % 2])
-            theta_p = self.shape.typical(width, length, max(high - low, SMALLEST_M))
+            theta_p = self.shape.typical(width, length, max(upper - lower, SMALLEST_M))
             kappa = math.atan2(side[1], side[0]) + quarter * math.pi / 2
             starts.append(
-                np.array([*(theta_p[n] for n in self.names), kappa, *corners.mean(axis=0), low])
+                np.array([*(theta_p[n] for n in self.names), kappa, *corners.mean(axis=0), lower])
             )
         return starts
 
@@ -117,7 +117,7 @@ class PaperFit:
 
     def vertices(self, theta: np.ndarray) -> np.ndarray:
         """Equation 9 without T_G: R_kappa S + T_L."""
-        return placed(self.shape.vertices(self.theta_p(theta)), theta[-4], theta[-3:])
+        return place_vertices(self.shape.vertices(self.theta_p(theta)), theta[-4], theta[-3:])
 
     def objective(self, theta: np.ndarray) -> float:
         """J at `theta`."""
@@ -137,15 +137,15 @@ class PaperFit:
             except ZeroDivisionError:
                 return False
         return all(
-            low <= q <= high for q, (low, high) in zip(shape, self.shape.bounds, strict=False)
+            lower <= q <= upper for q, (lower, upper) in zip(shape, self.shape.bounds, strict=False)
         )
 
     def minimise(self) -> PaperFit:
         """From the start to the nearest minimum."""
         from scipy.optimize import minimize
 
-        found = minimize(self.objective, self.theta, method="L-BFGS-B", bounds=self.bounds())
-        self.theta, self.value = found.x, float(found.fun)
+        result = minimize(self.objective, self.theta, method="L-BFGS-B", bounds=self.bounds())
+        self.theta, self.value = result.x, float(result.fun)
         return self
 
     def outcome(self, xyz: np.ndarray, frame: LocalFrame, values: dict[str, float]) -> Fit:
@@ -161,7 +161,7 @@ class PaperFit:
             self.shape.to_theta(self.theta_p(self.theta), self.theta[-4], self.theta[-3:])
         )
         theta_p, kappa, translation = self.shape.from_theta(theta)
-        vertices = placed(self.shape.vertices(theta_p), kappa, translation)
+        vertices = place_vertices(self.shape.vertices(theta_p), kappa, translation)
         distances = np.abs(plane_distances(xyz, vertices, self.shape.faces)).min(axis=0)
         return Fit(
             type=self.shape.name,

@@ -23,14 +23,14 @@ import shapely
 
 from ..geometry.grid import number_cells
 
-FARTHEST_M = 4.8
+FARTHEST_SHIFT_M = 4.8
 """Longest common shift (m) that is looked for.
 
 Missing grids move things by 0.5 to 4 m; farther off, houses of a row match the footprints of their
 neighbours.
 """
 
-LEAST_M, SIGMAS, MOST_SIGMA_M = 0.3, 4.0, 0.15
+SMALLEST_SHIFT_M, SIGMAS, MOST_SIGMA_M = 0.3, 4.0, 0.15
 """A common shift is applied from this length (m) on, if it is so many standard deviations long and
 these are no larger. Outlines of surveys lie 0.1 to 0.2 m from their roofs without any error of the
 datum.
@@ -46,10 +46,10 @@ LEAST_AGREEMENT, OTHER_M = 1.0, 1.0
 it: rows of equal houses fit each other's footprints nearly as well.
 """
 
-PITCH_M = 0.2
+RASTER_PITCH_M = 0.2
 """Pitch (m) of the raster on which footprints are shifted, and step of the fine search."""
 
-COARSE = 3
+COARSE_STEP = 3
 """Pitches between the shifts of the first search."""
 
 EVERY = 4
@@ -61,10 +61,10 @@ BLUR_M, STRAY = 0.25, math.exp(-4.0)
 SQUARE_M = 50.0
 """Side (m) of the squares whose scatter is measured: a few houses each."""
 
-MARGIN = round((FARTHEST_M + 1.2) / PITCH_M)
+RASTER_MARGIN = round((FARTHEST_SHIFT_M + 1.2) / RASTER_PITCH_M)
 """Pitches of raster around the points, so that no shift leads out of it."""
 
-MOST_POINTS = 30_000
+MOST_SAMPLE_POINTS = 30_000
 """Points of a cell that are used, evenly thinned: more do not change a shift by a centimetre."""
 
 
@@ -93,7 +93,7 @@ class Registration:
         if (
             self.squares < LEAST_SQUARES
             or self.footprints < LEAST_FOOTPRINTS
-            or not self.length >= LEAST_M
+            or not self.length >= SMALLEST_SHIFT_M
         ):
             return False
         sigma = max(self.sigma)
@@ -112,10 +112,10 @@ class Registration:
 
     def to_dict(self) -> dict[str, Any]:
         """For run.json: what was found, and whether it was applied."""
-        known = self.squares > 0 and all(map(math.isfinite, self.sigma))
+        is_determined = self.squares > 0 and all(map(math.isfinite, self.sigma))
         return {
             "shift_m": list(self.xy),
-            "sigma_m": list(self.sigma) if known else None,
+            "sigma_m": list(self.sigma) if is_determined else None,
             "footprints": self.footprints,
             "squares": self.squares,
             "agreement": self.agreement,
@@ -178,21 +178,21 @@ def register(cells: Iterable[tuple[np.ndarray, list[shapely.Polygon]]]) -> Regis
     (True, True)
     """
     pairs = [
-        (cell_of(xy, polygons), len(polygons)) for xy, polygons in cells if len(xy) and polygons
+        (make_cell(xy, polygons), len(polygons)) for xy, polygons in cells if len(xy) and polygons
     ]
     if not pairs:
         return Registration()
     pairs.sort(key=lambda pair: pair[0].low)
-    found, footprints = [cell for cell, _ in pairs], sum(count for _, count in pairs)
-    coarse = grid_of(COARSE, FARTHEST_M)
-    by_square = sums_of(found, coarse, EVERY)
+    result, footprints = [cell for cell, _ in pairs], sum(count for _, count in pairs)
+    coarse = make_shift_grid(COARSE_STEP, FARTHEST_SHIFT_M)
+    by_square = sum_costs(result, coarse, EVERY)
     best = coarse[int(np.argmin(by_square.sum(axis=0)))]
-    fine = best + grid_of(1, COARSE * PITCH_M)
-    best = fine[int(np.argmin(sums_of(found, fine).sum(axis=0)))]
-    gains = by_square[:, PITCH_M * np.hypot(*(coarse - best).T) > OTHER_M] - sums_of(
-        found, best[None], EVERY
+    fine = best + make_shift_grid(1, COARSE_STEP * RASTER_PITCH_M)
+    best = fine[int(np.argmin(sum_costs(result, fine).sum(axis=0)))]
+    gains = by_square[:, RASTER_PITCH_M * np.hypot(*(coarse - best).T) > OTHER_M] - sum_costs(
+        result, best[None], EVERY
     )
-    xy, sigma = settle(found, best)
+    xy, sigma = settle(result, best)
     return Registration(xy, sigma, footprints, len(gains), agreement(gains))
 
 
@@ -208,55 +208,57 @@ def settle(cells: list[Cell], best: np.ndarray) -> tuple[tuple[float, float], tu
     """The minimum (m) beside `best` by a parabola through its surroundings, with deviations by the
     scatter between squares.
     """
-    around = np.array(
+    surroundings = np.array(
         [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]]
     )
-    costs = sums_of(cells, best + around)
-    at, plus_x, minus_x, plus_y, minus_y, both, neither, one, other = costs.sum(axis=0)
+    costs = sum_costs(cells, best + surroundings)
+    position, plus_x, minus_x, plus_y, minus_y, combined, neither, item, other = costs.sum(axis=0)
     slopes = np.column_stack([costs[:, 1] - costs[:, 2], costs[:, 3] - costs[:, 4]]) / 2
-    cross = (both + neither - one - other) / 4
-    bend = np.array([[plus_x + minus_x - 2 * at, cross], [cross, plus_y + minus_y - 2 * at]])
+    cross = (combined + neither - item - other) / 4
+    bend = np.array(
+        [[plus_x + minus_x - 2 * position, cross], [cross, plus_y + minus_y - 2 * position]]
+    )
     if not (np.linalg.eigvalsh(bend) > 0).all():
-        return rounded(best), (math.inf, math.inf)
+        return round_shift(best), (math.inf, math.inf)
     inverse = np.linalg.inv(bend)
     move = -inverse @ slopes.sum(axis=0)
-    apart = slopes - slopes.mean(axis=0)
-    sigma = np.sqrt(np.diag(inverse @ (apart.T @ apart) @ inverse))
-    return rounded(best + move / max(1.0, float(np.hypot(*move)))), rounded(sigma)
+    gap = slopes - slopes.mean(axis=0)
+    sigma = np.sqrt(np.diag(inverse @ (gap.T @ gap) @ inverse))
+    return round_shift(best + move / max(1.0, float(np.hypot(*move)))), round_shift(sigma)
 
 
-def sums_of(cells: list[Cell], shifts: np.ndarray, every: int = 1) -> np.ndarray:
+def sum_costs(cells: list[Cell], shifts: np.ndarray, every: int = 1) -> np.ndarray:
     """Costs (squares, m) of all cells, one after the other."""
     return np.concatenate([cell.sums(shifts, every) for cell in cells])
 
 
-def rounded(pitches: np.ndarray) -> tuple[float, float]:
+def round_shift(pitches: np.ndarray) -> tuple[float, float]:
     """Metres, to the millimetre, so that the run's files say exactly what was done."""
-    x, y = (round(float(value) * PITCH_M, 3) for value in pitches)
+    x, y = (round(float(value) * RASTER_PITCH_M, 3) for value in pitches)
     return x, y
 
 
-def grid_of(step: int, reach_m: float) -> np.ndarray:
+def make_shift_grid(step: int, reach_m: float) -> np.ndarray:
     """Shifts (m, 2), `step` pitches apart, at most `reach_m` long."""
-    most = round(reach_m / PITCH_M / step)
-    along = step * np.arange(-most, most + 1)
+    limit = round(reach_m / RASTER_PITCH_M / step)
+    along = step * np.arange(-limit, limit + 1)
     shifts = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
-    return shifts[np.hypot(*shifts.T) * PITCH_M <= reach_m + 1e-9]
+    return shifts[np.hypot(*shifts.T) * RASTER_PITCH_M <= reach_m + 1e-9]
 
 
-def cell_of(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
+def make_cell(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
     """The points in a fixed order, thinned, on the raster of what a point costs around them."""
     places = np.unique(np.ascontiguousarray(np.asarray(xy, float)[:, :2]).view(complex))
-    places = places[:: -(-len(places) // MOST_POINTS)]
+    places = places[:: -(-len(places) // MOST_SAMPLE_POINTS)]
     xy = np.column_stack([places.real, places.imag])
-    low = np.floor(xy.min(axis=0) / PITCH_M) - MARGIN
-    shape = (np.ceil(xy.max(axis=0) / PITCH_M) + MARGIN - low).astype(int) + 1
-    inside = blur(rasterise(polygons, low, shape), BLUR_M / PITCH_M)
-    i, j = (np.rint(xy / PITCH_M) - low).astype(int).T
+    lower = np.floor(xy.min(axis=0) / RASTER_PITCH_M) - RASTER_MARGIN
+    shape = (np.ceil(xy.max(axis=0) / RASTER_PITCH_M) + RASTER_MARGIN - lower).astype(int) + 1
+    inside = blur(rasterise(polygons, lower, shape), BLUR_M / RASTER_PITCH_M)
+    i, j = (np.rint(xy / RASTER_PITCH_M) - lower).astype(int).T
     _, squares = number_cells(np.floor(xy / SQUARE_M))
     costs = -np.log(STRAY + (1.0 - STRAY) * inside)
     return Cell(
-        (float(low[0]), float(low[1])),
+        (float(lower[0]), float(lower[1])),
         squares,
         i * shape[1] + j,
         costs.ravel(),
@@ -284,19 +286,22 @@ def blur(raster: np.ndarray, sigma: float) -> np.ndarray:
     return raster
 
 
-def rasterise(polygons: list[shapely.Polygon], low: np.ndarray, shape: np.ndarray) -> np.ndarray:
+def rasterise(polygons: list[shapely.Polygon], lower: np.ndarray, shape: np.ndarray) -> np.ndarray:
     """1 at the nodes (columns, rows) of a raster that any of the polygons holds, else 0;
 
-    `low` (2,) are the first node's pitches.
+    `lower` (2,) are the first node's pitches.
     """
     inside = np.zeros(shape, np.float32)
     for polygon in polygons:
-        box = np.reshape(polygon.bounds, (2, 2)) / PITCH_M - low
+        box = np.reshape(polygon.bounds, (2, 2)) / RASTER_PITCH_M - lower
         first = np.clip(np.ceil(box[0]), 0, shape).astype(int)
         last = np.clip(np.floor(box[1]) + 1, 0, shape).astype(int)
         if (last > first).all():
-            x, y = (PITCH_M * (low[axis] + np.arange(first[axis], last[axis])) for axis in (0, 1))
+            x, y = (
+                RASTER_PITCH_M * (lower[axis] + np.arange(first[axis], last[axis]))
+                for axis in (0, 1)
+            )
             shapely.prepare(polygon)
-            held = shapely.contains_xy(polygon, *np.meshgrid(x, y, indexing="ij"))
-            inside[first[0] : last[0], first[1] : last[1]][held] = 1.0
+            mask = shapely.contains_xy(polygon, *np.meshgrid(x, y, indexing="ij"))
+            inside[first[0] : last[0], first[1] : last[1]][mask] = 1.0
     return inside

@@ -9,10 +9,10 @@ import shapely
 
 from ..errors import FitError
 from ..frames import LocalFrame
-from ..log import counted
+from ..log import count_things
 from ..model import Fit
 from ..primitives import CATALOGUE, get
-from ..primitives.contract import HALF_WIDTH, KAPPA, placed
+from ..primitives.contract import HALF_WIDTH, KAPPA, place_vertices
 from ..read.plausible import is_plausible
 from ..settings import Settings
 from .likelihood import Estimate, fit_likelihood, plan_extents
@@ -104,14 +104,14 @@ def usable_points(
         )
     finite = is_plausible(points[:, :3])
     cloud = np.column_stack([points[finite, :3], weights[finite]])
-    where = "finite points"
+    text = "finite points"
     if outline is not None:
         cloud = cloud[shapely.intersects_xy(outline, cloud[:, 0], cloud[:, 1])]
-        where = "finite points inside the outline"
+        text = "finite points inside the outline"
     count = np.count_nonzero(cloud[:, 3])
     if count < FEWEST_POINTS:
         raise FitError(
-            f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {count} of "
+            f"expected at least {FEWEST_POINTS} {text} to fit a roof, got {count} of "
             f"{len(points)} given; "
             "a flat roof at their median height is all that can be said"
         )
@@ -120,7 +120,8 @@ def usable_points(
     if narrow <= max(THINNEST * wide, 1e-6):
         shape = "in one place" if wide < 1e-6 else "on one line in plan"
         raise FitError(
-            f"expected points spread over a roof, got {counted(len(cloud), 'point')} {shape}; add "
+            f"expected points spread over a roof, got {count_things(len(cloud), 'point')} {shape}; "
+            "add "
             "points beside it"
         )
     return cloud
@@ -143,7 +144,7 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
     shape = estimate.primitive
     theta_p, kappa, translation = shape.from_theta(estimate.theta)
     sigma = standard_deviations(estimate)
-    vertices = placed(shape.vertices(theta_p), kappa, translation)
+    vertices = place_vertices(shape.vertices(theta_p), kappa, translation)
     return Fit(
         type=shape.name,
         parameters=theta_p,
@@ -174,13 +175,13 @@ def standard_deviations(estimate: Estimate) -> dict[str, float]:
     """
     shape, covariance = estimate.primitive, estimate.covariance
     values = estimate.theta[HALF_WIDTH:]
-    named = {**shape.measures, "t_z": shape.eave}
-    gradients = np.zeros((len(named), 9))
-    for row, measure in zip(gradients, named.values(), strict=True):
+    names = {**shape.measures, "t_z": shape.eave}
+    gradients = np.zeros((len(names), 9))
+    for row, measure in zip(gradients, names.values(), strict=True):
         row[HALF_WIDTH:] = measure.gradient(values)
     variances = np.einsum("ij,jk,ik->i", gradients, covariance, gradients)
     sigma = {
-        name: math.sqrt(max(variance, 0.0)) for name, variance in zip(named, variances, strict=True)
+        name: math.sqrt(max(variance, 0.0)) for name, variance in zip(names, variances, strict=True)
     }
     for name, k in (("kappa", KAPPA), ("t_x", 0), ("t_y", 1)):
         sigma[name] = math.sqrt(max(covariance[k, k], 0.0))

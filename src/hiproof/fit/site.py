@@ -14,7 +14,7 @@ from ..read.terrain import Terrain, TerrainChain
 from ..settings import Settings
 from ..status import Doubt
 from .bare_ground import find_bare_ground
-from .standing import FEWEST_PLACES, LEAST_LOW, cover, ground_plane, what_stands
+from .standing import FEWEST_PLACES, LEAST_LOW, classify_standing, cover, ground_plane
 
 DECK_M = 1.0
 """Height over the ground around from which on points of the ground lie on a deck, which is part of
@@ -52,14 +52,14 @@ def look_at_ground(
     in the local `frame`, and by the terrain around.
     """
     ground = ground.compress(shapely.intersects_xy(outline, ground[:, 0], ground[:, 1]), axis=0)
-    plane = None if terrain is None else plane_around(outline, frame, terrain)
+    plane = None if terrain is None else fit_plane_around(outline, frame, terrain)
     if plane is None:
         return cut_bare_ground(points, outline, ground, settings, points)
     ground = ground[ground[:, 2] - ground[:, :2] @ plane[:2] - plane[2] < DECK_M]
-    both = np.concatenate([points, ground])
-    found = what_stands(both, plane)
-    if found.is_empty and not has_roofed_rest(both, found.is_low, outline):
-        share = f"{100 * found.low_share:.0f} % of its points lie on the ground"
+    combined = np.concatenate([points, ground])
+    standing = classify_standing(combined, plane)
+    if standing.is_empty and not has_roofed_rest(combined, standing.is_low, outline):
+        share = f"{100 * standing.low_share:.0f} % of its points lie on the ground"
         if settings.reconstruct.empty_footprints == "skip":
             return Site(
                 points,
@@ -68,12 +68,12 @@ def look_at_ground(
                 is_empty=True,
             )
         return Site(points, outline, f"perhaps nothing stands there: {share}")
-    low = found.is_low[: len(points)]
-    kept = (
-        points[~low] if low.mean() >= LEAST_LOW else points
+    lower = standing.is_low[: len(points)]
+    selection = (
+        points[~lower] if lower.mean() >= LEAST_LOW else points
     )  # so many are the cloud's ground, fewer the feet of walls
     return cut_bare_ground(
-        kept, outline, np.concatenate([ground, points[low]]), settings, points[~low]
+        selection, outline, np.concatenate([ground, points[lower]]), settings, points[~lower]
     )
 
 
@@ -83,14 +83,14 @@ def has_roofed_rest(all_points: np.ndarray, is_low: np.ndarray, outline: shapely
     """
     if is_low.all():
         return False
-    found = find_bare_ground(outline, all_points[~is_low], all_points[is_low])
-    if found is None or found.outline is None:
+    bare_ground = find_bare_ground(outline, all_points[~is_low], all_points[is_low])
+    if bare_ground is None or bare_ground.outline is None:
         return False
-    left = shapely.intersects_xy(found.outline, all_points[:, 0], all_points[:, 1])
-    return bool(left.any()) and cover(all_points[left], ~is_low[left]) >= ROOFED
+    mask = shapely.intersects_xy(bare_ground.outline, all_points[:, 0], all_points[:, 1])
+    return bool(mask.any()) and cover(all_points[mask], ~is_low[mask]) >= ROOFED
 
 
-def plane_around(
+def fit_plane_around(
     outline: shapely.Polygon, frame: LocalFrame, terrain: Terrain
 ) -> np.ndarray | None:
     """The plane of the ground around the outline in the local frame, by what the terrain knows,
@@ -99,12 +99,12 @@ def plane_around(
 
     def height_at(xy: np.ndarray) -> np.ndarray:
         xy = frame.to_world(xy)
-        known = (
-            terrain.known_heights(xy, FEWEST_PLACES)
+        heights = (
+            terrain.find_known_heights(xy, FEWEST_PLACES)
             if isinstance(terrain, TerrainChain)
             else terrain.height_at(xy)
         )
-        return known - frame.origin[2]
+        return heights - frame.origin[2]
 
     return ground_plane(outline, height_at)
 
@@ -114,19 +114,19 @@ def cut_bare_ground(
     outline: shapely.Polygon,
     ground: np.ndarray,
     settings: Settings,
-    high: np.ndarray,
+    upper: np.ndarray,
 ) -> Site:
     """Points and outline without the bare ground among `ground` (m, 3), or with a remark where it
-    is roofed over; `high` (k, 3) are the points that lie above it.
+    is roofed over; `upper` (k, 3) are the points that lie above it.
     """
-    found = find_bare_ground(outline, high, ground) if len(ground) else None
-    if found is None:
+    bare_ground = find_bare_ground(outline, upper, ground) if len(ground) else None
+    if bare_ground is None:
         return Site(points, outline)
-    area = f"{found.area_m2:.0f} m2 {Doubt.BARE_GROUND_INSIDE.value}"
-    if found.outline is None or settings.reconstruct.footprint_trust == "full":
-        advice = "" if found.outline is None else "; --footprint-trust points cuts it out"
+    area = f"{bare_ground.area_m2:.0f} m2 {Doubt.BARE_GROUND_INSIDE.value}"
+    if bare_ground.outline is None or settings.reconstruct.footprint_trust == "full":
+        advice = "" if bare_ground.outline is None else "; --footprint-trust points cuts it out"
         return Site(points, outline, f"{area} is roofed over{advice}")
-    inside = shapely.intersects_xy(found.outline, points[:, 0], points[:, 1])
+    inside = shapely.intersects_xy(bare_ground.outline, points[:, 0], points[:, 1])
     if not inside.any():
         return Site(points, outline, f"{area} is roofed over")
-    return Site(points.compress(inside, axis=0), found.outline, f"{area} was cut out")
+    return Site(points.compress(inside, axis=0), bare_ground.outline, f"{area} was cut out")

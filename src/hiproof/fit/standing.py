@@ -29,7 +29,7 @@ PLACE_M = 2.0
 FEWEST_PLACES = 8
 """Places with a known ground below which no plane is fitted."""
 
-ROUNDS, FAR_M = 3, 0.4
+ROUNDS, BESIDE_PLANE_M = 3, 0.4
 """Rounds of fitting the plane, each without the places farther (m) from the last: kerbs, terraces,
 cars taken for ground.
 """
@@ -75,12 +75,12 @@ class Standing:
     is_empty: bool
 
 
-def what_stands(points: np.ndarray, plane: np.ndarray) -> Standing:
+def classify_standing(points: np.ndarray, plane: np.ndarray) -> Standing:
     """What stands on the ground `plane` (3,), by the points (n, 3) inside a footprint."""
     height = points[:, 2] - points[:, :2] @ plane[:2] - plane[2]
-    low = (height < CLEAR_M) & (height > -DEEPEST_M)
-    share = float(low.mean()) if len(points) else 0.0
-    return Standing(low, share, share >= LEAST_LOW and cover(points, ~low) < LEAST_COVER)
+    mask = (height < CLEAR_M) & (height > -DEEPEST_M)
+    share = float(mask.mean()) if len(points) else 0.0
+    return Standing(mask, share, share >= LEAST_LOW and cover(points, ~mask) < LEAST_COVER)
 
 
 def cover(points: np.ndarray, is_high: np.ndarray) -> float:
@@ -106,16 +106,16 @@ def ground_plane(
         [places_along(shapely.buffer(outline, reach, quad_segs=2)) for reach in RINGS_M]
     )
     heights = height_at(places)
-    known = np.isfinite(heights)
-    if known.sum() < FEWEST_PLACES:
+    mask = np.isfinite(heights)
+    if mask.sum() < FEWEST_PLACES:
         return None
-    places, heights = np.column_stack([places, np.ones(len(places))])[known], heights[known]
+    places, heights = np.column_stack([places, np.ones(len(places))])[mask], heights[mask]
     level = float(np.median(heights))
-    plane, kept = np.array([0.0, 0.0, level]), np.ones(len(heights), bool)
+    plane, selection = np.array([0.0, 0.0, level]), np.ones(len(heights), bool)
     for _ in range(ROUNDS):
-        plane = np.linalg.lstsq(places[kept], heights[kept], rcond=None)[0]
+        plane = np.linalg.lstsq(places[selection], heights[selection], rcond=None)[0]
         off = np.abs(places @ plane - heights)
-        kept = off < max(FAR_M, 2.0 * float(np.median(off)))
+        selection = off < max(BESIDE_PLANE_M, 2.0 * float(np.median(off)))
     return plane if np.median(off) < MOST_ROUGH_M else None
 
 

@@ -56,12 +56,12 @@ def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
         target=np.array(targets),
         power=np.array(powers),
         turns=np.array([vote.turns for vote in votes]),
-        slopes=padded([vote.slopes for vote in votes]),
-        shifts=padded([vote.shifts for vote in votes]),
+        slopes=pad_rows([vote.slopes for vote in votes]),
+        shifts=pad_rows([vote.shifts for vote in votes]),
     )
 
 
-def padded(rows: list[tuple[float, ...]]) -> np.ndarray:
+def pad_rows(rows: list[tuple[float, ...]]) -> np.ndarray:
     """`rows` as one array, NaN where a row is shorter than the longest."""
     result = np.full((len(rows), max(len(row) for row in rows)), np.nan)
     for k, row in enumerate(rows):
@@ -73,9 +73,9 @@ def padded(rows: list[tuple[float, ...]]) -> np.ndarray:
 def bounds(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[np.ndarray, np.ndarray]:
     """(low, high), each (T, 9): the box of theta for every variant; q0 is left to the data."""
     shapes = variants(names)
-    low, high = np.full((len(shapes), SIZE), -np.inf), np.full((len(shapes), SIZE), np.inf)
-    low[:, : len(PLAN_LOW)], high[:, : len(PLAN_HIGH)] = PLAN_LOW, PLAN_HIGH
+    lower, upper = np.full((len(shapes), SIZE), -np.inf), np.full((len(shapes), SIZE), np.inf)
+    lower[:, : len(PLAN_LOW)], upper[:, : len(PLAN_HIGH)] = PLAN_LOW, PLAN_HIGH
     for t, shape in enumerate(shapes):
         for k, (smallest, largest) in enumerate(shape.bounds):
-            low[t, 6 + k], high[t, 6 + k] = smallest, largest
-    return low, high
+            lower[t, 6 + k], upper[t, 6 + k] = smallest, largest
+    return lower, upper

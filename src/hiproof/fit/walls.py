@@ -9,28 +9,28 @@ import numpy as np
 
 from ..compiled import compiled
 
-REACH_SPACINGS = 1.2  # how far around a point is looked
-STEEPEST = 2.0  # slope of a roof: 63 degrees
+WALL_REACH_SPACINGS = 1.2  # how far around a point is looked
+STEEPEST_ROOF = 2.0  # slope of a roof: 63 degrees
 
 
 @compiled
-def on_walls(points, others, spacing):
-    """Which of `points` (n, 3) lie on a wall of the roof that `others` (m, 3) are of, about
+def on_walls(points, neighbours, spacing):
+    """Which of `points` (n, 3) lie on a wall of the roof that `neighbours` (m, 3) are of, about
     `spacing` (m) apart in plan.
 
     >>> roof = np.array([[0.0, 0.0, 5.0], [0.4, 0.0, 5.0], [0.8, 0.0, 5.0]])
     >>> on_walls(np.array([[-0.05, 0.0, 2.0], [-0.05, 0.0, 4.8]]), roof, 0.5)
     array([ True, False])
     """
-    reach, found = REACH_SPACINGS * spacing, np.zeros(len(points), np.bool_)
-    order = np.argsort(others[:, 0])
-    ascending = others[order, 0]
+    reach, result = WALL_REACH_SPACINGS * spacing, np.zeros(len(points), np.bool_)
+    order = np.argsort(neighbours[:, 0])
+    ascending = neighbours[order, 0]
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         k = np.searchsorted(ascending, x - reach)
-        while k < len(order) and ascending[k] <= x + reach and not found[i]:
+        while k < len(order) and ascending[k] <= x + reach and not result[i]:
             j = order[k]
-            near = (others[j, 0] - x) ** 2 + (others[j, 1] - y) ** 2 < reach * reach
-            found[i] = near and others[j, 2] > z + STEEPEST * reach
+            mask = (neighbours[j, 0] - x) ** 2 + (neighbours[j, 1] - y) ** 2 < reach * reach
+            result[i] = mask and neighbours[j, 2] > z + STEEPEST_ROOF * reach
             k += 1
-    return found
+    return result

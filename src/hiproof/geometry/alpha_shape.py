@@ -52,14 +52,14 @@ def alpha_shape(
             f"expected points that span an area, got {len(xy)} in one place or on one line"
         ) from error
     radius = default_radius(xy) if radius is None else radius
-    kept = circumradii(xy[mesh.simplices]) < radius
-    if not kept.any():
+    mask = circumradii(xy[mesh.simplices]) < radius
+    if not mask.any():
         raise FitError(
             f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger "
             "one"
         )
-    outside = np.where(mesh.neighbors < 0, True, ~kept[mesh.neighbors])
-    triangle, opposite = np.nonzero(kept[:, None] & outside)
+    outside = np.where(mesh.neighbors < 0, True, ~mask[mesh.neighbors])
+    triangle, opposite = np.nonzero(mask[:, None] & outside)
     sides = xy[
         mesh.simplices[
             triangle[:, None], np.stack([(opposite + 1) % 3, (opposite + 2) % 3], axis=1)

@@ -18,15 +18,15 @@ def dot(a, b):
 
 
 @compiled
-def newell(vertices, index, low, high):
+def newell(vertices, index, lower, upper):
     """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the
     normal.
     """
     total = np.zeros(3)
-    origin = vertices[index[low]]
-    for k in range(low, high):
+    origin = vertices[index[lower]]
+    for k in range(lower, upper):
         p = vertices[index[k]] - origin
-        q = vertices[index[k + 1 if k + 1 < high else low]] - origin
+        q = vertices[index[k + 1 if k + 1 < upper else lower]] - origin
         total[0] += p[1] * q[2] - p[2] * q[1]
         total[1] += p[2] * q[0] - p[0] * q[2]
         total[2] += p[0] * q[1] - p[1] * q[0]

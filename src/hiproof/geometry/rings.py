@@ -12,14 +12,15 @@ import shapely
 
 # of coordinates (m) where polygons are overlaid: on a grid no overlay fails, nor loses a polygon
 # whose sides all but lie on a neighbour's, as GEOS 3.14 does without one
-GRID_M = 1e-6
+OVERLAY_GRID_M = 1e-6
 
 
-def enclosed(polygons: Any) -> Any:
+def repair_polygons(polygons: Any) -> Any:
     """What the rings of a polygon, or of each of several, enclose: crossing and touching ones made
     valid, a spike of no width none.
 
-    >>> enclosed(shapely.Polygon([(0, 0), (2, 0), (2, 1), (3, 1), (2, 1), (2, 2), (0, 2)])).area
+    >>> repair_polygons(shapely.Polygon([(0, 0), (2, 0), (2, 1), (3, 1), (2, 1), (2, 2), (0,
+    ...     2)])).area
     4.0
     """
     return shapely.make_valid(polygons, method="structure", keep_collapsed=False)

@@ -18,7 +18,7 @@ The only room that imports torch, and not before `train` is asked for.
 
 from __future__ import annotations
 
-from ..extras import needed
+from ..extras import import_extra
 
 __all__ = ["TrainSettings", "train"]
 
@@ -31,7 +31,7 @@ def __getattr__(name: str):
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     for package in ("torch", "onnx", "matplotlib"):
-        needed(package, "train", "training")
+        import_extra(package, "train", "training")
     from . import training
 
     return getattr(training, name)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 FEWEST_KEPT = 30  # points that dropping leaves of a cloud; fewer show no roof
-ALONG, ACROSS = (0, 3, 8), (1, 4, 9)
+ALONG_AXES, ACROSS_AXES = (0, 3, 8), (1, 4, 9)
 """Columns of the features that change sign when a building is mirrored along or across its own
 first axis.
 """
@@ -27,15 +27,15 @@ class AugmentSettings:
     drop: float = 0.4
 
 
-def varied(
+def vary_cloud(
     xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settings: AugmentSettings
 ):
     """A cloud (n, 3) and its labels (n,), scaled, stretched in height, thinned and jittered at
     random.
     """
-    kept = rng.random(len(xyz)) >= settings.drop * rng.random() ** 2
-    if kept.sum() >= FEWEST_KEPT:
-        xyz, labels = xyz[kept], labels[kept]
+    mask = rng.random(len(xyz)) >= settings.drop * rng.random() ** 2
+    if mask.sum() >= FEWEST_KEPT:
+        xyz, labels = xyz[mask], labels[mask]
     factor = np.full(3, 1.0 + settings.scale * rng.uniform(-1, 1))
     factor[2] *= 1.0 + settings.stretch * rng.uniform(-1, 1)
     return xyz * factor + settings.jitter_m * rng.random() * rng.standard_normal(xyz.shape), labels
@@ -44,7 +44,7 @@ def varied(
 def symmetric(features: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Arranged features (N, 11) mirrored along and across the building, each every second time."""
     features = features.copy()
-    for columns in (ALONG, ACROSS):
+    for columns in (ALONG_AXES, ACROSS_AXES):
         if rng.random() < 0.5:
             features[:, columns] *= -1
     return features

@@ -6,14 +6,16 @@ import numpy as np
 import torch
 
 from ..segment.arrange import Arrangement, Layout, arrange
-from ..segment.inference import stacked
+from ..segment.inference import stack_arrangements
 
 
 def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[torch.Tensor, ...]:
     """The network's nine inputs for a batch of buildings, in the order of
     `segment.inference.INPUT_NAMES`.
     """
-    return tuple(torch.from_numpy(array) for array in stacked(arrangements, layout).values())
+    return tuple(
+        torch.from_numpy(array) for array in stack_arrangements(arrangements, layout).values()
+    )
 
 
 def example_batch(layout: Layout) -> tuple[torch.Tensor, ...]:

@@ -126,7 +126,7 @@ def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Gen
     have.
     """
     if len(cloud) > POINTS[1]:
-        cloud = cloud.chosen(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
+        cloud = cloud.select(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
     index = np.full(len(ROOF_TYPES) + 1, NOT_ROOF)
     for position, name in enumerate(types):
         index[ROOF_TYPES.index(name)] = position
@@ -150,7 +150,7 @@ def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 
         raise InputError(
             "expected training data, got none; give simulated, denhaag:FILE or roofn3d:DIR"
         )
-    sources = tuple(open_one(name, tuple(types), seed) for name in names)
+    sources = tuple(open_data_set(name, tuple(types), seed) for name in names)
     if any(source.types != sources[0].types for source in sources):
         raise InputError(
             "expected data of the same roof types to be mixed; name the types with --types"
@@ -158,7 +158,7 @@ def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 
     return sources[0] if len(sources) == 1 else Mixture(sources, seed)
 
 
-def open_one(name: str, types: tuple[str, ...], seed: int) -> Source:
+def open_data_set(name: str, types: tuple[str, ...], seed: int) -> Source:
     kind, _, path = name.partition(":")
     if kind == "simulated" and not path:
         return Simulated(types or ROOF_TYPES, seed)

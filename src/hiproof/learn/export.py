@@ -11,7 +11,7 @@ import torch
 
 from ..errors import InputError
 from ..segment.inference import FORMAT, INPUT_NAMES, OUTPUT_NAMES
-from ..segment.sampling import FEATURES
+from ..segment.sampling import POINT_FEATURES
 from .batch import example_batch
 from .network import RoofNetwork
 
@@ -46,7 +46,7 @@ def export(network: RoofNetwork, path: str | Path) -> Path:
         "format": FORMAT,
         "types": json.dumps(network.settings.types),
         "layout": json.dumps(dataclasses.asdict(network.settings.layout)),
-        "features": json.dumps(FEATURES),
+        "features": json.dumps(POINT_FEATURES),
     }
     onnx.helper.set_model_props(model, metadata)
     onnx.save(model, path)
@@ -65,10 +65,10 @@ def read_weights(network: RoofNetwork, path: str | Path) -> None:
         stored = {
             tensor.name: torch.tensor(onnx.numpy_helper.to_array(tensor)) for tensor in tensors
         }
-        own = {name: stored.get(name, value) for name, value in network.state_dict().items()}
+        weights = {name: stored.get(name, value) for name, value in network.state_dict().items()}
         if missing := [name for name, _ in network.named_parameters() if name not in stored]:
             raise ValueError(f"it has no {missing[0]}")
-        network.load_state_dict(own)
+        network.load_state_dict(weights)
     except Exception as error:
         raise InputError(
             f"expected {path} to hold the weights of such a network, got: "

@@ -31,14 +31,14 @@ def training_house(rng: np.random.Generator, type: str, annex_share: float) -> S
     building = random_building(rng, type)
     main = building.roof.parts[0]
     if type == "gable" and rng.random() < 0.1:
-        main = hipped_at_one_end(rng, main)
+        main = hip_one_end(rng, main)
     else:
         if type == "hip" and rng.random() < 0.3:
             main = with_short_ridge(rng, main)
         elif type != "pyramid" and rng.random() < 0.2:
-            main = lengthened(rng, main)
+            main = lengthen(rng, main)
         if rng.random() < 0.3:
-            main = resized(rng, main)
+            main = resize(rng, main)
     count = 1 + int(rng.random() < 0.3) if rng.random() < annex_share else 0
     annexes = tuple(annex(rng, main) for _ in range(count))
     if type != "shed" and not annexes and rng.random() < 0.15:
@@ -56,14 +56,16 @@ def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
     return make_part("hip", parameters, hip.kappa, hip.translation)
 
 
-def lengthened(rng: np.random.Generator, part: Part) -> Part:
+def lengthen(rng: np.random.Generator, part: Part) -> Part:
     """A part as long as a row or a barn: half a width to three widths longer."""
-    more = part.parameters["width"] * rng.uniform(0.5, 3.0)
-    parameters = {name: value + more * (name in LENGTHS) for name, value in part.parameters.items()}
+    additions = part.parameters["width"] * rng.uniform(0.5, 3.0)
+    parameters = {
+        name: value + additions * (name in LENGTHS) for name, value in part.parameters.items()
+    }
     return make_part(part.type, parameters, part.kappa, part.translation)
 
 
-def resized(rng: np.random.Generator, part: Part) -> Part:
+def resize(rng: np.random.Generator, part: Part) -> Part:
     """A part down to two fifths of its size (a shed, a garage), and lower than that yet by up to a
     half.
     """
@@ -85,19 +87,19 @@ def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
     corners = np.asarray(piece.outline.exterior.coords) @ normal
     middle = np.array(piece.outline.centroid.coords[0])
     reach = corners.max() - middle @ normal
-    border, far = middle + normal * reach * rng.uniform(0.55, 0.9), 100.0
-    beyond = shapely.Polygon(
+    border, distant = middle + normal * reach * rng.uniform(0.55, 0.9), 100.0
+    polygon = shapely.Polygon(
         [
-            border - far * along,
-            border + far * (normal - along),
-            border + far * (normal + along),
-            border + far * along,
+            border - distant * along,
+            border + distant * (normal - along),
+            border + distant * (normal + along),
+            border + distant * along,
         ]
     )
-    return replace(part, pieces=(replace(piece, outline=piece.outline.difference(beyond)),))
+    return replace(part, pieces=(replace(piece, outline=piece.outline.difference(polygon)),))
 
 
-def hipped_at_one_end(rng: np.random.Generator, gable: Part) -> Part:
+def hip_one_end(rng: np.random.Generator, gable: Part) -> Part:
     """A roof with a hip at one end and a gable wall at the other.
 
     It is called a gable: RoofN3D's hips are "two-sided", and the catalogue has nothing nearer.
@@ -125,10 +127,10 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
     parameters = annex_parameters(
         rng, type, depth + inside, across, main.parameters.get("height", 0.0)
     )
-    along, aside = reach + (depth - inside) / 2, rng.uniform(-0.5, 0.5) * (side - across)
+    along, perpendicular = reach + (depth - inside) / 2, rng.uniform(-0.5, 0.5) * (side - across)
     angle = main.kappa + quarters * math.pi / 2
-    x = math.cos(angle) * along - math.sin(angle) * aside
-    y = math.sin(angle) * along + math.cos(angle) * aside
+    x = math.cos(angle) * along - math.sin(angle) * perpendicular
+    y = math.sin(angle) * along + math.cos(angle) * perpendicular
     turn = math.pi / 2 if type == "monopitch" else 0.0
     if turn:
         parameters["length"], parameters["width"] = parameters["width"], parameters["length"]

@@ -18,7 +18,7 @@ import torch
 from torch import nn
 
 from ..segment.arrange import Layout
-from ..segment.sampling import FEATURES, POSITION_SCALE
+from ..segment.sampling import POINT_FEATURES, POSITION_SCALE
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class SetAbstraction(nn.Module):
         outputs).
         """
         source = self.features(x) + self.position(position)
-        grouped = torch.relu(gathered(source, group) - self.position(centres).unsqueeze(1))
+        grouped = torch.relu(gather_rows(source, group) - self.position(centres).unsqueeze(1))
         return torch.relu(self.norm(self.second(grouped).max(dim=1)[0]))
 
 
@@ -91,7 +91,7 @@ class FeaturePropagation(nn.Module):
         """Coarse (rows, C) and fine features (S, D), interpolation `index`, `weight` (S, 3): (S,
         outputs).
         """
-        joined = (gathered(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(
+        joined = (gather_rows(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(
             dim=1
         ) + self.fine(fine)
         return torch.relu(self.norm(joined))
@@ -118,18 +118,18 @@ class RoofNetwork(nn.Module):
     def __init__(self, settings: NetworkSettings):
         super().__init__()
         self.settings = settings
-        widths, up, classes = settings.widths, settings.up_widths, len(settings.types)
-        inputs = [len(FEATURES), *(output for _, output in widths)]
+        widths, up_widths, classes = settings.widths, settings.up_widths, len(settings.types)
+        inputs = [len(POINT_FEATURES), *(output for _, output in widths)]
         self.down = nn.ModuleList(SetAbstraction(inputs[i], *widths[i]) for i in range(3))
         self.everything = GlobalAbstraction(inputs[3], *widths[3])
         self.up = nn.ModuleList(
             [
-                FeaturePropagation(inputs[3] + inputs[4], inputs[1], up[0]),
-                FeaturePropagation(up[0], len(FEATURES), up[1]),
+                FeaturePropagation(inputs[3] + inputs[4], inputs[1], up_widths[0]),
+                FeaturePropagation(up_widths[0], len(POINT_FEATURES), up_widths[1]),
             ]
         )
         self.dropout = nn.Dropout(settings.dropout)
-        self.point_head = nn.Linear(up[1], classes + 1)
+        self.point_head = nn.Linear(up_widths[1], classes + 1)
         self.type_head = nn.Sequential(
             Dense(inputs[4], 96), nn.Dropout(settings.dropout), nn.Linear(96, classes)
         )
@@ -152,14 +152,16 @@ class RoofNetwork(nn.Module):
             levels.append(layer(levels[-1], scaled.reshape(-1, 3), centres, group))
             position = position.reshape(-1, sizes[i], 3)[:, : sizes[i + 1]].reshape(-1, 3)
         building = self.everything(levels[3], position / 10.0, sizes[3])
-        around = building.unsqueeze(1).expand(-1, sizes[3], -1).reshape(-1, self.everything.outputs)
+        surroundings = (
+            building.unsqueeze(1).expand(-1, sizes[3], -1).reshape(-1, self.everything.outputs)
+        )
         middle = self.up[0](
-            torch.cat([levels[3], around], dim=-1), levels[1], up_index1, up_weight1
+            torch.cat([levels[3], surroundings], dim=-1), levels[1], up_index1, up_weight1
         )
         fine = self.up[1](middle, levels[0], up_index2, up_weight2)
         return self.point_head(self.dropout(fine)), self.type_head(building)
 
 
-def gathered(x, index):
+def gather_rows(x, index):
     """Rows of `x` (rows, C) by `index` (S, K): (S, K, C)."""
     return x[index]

@@ -14,10 +14,10 @@ from ..segment.inference import NOT_ROOF
 from ..simulate import ROOF_TYPES
 from .sample import TRAINING, Sample
 
-BUILDINGS, SURFACES = "roofn3d_buildings.csv", "roofn3d_surfacegrowing.csv"
-TYPES = tuple(name for name in ROOF_TYPES if name in ("gable", "hip", "pyramid"))
+BUILDINGS_FILE, SURFACES_FILE = "roofn3d_buildings.csv", "roofn3d_surfacegrowing.csv"
+TRAINING_TYPES = tuple(name for name in ROOF_TYPES if name in ("gable", "hip", "pyramid"))
 HELD_OUT_PERCENT = 20  # of the ids, which training never sees: the usual fifth
-FEWEST_POINTS = 10  # points; the least the network takes
+FEWEST_CLOUD_POINTS = 10  # points; the least the network takes
 
 
 @dataclass(frozen=True)
@@ -48,18 +48,18 @@ class RoofN3D:
 
         Raises InputError when they are missing, of another layout or too few.
         """
-        for name in (BUILDINGS, SURFACES):
+        for name in (BUILDINGS_FILE, SURFACES_FILE):
             if not (folder / name).is_file():
                 raise InputError(
                     f"expected RoofN3D's {name} in {folder}, found none; download it from "
                     "roofn3d.gis.tu-berlin.de"
                 )
-        types = types or TYPES
+        types = types or TRAINING_TYPES
         clouds, surfaces, kinds, ids = [], [], [], []
         for record, labels in read_roofn3d_labels(
-            folder / SURFACES, read_roofn3d(folder / BUILDINGS)
+            folder / SURFACES_FILE, read_roofn3d(folder / BUILDINGS_FILE)
         ):
-            if record.type in types and len(record.points) >= FEWEST_POINTS:
+            if record.type in types and len(record.points) >= FEWEST_CLOUD_POINTS:
                 clouds.append((record.points - record.points.mean(axis=0)).astype(np.float32))
                 surfaces.append(labels >= 0)
                 kinds.append(types.index(record.type))
@@ -93,10 +93,12 @@ class RoofN3D:
         else:
             held_out = np.flatnonzero(self.held_out)
             building = held_out[index % len(held_out)]
-        own = slice(self.starts[building], self.starts[building + 1])
+        rows = slice(self.starts[building], self.starts[building + 1])
         type = int(self.type_of[building])
         return Sample(
-            self.xyz[own].astype(float), np.where(self.on_surface[own], type, NOT_ROOF), type
+            self.xyz[rows].astype(float),
+            np.where(self.on_surface[rows], type, NOT_ROOF),
+            type,
         )
 
 

@@ -22,7 +22,8 @@ from ..read.solids import read_solids
 TYPE_OF_CODE = {CATALOGUE[name].citygml_code: name for name in reversed(CATALOGUE)} | {
     "1120": "pyramid"
 }
-HELD_OUT_PERCENT = 40  # of the buildings: shapes are few, and a test on a fifth would tell little
+# of the buildings: shapes are few, and a test on a fifth would tell little
+HELD_OUT_SHAPES_PERCENT = 40
 SMALLEST_AREA_M2 = 12.0  # m2 of ground; smaller are sheds, whose type is often wrong in the file
 
 
@@ -64,12 +65,12 @@ def read_shapes(path: Path) -> list[Shape]:
 
 
 def is_held_out(building: str) -> bool:
-    return zlib.crc32(building.encode()) % 100 < HELD_OUT_PERCENT
+    return zlib.crc32(building.encode()) % 100 < HELD_OUT_SHAPES_PERCENT
 
 
 def ground_outline(solid: Solid) -> shapely.Geometry:
     """Plan outline of the ground surfaces (of the roof's where there are none)."""
-    faces = solid.of_kind(GROUND) or solid.of_kind(ROOF)
+    faces = solid.select_faces(GROUND) or solid.select_faces(ROOF)
     rings = [solid.vertices[list(face.rings[0])][:, :2] for face in faces]
     return shapely.union_all(
         [

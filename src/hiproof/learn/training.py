@@ -21,7 +21,7 @@ from torch import nn
 from ..errors import InputError, OutputError, SettingsError
 from ..segment.arrange import Layout, arrange
 from ..segment.scores import Scores
-from .augment import AugmentSettings, symmetric, varied
+from .augment import AugmentSettings, symmetric, vary_cloud
 from .batch import network_inputs
 from .card import write_card, write_curve
 from .data import open_source
@@ -114,7 +114,7 @@ class Trainer:
         self.history: list[dict[str, Any]] = []
         self.best: dict[str, Any] = {"score": -math.inf}
         self.validation = [
-            arranged(source.sample(VALIDATION, index), settings.layout)
+            arrange_sample(source.sample(VALIDATION, index), settings.layout)
             for index in range(settings.validation)
         ]
 
@@ -141,20 +141,20 @@ class Trainer:
         A last batch of a single cloud is left out: it has no statistics to normalise by.
         """
         settings = self.settings
-        fresh = settings.epoch // settings.views
+        new_items = settings.epoch // settings.views
         clouds = []
-        for index in range(0, fresh - 1, settings.batch):
+        for index in range(0, new_items - 1, settings.batch):
             batch = [
-                self.training_cloud(self.epoch * fresh + i)
-                for i in range(index, min(index + settings.batch, fresh))
+                self.training_cloud(self.epoch * new_items + i)
+                for i in range(index, min(index + settings.batch, new_items))
             ]
             clouds += batch
             yield batch
         rng = np.random.default_rng([settings.seed, 19, self.epoch])
         for _ in range(settings.views - 1):
-            order = rng.permutation(fresh)
-            for index in range(0, fresh - 1, settings.batch):
-                yield [turned(clouds[i], rng) for i in order[index : index + settings.batch]]
+            order = rng.permutation(new_items)
+            for index in range(0, new_items - 1, settings.batch):
+                yield [turn_cloud(clouds[i], rng) for i in order[index : index + settings.batch]]
 
     def training_cloud(self, index: int):
         """The arranged cloud number `index`, varied at random by that number, with its points'
@@ -162,9 +162,9 @@ class Trainer:
         """
         rng = np.random.default_rng([self.settings.seed, 7, index])
         sample = self.source.sample(TRAINING, index)
-        xyz, labels = varied(sample.xyz, sample.labels, rng, self.settings.augment)
+        xyz, labels = vary_cloud(sample.xyz, sample.labels, rng, self.settings.augment)
         arrangement = arrange(xyz, self.settings.layout)
-        return turned((arrangement, labels[arrangement.chosen], sample.type), rng)
+        return turn_cloud((arrangement, labels[arrangement.select], sample.type), rng)
 
     def step(self, clouds) -> float:
         """One step of the optimiser on a batch of (arrangement, labels, type)."""
@@ -182,8 +182,10 @@ class Trainer:
     def tensors(self, clouds):
         """Network inputs, point labels (not-roof last) and types of a batch, on the device."""
         inputs = network_inputs([cloud[0] for cloud in clouds], self.settings.layout)
-        told = np.concatenate([cloud[1] for cloud in clouds])
-        labels = torch.from_numpy(np.where(told < 0, len(self.source.types), told).astype(np.int64))
+        all_labels = np.concatenate([cloud[1] for cloud in clouds])
+        labels = torch.from_numpy(
+            np.where(all_labels < 0, len(self.source.types), all_labels).astype(np.int64)
+        )
         types = torch.tensor([cloud[2] for cloud in clouds])
         return (
             tuple(array.to(self.device) for array in inputs),
@@ -218,18 +220,18 @@ class Trainer:
     @torch.no_grad()
     def validate(self):
         """Score the averaged weights and keep them if they are the best so far."""
-        told_points, true_points, told, true = [], [], [], []
+        told_points, true_points, predicted, true = [], [], [], []
         for start in range(0, len(self.validation), self.settings.batch):
             inputs, labels, types = self.tensors(
                 self.validation[start : start + self.settings.batch]
             )
             point_logits, type_logits = self.averaged(*inputs)
             told_points.append(point_logits.argmax(1).cpu())
-            told.append(type_logits.argmax(1).cpu())
+            predicted.append(type_logits.argmax(1).cpu())
             true_points.append(labels.cpu())
             true.append(types.cpu())
         names = self.source.types
-        types = Scores.of(torch.cat(true).numpy(), torch.cat(told).numpy(), names)
+        types = Scores.of(torch.cat(true).numpy(), torch.cat(predicted).numpy(), names)
         points = Scores.of(
             torch.cat(true_points).numpy(), torch.cat(told_points).numpy(), (*names, "not roof")
         )
@@ -306,16 +308,16 @@ class Trainer:
         )
 
 
-def turned(cloud, rng: np.random.Generator):
+def turn_cloud(cloud, rng: np.random.Generator):
     """An arranged, labelled cloud in another of the roof's symmetries."""
     arrangement, labels, type = cloud
     return replace(arrangement, features=symmetric(arrangement.features, rng)), labels, type
 
 
-def arranged(sample: Sample, layout: Layout):
+def arrange_sample(sample: Sample, layout: Layout):
     """A validation cloud as it is: (arrangement, labels of its chosen points, type)."""
     arrangement = arrange(sample.xyz, layout)
-    return arrangement, sample.labels[arrangement.chosen], sample.type
+    return arrangement, sample.labels[arrangement.select], sample.type
 
 
 def chosen_device(name: str) -> torch.device:

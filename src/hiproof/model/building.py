@@ -14,7 +14,7 @@ from ..errors import NoModelError
 from ..settings import ComposeSettings
 from ..status import Grade, Status
 from .roof import Part, Roof
-from .shown import shown_areas, shown_m2
+from .shown import compute_visible_areas, measure_visible_areas
 from .solid import Solid
 
 METHODS: dict[str, Callable[..., Any]] = {}
@@ -55,9 +55,9 @@ class Model:
     compose: ComposeSettings | None = None
 
     @cached_property
-    def shown_m2(self) -> tuple[float, ...]:
+    def visible_m2(self) -> tuple[float, ...]:
         """Plan area that each part of the roof shows from above, 0 of one that others hide."""
-        return shown_m2(self.roof, self.solid)
+        return measure_visible_areas(self.roof, self.solid)
 
     @property
     def main(self) -> int:
@@ -65,7 +65,7 @@ class Model:
 
         Its type is the building's.
         """
-        return self.shown_m2.index(max(self.shown_m2))
+        return self.visible_m2.index(max(self.visible_m2))
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class Building:
         """
         return self.solid.volume
 
-    def shown_areas(self) -> list[shapely.Geometry]:
+    def compute_visible_areas(self) -> list[shapely.Geometry]:
         """Where each part shows, in world coordinates; empty where others hide all of it, none
         without a model.
 
@@ -162,10 +162,10 @@ class Building:
         >>> hut = {"type": "flat", "parameters": {"width": 4, "length": 4}, "position": [9, 3, 6]}
         >>> record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring],
         ...     "parts": [flat, hut]}
-        >>> [area.area for area in build(record).shown_areas()]
+        >>> [area.area for area in build(record).compute_visible_areas()]
         [48.0, 12.0]
         """
-        return [] if self.built is None else shown_areas(self.roof, self.solid)
+        return [] if self.built is None else compute_visible_areas(self.roof, self.solid)
 
     def with_part(self, index: int, **change: Any) -> Building:
         """The building with part `index` changed, or with one more part where `index` is the number
@@ -209,4 +209,4 @@ class Building:
 
     def _repr_html_(self) -> str:
         """A small view in a notebook, turned by dragging; it asks nothing of the network."""
-        return METHODS["html_of"](self)
+        return METHODS["render_building"](self)

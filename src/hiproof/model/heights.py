@@ -12,7 +12,7 @@ from ..geometry.rings import ring_edges
 from .roof import Part
 
 
-def highest_of(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Height (n,) of the roof of `parts` at `xy` (n, 2), minus infinity beside it, and the part
     (n,) it is of, the first of several, by its number: `Part.height_at` for many points. On a
     border that two pieces share it is one of them that holds a point.

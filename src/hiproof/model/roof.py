@@ -27,7 +27,7 @@ class Piece:
         """Height (n,) of the lower envelope at `xy` (n, 2), the outline not asked."""
         return (np.asarray(xy, float) @ self.planes[:, :2].T + self.planes[:, 2]).min(axis=1)
 
-    def moved(self, shift: np.ndarray) -> Piece:
+    def move(self, shift: np.ndarray) -> Piece:
         """The piece moved by `shift` (3,): its outline, and its planes with it."""
         planes = self.planes.copy()
         planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]

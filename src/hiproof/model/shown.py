@@ -13,7 +13,7 @@ from itertools import accumulate, chain
 import numpy as np
 import shapely
 
-from ..geometry.rings import enclosed, with_area
+from ..geometry.rings import repair_polygons, with_area
 from .roof import Part, Roof
 from .solid import ROOF, Face, Solid
 
@@ -22,44 +22,45 @@ SAME_PLANE_M = 0.005
 GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
 AREA_DIGITS = 4  # of areas in square metres, as the tables of parts round them
 # of what one part has of a common surface; less is a sliver between outlines that miss one another
-LEAST_M2 = 0.05
+SURFACE_SLIVER_M2 = 0.05
 
 
-def shown_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
+def compute_visible_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
     """Where each part shows, in world coordinates; empty where others hide all of it."""
     united = [
-        with_area(shapely.union_all(areas, grid_size=GRID_M)) for areas in shown_pieces(roof, solid)
+        with_area(shapely.union_all(areas, grid_size=GRID_M))
+        for areas in compute_visible_pieces(roof, solid)
     ]
     return shapely.transform(np.array(united, object), roof.frame.to_world).tolist()
 
 
-def shown_m2(roof: Roof, solid: Solid) -> tuple[float, ...]:
+def measure_visible_areas(roof: Roof, solid: Solid) -> tuple[float, ...]:
     """Plan area that each part shows, rounded, so that parts which show the same are equal."""
     return tuple(
         round(float(shapely.area(pieces).sum()), AREA_DIGITS)
-        for pieces in shown_pieces(roof, solid)
+        for pieces in compute_visible_pieces(roof, solid)
     )
 
 
-def shown_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
+def compute_visible_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
     """Where each part shows, in the roof's local frame, as pieces that share no area."""
-    local = solid.moved(-roof.frame.origin)
-    shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
-    faces = local.of_kind(ROOF)
-    for face, others in zip(
-        faces, parts_in_plane(faces, local.vertices, planes_of(roof)), strict=True
+    local = solid.move(-roof.frame.origin)
+    visible: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
+    faces = local.select_faces(ROOF)
+    for face, neighbours in zip(
+        faces, parts_in_plane(faces, local.vertices, list_planes(roof)), strict=True
     ):
-        left = local.plan_of(face)
-        for other in others:
-            left, others_own = shared_out(
-                left, drawn(roof.parts[face.part]), drawn(roof.parts[other])
+        remainder = local.project_face(face)
+        for other in neighbours:
+            remainder, others_own = share_surface(
+                remainder, unite_outlines(roof.parts[face.part]), unite_outlines(roof.parts[other])
             )
-            shown[other].append(others_own)
-        shown[face.part].append(left)
-    return shown
+            visible[other].append(others_own)
+        visible[face.part].append(remainder)
+    return visible
 
 
-def planes_of(roof: Roof) -> np.ndarray:
+def list_planes(roof: Roof) -> np.ndarray:
     """All planes of a roof (k, 4): the number of the part, then z = a x + b y + c."""
     parts = enumerate(roof.parts)
     return np.array(
@@ -85,26 +86,30 @@ def parts_in_plane(
     off = np.abs(corners[:, :2] @ planes[:, 1:3].T + planes[:, 3] - corners[:, 2:])
     lies_in = np.maximum.reduceat(off, [0, *accumulate(map(len, of_faces[:-1]))]) < SAME_PLANE_M
     return [
-        sorted(set(planes[own, 0].astype(int).tolist()) - {f.part})
-        for f, own in zip(faces, lies_in, strict=True)
+        sorted(set(planes[plane_mask, 0].astype(int).tolist()) - {f.part})
+        for f, plane_mask in zip(faces, lies_in, strict=True)
     ]
 
 
-def shared_out(
-    area: shapely.Geometry, own: shapely.Geometry, other: shapely.Geometry
+def share_surface(
+    area: shapely.Geometry, drawn_area: shapely.Geometry, other: shapely.Geometry
 ) -> tuple[shapely.Geometry, shapely.Geometry]:
-    """What is left of `area` to the part drawn as `own`, and what goes to the one drawn as `other`:
-    where that one alone is drawn, and slivers beside it.
+    """What is left of `area` to the part drawn as `drawn_area`, and what goes to the one drawn as
+    `other`: where that one alone is drawn, and slivers beside it.
     """
-    beyond = without_slivers(shapely.difference(area, own, grid_size=GRID_M))
-    others_own = without_slivers(shapely.intersection(beyond, other, grid_size=GRID_M))
+    slivers = without_slivers(shapely.difference(area, drawn_area, grid_size=GRID_M))
+    others_own = without_slivers(shapely.intersection(slivers, other, grid_size=GRID_M))
     if others_own.is_empty:
         return area, others_own
-    left = without_slivers(shapely.difference(area, others_own, grid_size=GRID_M))
-    return left, without_slivers(shapely.difference(area, left, grid_size=GRID_M), least_m2=0.0)
+    remainder = without_slivers(shapely.difference(area, others_own, grid_size=GRID_M))
+    return remainder, without_slivers(
+        shapely.difference(area, remainder, grid_size=GRID_M), least_m2=0.0
+    )
 
 
-def without_slivers(area: shapely.Geometry, least_m2: float = LEAST_M2) -> shapely.Geometry:
+def without_slivers(
+    area: shapely.Geometry, least_m2: float = SURFACE_SLIVER_M2
+) -> shapely.Geometry:
     """Those polygons of an area that are large enough, without the lines to which others shrank on
     the grid.
     """
@@ -113,8 +118,8 @@ def without_slivers(area: shapely.Geometry, least_m2: float = LEAST_M2) -> shape
     return shapely.multipolygons(pieces[polygons & (shapely.area(pieces) >= least_m2)])
 
 
-def drawn(part: Part) -> shapely.Geometry:
+def unite_outlines(part: Part) -> shapely.Geometry:
     """The outlines of a part as one area; rounded, an outline may touch itself, and a spike of no
     width is none.
     """
-    return shapely.union_all(enclosed([piece.outline for piece in part.pieces]))
+    return shapely.union_all(repair_polygons([piece.outline for piece in part.pieces]))

@@ -37,7 +37,7 @@ class Solid:
     faces: tuple[Face, ...]
     defects: tuple[tuple[int, int], ...] = ()
 
-    def moved(self, shift: np.ndarray) -> Solid:
+    def move(self, shift: np.ndarray) -> Solid:
         return Solid(self.vertices + shift, self.faces, self.defects)
 
     @property
@@ -47,10 +47,10 @@ class Solid:
         from ..geometry.area_vectors import enclosed_volume
 
         return round(
-            enclosed_volume(self.vertices - self.vertices.mean(axis=0), *self.flattened()), 9
+            enclosed_volume(self.vertices - self.vertices.mean(axis=0), *self.flatten()), 9
         )
 
-    def flattened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def flatten(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Vertex indices of all rings one after the other, the start of each ring, and of each face
         among the rings.
         """
@@ -60,10 +60,10 @@ class Solid:
         face_start = np.cumsum([0, *(len(face.rings) for face in self.faces)], dtype=np.int64)
         return index, ring_start, face_start
 
-    def of_kind(self, kind: str) -> tuple[Face, ...]:
+    def select_faces(self, kind: str) -> tuple[Face, ...]:
         return tuple(face for face in self.faces if face.kind == kind)
 
-    def plan_of(self, face: Face) -> shapely.Polygon:
+    def project_face(self, face: Face) -> shapely.Polygon:
         """A face of the solid in plan, its holes left out."""
         outer, *holes = (self.vertices[list(ring), :2] for ring in face.rings)
         return shapely.Polygon(outer, holes)

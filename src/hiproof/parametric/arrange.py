@@ -13,8 +13,8 @@ import shapely
 
 from ..errors import InputError
 from ..model import Roof
-from ..primitives.cants import cants_left_in_place
-from .change import polygon_of, with_sizes
+from ..primitives.cants import keep_cants_in_place
+from .change import make_polygon, with_sizes
 
 INNER = {
     "length": ("ridge_length", "top_length"),
@@ -28,8 +28,8 @@ FAR_M = 1e4  # m; beyond any building, for a half plane drawn as a rectangle
 DORMER_WIDTH_M, DORMER_WALL_M, DORMER_RISE_M = 1.8, 1.0, 0.6
 # m, least and most; on a flat slope it would reach through the whole roof
 DORMER_DEPTH_M = (1.0, 4.0)
-LEVEL = 0.05  # a slope that a dormer cannot run into; a block stands there
-BLOCK_M, BLOCK_HEIGHT_M = 3.0, 2.5  # m; a lift's or a staircase's head
+LEVEL_SLOPE = 0.05  # a slope that a dormer cannot run into; a block stands there
+BLOCK_SIDE_M, BLOCK_HEIGHT_M = 3.0, 2.5  # m; a lift's or a staircase's head
 
 
 def split_part(
@@ -53,7 +53,7 @@ def split_part(
             f"{share}"
         )
     part = {key: value for key, value in with_sizes(part).items() if key != "sigma"}
-    whole, axis = part["parameters"][side], axis_of(part, side)
+    whole, axis = part["parameters"][side], find_axis(part, side)
     cut = np.array(part["position"][:2]) + (share - 0.5) * whole * axis
     halves = []
     for size, middle, sign in ((share, 0.5 * share - 0.5, -1.0), (1.0 - share, 0.5 * share, 1.0)):
@@ -62,31 +62,31 @@ def split_part(
         halves.append(
             {
                 **part,
-                "parameters": cants_left_in_place(
-                    resized(part["parameters"], side, size * whole), *moved
+                "parameters": keep_cants_in_place(
+                    resize_rectangle(part["parameters"], side, size * whole), *moved
                 ),
                 "position": [float(x), float(y), part["position"][2]],
-                "outlines": outlines_beyond(part["outlines"], cut, sign * axis),
+                "outlines": cut_outlines(part["outlines"], cut, sign * axis),
             }
         )
     return halves
 
 
-def merged_parts(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     """One part in place of two: of the larger's type, direction and heights, over the rectangle
     around both, roofing what both roofed.
     """
-    main, side = sorted(map(with_sizes, (one, other)), key=area_of, reverse=True)
-    along, across = axis_of(main, "length"), axis_of(main, "width")
-    corners = np.concatenate([corners_of(main), corners_of(side)])
-    low, high = (np.array([f(corners @ along), f(corners @ across)]) for f in (np.min, np.max))
-    x, y = 0.5 * (low + high) @ np.array([along, across])
-    parameters = resized(main["parameters"], "length", float(high[0] - low[0]))
-    parameters = resized(parameters, "width", float(high[1] - low[1]))
+    main, side = sorted(map(with_sizes, (item, other)), key=compute_part_area, reverse=True)
+    along, across = find_axis(main, "length"), find_axis(main, "width")
+    corners = np.concatenate([compute_corners(main), compute_corners(side)])
+    lower, upper = (np.array([f(corners @ along), f(corners @ across)]) for f in (np.min, np.max))
+    x, y = 0.5 * (lower + upper) @ np.array([along, across])
+    parameters = resize_rectangle(main["parameters"], "length", float(upper[0] - lower[0]))
+    parameters = resize_rectangle(parameters, "width", float(upper[1] - lower[1]))
     moved = np.array([x, y]) - main["position"][:2]
-    parameters = cants_left_in_place(parameters, float(moved @ along), float(moved @ across))
+    parameters = keep_cants_in_place(parameters, float(moved @ along), float(moved @ across))
     together = shapely.union_all(
-        [polygon_of(o) for part in (main, side) for o in part["outlines"]], grid_size=GRID_M
+        [make_polygon(o) for part in (main, side) for o in part["outlines"]], grid_size=GRID_M
     )
     merged = {key: value for key, value in main.items() if key != "sigma"}
     position = [float(x), float(y), main["position"][2]]
@@ -94,25 +94,25 @@ def merged_parts(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
         **merged,
         "parameters": parameters,
         "position": position,
-        "outlines": rings_of(together),
+        "outlines": list_rings(together),
     }
 
 
-def dormer_on(roof: Roof, index: int, place: tuple[float, float] | None = None) -> dict[str, Any]:
+def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None) -> dict[str, Any]:
     """A gable dormer on part `index`, its middle at `place` (x, y about the roof's origin) or
     half-way up a slope, its ridge running into the slope; where the part is level a flat block,
     turned as the part is.
     """
     part = roof.parts[index]
-    x, y = place if place is not None else middle_of_slope(part)
-    around = np.array([[x, y], [x + 0.01, y], [x, y + 0.01]])
-    z = np.max([piece.height_at(around) for piece in part.pieces], axis=0)
+    x, y = place if place is not None else place_on_slope(part)
+    surroundings = np.array([[x, y], [x + 0.01, y], [x, y + 0.01]])
+    z = np.max([piece.height_at(surroundings) for piece in part.pieces], axis=0)
     slope = np.array([z[1] - z[0], z[2] - z[0]]) / 0.01
     steepness = float(np.hypot(*slope))
-    if not steepness > LEVEL:
+    if not steepness > LEVEL_SLOPE:
         return {
             "type": "flat",
-            "parameters": {"width": BLOCK_M, "length": BLOCK_M},
+            "parameters": {"width": BLOCK_SIDE_M, "length": BLOCK_SIDE_M},
             "position": [float(x), float(y), float(z[0]) + BLOCK_HEIGHT_M],
             "rotation": math.degrees(part.kappa),
         }
@@ -126,7 +126,7 @@ def dormer_on(roof: Roof, index: int, place: tuple[float, float] | None = None) 
     }
 
 
-def middle_of_slope(part: Any) -> tuple[float, float]:
+def place_on_slope(part: Any) -> tuple[float, float]:
     """A place half-way between the ridge and the front eave."""
     width = part.parameters.get("width", 0.0)
     x, y = part.translation[:2] - 0.25 * width * np.array(
@@ -135,13 +135,13 @@ def middle_of_slope(part: Any) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def axis_of(part: dict[str, Any], side: str) -> np.ndarray:
+def find_axis(part: dict[str, Any], side: str) -> np.ndarray:
     """Direction (2,) of a side of the part's rectangle."""
     turn = math.radians(part.get("rotation", 0.0)) + (0.0 if side == "length" else 0.5 * math.pi)
     return np.array([math.cos(turn), math.sin(turn)])
 
 
-def resized(parameters: dict[str, float], side: str, size: float) -> dict[str, float]:
+def resize_rectangle(parameters: dict[str, float], side: str, size: float) -> dict[str, float]:
     """Parameters whose rectangle has another `side`, what lies within it grown alike."""
     grown = {
         name: parameters[name] * size / parameters[side]
@@ -151,35 +151,37 @@ def resized(parameters: dict[str, float], side: str, size: float) -> dict[str, f
     return {**parameters, **grown, side: size}
 
 
-def corners_of(part: dict[str, Any]) -> np.ndarray:
+def compute_corners(part: dict[str, Any]) -> np.ndarray:
     """Corners (4, 2) of the part's rectangle."""
-    u = 0.5 * part["parameters"]["length"] * axis_of(part, "length")
-    v = 0.5 * part["parameters"]["width"] * axis_of(part, "width")
+    u = 0.5 * part["parameters"]["length"] * find_axis(part, "length")
+    v = 0.5 * part["parameters"]["width"] * find_axis(part, "width")
     return np.array(part["position"][:2]) + np.array([-u - v, u - v, u + v, v - u])
 
 
-def area_of(part: dict[str, Any]) -> float:
-    return sum(polygon_of(outline).area for outline in part["outlines"])
+def compute_part_area(part: dict[str, Any]) -> float:
+    return sum(make_polygon(outline).area for outline in part["outlines"])
 
 
-def outlines_beyond(outlines: list, place: np.ndarray, direction: np.ndarray) -> list:
+def cut_outlines(outlines: list, place: np.ndarray, direction: np.ndarray) -> list:
     """What of the outlines lies beyond a line through `place` (2,), seen along `direction` (2,)."""
-    aside = np.array([-direction[1], direction[0]])
-    ring = place + FAR_M * np.array([-aside, aside, aside + direction, direction - aside])
-    kept = shapely.intersection(
-        shapely.union_all([polygon_of(o) for o in outlines]),
+    perpendicular = np.array([-direction[1], direction[0]])
+    ring = place + FAR_M * np.array(
+        [-perpendicular, perpendicular, perpendicular + direction, direction - perpendicular]
+    )
+    overlap = shapely.intersection(
+        shapely.union_all([make_polygon(o) for o in outlines]),
         shapely.Polygon(ring),
         grid_size=GRID_M,
     )
-    found = rings_of(kept)
-    if not found:
+    rings = list_rings(overlap)
+    if not rings:
         raise InputError(
             "expected a cut through what the part roofs, got one beside it; cut elsewhere"
         )
-    return found
+    return rings
 
 
-def rings_of(geometry: shapely.Geometry) -> list:
+def list_rings(geometry: shapely.Geometry) -> list:
     """The polygons of a geometry as rings, the outer first."""
     return [
         [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]

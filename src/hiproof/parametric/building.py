@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..model import Building, Model, Roof
 from ..settings import ComposeSettings, Settings
-from .record import building_of, mapping
+from .record import read_building, require_mapping
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:
@@ -26,9 +26,9 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
     ...     "parts": [part]}).type
     'gable'
     """
-    if "id" not in mapping(parameters, "the building"):
+    if "id" not in require_mapping(parameters, "the building"):
         raise InputError("expected the id of the building, got none; give one")
-    building, roof = building_of(parameters)
+    building, roof = read_building(parameters)
     return building if roof is None else with_model(building, roof, compose)
 
 
@@ -38,4 +38,4 @@ def with_model(building: Building, roof: Roof, compose: ComposeSettings | None =
 
     settings = dataclasses.replace(Settings(), compose=compose or ComposeSettings())
     solid = composed(roof, building.z_ground - roof.frame.origin[2], settings)
-    return dataclasses.replace(building, built=Model(roof, solid.moved(roof.frame.origin), compose))
+    return dataclasses.replace(building, built=Model(roof, solid.move(roof.frame.origin), compose))

@@ -15,15 +15,15 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..geometry.rings import enclosed
+from ..geometry.rings import repair_polygons
 from ..primitives.catalogue import CATALOGUE
-from ..primitives.family import Member, member_of
+from ..primitives.family import Member, read_member
 from ..primitives.parameters import SIDED
 from .record import measure, place
 
-PLAN = ("width", "length")
+PLAN_SIZES = ("width", "length")
 USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one
-STEEPEST = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a wall
+STEEPEST_SLOPE = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a wall
 
 
 def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     part = {key: value for key, value in part.items() if key != "sigma"}
     kind = change.pop("type", part["type"])
     if kind != part["type"]:
-        part = of_type(with_sizes(part), kind, sizes_of(change))
+        part = change_type(with_sizes(part), kind, read_sizes(change))
     ridge, eave = (
         measure(change.pop(name), name) if name in change else None
         for name in ("ridge_height", "eave_height")
@@ -49,7 +49,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     }
     if SIDED & change.keys():
         part = side_by_side(part)
-    moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN)
+    moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN_SIZES)
     if moves and "outlines" not in placed:
         part = {key: value for key, value in with_sizes(part).items() if key != "outlines"}
     part = from_lowest_eave({**part, **placed, "parameters": {**part["parameters"], **change}})
@@ -64,21 +64,23 @@ def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
     """
     parameters = part["parameters"]
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
-    low = min((measure(parameters[name], name) for name in eaves), default=0.0)
-    if low == 0.0:
+    smallest = min((measure(parameters[name], name) for name in eaves), default=0.0)
+    if smallest == 0.0:
         return part
     x, y, z = place(part["position"], "position").tolist()
-    from_low = {name: parameters[name] - low for name in (*eaves, "height") if name in parameters}
-    return {**part, "parameters": {**parameters, **from_low}, "position": [x, y, z + low]}
+    from_low = {
+        name: parameters[name] - smallest for name in (*eaves, "height") if name in parameters
+    }
+    return {**part, "parameters": {**parameters, **from_low}, "position": [x, y, z + smallest]}
 
 
 def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
     """The part with a width and a length; one that has none gets those of the smallest rectangle
     around its outlines.
     """
-    if all(name in part["parameters"] for name in PLAN):
+    if all(name in part["parameters"] for name in PLAN_SIZES):
         return part
-    outlines = shapely.union_all([polygon_of(outline) for outline in part["outlines"]])
+    outlines = shapely.union_all([make_polygon(outline) for outline in part["outlines"]])
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(outlines))[:4]
     sides = corners[1:3] - corners[:2]
     lengths = np.hypot(*sides.T)
@@ -94,29 +96,29 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def polygon_of(rings: list) -> shapely.Geometry:
+def make_polygon(rings: list) -> shapely.Geometry:
     """The area of a part's outline, rings of (x, y), the outer first; a spike of no width
     is none.
     """
-    return enclosed(shapely.Polygon(rings[0], rings[1:]))
+    return repair_polygons(shapely.Polygon(rings[0], rings[1:]))
 
 
-def sizes_of(change: dict[str, Any]) -> dict[str, float]:
+def read_sizes(change: dict[str, Any]) -> dict[str, float]:
     """The width and length that a change gives, those that make no rectangle left to be refused
     with the whole part.
     """
-    sizes = {name: measure(change[name], name) for name in PLAN if name in change}
+    sizes = {name: measure(change[name], name) for name in PLAN_SIZES if name in change}
     return {name: size for name, size in sizes.items() if size > 0.0}
 
 
-def of_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
+def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
     """The part as another roof type over the same rectangle, or one of other `sizes`, with the same
     lowest eave and the same rise.
     """
     if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
-    width, length = (sizes.get(name, part["parameters"][name]) for name in PLAN)
-    rise = rise_of(part) or 0.5 * USUAL_PITCH * width
+    width, length = (sizes.get(name, part["parameters"][name]) for name in PLAN_SIZES)
+    rise = measure_rise(part) or 0.5 * USUAL_PITCH * width
     return {**part, "type": kind, "parameters": CATALOGUE[kind].typical(width, length, rise)}
 
 
@@ -135,20 +137,20 @@ def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
         )
     return {
         **part,
-        "parameters": member_of(part["type"], parameters, 0.0, np.zeros(3)).side_by_side()[0],
+        "parameters": read_member(part["type"], parameters, 0.0, np.zeros(3)).side_by_side()[0],
     }
 
 
-def rise_of(part: dict[str, Any]) -> float:
+def measure_rise(part: dict[str, Any]) -> float:
     """Height of the part's ridge or top over its lowest eave [m]."""
     if part["type"] == "flat":
         return 0.0
     if not CATALOGUE[part["type"]].is_of_family:
         return part["parameters"]["height"]
-    return rise_of_member(member_of(part["type"], part["parameters"], 0.0, np.zeros(3)))
+    return measure_member_rise(read_member(part["type"], part["parameters"], 0.0, np.zeros(3)))
 
 
-def rise_of_member(member: Member) -> float:
+def measure_member_rise(member: Member) -> float:
     """Height of a member's highest place over its base, within its rectangle, skews and cants left
     aside.
     """
@@ -171,8 +173,8 @@ def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
     """The part with its ridge or top at `z_ridge` about the origin, its eaves where they are."""
     if part["type"] == "flat":
         return {**part, "position": [*part["position"][:2], z_ridge]}
-    if not rise_of(part) > 0.0:  # a roof without any slope has none that could be made steeper
-        part = of_type(with_sizes(part), part["type"], {})
+    if not measure_rise(part) > 0.0:  # a roof without any slope has none that could be made steeper
+        part = change_type(with_sizes(part), part["type"], {})
     parameters, rise = part["parameters"], z_ridge - part["position"][2]
     if not rise > 0.0:
         raise InputError(
@@ -180,13 +182,13 @@ def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
             "(eave_height)"
         )
     if not SIDED & parameters.keys():
-        scale = rise / rise_of(part)
+        scale = rise / measure_rise(part)
         heights = {
             n: scale * h for n, h in parameters.items() if n.endswith("height") or n == "eave_step"
         }
         return {**part, "parameters": {**parameters, **heights}}
     if "height" not in parameters:
-        return {**part, "parameters": parameters | pitches_for(parameters, part["type"], rise)}
+        return {**part, "parameters": parameters | scale_pitches(parameters, part["type"], rise)}
     steeper = rise / parameters["height"]  # a level top keeps its size
     pitches = {n: steeper_by(steeper, v) for n, v in parameters.items() if n.startswith("pitch_")}
     return {**part, "parameters": {**parameters, **pitches, "height": rise}}
@@ -197,18 +199,20 @@ def steeper_by(factor: float, pitch_deg: float) -> float:
     return math.degrees(math.atan(factor * math.tan(math.radians(pitch_deg))))
 
 
-def pitches_for(parameters: dict[str, float], kind: str, rise: float) -> dict[str, float]:
+def scale_pitches(parameters: dict[str, float], kind: str, rise: float) -> dict[str, float]:
     """Pitches, all slopes changed by one factor, with which the ridge comes to `rise` over the
     lowest eave.
     """
-    given = {name: value for name, value in parameters.items() if name.startswith("pitch_")}
+    arguments = {name: value for name, value in parameters.items() if name.startswith("pitch_")}
 
     def pitches(factor: float) -> dict[str, float]:
-        return {name: steeper_by(factor, pitch) for name, pitch in given.items()}
+        return {name: steeper_by(factor, pitch) for name, pitch in arguments.items()}
 
-    low, high = 0.0, STEEPEST / max(math.tan(math.radians(max(given.values()))), 1e-9)
+    lower, upper = 0.0, STEEPEST_SLOPE / max(math.tan(math.radians(max(arguments.values()))), 1e-9)
     for _ in range(60):  # the rise grows with the factor
-        middle = 0.5 * (low + high)
-        found = rise_of_member(member_of(kind, parameters | pitches(middle), 0.0, np.zeros(3)))
-        low, high = (middle, high) if found < rise else (low, middle)
-    return pitches(0.5 * (low + high))
+        middle = 0.5 * (lower + upper)
+        member_rise = measure_member_rise(
+            read_member(kind, parameters | pitches(middle), 0.0, np.zeros(3))
+        )
+        lower, upper = (middle, upper) if member_rise < rise else (lower, middle)
+    return pitches(0.5 * (lower + upper))

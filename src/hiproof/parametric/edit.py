@@ -13,7 +13,7 @@ from ..status import Status
 from ..write.parameters import building_record
 from .building import build
 from .change import changed_part
-from .recess import placed
+from .recess import replace_part
 
 BY_HAND = "changed by hand"
 
@@ -23,7 +23,10 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
     `Building.with_part`.
     """
     z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
-    parts, change = record["parts"], {name: as_written(value) for name, value in change.items()}
+    parts, change = (
+        record["parts"],
+        {name: convert_to_plain(value) for name, value in change.items()},
+    )
     if not 0 <= index <= len(parts):
         raise InputError(
             f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one"
@@ -31,20 +34,20 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
     if index == len(parts):
         parts = [*parts, new_part(change, z_origin)]
     else:
-        parts = placed(parts, index, changed_part(parts[index], change, z_origin))
-    return built(building, {**record, "parts": parts})
+        parts = replace_part(parts, index, changed_part(parts[index], change, z_origin))
+    return rebuild(building, {**record, "parts": parts})
 
 
-def as_written(value: Any) -> Any:
+def convert_to_plain(value: Any) -> Any:
     """A value as a file of parameters holds it: arrays and tuples as lists, NumPy's numbers as
     Python's.
 
-    >>> as_written((np.int64(1), np.array([2.5, 3.0])))
+    >>> convert_to_plain((np.int64(1), np.array([2.5, 3.0])))
     [1, [2.5, 3.0]]
     """
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    return [as_written(one) for one in value] if isinstance(value, (list, tuple)) else value
+    return [convert_to_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
 def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
@@ -69,19 +72,19 @@ def without_part(building: Building, index: int) -> Building:
             "least"
         )
     parts = record["parts"]
-    return built(building, {**record, "parts": [*parts[:index], *parts[index + 1 :]]})
+    return rebuild(building, {**record, "parts": [*parts[:index], *parts[index + 1 :]]})
 
 
-def built(building: Building, record: dict[str, Any]) -> Building:
+def rebuild(building: Building, record: dict[str, Any]) -> Building:
     """The building of a changed record, composed as `building` was: no figure of the earlier model
     stays.
     """
-    found = build(
+    result = build(
         {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND},
         building.model.compose,
     )
     return dataclasses.replace(
-        found,
+        result,
         quality=Quality(points=building.quality.points, density=building.quality.density),
         footprint=building.footprint,
         attributes=building.attributes,

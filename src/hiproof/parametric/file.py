@@ -20,7 +20,7 @@ from ..read.plausible import MOST_PLAN
 from ..settings import Settings
 from ..write.parameters import VERSION, FileHead
 
-HEAD = "hiproof_parameters"
+HEAD_KEY = "hiproof_parameters"
 # This very object stands for a line that cannot be read.
 DAMAGED: dict[str, Any] = {"damaged": True}
 
@@ -48,11 +48,11 @@ def opened_parameters(
         # Editors may begin it with a mark of the encoding.
         with Path(path).open(encoding="utf-8-sig") as file:
             lines = objects(file, path, damaged)
-            yield head_of(next(lines, None), path), records(lines, path, damaged)
+            yield read_head(next(lines, None), path), records(lines, path, damaged)
     except (OSError, UnicodeDecodeError) as error:
-        found = "none" if isinstance(error, FileNotFoundError) else f"something else: {error}"
+        text = "none" if isinstance(error, FileNotFoundError) else f"something else: {error}"
         raise InputError(
-            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got {found}; "
+            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got {text}; "
             "check the path"
         ) from error
 
@@ -65,14 +65,14 @@ def objects(
     for number, line in enumerate(file, 1):
         if line.strip():
             try:
-                value = object_of(line.rstrip(), f"line {number} of {os.fspath(path)}")
+                value = parse_object(line.rstrip(), f"line {number} of {os.fspath(path)}")
             except InputError as error:
                 damaged(error)
                 value = DAMAGED
             yield number, value
 
 
-def object_of(line: str, place: str) -> Any:
+def parse_object(line: str, place: str) -> Any:
     """The JSON value of a line. Raises InputError, one sentence, where it is none."""
     try:
         value = json.loads(line)
@@ -80,7 +80,7 @@ def object_of(line: str, place: str) -> Any:
         is_cut = error.pos >= len(line)
         raise InputError(
             f"expected a JSON object in {place}, got a syntax error at column "
-            f"{error.colno} ({error.msg}), beside {around(line, error.pos)!r}; "
+            f"{error.colno} ({error.msg}), beside {quote_line(line, error.pos)!r}; "
             + ("an object stands on one line" if is_cut else "mend it there")
         ) from error
     except (ValueError, RecursionError) as error:  # a number of 5,000 digits, nested without end
@@ -90,24 +90,25 @@ def object_of(line: str, place: str) -> Any:
     return readable(value) if ESCAPED.search(line) else value
 
 
-def around(line: str, place: int) -> str:
+def quote_line(line: str, place: int) -> str:
     return line[max(place - 12, 0) : place + 12].strip()
 
 
-def head_of(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
+def read_head(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
     """The head, from the first line."""
     where = os.fspath(path)
     record = first[1] if first else None
-    if not isinstance(record, dict) or HEAD not in record:
+    if not isinstance(record, dict) or HEAD_KEY not in record:
         raise InputError(
-            f'expected {{"{HEAD}": {VERSION}, ...}} in the first line of {where}, got something '
+            f'expected {{"{HEAD_KEY}": {VERSION}, ...}} in the first line of {where}, got '
+            "something "
             "else; "
             "is it a parameters.jsonl that hiproof wrote?"
         )
-    if record[HEAD] != VERSION:
+    if record[HEAD_KEY] != VERSION:
         raise InputError(
             f"expected parameters of version {VERSION} in {where}, got version "
-            f"{excerpt(record[HEAD])}; "
+            f"{excerpt(record[HEAD_KEY])}; "
             "use the hiproof that wrote them, or reconstruct again"
         )
     unit, offset = record.get("unit", "auto"), record.get("cityjson_offset")

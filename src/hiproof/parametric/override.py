@@ -37,12 +37,12 @@ from ..status import Doubt, Status
 from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
 from .building import build
-from .edit import built
-from .record import mapping, number, numbers_by_name, place, polygon
-from .refit import measured
+from .edit import rebuild
+from .record import number, numbers_by_name, place, polygon, require_mapping
+from .refit import measure_building
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
-TOLD = ("note", "who", "when")
+NOTE_KEYS = ("note", "who", "when")
 KEYS = (
     "id",
     *SHAPING,
@@ -52,10 +52,10 @@ KEYS = (
     "z_ground",
     "block_height",
     "leave_out",
-    *TOLD,
+    *NOTE_KEYS,
 )
 
-FAR_GROUND_M = 5.0
+FAR_GIVEN_GROUND_M = 5.0
 """Difference (m) between a ground given and the terrain from which on it is remarked: a code for
 "unknown", or another height system. Ground levels of registers differ less from the lowest terrain
 along the walls.
@@ -95,17 +95,19 @@ class Override:
     told: str = ""
 
 
-def override_of(record: Mapping[str, Any]) -> Override:
+def read_override(record: Mapping[str, Any]) -> Override:
     """The override that an object tells of.
 
     Raises InputError, one sentence, where it cannot be or contradicts itself.
 
-    >>> override_of({"id": "a", "type": "hip", "ridge_height": 12.4}).fixed
+    >>> read_override({"id": "a", "type": "hip", "ridge_height": 12.4}).fixed
     {'ridge_height': 12.4}
     """
-    record = {k: v for k, v in mapping(record, "an override").items() if v is not None and v != ""}
+    record = {
+        k: v for k, v in require_mapping(record, "an override").items() if v is not None and v != ""
+    }
     id = str(record.get("id", ""))
-    where = f"the override of {id!r}"
+    text = f"the override of {id!r}"
     if not id:
         raise InputError("expected the id of a building in every override, got none; give one")
     has_list = isinstance(record.get("parts"), list)
@@ -122,34 +124,34 @@ def override_of(record: Mapping[str, Any]) -> Override:
     other = [name for name in record if name not in KEYS]
     if other:
         raise InputError(
-            f"expected {', '.join(KEYS)} in {where}, got also {', '.join(other[:8])}; remove it"
+            f"expected {', '.join(KEYS)} in {text}, got also {', '.join(other[:8])}; remove it"
         )
-    refuse_contradictions(record, has_list, where)
-    fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {where}")
-    heights = {name: possible(record, name, where) for name in ("ridge_height", "eave_height")}
+    refuse_contradictions(record, has_list, text)
+    fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {text}")
+    heights = {name: possible(record, name, text) for name in ("ridge_height", "eave_height")}
     fixed |= {name: height for name, height in heights.items() if height is not None}
-    count = None if has_list else possible(record, "parts", where)
+    count = None if has_list else possible(record, "parts", text)
     if count is not None and count != int(count):
         raise InputError(
-            f"expected a whole number of parts from 1 in {where}, got {count:g}; or give a list of "
+            f"expected a whole number of parts from 1 in {text}, got {count:g}; or give a list of "
             "parts"
         )
-    types = types_of(record, where)
+    types = read_types(record, text)
     return Override(
         id=id,
         type=record.get("type"),
         types=types,
         most_parts=None if count is None else int(count),
         parts=record["parts"] if has_list else None,
-        origin=place(record["origin"], f"origin of {where}") if "origin" in record else None,
+        origin=place(record["origin"], f"origin of {text}") if "origin" in record else None,
         outline=record["outline"]
-        if "outline" in record and polygon(record["outline"], f"outline of {where}")
+        if "outline" in record and polygon(record["outline"], f"outline of {text}")
         else None,
         fixed=fixed,
-        z_ground=possible(record, "z_ground", where),
-        block_height=possible(record, "block_height", where),
+        z_ground=possible(record, "z_ground", text),
+        block_height=possible(record, "block_height", text),
         leave_out=bool(record.get("leave_out", False)),
-        told=told_of(record, has_list),
+        told=describe_override(record, has_list),
     )
 
 
@@ -165,10 +167,10 @@ def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
     """
     if key not in record:
         return None
-    value, (low, high) = number(record[key], f"{key} of {where}"), RANGES[key]
-    if not low <= value <= high:
+    value, (lower, upper) = number(record[key], f"{key} of {where}"), RANGES[key]
+    if not lower <= value <= upper:
         raise InputError(
-            f"expected {key} from {low:g} to {high:g} in {where}, got {value:g}; leave it out "
+            f"expected {key} from {lower:g} to {upper:g} in {where}, got {value:g}; leave it out "
             "where unknown"
         )
     return value
@@ -183,16 +185,17 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
             f"expected true or false as leave_out of {where}, got {excerpt(record['leave_out'])}; "
             "say which"
         )
-    alone = {
+    single = {
         "leave_out": (bool(record.get("leave_out")), (*SHAPING, "parts", "block_height")),
         "block_height": ("block_height" in record, (*SHAPING, "parts")),
         "a list of parts": (has_list, SHAPING),
     }
-    for name, (said, others) in alone.items():
-        against = [key for key in others if key in record]
-        if said and against:
+    for name, (is_given, neighbours) in single.items():
+        against = [key for key in neighbours if key in record]
+        if is_given and against:
             raise InputError(
-                f"expected {name} without {', '.join(others)} in {where}, got also {against[0]}; "
+                f"expected {name} without {', '.join(neighbours)} in {where}, got also "
+                f"{against[0]}; "
                 "keep one"
             )
     if has_list and "origin" not in record:
@@ -201,15 +204,17 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
         )
 
 
-def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
+def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     """Types that parts may have, none where nothing is said of them; a text names several by
     commas.
     """
-    told = record.get("types")
-    names = told.split(",") if isinstance(told, str) else told
+    given_types = record.get("types")
+    names = given_types.split(",") if isinstance(given_types, str) else given_types
     if names is not None and not (isinstance(names, (list, tuple)) and names):
         raise InputError(
-            f"expected a list of roof types as types of {where}, got {excerpt(told)}; name one at "
+            f"expected a list of roof types as types of {where}, got {excerpt(given_types)}; name "
+            "one "
+            "at "
             "least"
         )
     types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
@@ -227,20 +232,20 @@ def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     return types
 
 
-def told_of(record: Mapping[str, Any], has_list: bool) -> str:
+def describe_override(record: Mapping[str, Any], has_list: bool) -> str:
     """The override in words, for the building's detail."""
-    said = [
+    phrases = [
         f"{name} {record[name]}"
         for name in (*SHAPING, "z_ground", "block_height")
         if name in record
     ]
-    said += (
+    phrases += (
         ["parts given"] if has_list else [f"parts {record['parts']}"] if "parts" in record else []
     )
-    note = ", ".join(str(record[name])[:200] for name in TOLD if name in record)
+    note = ", ".join(str(record[name])[:200] for name in NOTE_KEYS if name in record)
     return (
         "overridden: "
-        + ", ".join(said or ["left out"] if record.get("leave_out") else said)
+        + ", ".join(phrases or ["left out"] if record.get("leave_out") else phrases)
         + (f" ({note})" if note else "")
     )
 
@@ -258,20 +263,20 @@ def overridden(
     `hiproof.reconstruct`.
     """
     points, settings = as_xyz(points), settings or Settings()
-    building = stages.asked_for(footprint, id)
+    building = stages.start_building(footprint, id)
     if override.leave_out:
         return dataclasses.replace(building, status=Status.LEFT_OUT, detail=override.told)
     try:
         if override.parts is not None or override.block_height is not None:
-            found = as_given(override, points, building, terrain, settings)
+            result = build_given(override, points, building, terrain, settings)
         else:
-            found = fitted_within(override, points, footprint, terrain, settings, id, ground)
+            result = fit_within(override, points, footprint, terrain, settings, id, ground)
     except HiproofError as error:
-        found = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
-    if lies_under(found, override.z_ground):
-        found = stages.remarked(found, "the ground given lies above its lowest eave")
-    found = stages.remarked(found, unlike_ground(found, override.z_ground, terrain))
-    return stages.remarked(found, override.told)
+        result = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
+    if lies_under(result, override.z_ground):
+        result = stages.add_remark(result, "the ground given lies above its lowest eave")
+    result = stages.add_remark(result, remark_given_ground(result, override.z_ground, terrain))
+    return stages.add_remark(result, override.told)
 
 
 def lies_under(building: Building, z_ground: float | None) -> bool:
@@ -283,38 +288,40 @@ def lies_under(building: Building, z_ground: float | None) -> bool:
     return bool(building.solid.vertices[:, 2].min() < z_ground - 1e-3)
 
 
-def unlike_ground(building: Building, z_ground: float | None, terrain: Any) -> str:
+def remark_given_ground(building: Building, z_ground: float | None, terrain: Any) -> str:
     """A remark where the ground given lies far from what the terrain says under the building's
     outline. Empty otherwise.
     """
     if z_ground is None or terrain is None or building.built is None:
         return ""
-    heights, source = stages.asked(
+    heights, source = stages.query_terrain(
         terrain, building.roof.frame.to_world(shapely.get_coordinates(building.roof.outline))
     )
     if (
         not np.isfinite(heights).any()
-        or abs(apart := z_ground - float(np.nanmin(heights))) < FAR_GROUND_M
+        or abs(gap := z_ground - float(np.nanmin(heights))) < FAR_GIVEN_GROUND_M
     ):
         return ""
     return (
-        f"{Doubt.GROUND_GIVEN_ELSEWHERE.value} {abs(apart):.1f} m "
-        f"{'above' if apart > 0 else 'below'} the {source}"
+        f"{Doubt.GROUND_GIVEN_ELSEWHERE.value} {abs(gap):.1f} m "
+        f"{'above' if gap > 0 else 'below'} the {source}"
     )
 
 
-def as_given(
+def build_given(
     override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings
 ) -> Building:
     """The building of the parts or the block given, measured on its points where there are any; its
     footprint is moved as a run does.
     """
-    building, footprint, of_footprint = stages.aligned(building, points, settings)
+    building, footprint, of_footprint = stages.align_footprint(building, points, settings)
     points, outline, status = stages.usable(points, footprint)
     if status is Status.BAD_FOOTPRINT and override.outline is None:
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = (
-        LocalFrame(override.origin) if override.origin is not None else frame_of(points, outline)
+        LocalFrame(override.origin)
+        if override.origin is not None
+        else choose_frame(points, outline)
     )
     local = frame.to_local(points)
     rings = override.outline or outline_record(stages.to_local(outline, frame))
@@ -324,7 +331,7 @@ def as_given(
             "neither; give one"
         )
     area = polygon(rings, "outline")
-    ground = given_ground(override, area, local, frame, terrain)
+    ground = choose_ground(override, area, local, frame, terrain)
     parts = override.parts
     if parts is None and override.block_height is not None:
         level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
@@ -343,23 +350,23 @@ def as_given(
         "z_ground": ground.z,
         "ground_source": ground.source,
     }
-    made = build(
+    created = build(
         {"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts},
         settings.compose,
     )
-    made = dataclasses.replace(
-        made,
+    created = dataclasses.replace(
+        created,
         detail="as given",
         terrain_intersection=ground.intersection,
         attributes=building.attributes,
-        footprint=made.footprint if building.footprint is None else building.footprint,
+        footprint=created.footprint if building.footprint is None else building.footprint,
         shift=building.shift,
     )
-    made = measured(made, local) if len(local) else made
-    return stages.remarked(made, of_footprint)
+    created = measure_building(created, local) if len(local) else created
+    return stages.add_remark(created, of_footprint)
 
 
-def frame_of(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
+def choose_frame(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
     """The frame about the points, where there are none about the outline."""
     if len(points):
         return LocalFrame.around(points)
@@ -369,7 +376,7 @@ def frame_of(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
     return LocalFrame.around(np.column_stack([corners, np.zeros(len(corners))]))
 
 
-def given_ground(
+def choose_ground(
     override: Override,
     outline: shapely.Polygon,
     points: np.ndarray,
@@ -390,7 +397,7 @@ def given_ground(
     return ground
 
 
-def fitted_within(
+def fit_within(
     override: Override,
     points: np.ndarray,
     footprint: shapely.Polygon | Footprint | None,
@@ -411,32 +418,34 @@ def fitted_within(
         return building
     changed = False
     while override.most_parts is not None and len(building.parts) > override.most_parts:
-        shown_m2 = building.model.shown_m2
+        shown_m2 = building.model.visible_m2
         building, changed = building.without_part(shown_m2.index(min(shown_m2))), True
     main = building.model.main
     if override.type and building.parts[main].type != override.type:
         building, changed = building.with_part(main, type=override.type), True
     if changed:
-        building = refitted(building, points, {})
+        building = try_refit(building, points, {})
     if override.fixed:
         building = building.with_part(main, **override.fixed)
-        held = {main: (*building.parts[main].parameters, "z")}
-        building = refitted(building, points, held)
+        fixed = {main: (*building.parts[main].parameters, "z")}
+        building = try_refit(building, points, fixed)
     if override.z_ground is not None:
         record = building_record(building) | {
             "z_ground": override.z_ground,
             "ground_source": "override",
         }
-        again = built(building, record)
+        repeat = rebuild(building, record)
         detail = stages.without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
-        again = dataclasses.replace(again, quality=building.quality, grade=building.grade)
-        building = dataclasses.replace(again, status=building.status, detail=detail)
+        repeat = dataclasses.replace(repeat, quality=building.quality, grade=building.grade)
+        building = dataclasses.replace(repeat, status=building.status, detail=detail)
     return building
 
 
-def refitted(building: Building, points: np.ndarray, held: dict[int, tuple[str, ...]]) -> Building:
+def try_refit(
+    building: Building, points: np.ndarray, fixed: dict[int, tuple[str, ...]]
+) -> Building:
     """The building fitted again; as it is where its points are too few."""
     try:
-        return building.refit(points, held)
+        return building.refit(points, fixed)
     except FitError:
         return building

@@ -16,15 +16,15 @@ from ..compose.readable import refuse_many, refuse_wrong_parts
 from ..compose.settle import (
     DIGITS,
     PLAN_DIGITS,
-    pieces_of,
+    make_pieces,
+    round_number,
     rounded_outline,
-    settled,
     settled_outline,
     settled_sigma,
 )
 from ..errors import InputError
 from ..frames import LocalFrame
-from ..geometry.rings import enclosed
+from ..geometry.rings import repair_polygons
 from ..model import Building, Part, Quality, Roof
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
@@ -32,17 +32,17 @@ from ..read.damage import excerpt
 from ..status import Grade, Status
 from ..write.attribute_list import PARAMETERS, PART
 
-WIDEST_M = 1e5  # of any number of a part, and of heights
+WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
-FARTHEST_M = 1e8
-MOST = 1e15  # of any number
+FARTHEST_WORLD_M = 1e8
+LARGEST_NUMBER = 1e15  # of any number
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 PART_KEYS = tuple(attribute.name for attribute in PART)
 FIGURES = ("density", "nodata_share", "unexplained_area_m2")
 RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
 
 
-def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
+def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     """The building that a JSON object tells of, without a model yet, and the roof made of its
     parts, None where it has none.
 
@@ -52,8 +52,8 @@ def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     parts = list_at(record, "parts")
     origin = None if record.get("origin") is None else place(record["origin"], "origin", coordinate)
     outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
-    status = status_of(record, bool(parts))
-    roof = roof_of(parts, outline, origin) if parts else None
+    status = read_status(record, bool(parts))
+    roof = read_roof(parts, outline, origin) if parts else None
     world = outline if roof is None else shapely.transform(roof.outline, roof.frame.to_world)
     ground = (
         figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
@@ -62,47 +62,47 @@ def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
         id=str(record["id"]),
         status=status,
         detail=text_at(record, "detail") if status.code == record.get("status") else "",
-        quality=quality_of(record),
-        grade=grade_of(record),
-        z_ground=settled(ground, PLAN_DIGITS),
+        quality=read_quality(record),
+        grade=read_grade(record),
+        z_ground=round_number(ground, PLAN_DIGITS),
         ground_source=text_at(record, "ground_source"),
-        terrain_intersection=tuple(lines_of(record)),
+        terrain_intersection=tuple(read_terrain_lines(record)),
         objective=figure(record, "objective"),
         recognised=numbers_by_name(record.get("recognised") or {}, "recognised"),
         types=numbers_by_name(record.get("types") or {}, "types"),
         footprint=world,
-        attributes=dict(mapping(record.get("attributes") or {}, "attributes")),
-        shift=shift_of(record),
+        attributes=dict(require_mapping(record.get("attributes") or {}, "attributes")),
+        shift=read_shift(record),
     )
     return building, roof
 
 
-def status_of(record: Mapping[str, Any], has_parts: bool) -> Status:
+def read_status(record: Mapping[str, Any], has_parts: bool) -> Status:
     """The status told; that of a building which has parts by hand is a model's."""
     code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
-    known = {status.code: status for status in Status}
-    if not isinstance(code, str) or code not in known:
+    by_code = {status.code: status for status in Status}
+    if not isinstance(code, str) or code not in by_code:
         raise InputError(
-            f"expected a status ({', '.join(known)}), got {excerpt(code)}; leave it as the run "
+            f"expected a status ({', '.join(by_code)}), got {excerpt(code)}; leave it as the run "
             "wrote it"
         )
-    if has_parts and not known[code].is_model:
+    if has_parts and not by_code[code].is_model:
         return Status.MODELLED
-    if not has_parts and known[code].is_model:
+    if not has_parts and by_code[code].is_model:
         raise InputError(
             f"expected parts of a building whose status is {code}, got none; give one part at least"
         )
-    return known[code]
+    return by_code[code]
 
 
-def outline_of(record: Mapping[str, Any]) -> shapely.Polygon | None:
+def read_outline(record: Mapping[str, Any]) -> shapely.Polygon | None:
     """The outline, in world coordinates, of the roof that a building's object tells of;
 
     None where it tells of none.
     """
     if not record.get("parts") or record.get("outline") is None or record.get("origin") is None:
         return None
-    frame = LocalFrame(rounded(place(record["origin"], "origin"), DIGITS))
+    frame = LocalFrame(round_values(place(record["origin"], "origin"), DIGITS))
     return shapely.transform(on_grid(polygon(record["outline"], "outline")), frame.to_world)
 
 
@@ -117,7 +117,7 @@ def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
         ) from error
 
 
-def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
+def read_roof(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
     """The roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
         raise InputError(
@@ -125,28 +125,28 @@ def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | N
         )
     refuse_many(parts)
     outline = on_grid(outline)
-    made = [part_of(part, outline, f"part {index}") for index, part in enumerate(parts)]
-    roof = Roof(tuple(made), outline, LocalFrame(rounded(origin, DIGITS)))
+    created = [read_part(part, outline, f"part {index}") for index, part in enumerate(parts)]
+    roof = Roof(tuple(created), outline, LocalFrame(round_values(origin, DIGITS)))
     refuse_wrong_parts(roof)
     return roof
 
 
-def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
+def read_part(record: Any, outline: shapely.Polygon, where: str) -> Part:
     """A part with its planes; without outlines of its own it roofs what its rectangle covers of the
     building's.
     """
-    refuse_other_keys(mapping(record, where), PART_KEYS, where)
+    refuse_other_keys(require_mapping(record, where), PART_KEYS, where)
     kind = text_at(record, "type")
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
     refuse_no_shape(kind, parameters, where)
-    parameters = {name: settled(value) for name, value in parameters.items()}
-    position = rounded(place(record.get("position"), f"position of {where}", measure), DIGITS)
-    kappa = math.radians(settled(number(record.get("rotation", 0.0), f"rotation of {where}")))
-    outlines = outlines_of(record, parameters, position, kappa, outline, where)
+    parameters = {name: round_number(value) for name, value in parameters.items()}
+    position = round_values(place(record.get("position"), f"position of {where}", measure), DIGITS)
+    kappa = math.radians(round_number(number(record.get("rotation", 0.0), f"rotation of {where}")))
+    outlines = read_part_outlines(record, parameters, position, kappa, outline, where)
     if kind == "shed":
         outlines = by_teeth(outlines, parameters, position, kappa)
     outlines = [rounded_outline(o) for o in outlines]
-    pieces = pieces_of(kind, parameters, kappa, position, outlines)
+    pieces = make_pieces(kind, parameters, kappa, position, outlines)
     sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {where}")
     sigma = {
         ("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s)
@@ -155,7 +155,7 @@ def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
     return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
 
 
-def outlines_of(
+def read_part_outlines(
     record: Mapping[str, Any],
     parameters: Mapping[str, float],
     position: np.ndarray,
@@ -167,11 +167,11 @@ def outlines_of(
     building's outline.
     """
     if record.get("outlines") is None:
-        return rectangle_within(parameters, position, kappa, outline, where)
+        return clip_rectangle(parameters, position, kappa, outline, where)
     return [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
 
 
-def rectangle_within(
+def clip_rectangle(
     parameters: Mapping[str, float],
     position: np.ndarray,
     kappa: float,
@@ -188,7 +188,9 @@ def rectangle_within(
     corners = (
         np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
     )
-    covered = shapely.intersection(shapely.Polygon(corners), enclosed(outline), grid_size=1e-4)
+    covered = shapely.intersection(
+        shapely.Polygon(corners), repair_polygons(outline), grid_size=1e-4
+    )
     return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
 
 
@@ -206,15 +208,15 @@ def by_teeth(
     cut = []
     for outline in outlines:
         v = (shapely.get_coordinates(outline) - position[:2]) @ (-s, c)
-        own = [
+        teeth_parts = [
             k
             for k in range(teeth)
             if v.max() > edges[k] + SLACK_M and v.min() < edges[k + 1] - SLACK_M
         ]
-        if len(own) < 2:
+        if len(teeth_parts) < 2:
             cut.append(outline)
             continue
-        for k in own:
+        for k in teeth_parts:
             uv = np.array(
                 [
                     (-FAR_M, edges[k]),
@@ -224,14 +226,14 @@ def by_teeth(
                 ]
             )
             strip = shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
-            found = shapely.get_parts(
-                shapely.intersection(strip, enclosed(outline), grid_size=1e-4)
+            result = shapely.get_parts(
+                shapely.intersection(strip, repair_polygons(outline), grid_size=1e-4)
             )
-            cut += [g for g in found if g.geom_type == "Polygon"]
+            cut += [g for g in result if g.geom_type == "Polygon"]
     return cut
 
 
-def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:
+def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
     """The terrain's lines (m, 3) along the outline."""
     lines = [
         np.array(
@@ -242,23 +244,24 @@ def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:
         )
         for line in as_list(record.get("terrain_line") or [], "terrain_line")
     ]
-    return [rounded(line, PLAN_DIGITS) for line in lines if len(line)]
+    return [round_values(line, PLAN_DIGITS) for line in lines if len(line)]
 
 
-def grade_of(record: Mapping[str, Any]) -> Grade | None:
+def read_grade(record: Mapping[str, Any]) -> Grade | None:
     """The verdict told, None where there is none."""
-    code, known = text_at(record, "quality"), {grade.code: grade for grade in Grade}
-    if code and code not in known:
+    code, by_code = text_at(record, "quality"), {grade.code: grade for grade in Grade}
+    if code and code not in by_code:
         raise InputError(
-            f"expected a quality ({', '.join(known)}), got {code!r:.40}; leave it as the run wrote "
+            f"expected a quality ({', '.join(by_code)}), got {code!r:.40}; leave it as the run "
+            "wrote "
             "it"
         )
-    return known.get(code)
+    return by_code.get(code)
 
 
-def quality_of(record: Mapping[str, Any]) -> Quality:
+def read_quality(record: Mapping[str, Any]) -> Quality:
     """The figures that were measured when the building was reconstructed."""
-    residuals = mapping(record.get("residuals") or {}, "residuals")
+    residuals = require_mapping(record.get("residuals") or {}, "residuals")
     figures = {name: figure(residuals, name) for name in RESIDUALS} | {
         name: figure(record, name) for name in FIGURES
     }
@@ -270,13 +273,16 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
     """Raise InputError where a value of a building's object is of another kind than a run writes;
     no geometry is made.
     """
-    parts = [mapping(part, f"part {index}") for index, part in enumerate(list_at(record, "parts"))]
-    status_of(record, bool(parts))
+    parts = [
+        require_mapping(part, f"part {index}")
+        for index, part in enumerate(list_at(record, "parts"))
+    ]
+    read_status(record, bool(parts))
     for name in ("detail", "type", "ground_source"):
         text_at(record, name)
     for name in ("z_ground", "objective"):
         figure(record, name)
-    quality_of(record)
+    read_quality(record)
     if record.get("origin") is not None:
         place(record["origin"], "origin", coordinate)
     if record.get("outline") is not None:
@@ -284,10 +290,10 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
     for name in ("recognised", "types"):
         numbers_by_name(record.get(name) or {}, name)
     for index, part in enumerate(parts):
-        refuse_other_kinds_of_part(part, f"part {index}")
+        refuse_other_part_kinds(part, f"part {index}")
 
 
-def refuse_other_kinds_of_part(part: Mapping[str, Any], where: str) -> None:
+def refuse_other_part_kinds(part: Mapping[str, Any], where: str) -> None:
     """Raise InputError where a value of a part is of another kind than a run writes."""
     if text_at(part, "type") not in CATALOGUE:
         raise InputError(
@@ -300,16 +306,17 @@ def refuse_other_kinds_of_part(part: Mapping[str, Any], where: str) -> None:
         numbers_by_name(part.get(name) or {}, f"{name} of {where}")
 
 
-def refuse_other_keys(record: Mapping[str, Any], known: Any, where: str) -> None:
-    other = [str(key)[:40] for key in record if key not in known]
+def refuse_other_keys(record: Mapping[str, Any], allowed: Any, where: str) -> None:
+    other = [str(key)[:40] for key in record if key not in allowed]
     if other:
         raise InputError(
-            f"expected the keys {', '.join(known)} of {where}, got also {', '.join(other[:8])}; "
+            f"expected the keys {', '.join(allowed)} of {where}, got also "
+            f"{', '.join(other[:8])}; "
             "remove them"
         )
 
 
-def mapping(value: Any, where: str) -> Mapping[str, Any]:
+def require_mapping(value: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
         raise InputError(f"expected an object as {where}, got {excerpt(value)}; write {{...}}")
     return value
@@ -335,7 +342,7 @@ def text_at(record: Mapping[str, Any], name: str) -> str:
 def number(value: Any, where: str) -> float:
     """A finite number that a building can have."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or not abs(value) < MOST:
+    if not is_number or not abs(value) < LARGEST_NUMBER:
         raise InputError(
             f"expected a number as {where}, got {excerpt(value)}; give metres, or degrees for "
             "angles"
@@ -350,25 +357,27 @@ def measure(value: Any, where: str) -> float:
     Traceback (most recent call last):
     hiproof.errors.InputError: expected z_ground within 100000, got 1e+09; check its unit
     """
-    found = number(value, where)
-    if abs(found) > WIDEST_M:
-        raise InputError(f"expected {where} within {WIDEST_M:g}, got {found:g}; check its unit")
-    return found
+    result = number(value, where)
+    if abs(result) > WIDEST_PART_M:
+        raise InputError(
+            f"expected {where} within {WIDEST_PART_M:g}, got {result:g}; check its unit"
+        )
+    return result
 
 
 def coordinate(value: Any, where: str) -> float:
     """A coordinate of a place on Earth."""
-    found = number(value, where)
-    if abs(found) > FARTHEST_M:
+    result = number(value, where)
+    if abs(result) > FARTHEST_WORLD_M:
         raise InputError(
-            f"expected {where} on Earth, within {FARTHEST_M:g} m of its CRS's origin, got "
-            f"{found:g}; check its unit"
+            f"expected {where} on Earth, within {FARTHEST_WORLD_M:g} m of its CRS's origin, got "
+            f"{result:g}; check its unit"
         )
-    return found
+    return result
 
 
-def rounded(values: np.ndarray, digits: int) -> np.ndarray:
-    return np.array([settled(v, digits) for v in values.ravel()]).reshape(values.shape)
+def round_values(values: np.ndarray, digits: int) -> np.ndarray:
+    return np.array([round_number(v, digits) for v in values.ravel()]).reshape(values.shape)
 
 
 def figure(record: Mapping[str, Any], name: str) -> float:
@@ -379,11 +388,11 @@ def figure(record: Mapping[str, Any], name: str) -> float:
 def numbers_by_name(values: Any, where: str) -> dict[str, float]:
     return {
         str(name): measure(value, f"{name} in {where}")
-        for name, value in mapping(values, where).items()
+        for name, value in require_mapping(values, where).items()
     }
 
 
-def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
+def read_shift(record: Mapping[str, Any]) -> tuple[float, float]:
     """How far the footprint was moved; of a building made by hand not at all."""
     value = record.get("shift", [0.0, 0.0])
     if not isinstance(value, list) or len(value) != 2:
@@ -402,7 +411,7 @@ def place(value: Any, where: str, read: Callable[[Any, str], float] = number) ->
 
 def polygon(rings: Any, where: str) -> shapely.Polygon:
     """A polygon of rings, the outer first."""
-    found = []
+    result = []
     for ring in as_list(rings, where):
         corners = as_list(ring, where)
         if len(corners) < 3 or not all(isinstance(xy, list) and len(xy) == 2 for xy in corners):
@@ -410,9 +419,9 @@ def polygon(rings: Any, where: str) -> shapely.Polygon:
                 f"expected rings of three or more [x, y] as {where}, got {excerpt(ring)}; close "
                 "the ring"
             )
-        found.append([(coordinate(x, where), coordinate(y, where)) for x, y in corners])
-    if not found:
+        result.append([(coordinate(x, where), coordinate(y, where)) for x, y in corners])
+    if not result:
         raise InputError(
             f"expected rings, the outer first, as {where}, got none; write null for no outline"
         )
-    return shapely.Polygon(found[0], found[1:])
+    return shapely.Polygon(result[0], result[1:])

@@ -16,28 +16,28 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..compose.settle import pieces_of
+from ..compose.settle import make_pieces
 from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
 from ..primitives.parameters import SIDED
 from ..write.parameters import building_record
-from .edit import built
+from .edit import rebuild
 
 # parameters, or beginnings of their names
-HELD = ("width", "length", "teeth", "skew", "facing", "distance")
+HELD_PARAMETERS = ("width", "length", "teeth", "skew", "facing", "distance")
 STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian
 SCALES_M = (3.0, 0.8, 0.25)  # residuals beyond are outliers, from coarse to fine
-ROUNDS = 6  # at each scale
-MOST_POINTS = 2000  # an even selection of more
+REFIT_ROUNDS = 6  # at each scale
+MOST_REFIT_POINTS = 2000  # an even selection of more
 # of a point's whole cost: a start that comes so near is no further searched for from afar
 WELL = 0.3
 # points so near the outline may be returns of walls; left out where enough others are
 FACADE_M, ENOUGH = 0.3, 30
-FEWEST_POINTS = 3  # points; fewer span no plane
+FEWEST_REFIT_POINTS = 3  # points; fewer span no plane
 # m, degrees: bounds in which heights and pitches stay, short of level and of upright
 LEAST_HEIGHT_M, PITCHES_DEG = 0.01, (0.5, 85.0)
 Z = "z"
-FAR_M = 100.0  # m; larger than any length of a roof: as good as no bound
+UNBOUNDED_M = 100.0  # m; larger than any length of a roof: as good as no bound
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,17 +58,19 @@ def refit(
     fixed: Mapping[int, Collection[str]] | None = None,
 ) -> Building:
     """The building with its parts fitted to `points` again; see `Building.refit`."""
-    record, local = building_record(building), within(building.roof, points)
-    parts = refitted_parts(building.roof, record["parts"], local, fixed or {})
-    return measured(fitted_again(built(building, {**record, "parts": parts})), local)
+    record, local = building_record(building), select_inside(building.roof, points)
+    parts = refit_parts(building.roof, record["parts"], local, fixed or {})
+    return measure_building(
+        refit_parts_freely(rebuild(building, {**record, "parts": parts})), local
+    )
 
 
-def fitted_again(building: Building) -> Building:
+def refit_parts_freely(building: Building) -> Building:
     """The building with its detail saying that its parts were fitted."""
     return dataclasses.replace(building, detail=f"{building.detail}, fitted to its points")
 
 
-def within(roof: Roof, points: np.ndarray) -> np.ndarray:
+def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
     """Those of the world `points` (n, 3) that are finite and lie inside the outline, about the
     origin of the roof.
     """
@@ -77,22 +79,23 @@ def within(roof: Roof, points: np.ndarray) -> np.ndarray:
     return local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
 
 
-def refitted_parts(
+def refit_parts(
     roof: Roof, parts: list, points: np.ndarray, fixed: Mapping[int, Collection[str]]
 ) -> list:
     """The objects `parts` that `roof` was made of, fitted to `points` (n, 3) about its origin.
 
     Raises FitError for fewer than three.
     """
-    unknowns = unknowns_of(roof.parts, fixed)
-    if len(points) < FEWEST_POINTS:
+    unknowns = list_unknowns(roof.parts, fixed)
+    if len(points) < FEWEST_REFIT_POINTS:
         raise FitError(
-            f"expected {FEWEST_POINTS} points or more inside the outline, got {len(points)}; add a "
+            f"expected {FEWEST_REFIT_POINTS} points or more inside the outline, got {len(points)}; "
+            "add a "
             "cloud"
         )
     if not unknowns.names:
         return parts
-    values, sigma = fitted(roof.parts, off_the_walls(points, roof.outline), unknowns)
+    values, sigma = fit_unknowns(roof.parts, off_the_walls(points, roof.outline), unknowns)
     return [
         with_values(
             part,
@@ -106,56 +109,57 @@ def refitted_parts(
 def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
     """The points (n, 3) that are no returns of walls, where they are enough; else all."""
     inner = shapely.buffer(outline, -FACADE_M)
-    kept = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
-    return kept if len(kept) >= ENOUGH else points
+    selection = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    return selection if len(selection) >= ENOUGH else points
 
 
-def unknowns_of(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:
+def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:
     """All parameters of all parts but their rectangles, where their planes face and those `fixed`
     by part; the position's z is "z".
     """
     rows = []
     for index, part in enumerate(parts):
         held = set(fixed.get(index, ()))
-        known = {*part.parameters, Z}
-        if held - known:
+        names = {*part.parameters, Z}
+        if held - names:
             raise InputError(
-                f"expected parameters of part {index} ({', '.join(sorted(known))}) to hold, got "
-                f"{', '.join(sorted(held - known))}; choose among these"
+                f"expected parameters of part {index} ({', '.join(sorted(names))}) to hold, "
+                "got "
+                f"{', '.join(sorted(held - names))}; choose among these"
             )
         # a member's eaves are free one by one
         if Z not in held and not SIDED & part.parameters.keys():
             rows.append((index, Z, float(part.translation[2]), -np.inf, np.inf))
         for name, value in part.parameters.items():
-            if name not in held and name.split("_")[0] not in HELD:
-                rows.append((index, name, value, *bounds_of(name, part.parameters)))
-    start, low, high = (np.array([row[k] for row in rows], float) for k in (2, 3, 4))
-    low, high = np.minimum(low, start), np.maximum(high, start)
-    return Unknowns(tuple((row[0], row[1]) for row in rows), start, low - 1e-9, high + 1e-9)
+            if name not in held and name.split("_")[0] not in HELD_PARAMETERS:
+                rows.append((index, name, value, *find_bounds(name, part.parameters)))
+    start, lower, upper = (np.array([row[k] for row in rows], float) for k in (2, 3, 4))
+    lower, upper = np.minimum(lower, start), np.maximum(upper, start)
+    return Unknowns(tuple((row[0], row[1]) for row in rows), start, lower - 1e-9, upper + 1e-9)
 
 
-def bounds_of(name: str, parameters: Mapping[str, float]) -> tuple[float, float]:
+def find_bounds(name: str, parameters: Mapping[str, float]) -> tuple[float, float]:
     """Within which a parameter makes a roof over its rectangle."""
-    width, length = parameters.get("width", FAR_M), parameters.get("length", FAR_M)
+    width, length = parameters.get("width", UNBOUNDED_M), parameters.get("length", UNBOUNDED_M)
     return {
         "ridge_length": (0.0, 0.98 * length),
         "top_length": (0.0, 0.98 * length),
         "top_width": (0.0, 0.98 * width),
         "break_width": (0.02 * width, 0.98 * width),
         "ridge_offset": (-0.45 * width, 0.45 * width),
-        "eave_step": (-FAR_M, FAR_M),
+        "eave_step": (-UNBOUNDED_M, UNBOUNDED_M),
     }.get(
         name,
         PITCHES_DEG
         if name.startswith("pitch_")
-        else (-FAR_M, FAR_M)
+        else (-UNBOUNDED_M, UNBOUNDED_M)
         if name.startswith("eave_")
-        else (LEAST_HEIGHT_M, FAR_M),
+        else (LEAST_HEIGHT_M, UNBOUNDED_M),
     )
 
 
 @dataclasses.dataclass(frozen=True)
-class Surface:
+class RefitSurface:
     """The roof over the points: their heights (n,) above it, the part (n,) that it is there and the
     row (n,) among that part's planes, and all planes (k, 3) of every part.
     """
@@ -195,43 +199,45 @@ class Heights:
         parameters = {name: values.get(name, value) for name, value in part.parameters.items()}
         translation = np.array([*part.translation[:2], values.get(Z, part.translation[2])])
         try:
-            pieces = pieces_of(part.type, parameters, part.kappa, translation, self.outlines[index])
+            pieces = make_pieces(
+                part.type, parameters, part.kappa, translation, self.outlines[index]
+            )
         except (FitError, ZeroDivisionError):
             return None
         return [piece.planes for piece in pieces]
 
-    def at(self, x: np.ndarray) -> Surface:
+    def at(self, x: np.ndarray) -> RefitSurface:
         """The roof that the unknowns make; far from all points where they make none."""
         count = len(self.z)
         top, part, row = np.full(count, -np.inf), np.zeros(count, int), np.zeros(count, int)
-        found: list[np.ndarray] = []
+        result: list[np.ndarray] = []
         for index, inside in enumerate(self.inside):
             planes, first = self.planes(index, x), 0
             if planes is None:
-                return Surface(np.full(count, FAR_M), part, row, [])
-            for own, own_planes in zip(inside, planes, strict=True):
-                heights = self.terms[own] @ own_planes.T
+                return RefitSurface(np.full(count, UNBOUNDED_M), part, row, [])
+            for point_mask, own_planes in zip(inside, planes, strict=True):
+                heights = self.terms[point_mask] @ own_planes.T
                 lowest = heights.argmin(axis=1)
-                height = heights[np.arange(len(own)), lowest]
-                higher = height > top[own]
-                chosen = own[higher]
-                top[chosen], part[chosen], row[chosen] = (
+                height = heights[np.arange(len(point_mask)), lowest]
+                higher = height > top[point_mask]
+                selection = point_mask[higher]
+                top[selection], part[selection], row[selection] = (
                     height[higher],
                     index,
                     first + lowest[higher],
                 )
                 first += len(own_planes)
-            found.append(np.concatenate(planes))
-        return Surface(np.clip(self.z - top, -FAR_M, FAR_M), part, row, found)
+            result.append(np.concatenate(planes))
+        return RefitSurface(np.clip(self.z - top, -UNBOUNDED_M, UNBOUNDED_M), part, row, result)
 
-    def jacobian(self, x: np.ndarray, surface: Surface) -> np.ndarray:
+    def jacobian(self, x: np.ndarray, surface: RefitSurface) -> np.ndarray:
         """By how much the roof's height (n, p) at each point grows with each unknown."""
-        found = np.zeros((len(self.z), len(x)))
-        covered = np.abs(surface.gaps) < FAR_M
+        result = np.zeros((len(self.z), len(x)))
+        covered = np.abs(surface.gaps) < UNBOUNDED_M
         for index, columns in enumerate(self.columns):
-            own = np.flatnonzero(covered & (surface.part == index))
-            terms, row = self.terms[own], surface.row[own]
-            for column in columns if len(own) else ():
+            indices = np.flatnonzero(covered & (surface.part == index))
+            terms, row = self.terms[indices], surface.row[indices]
+            for column in columns if len(indices) else ():
                 moved, step = (
                     x.copy(),
                     STEP if x[column] + STEP < self.unknowns.high[column] else -STEP,
@@ -240,57 +246,57 @@ class Heights:
                 planes = self.planes(index, moved)
                 if planes is not None:
                     change = (np.concatenate(planes) - surface.planes[index]) / step
-                    found[own, column] = np.einsum("ij,ij->i", terms, change[row])
-        return found
+                    result[indices, column] = np.einsum("ij,ij->i", terms, change[row])
+        return result
 
 
-def fitted(
+def fit_unknowns(
     parts: tuple[Part, ...], points: np.ndarray, unknowns: Unknowns
 ) -> tuple[np.ndarray, list[dict[str, float]]]:
     """Values (p,) of the unknowns, and standard deviations by name of every part."""
-    heights = Heights(parts, points[:: max(1, -(-len(points) // MOST_POINTS))], unknowns)
+    heights = Heights(parts, points[:: max(1, -(-len(points) // MOST_REFIT_POINTS))], unknowns)
     finest = SCALES_M[-1]
-    x = descended(heights, unknowns.start, finest)
+    x = descend(heights, unknowns.start, finest)
     surface = heights.at(x)
     if misfit(surface.gaps, finest) > WELL * len(heights.z):
         coarse = unknowns.start
         for scale in SCALES_M:
-            coarse = descended(heights, coarse, scale)
-        found = heights.at(coarse)
-        if misfit(found.gaps, finest) < misfit(surface.gaps, finest):
-            x, surface = coarse, found
-    near = np.abs(surface.gaps) < finest
+            coarse = descend(heights, coarse, scale)
+        result = heights.at(coarse)
+        if misfit(result.gaps, finest) < misfit(surface.gaps, finest):
+            x, surface = coarse, result
+    mask = np.abs(surface.gaps) < finest
     deviations = np.sqrt(
-        np.diag(covariance(heights.jacobian(x, surface)[near], surface.gaps[near]))
+        np.diag(covariance(heights.jacobian(x, surface)[mask], surface.gaps[mask]))
     )
     sigma: list[dict[str, float]] = [{} for _ in parts]
     for (index, name), deviation in zip(unknowns.names, deviations, strict=True):
-        if 0.0 < deviation < FAR_M:
+        if 0.0 < deviation < UNBOUNDED_M:
             sigma[index]["t_z" if name == Z else name] = float(deviation)
     return x, sigma
 
 
-def descended(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
+def descend(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
     """The unknowns at the foot of the hill: damped steps that each lessen the misfit at
     this scale.
     """
     unknowns, damping = heights.unknowns, 1e-3
     surface = heights.at(x)
     cost, slopes = misfit(surface.gaps, scale), None
-    for _ in range(ROUNDS):
+    for _ in range(REFIT_ROUNDS):
         slopes = heights.jacobian(x, surface) if slopes is None else slopes
         weight = np.clip(1.0 - (surface.gaps / scale) ** 2, 0.0, None) ** 2
         normal, right = (slopes * weight[:, None]).T @ slopes, slopes.T @ (weight * surface.gaps)
         scales = np.diag(normal) + 1e-9 * max(normal.max(initial=0.0), 1e-9)
         step = np.linalg.solve(normal + damping * np.diag(scales), right)
-        tried = np.clip(x + step, unknowns.low, unknowns.high)
-        found = heights.at(tried)
-        new_cost = misfit(found.gaps, scale)
+        candidates = np.clip(x + step, unknowns.low, unknowns.high)
+        result = heights.at(candidates)
+        new_cost = misfit(result.gaps, scale)
         if new_cost >= cost:
             damping *= 30.0
             continue
         gained = (cost - new_cost) / cost
-        x, surface, cost, slopes, damping = tried, found, new_cost, None, 0.1 * damping
+        x, surface, cost, slopes, damping = candidates, result, new_cost, None, 0.1 * damping
         if gained < 1e-4:
             break
     return x
@@ -319,20 +325,22 @@ def with_values(
     z = values.get(Z, z)
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
     if eaves:
-        low = min(parameters[name] for name in eaves)
+        smallest = min(parameters[name] for name in eaves)
         parameters |= {
-            name: parameters[name] - low for name in (*eaves, "height") if name in parameters
+            name: parameters[name] - smallest for name in (*eaves, "height") if name in parameters
         }
-        z += low
+        z += smallest
     return {**part, "parameters": parameters, "position": [x, y, z], "sigma": sigma}
 
 
-def measured(building: Building, points_local: np.ndarray) -> Building:
+def measure_building(building: Building, points_local: np.ndarray) -> Building:
     """The building with its quality on `points_local` (n, 3), and what that says of it."""
-    from ..compose.settle import settled_building
+    from ..compose.settle import round_building
     from ..evaluate.metrics import quality
-    from ..stages import graded
+    from ..stages import grade_building
 
     roof = building.roof
-    found = quality(building.solid.moved(-roof.frame.origin), points_local, roof.outline)
-    return graded(settled_building(dataclasses.replace(building, quality=found)), points_local)
+    result = quality(building.solid.move(-roof.frame.origin), points_local, roof.outline)
+    return grade_building(
+        round_building(dataclasses.replace(building, quality=result)), points_local
+    )

@@ -20,14 +20,14 @@ import shapely
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError, is_interrupt
 from ..evaluate.run import run_record
-from ..formats import asked_files, places_of_models
+from ..formats import list_model_paths, requested_files
 from ..log import LOGGER
-from ..masking import masked, masked_values
+from ..masking import mask, masked_values
 from ..model import Building
 from ..read.damage import finite
 from ..settings import Settings
 from ..status import Status
-from ..write.cityjson.features import offset_of
+from ..write.cityjson.features import choose_offset
 from ..write.files import atomic
 from ..write.fragments import Fragment, Fragments
 from ..write.head import FileHead
@@ -39,7 +39,7 @@ from .building import build
 from .file import opened_parameters
 
 # sentences kept of buildings that could not be built; a wrong file may have millions
-MOST_TOLD = 1000
+MOST_REPORTED = 1000
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Built:
             self.by_type[building.type] += 1
         if (
             building.status in (Status.NOT_BUILT, Status.INTERNAL_ERROR)
-            and len(self.not_built) < MOST_TOLD
+            and len(self.not_built) < MOST_REPORTED
         ):
             self.not_built.append((building.id, building.detail))
 
@@ -92,23 +92,25 @@ def build_file(
     cannot be written; then nothing is written.
     """
     path, out, built = Path(path), Path(out), Built()
-    refuse_folder_of_a_run(out)
+    refuse_run_folder(out)
     with opened_parameters(path) as (head, records):
         settings = Settings(write=head.write).replace(changes or {})
         offset = head.offset if settings.write.out_crs == head.write.out_crs else None
-        built.models = places_of_models(settings, out)
+        built.models = list_model_paths(settings, out)
         maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))
         first = next(records, None)
-        records = iter(()) if first is None else chained(first, records)
+        records = iter(()) if first is None else chain_records(first, records)
         maker.settle_offset(first)
         join_fragments(
-            asked_files(settings, out), made(maker, records, built, progress), maker.head
+            requested_files(settings, out),
+            make_fragments(maker, records, built, progress),
+            maker.head,
         )
     write_record(path, out, maker.head, built)
     return built
 
 
-def refuse_folder_of_a_run(out: Path) -> None:
+def refuse_run_folder(out: Path) -> None:
     """Raise OutputError for the folder of `hiproof reconstruct`, which would make all its files
     again.
     """
@@ -120,12 +122,12 @@ def refuse_folder_of_a_run(out: Path) -> None:
         )
 
 
-def chained(first: dict, rest: Iterator[dict]) -> Iterator[dict]:
+def chain_records(first: dict, remainder: Iterator[dict]) -> Iterator[dict]:
     yield first
-    yield from rest
+    yield from remainder
 
 
-def made(
+def make_fragments(
     maker: Maker, records: Iterator[dict], built: Built, progress: Callable[[int], None]
 ) -> Iterator[Fragments]:
     """The texts of every building, counted."""
@@ -161,32 +163,32 @@ class Maker:
                 )
             return fragments(build(record, self.head.compose), names, self.head)
         except HiproofError as error:
-            why, status = str(error), Status.NOT_BUILT
+            reason, status = str(error), Status.NOT_BUILT
         except MemoryError:
             raise
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
             place = traceback.extract_tb(error.__traceback__)[-1]
-            why = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+            reason = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
             status = Status.INTERNAL_ERROR
-        building = Building(id, status, masked(why))
+        building = Building(id, status, mask(reason))
         building, texts = fragments(building, names, self.head)
-        kept = finite({**record, "status": status.code, "detail": building.detail})
-        return building, texts | {"parameters": Fragment(dump(kept) + b"\n")}
+        selection = finite({**record, "status": status.code, "detail": building.detail})
+        return building, texts | {"parameters": Fragment(dump(selection) + b"\n")}
 
 
 def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
     """The offset (3,) of a CityJSON file whose first building is `record`."""
-    from .record import building_of
+    from .record import read_building
 
     try:
-        outline = building_of(record)[0].footprint if record is not None else None
+        outline = read_building(record)[0].footprint if record is not None else None
     except HiproofError:
         outline = None
     if outline is None:
         return np.zeros(3)
-    return offset_of(units.cityjson.from_metres(np.array(shapely.bounds(outline)[:2])))
+    return choose_offset(units.cityjson.from_metres(np.array(shapely.bounds(outline)[:2])))
 
 
 def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
@@ -204,8 +206,8 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         "by_type": dict(built.by_type),
         "not_built": [list(pair) for pair in built.not_built],
     }
-    with atomic(out / "run.json") as beside:
-        Path(beside).write_text(
+    with atomic(out / "run.json") as temporary:
+        Path(temporary).write_text(
             json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
         )
 
@@ -220,10 +222,10 @@ def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
     except InputError as error:
         LOGGER.warning("built without the settings and inputs of the run: %s", error)
         record = {}
-    known = {name: record[name] for name in ("settings", "inputs") if record.get(name)}
-    told = {
+    kept_values = {name: record[name] for name in ("settings", "inputs") if record.get(name)}
+    settings = {
         "read": {"unit": head.unit},
-        **known.get("settings", {}),
+        **kept_values.get("settings", {}),
         "write": dataclasses.asdict(head.write),
     }
-    return {**known, "settings": told, "units": head.units.told()}
+    return {**kept_values, "settings": settings, "units": head.units.describe()}

@@ -14,18 +14,18 @@ from ..status import Grade, Status
 from ..write.attribute_list import HEAD, PARAMETERS, PART, Attribute
 from ..write.parameters import VERSION
 
-NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+NUMBER_SCHEMA, TEXT_SCHEMA = {"type": "number"}, {"type": "string"}
 NUMBER_OR_NULL, TEXT_OR_NULL = {"type": ["number", "null"]}, {"type": ["string", "null"]}
-NUMBERS = {"type": "object", "additionalProperties": NUMBER}
+NUMBERS = {"type": "object", "additionalProperties": NUMBER_SCHEMA}
 SHARES = {"type": "object", "additionalProperties": NUMBER_OR_NULL}
-PLACE = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
+PLACE = {"type": "array", "items": NUMBER_SCHEMA, "minItems": 3, "maxItems": 3}
 RING = {
     "type": "array",
     "minItems": 3,
-    "items": {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2},
+    "items": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 2, "maxItems": 2},
 }
-POLYGON = {"type": "array", "items": RING, "minItems": 1}
-LENGTH = {"type": "number", "exclusiveMinimum": 0}
+POLYGON_SCHEMA = {"type": "array", "items": RING, "minItems": 1}
+LENGTH_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
 
 HEAD_KINDS = {
     "hiproof_parameters": {"const": VERSION},
@@ -36,15 +36,15 @@ HEAD_KINDS = {
     "write": {"type": "object"},
 }
 BUILDING_KINDS = {
-    "id": TEXT,
+    "id": TEXT_SCHEMA,
     "status": {"enum": [status.code for status in Status]},
     "quality": {"enum": [*(grade.code for grade in Grade), None]},
-    "detail": TEXT,
+    "detail": TEXT_SCHEMA,
     "type": TEXT_OR_NULL,
     "origin": {"anyOf": [PLACE, {"type": "null"}]},
     "parts": {"type": "array", "items": {"$ref": "#/$defs/part"}},
-    "outline": {"anyOf": [POLYGON, {"type": "null"}]},
-    "shift": {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2},
+    "outline": {"anyOf": [POLYGON_SCHEMA, {"type": "null"}]},
+    "shift": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 2, "maxItems": 2},
     "z_ground": NUMBER_OR_NULL,
     "ground_source": TEXT_OR_NULL,
     "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},
@@ -55,11 +55,11 @@ BUILDING_KINDS = {
     "types": SHARES,
 }
 PART_KINDS = {
-    "parameters": {**NUMBERS, "properties": {"width": LENGTH, "length": LENGTH}},
+    "parameters": {**NUMBERS, "properties": {"width": LENGTH_SCHEMA, "length": LENGTH_SCHEMA}},
     "position": PLACE,
-    "rotation": NUMBER,
+    "rotation": NUMBER_SCHEMA,
     "sigma": NUMBERS,
-    "outlines": {"type": "array", "items": POLYGON},
+    "outlines": {"type": "array", "items": POLYGON_SCHEMA},
 }
 
 
@@ -70,9 +70,9 @@ def schema() -> dict[str, Any]:
     1
     """
     defs = {
-        "head": described(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
-        "building": described(PARAMETERS, BUILDING_KINDS, required=("id",)),
-        "part": described(
+        "head": describe_attributes(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
+        "building": describe_attributes(PARAMETERS, BUILDING_KINDS, required=("id",)),
+        "part": describe_attributes(
             PART,
             {"type": {"enum": list(CATALOGUE)}, **PART_KINDS},
             required=("type", "parameters", "position"),
@@ -89,7 +89,7 @@ def schema() -> dict[str, Any]:
     }
 
 
-def described(
+def describe_attributes(
     attributes: tuple[Attribute, ...], kinds: dict[str, Any], required: tuple[str, ...]
 ) -> dict[str, Any]:
     """An object with `attributes`, each with its meaning and unit; those of no other kind are
@@ -115,7 +115,7 @@ def parameters_by_type() -> list[dict[str, Any]]:
     side_by_side = {"propertyNames": {"pattern": f"^(width|length|height|{sides}|{cants})$"}}
     rules = []
     for kind, shape in CATALOGUE.items():
-        own = [
+        alternatives = [
             {
                 "required": [] if kind == "flat" else list(names),
                 "propertyNames": {"enum": list(names)},
@@ -124,7 +124,10 @@ def parameters_by_type() -> list[dict[str, Any]]:
         ]
         is_kind = {"properties": {"type": {"const": kind}}}
         rules.append(
-            {"if": is_kind, "then": {"properties": {"parameters": {"anyOf": [*own, side_by_side]}}}}
+            {
+                "if": is_kind,
+                "then": {"properties": {"parameters": {"anyOf": [*alternatives, side_by_side]}}},
+            }
         )
     return rules
 

@@ -23,7 +23,7 @@ from .contract import (
 from .drawing import drawn_plan, drawn_slope
 from .gable import FACES
 
-RISE = q1 * V + q1 * q3 * V  # from the eave at -v, the lower one, to the ridge
+RIDGE_RISE = q1 * V + q1 * q3 * V  # from the eave at -v, the lower one, to the ridge
 SAME_M = 1e-9  # m; numerically level with each other
 RISE_HIGH_SIDE = q2 * V - q2 * q3 * V
 
@@ -84,7 +84,7 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     }
 
 
-def of_member(member: Sides) -> tuple[float, ...]:
+def read_member(member: Sides) -> tuple[float, ...]:
     (front, back), ridge = member.slopes[[FRONT, BACK]], member.apex(1)
     return ridge, front, back, (ridge - member.eaves[FRONT]) / (front * member.half[1]) - 1.0
 
@@ -98,11 +98,11 @@ PRIMITIVE = Primitive(
     measures={
         "width": 2 * V,
         "length": 2 * U,
-        "height": RISE,
+        "height": RIDGE_RISE,
         "ridge_offset": q3 * V,
-        "eave_step": RISE - RISE_HIGH_SIDE,
+        "eave_step": RIDGE_RISE - RISE_HIGH_SIDE,
     },
-    eave=q0 - RISE,
+    eave=q0 - RIDGE_RISE,
     planes=((0, q1, q0 - q1 * q3 * V), (0, -q2, q0 + q2 * q3 * V)),
     shape=shape,
     corners=corners,
@@ -117,5 +117,5 @@ PRIMITIVE = Primitive(
     signed=("ridge_offset", "eave_step"),
     half_turn_symmetric=False,
     draw=draw,
-    of_member=of_member,
+    read_member=read_member,
 )

@@ -31,10 +31,10 @@ def no_cants() -> np.ndarray:
     return np.zeros((len(MEASURES), 0))
 
 
-def planes_of_cants(cants: np.ndarray) -> list[tuple[float, float, float]]:
+def compute_cant_planes(cants: np.ndarray) -> list[tuple[float, float, float]]:
     """Planes a, b, c over u, v about the middle of the rectangle.
 
-    >>> planes_of_cants(np.array([[0.0], [4.0], [3.0], [0.5]]))
+    >>> compute_cant_planes(np.array([[0.0], [4.0], [3.0], [0.5]]))
     [(-0.5, -0.0, 5.0)]
     """
     return [
@@ -43,54 +43,58 @@ def planes_of_cants(cants: np.ndarray) -> list[tuple[float, float, float]]:
     ]
 
 
-def cants_turned(cants: np.ndarray, quarters: int) -> np.ndarray:
+def turn_cants(cants: np.ndarray, quarters: int) -> np.ndarray:
     """The cants seen from axes turned by so many times 90 degrees."""
     turned = cants.copy()
     turned[0] -= 0.5 * np.pi * quarters
     return turned
 
 
-def words_of_cants(cants: np.ndarray, base: Any) -> dict[str, Any]:
+def name_cant_values(cants: np.ndarray, base: Any) -> dict[str, Any]:
     """Parameters by name, with T_L at the height `base`."""
     words: dict[str, Any] = {}
     for cant, (facing, distance, eave, slope) in zip(CANTS, cants.swapaxes(0, 1), strict=False):
         once_round = 180.0 - np.remainder(180.0 - np.degrees(facing), 360.0)
         values = once_round, distance, eave - base, np.degrees(np.arctan(slope))
-        words |= {f"{what}_{cant}": value for what, value in zip(MEASURES, values, strict=True)}
+        words |= {
+            f"{subject}_{cant}": value for subject, value in zip(MEASURES, values, strict=True)
+        }
     return words
 
 
-def cants_of_words(parameters: Mapping[str, float], base: float) -> np.ndarray:
+def read_cants(parameters: Mapping[str, float], base: float) -> np.ndarray:
     """The cants (4, c) that parameters tell of, with T_L at the height `base`.
 
     Raises KeyError where one is missing.
     """
-    told = [[parameters[f"{what}_{cant}"] for what in MEASURES] for cant in cants_named(parameters)]
-    facing, distance, eave, pitch = np.array(told, float).reshape(-1, len(MEASURES)).T
+    rows = [
+        [parameters[f"{measure}_{cant}"] for measure in MEASURES] for cant in list_cants(parameters)
+    ]
+    facing, distance, eave, pitch = np.array(rows, float).reshape(-1, len(MEASURES)).T
     return np.array([np.radians(facing), distance, base + eave, np.tan(np.radians(pitch))])
 
 
-def cants_left_in_place(
+def keep_cants_in_place(
     parameters: Mapping[str, float], along: float, across: float
 ) -> dict[str, float]:
     """The parameters of a part whose rectangle's middle went so far along and across it while its
     walls stayed.
 
-    >>> cants_left_in_place({"facing_cant1": 90.0, "distance_cant1": 5.0}, 2.0,
+    >>> keep_cants_in_place({"facing_cant1": 90.0, "distance_cant1": 5.0}, 2.0,
     ...     1.0)["distance_cant1"]
     4.0
     """
-    left = dict(parameters)
-    for cant in cants_named(parameters):
+    remainder = dict(parameters)
+    for cant in list_cants(parameters):
         facing = math.radians(parameters[f"facing_{cant}"])
-        left[f"distance_{cant}"] -= along * math.cos(facing) + across * math.sin(facing)
-    return left
+        remainder[f"distance_{cant}"] -= along * math.cos(facing) + across * math.sin(facing)
+    return remainder
 
 
-def cants_named(parameters: Iterable[str]) -> list[str]:
+def list_cants(parameters: Iterable[str]) -> list[str]:
     """The cants of which parameters tell anything, in order.
 
-    >>> cants_named(["width", "pitch_cant2", "pitch_cant1"])
+    >>> list_cants(["width", "pitch_cant2", "pitch_cant1"])
     ['cant1', 'cant2']
     """
     return sorted({name.split("_")[1] for name in parameters if name in CANTED})

@@ -36,7 +36,7 @@ from .drawing import drawn_slope
 # places in theta (9,): centre, rotation, half sizes, and four numbers of the shape
 CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
 SLOPE_MIN, SLOPE_MAX = 0.04, 2.75  # 2 and 70 degrees: steeper planes swallow facade points
-LEAST_M = 1e-3  # Shortest length (m) of a parameter. Shorter ones are numerical noise.
+SHORTEST_LENGTH_M = 1e-3  # Shortest length (m) of a parameter. Shorter ones are numerical noise.
 WRITTEN_DIGITS = 6  # Digits of a length (m) in files of parameters: micrometres.
 SLOPE_SHARE = 1e-3  # Largest error of a slope or a share that rounded parameters may cause.
 LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: -u, +u, -v, +v, none
@@ -60,7 +60,7 @@ class Sides(Protocol):
     @property
     def top(self) -> float: ...
     def apex(self, axis: int) -> float: ...
-    def over(self, half: np.ndarray) -> Sides: ...
+    def resize(self, half: np.ndarray) -> Sides: ...
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class DerivedStart:
         """theta (9,) with the plan of `source_theta` (9,) and its q by the formulas."""
         theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
         for _ in range(self.quarters):
-            theta = quarter_turned(theta)
+            theta = turn_quarter(theta)
         theta[Q0 : Q0 + len(self.q)] = [
             q.at(shape) if isinstance(q, Formula) else q for q in self.q
         ]
@@ -149,7 +149,7 @@ class Primitive:
     strips: int = 1
     more: tuple[Primitive, ...] = ()
     draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
-    of_member: Callable[[Sides], tuple[float, ...]] | None = None
+    read_member: Callable[[Sides], tuple[float, ...]] | None = None
     osm_shape: str | None = None
     legend: str = "other"
 
@@ -192,8 +192,10 @@ class Primitive:
         of no other.
         """
         if self.strips == 1:
-            told = [variant for variant in self.variants if set(variant.parameters) <= set(theta_p)]
-            return max(told, key=lambda variant: len(variant.parameters), default=self)
+            matching = [
+                variant for variant in self.variants if set(variant.parameters) <= set(theta_p)
+            ]
+            return max(matching, key=lambda variant: len(variant.parameters), default=self)
         for variant in self.variants:
             if variant.strips == theta_p.get("teeth", self.strips):
                 return variant
@@ -217,7 +219,7 @@ class Primitive:
             )
         return np.asarray(shape.corners(theta_p), float)
 
-    def drawn(self, rng: np.random.Generator, width: float) -> dict[str, float]:
+    def draw_parameters(self, rng: np.random.Generator, width: float) -> dict[str, float]:
         """theta_p of a roof made up at random, `width` (m) wide."""
         if self.draw is not None:
             return self.draw(rng, width)
@@ -230,12 +232,12 @@ class Primitive:
 
         Raises FitError for a shape that is of no family.
         """
-        if self.of_member is None:
+        if self.read_member is None:
             raise FitError(
                 f"expected a shape of at most one plane a side, got {self.name}; name its "
                 "parameters"
             )
-        return self.of_member(member)
+        return self.read_member(member)
 
     def to_theta(
         self,
@@ -270,17 +272,20 @@ class Primitive:
         Slopes over a run of less than a millimetre do not follow from lengths in micrometres.
         """
         theta_p, _, _ = self.from_theta(theta)
-        if any(value < LEAST_M for name, value in theta_p.items() if name not in self.signed):
+        if any(
+            value < SHORTEST_LENGTH_M for name, value in theta_p.items() if name not in self.signed
+        ):
             return False
         try:
-            again = self.shape(
+            repeat = self.shape(
                 {name: round(value, WRITTEN_DIGITS) for name, value in theta_p.items()}
             )
         except ZeroDivisionError:
             return False
-        slopes = zip(again[Q1 - HALF_WIDTH :], theta[Q1 : self.theta_size].tolist(), strict=False)
+        slopes = zip(repeat[Q1 - HALF_WIDTH :], theta[Q1 : self.theta_size].tolist(), strict=False)
         return all(
-            abs(after - before) <= SLOPE_SHARE * (1.0 + abs(before)) for after, before in slopes
+            abs(updated - previous) <= SLOPE_SHARE * (1.0 + abs(previous))
+            for updated, previous in slopes
         )
 
     def canonical_theta(self, theta: np.ndarray) -> np.ndarray:
@@ -338,16 +343,21 @@ class Primitive:
         breaks = np.linspace(-half_width, half_width, self.strips + 1)
         groups = [planes] if self.strips == 1 else [plane[None] for plane in planes]
         pieces = []
-        for low, high, group in zip(breaks[:-1], breaks[1:], groups, strict=True):
+        for lower, upper, group in zip(breaks[:-1], breaks[1:], groups, strict=True):
             uv = np.array(
-                [(-half_length, low), (half_length, low), (half_length, high), (-half_length, high)]
+                [
+                    (-half_length, lower),
+                    (half_length, lower),
+                    (half_length, upper),
+                    (-half_length, upper),
+                ]
             )
             xy = translation[:2] + uv @ np.array([[c, s], [-s, c]])
             pieces.append(Piece(shapely.polygons(xy), group))
         return Part(self.name, tuple(pieces), theta_p, kappa, translation, dict(sigma or {}))
 
 
-def placed(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:
+def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:
     """Vertices (n, 3) turned by `kappa` about Z and moved by `translation` (3,): R V + T_L, eq.
 
     9.
@@ -357,16 +367,16 @@ def placed(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.nd
 
 
 def rectangle(
-    theta_p: Mapping[str, float], low: float = 0.0, high: float = 0.0
+    theta_p: Mapping[str, float], lower: float = 0.0, upper: float = 0.0
 ) -> list[tuple[float, float, float]]:
-    """Corners v1..v4 of the plan, clockwise from (+u, -v), at height `low` on the -v side and
-    `high` on the +v side.
+    """Corners v1..v4 of the plan, clockwise from (+u, -v), at height `lower` on the -v side and
+    `upper` on the +v side.
     """
     u, v = theta_p["length"] / 2, theta_p["width"] / 2
-    return [(u, -v, low), (-u, -v, low), (-u, v, high), (u, v, high)]
+    return [(u, -v, lower), (-u, -v, lower), (-u, v, upper), (u, v, upper)]
 
 
-def quarter_turned(theta: np.ndarray) -> np.ndarray:
+def turn_quarter(theta: np.ndarray) -> np.ndarray:
     """Plan axes exchanged by a quarter turn; the caller exchanges the q that belong to them."""
     theta = theta.copy()
     theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]

@@ -32,14 +32,14 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     share = p["height"] / p["end_height"]
     top = min(p["height"], p["end_height"])
     hip = (u - 2 * u * min(share, 1.0), -v + 2 * v / max(share, 1.0), top)
-    far = (-u, v, top)
+    distant = (-u, v, top)
     return [
         (u, -v, 0),
         (-u, -v, 0),
         (u, v, 0),
         hip,
-        far if share < 1.0 else hip,
-        hip if share < 1.0 else far,
+        distant if share < 1.0 else hip,
+        hip if share < 1.0 else distant,
     ]
 
 
@@ -76,6 +76,6 @@ PRIMITIVE = Primitive(
     draw=draw,
     bounds=((SLOPE_MIN, SLOPE_MAX), (SLOPE_MIN, SLOPE_MAX)),
     vote=Vote(turns=4, slopes=(0.15, 0.3, 0.5, 0.75)),
-    of_member=lambda m: (m.eaves[FRONT], m.slopes[FRONT], m.slopes[RIGHT]),
+    read_member=lambda m: (m.eaves[FRONT], m.slopes[FRONT], m.slopes[RIGHT]),
     half_turn_symmetric=False,
 )

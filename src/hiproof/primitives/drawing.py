@@ -13,7 +13,7 @@ def drawn_slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> fl
 
 
 def drawn_plan(
-    rng: np.random.Generator, width: float, low: float = 1.05, high: float = 2.2
+    rng: np.random.Generator, width: float, lower: float = 1.05, upper: float = 2.2
 ) -> dict[str, float]:
-    """A plan of that width (m), `low` to `high` times as long."""
-    return {"width": width, "length": width * float(rng.uniform(low, high))}
+    """A plan of that width (m), `lower` to `upper` times as long."""
+    return {"width": width, "length": width * float(rng.uniform(lower, upper))}

@@ -33,7 +33,7 @@ import shapely
 
 from ..errors import FitError
 from ..model import Part, Piece
-from .cants import cants_of_words, cants_turned, no_cants, planes_of_cants, words_of_cants
+from .cants import compute_cant_planes, name_cant_values, no_cants, read_cants, turn_cants
 from .catalogue import CATALOGUE, get
 from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, Q0, RIGHT, Primitive
 
@@ -51,19 +51,19 @@ QUARTER_TURN, HALF_TURN, OTHER_TURN = (
 LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])
 TURNS = {1: (QUARTER_TURN, LEANS_TURN), 2: (HALF_TURN, -np.ones(4)), 3: (OTHER_TURN, -LEANS_TURN)}
 SAME = 1e-9  # m; numerically equal
-ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
+ALONG_COSINE = 0.7  # cosine of the angle within which a member is seen from the same side
 NEGLIGIBLE = 1e-18  # m2 or square degrees; numerically no variance
 # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
 HALF_HIP_SHARE = 0.15
 
 
-def has_of(shape: Primitive) -> tuple[bool, int, int]:
+def describe_sides(shape: Primitive) -> tuple[bool, int, int]:
     """Whether a shape of the family has a top, and how many planes along u and across v."""
     along = sum(side in (LEFT, RIGHT) for side in shape.sides)
     return LEVEL in shape.sides, along, sum(side in (FRONT, BACK) for side in shape.sides)
 
 
-def eaves_of(shape: Primitive) -> tuple[int, ...]:
+def list_eaves(shape: Primitive) -> tuple[int, ...]:
     """The sides from which a shape has planes."""
     return tuple(sorted(side for side in shape.sides if side != LEVEL))
 
@@ -72,10 +72,10 @@ def eaves_of(shape: Primitive) -> tuple[int, ...]:
 ALIKE: dict[tuple[bool, int, int], list[Primitive]] = {}
 for member in CATALOGUE.values():
     if member.is_of_family:
-        ALIKE.setdefault(has_of(member), []).append(member)
+        ALIKE.setdefault(describe_sides(member), []).append(member)
 # The general one of each, by (has a top, planes along u, planes across v), and which sides have
 # planes in its own direction.
-SHAPES = {has: (shapes[0].name, eaves_of(shapes[0])) for has, shapes in ALIKE.items()}
+GENERAL_SHAPES = {has: (shapes[0].name, list_eaves(shapes[0])) for has, shapes in ALIKE.items()}
 # Names told apart by eaves and pitches alone: one may be described as the other.
 KIN = tuple(tuple(shape.name for shape in shapes) for shapes in ALIKE.values() if len(shapes) > 1)
 COMPONENTS = {
@@ -128,7 +128,7 @@ class Member:
     def general_shape(self) -> tuple[str, tuple[int, ...]]:
         """Of SHAPES the one with planes on as many sides."""
         along, across = sorted((sum(self.has[:2]), sum(self.has[2:])))
-        return SHAPES[self.has_top, along, across]
+        return GENERAL_SHAPES[self.has_top, along, across]
 
     @property
     def base(self) -> Any:
@@ -146,7 +146,7 @@ class Member:
             self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which], cants
         )
 
-    def own_planes(self) -> list[tuple[float, float, float]]:
+    def compute_local_planes(self) -> list[tuple[float, float, float]]:
         """Planes a, b, c over u, v about the centre: those of the sides in order, of the cants,
         then the top.
         """
@@ -155,13 +155,13 @@ class Member:
             rise, along = SIGN[side] * self.slopes[side], self.leans[side] * self.slopes[side]
             middle = self.eaves[side] + self.slopes[side] * self.half[side // 2]
             planes.append((rise, along, middle) if side < FRONT else (along, rise, middle))
-        planes += planes_of_cants(self.cants)
+        planes += compute_cant_planes(self.cants)
         return [*planes, (0.0, 0.0, self.top)] if self.has_top else planes
 
     def planes(self) -> np.ndarray:
         """Planes (k, 3) over x, y of the frame that `kappa` and `centre` are given in."""
         c, s = math.cos(self.kappa), math.sin(self.kappa)
-        planes = np.array(self.own_planes()) @ np.array(
+        planes = np.array(self.compute_local_planes()) @ np.array(
             [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
         )
         planes[:, 2] -= planes[:, :2] @ self.centre
@@ -174,21 +174,21 @@ class Member:
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
             return math.inf
-        low, high, one, other = (
+        lower, upper, item, other = (
             self.eaves[side],
             self.eaves[side + 1],
             self.slopes[side],
             self.slopes[side + 1],
         )
         # from the low side's eave to the ridge
-        run = (high - low + 2.0 * self.half[axis] * other) / (one + other)
-        return low + one * run
+        run = (upper - lower + 2.0 * self.half[axis] * other) / (item + other)
+        return lower + item * run
 
-    def over(self, half: np.ndarray) -> Member:
+    def resize(self, half: np.ndarray) -> Member:
         """The member with its eaves and slopes over a rectangle of other half extents (2,)."""
         return replace(self, half=half)
 
-    def turned(self, quarters: int = 1) -> Member:
+    def turn(self, quarters: int = 1) -> Member:
         """The same surface with its axes turned by so many times 90 degrees, 0 to 3."""
         if quarters == 0:
             return self
@@ -208,26 +208,30 @@ class Member:
             slopes,
             self.top,
             leans,
-            cants_turned(self.cants, quarters),
+            turn_cants(self.cants, quarters),
         )
 
     def canonical(self) -> Member:
         """The same surface in the direction in which it is named: the ridge along u, planes on the
         sides that SHAPES says.
         """
-        return self.turned(self.quarter_turns)
+        return self.turn(self.quarter_turns)
 
     @cached_property
     def quarter_turns(self) -> int:
         """How many turns lead to the canonical direction."""
         _, sides = self.general_shape
-        wanted, named, places = [side in sides for side in range(4)], [], [LEFT, RIGHT, FRONT, BACK]
+        targets, names, places = (
+            [side in sides for side in range(4)],
+            [],
+            [LEFT, RIGHT, FRONT, BACK],
+        )
         lies = self.lies_along(0), self.lies_along(1)
         for turns in range(4):
-            if lies[turns % 2] and [self.has[place] for place in places] == wanted:
-                named.append((self.order(turns, places), turns))
+            if lies[turns % 2] and [self.has[place] for place in places] == targets:
+                names.append((self.order(turns, places), turns))
             places = [places[place] for place in QUARTER_TURN]
-        return min(named, default=((), 0))[1]
+        return min(names, default=((), 0))[1]
 
     def order(self, turns: int, places: list[int]) -> tuple[float, ...]:
         """Of members of the same surface the least comes first: steeper, then lower, in front and
@@ -236,7 +240,7 @@ class Member:
         """
         slopes = [float(self.slopes[place]) for place in places]
         eaves = [float(self.eaves[place]) if self.has[place] else 0.0 for place in places]
-        apart = (
+        gap = (
             slopes[BACK] - slopes[FRONT],
             eaves[FRONT] - eaves[BACK],
             slopes[RIGHT] - slopes[LEFT],
@@ -247,15 +251,15 @@ class Member:
             < math.remainder(self.kappa + 0.5 * math.pi * turns, 2.0 * math.pi)
             <= 0.5 * math.pi
         )
-        return (*(round(x, 6) for x in apart), not ahead)
+        return (*(round(x, 6) for x in gap), not ahead)
 
     def lies_along(self, axis: int) -> bool:
         """Whether `axis` is the longer way: along the ridge of the sides that meet lower, else of
         the rectangle.
         """
-        low, high = self.apex(1 - axis), self.apex(axis)
-        if math.isfinite(low) and math.isfinite(high) and abs(low - high) > SAME:
-            return low < high
+        lower, upper = self.apex(1 - axis), self.apex(axis)
+        if math.isfinite(lower) and math.isfinite(upper) and abs(lower - upper) > SAME:
+            return lower < upper
         square_like = all(self.has) or not any(self.has)
         return not square_like or bool(self.half[axis] >= self.half[1 - axis] - SAME)
 
@@ -289,7 +293,7 @@ class Member:
         """
         if self.leans.any() or self.cants.shape[1]:
             return None
-        own = self.own_planes()
+        local_planes = self.compute_local_planes()
         for shape in get(self.name).variants:
             theta = self.theta(shape)
             planes = [
@@ -298,12 +302,12 @@ class Member:
                     zip(shape.sides, shape.plane_values(theta).tolist(), strict=True)
                 )
             ]
-            apart = (
+            gap = (
                 abs(x - y)
-                for one, other in zip(planes, own, strict=True)
-                for x, y in zip(one, other, strict=True)
+                for item, other in zip(planes, local_planes, strict=True)
+                for x, y in zip(item, other, strict=True)
             )
-            if max(apart) < SAME * 10.0 and shape.is_proper(theta):
+            if max(gap) < SAME * 10.0 and shape.is_proper(theta):
                 return shape, shape.canonical_theta(theta)
         return None
 
@@ -331,10 +335,10 @@ class Member:
 
     def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member, each side's own."""
-        parameters = {name: float(value) for name, value in self.own_measures().items()}
+        parameters = {name: float(value) for name, value in self.list_side_measures().items()}
         return parameters, self.kappa, np.array([*self.centre, self.base])
 
-    def own_measures(self) -> dict[str, Any]:
+    def list_side_measures(self) -> dict[str, Any]:
         """Parameters by name, each side's own."""
         parameters, base = {"width": 2.0 * self.half[1], "length": 2.0 * self.half[0]}, self.base
         if self.has_top:
@@ -344,18 +348,18 @@ class Member:
             parameters[f"eave_{SIDES[side]}"] = self.eaves[side] - base
             if self.leans[side].any():
                 parameters[f"skew_{SIDES[side]}"] = degrees(self.leans[side])
-        return parameters | words_of_cants(self.cants, base)
+        return parameters | name_cant_values(self.cants, base)
 
-    def measures_of(self, shape: Primitive | None, kappa: float) -> list[Any]:
+    def measure_as(self, shape: Primitive | None, kappa: float) -> list[Any]:
         """The parameters and t_z that this member, or each of several, has as `shape`, side by side
         without one; seen from `kappa` or its opposite, so that a small change does not turn it
         round.
         """
         if shape is None:
-            return [*self.own_measures().values(), self.base]
-        seen = self.turned(2) if math.cos(self.kappa - kappa) < 0.0 else self
-        theta = seen.theta(shape)
-        if math.cos(seen.kappa - kappa) <= ALONG:
+            return [*self.list_side_measures().values(), self.base]
+        aligned = self.turn(2) if math.cos(self.kappa - kappa) < 0.0 else self
+        theta = aligned.theta(shape)
+        if math.cos(aligned.kappa - kappa) <= ALONG_COSINE:
             theta = np.apply_along_axis(shape.canonical_theta, 0, theta)
         return shape.measures_at(list(theta[HALF_WIDTH:]))
 
@@ -377,7 +381,7 @@ class Member:
         words = self.in_words(as_catalogue)
         sigma = {} if changes is None else self.sigma(changes, untold, as_catalogue, words)
         name = name or self.name
-        planes = planes_of(name, *words)
+        planes = compute_planes(name, *words)
         return Part(name, tuple(Piece(o, planes) for o in outlines), *words, sigma)
 
     def sigma(
@@ -392,18 +396,18 @@ class Member:
         """
         parameters, kappa, translation = words
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
-        own = {**parameters, "t_z": float(translation[2])}
-        squares = np.zeros((len(own), changes.eaves.shape[1]))
+        quantities = {**parameters, "t_z": float(translation[2])}
+        squares = np.zeros((len(quantities), changes.eaves.shape[1]))
         for k, (value, changed) in enumerate(
-            zip(own.values(), changes.measures_of(shape, kappa), strict=True)
+            zip(quantities.values(), changes.measure_as(shape, kappa), strict=True)
         ):
             squares[k] = (changed - value) ** 2
-        told = squares.shape[1] - untold
-        known, unknown = (
-            squares[:, :told].sum(axis=1).tolist(),
-            squares[:, told:].sum(axis=1).tolist(),
+        informed = squares.shape[1] - untold
+        variances, unknown = (
+            squares[:, :informed].sum(axis=1).tolist(),
+            squares[:, informed:].sum(axis=1).tolist(),
         )
-        each = zip(own, known, unknown, strict=True)
+        each = zip(quantities, variances, unknown, strict=True)
         return {
             name: math.sqrt(v) for name, v, free in each if v > NEGLIGIBLE and not free > NEGLIGIBLE
         }
@@ -427,7 +431,7 @@ def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
     return next((kin for kins in KIN if name in kins for kin in kins if kin in allowed), None)
 
 
-def planes_of(
+def compute_planes(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> np.ndarray:
     """Planes (k, 3) over x, y of the roof type `name` with its parameters: the inverse of
@@ -435,17 +439,18 @@ def planes_of(
 
     Raises FitError for a name that is no type or parameters that are not its own.
 
-    >>> planes_of("monopitch", {"width": 4.0, "length": 9.0, "height": 2.0}, 0.0, np.array([0.0,
+    >>> compute_planes("monopitch", {"width": 4.0, "length": 9.0, "height": 2.0}, 0.0,
+    ...     np.array([0.0,
     ...     0.0, 5.0])).tolist()
     [[0.0, 0.5, 6.0]]
     """
     if name in CATALOGUE and not any(key.startswith("pitch_") for key in parameters):
         shape = get(name).variant(parameters)
         return shape.planes_at(shape.to_theta(parameters, kappa, translation))
-    return member_of(name, parameters, kappa, translation).planes()
+    return read_member(name, parameters, kappa, translation).planes()
 
 
-def member_of(
+def read_member(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> Member:
     """The member with these parameters, the catalogue's or each side's own.
@@ -457,7 +462,7 @@ def member_of(
             f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; choose one of these"
         )
     if not any(key.startswith("pitch_") for key in parameters):
-        return member_like(get(name).variant(parameters), parameters, kappa, translation)
+        return convert_to_member(get(name).variant(parameters), parameters, kappa, translation)
     *sides, top = (side in get(name).sides for side in range(5))
     eaves, slopes, leans = np.full(4, np.inf), np.zeros(4), np.zeros(4)
     try:
@@ -465,7 +470,7 @@ def member_of(
             eaves[side] = translation[2] + parameters[f"eave_{SIDES[side]}"]
             slopes[side] = math.tan(math.radians(parameters[f"pitch_{SIDES[side]}"]))
             leans[side] = math.tan(math.radians(parameters.get(f"skew_{SIDES[side]}", 0.0)))
-        cants = cants_of_words(parameters, translation[2])
+        cants = read_cants(parameters, translation[2])
         height = translation[2] + parameters["height"] if top else math.inf
         half = 0.5 * np.array([parameters["length"], parameters["width"]])
     except KeyError as missing:
@@ -478,7 +483,7 @@ def member_of(
     )
 
 
-def member_like(
+def convert_to_member(
     shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> Member:
     """The member that is the same surface as the catalogue's `shape` with its own parameters."""

@@ -3,13 +3,13 @@
 import numpy as np
 
 from .algebra import U, V, q0
-from .contract import HALF_LENGTH, HALF_WIDTH, Primitive, Vote, quarter_turned, rectangle
+from .contract import HALF_LENGTH, HALF_WIDTH, Primitive, Vote, rectangle, turn_quarter
 from .drawing import drawn_plan
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
     """The longer side is the length."""
-    return quarter_turned(theta) if theta[HALF_WIDTH] > theta[HALF_LENGTH] else theta
+    return turn_quarter(theta) if theta[HALF_WIDTH] > theta[HALF_LENGTH] else theta
 
 
 def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
@@ -32,5 +32,5 @@ PRIMITIVE = Primitive(
     vote=Vote(turns=1, slopes=(0.0,)),
     canonical=canonical,
     draw=draw,
-    of_member=lambda m: (m.top,),
+    read_member=lambda m: (m.top,),
 )

@@ -70,7 +70,7 @@ OFF_THE_MIDDLE = Primitive(
     canonical=ridge_at_the_back,
     signed=("ridge_offset",),
     half_turn_symmetric=False,
-    of_member=lambda m: (
+    read_member=lambda m: (
         m.apex(1),
         m.slopes[BACK],
         (m.apex(1) - m.eaves[FRONT]) / (m.slopes[FRONT] * m.half[1]) - 1.0,
@@ -99,6 +99,6 @@ PRIMITIVE = Primitive(
     draw=draw,
     bounds=((SLOPE_MIN, SLOPE_MAX),),
     vote=Vote(shifts=(-0.3, 0.0, 0.3)),
-    of_member=lambda m: (m.apex(1), m.slopes[BACK]),
+    read_member=lambda m: (m.apex(1), m.slopes[BACK]),
     more=(OFF_THE_MIDDLE,),
 )

@@ -12,7 +12,7 @@ from .gable import SLOPES
 # q2 is how much steeper the lower part is, q3 the share of the half width above the break
 LOWER_SLOPE = q1 + q2
 BREAK_HEIGHT = LOWER_SLOPE * V * (1 - q3)
-HEIGHT = BREAK_HEIGHT + q1 * q3 * V
+TOTAL_HEIGHT = BREAK_HEIGHT + q1 * q3 * V
 LOWER_AT_RIDGE = q0 + q2 * q3 * V
 
 
@@ -65,11 +65,11 @@ PRIMITIVE = Primitive(
     measures={
         "width": 2 * V,
         "length": 2 * U,
-        "height": HEIGHT,
+        "height": TOTAL_HEIGHT,
         "break_width": 2 * q3 * V,
         "break_height": BREAK_HEIGHT,
     },
-    eave=q0 - HEIGHT,
+    eave=q0 - TOTAL_HEIGHT,
     planes=(*SLOPES, (0, LOWER_SLOPE, LOWER_AT_RIDGE), (0, -LOWER_SLOPE, LOWER_AT_RIDGE)),
     shape=shape,
     corners=corners,

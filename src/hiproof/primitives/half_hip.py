@@ -56,7 +56,7 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     return plan | {"height": height, "ridge_length": ridge, "hip_height": hip_height}
 
 
-def of_member(member: Sides) -> tuple[float, ...]:
+def read_member(member: Sides) -> tuple[float, ...]:
     slope, ridge = member.slopes[FRONT], member.apex(1)
     return (
         ridge,
@@ -88,5 +88,5 @@ PRIMITIVE = Primitive(
     bounds=((SLOPE_MIN, SLOPE_MAX), (SLOPE_MIN, SLOPE_MAX), (0.15, 0.75)),
     starts=(DerivedStart("gable", (q0, q1, 1.0, 0.5)), DerivedStart("hip", (q0, q1, q2, 0.7))),
     draw=draw,
-    of_member=of_member,
+    read_member=read_member,
 )

@@ -21,23 +21,23 @@ from .truncated_gable import PRIMITIVE as TRUNCATED_GABLE
 
 ALONG, ACROSS = 0, 1  # the axis that the cut halves
 CROSSED = (("length", "ridge_length", "top_length"), ("width", "top_width"))
-EXTENT = (("U", U), ("V", V))
+AXES = (("U", U), ("V", V))
 
 
-def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
+def cut_half(whole: Primitive, axis: int, **own: Any) -> Primitive:
     """The half of `whole` beyond a cut across `axis`: at +u, or at -v."""
-    kept = [k for k, side in enumerate(whole.sides) if side != (LEFT, BACK)[axis]]
-    used = sorted({corner for k in kept for corner in whole.faces[k]})
-    symbol, crossed = EXTENT[axis][0], CROSSED[axis]
+    selection = [k for k, side in enumerate(whole.sides) if side != (LEFT, BACK)[axis]]
+    in_use = sorted({corner for k in selection for corner in whole.faces[k]})
+    symbol, crossed = AXES[axis][0], CROSSED[axis]
 
-    def doubled(p: Mapping[str, float]) -> dict[str, float]:
+    def double_extents(p: Mapping[str, float]) -> dict[str, float]:
         return {name: 2.0 * value if name in crossed else value for name, value in p.items()}
 
-    def halved(p: Mapping[str, float]) -> dict[str, float]:
+    def halve_extents(p: Mapping[str, float]) -> dict[str, float]:
         return {name: 0.5 * value if name in crossed else value for name, value in p.items()}
 
     def shape(p: Mapping[str, float]) -> Shape:
-        half_width, half_length, *q = whole.shape(doubled(p))
+        half_width, half_length, *q = whole.shape(double_extents(p))
         return (
             (half_width, 0.5 * half_length, *q)
             if axis == ALONG
@@ -47,11 +47,11 @@ def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
     def of_member(member: Sides) -> tuple[float, ...]:
         half = member.half.copy()
         half[axis] *= 2.0
-        return whole.from_member(member.over(half))
+        return whole.from_member(member.resize(half))
 
     def typical(width: float, length: float, height: float) -> dict[str, float]:
-        sizes = doubled({"width": width, "length": length})
-        return halved(whole.typical(sizes["width"], sizes["length"], height))
+        sizes = double_extents({"width": width, "length": length})
+        return halve_extents(whole.typical(sizes["width"], sizes["length"], height))
 
     return replace(
         whole,
@@ -60,15 +60,17 @@ def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
             for name, measure in whole.measures.items()
         },
         eave=whole.eave.with_multiple(symbol, 2.0),
-        planes=tuple(seen_from_the_half(whole.plane_formulas[k], axis) for k in kept),
+        planes=tuple(shift_plane_to_half(whole.plane_formulas[k], axis) for k in selection),
         shape=shape,
-        corners=lambda p: cut(
-            np.array(whole.corners(doubled(p)), float)[used], axis, p[crossed[0]]
+        corners=lambda p: cut_vertices(
+            np.array(whole.corners(double_extents(p)), float)[in_use], axis, p[crossed[0]]
         ),
-        faces=tuple(tuple(used.index(corner) for corner in whole.faces[k]) for k in kept),
+        faces=tuple(tuple(in_use.index(corner) for corner in whole.faces[k]) for k in selection),
         typical=typical,
-        draw=lambda rng, width: halved(whole.drawn(rng, doubled({"width": width})["width"])),
-        of_member=of_member,
+        draw=lambda rng, width: halve_extents(
+            whole.draw_parameters(rng, double_extents({"width": width})["width"])
+        ),
+        read_member=of_member,
         canonical=lambda theta: theta,
         half_turn_symmetric=False,
         vote=None,
@@ -76,16 +78,16 @@ def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
     )
 
 
-def seen_from_the_half(plane: tuple[Formula, ...], axis: int) -> Plane:
+def shift_plane_to_half(plane: tuple[Formula, ...], axis: int) -> Plane:
     """The plane over u, v about the half's middle, which lies half of its extent at +u, or -v, of
     the whole's.
     """
-    symbol, extent = EXTENT[axis]
+    symbol, extent = AXES[axis]
     a, b, c = (formula(coefficient).with_multiple(symbol, 2.0) for coefficient in plane)
     return a, b, c + (a * extent if axis == ALONG else b * -extent)
 
 
-def cut(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
+def cut_vertices(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
     """Vertices (n, 3) of the whole about the half's middle, those beyond the cut moved onto it,
     straight across.
 
@@ -98,7 +100,7 @@ def cut(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
     return moved
 
 
-SIDE_HIP = half_of(  # a gable of which one end slopes too
+SIDE_HIP = cut_half(  # a gable of which one end slopes too
     HIP,
     ALONG,
     name="side_hip",
@@ -109,7 +111,7 @@ SIDE_HIP = half_of(  # a gable of which one end slopes too
         *at_quarters("hip", (q0, q1, q2), (0, 2)),
     ),
 )
-SIDE_HALF_HIP = half_of(  # a gable of which a small hip cuts one end
+SIDE_HALF_HIP = cut_half(  # a gable of which a small hip cuts one end
     HALF_HIP,
     ALONG,
     name="side_half_hip",
@@ -117,7 +119,7 @@ SIDE_HALF_HIP = half_of(  # a gable of which a small hip cuts one end
     legend="half hip",
     starts=at_quarters("gable", (q0, q1, 1.0, 0.5), (0, 2)),
 )
-HALF_MANSARD = half_of(  # one slope up to a level top
+HALF_MANSARD = cut_half(  # one slope up to a level top
     TRUNCATED_GABLE,
     ACROSS,
     name="half_mansard",
@@ -128,7 +130,7 @@ HALF_MANSARD = half_of(  # one slope up to a level top
         *at_quarters("flat", (q0, 1.0, 0.15)),
     ),
 )
-SIDE_MANSARD = half_of(  # three slopes up to a level top that reaches to the fourth side
+SIDE_MANSARD = cut_half(  # three slopes up to a level top that reaches to the fourth side
     MANSARD,
     ALONG,
     name="side_mansard",
@@ -140,7 +142,7 @@ SIDE_MANSARD = half_of(  # three slopes up to a level top that reaches to the fo
     ),
 )
 # two adjacent slopes up to a level top that reaches to the other two sides
-CORNER_MANSARD = half_of(
+CORNER_MANSARD = cut_half(
     SIDE_MANSARD,
     ACROSS,
     name="corner_mansard",

@@ -16,12 +16,12 @@ from .contract import (
     SLOPE_MIN,
     Primitive,
     Vote,
-    quarter_turned,
+    turn_quarter,
 )
 from .drawing import drawn_slope
 from .gable import FACES, SLOPES
 
-EAVE = q0 - q1 * V
+HIP_EAVE_HEIGHT = q0 - q1 * V
 
 
 def shape(p: Mapping[str, float]) -> tuple[float, ...]:
@@ -51,7 +51,7 @@ def canonical(theta: np.ndarray) -> np.ndarray:
     rise_across, rise_along = theta[Q1] * theta[HALF_WIDTH], theta[Q2] * theta[HALF_LENGTH]
     if rise_across <= rise_along:
         return theta
-    turned = quarter_turned(theta)
+    turned = turn_quarter(theta)
     turned[5] += rise_along - rise_across
     turned[[Q1, Q2]] = theta[[Q2, Q1]]
     return turned
@@ -85,8 +85,8 @@ PRIMITIVE = Primitive(
         "height": q1 * V,
         "ridge_length": 2 * U - 2 * q1 * V / q2,
     },
-    eave=EAVE,
-    planes=(*SLOPES, (-q2, 0, EAVE + q2 * U), (q2, 0, EAVE + q2 * U)),
+    eave=HIP_EAVE_HEIGHT,
+    planes=(*SLOPES, (-q2, 0, HIP_EAVE_HEIGHT + q2 * U), (q2, 0, HIP_EAVE_HEIGHT + q2 * U)),
     shape=shape,
     corners=corners,
     faces=(*FACES, (0, 4, 3), (5, 1, 2)),
@@ -95,5 +95,5 @@ PRIMITIVE = Primitive(
     vote=Vote(),
     canonical=canonical,
     draw=draw,
-    of_member=lambda m: (m.apex(1), m.slopes[FRONT], m.slopes[RIGHT]),
+    read_member=lambda m: (m.apex(1), m.slopes[FRONT], m.slopes[RIGHT]),
 )

@@ -17,13 +17,13 @@ from .contract import (
     DerivedStart,
     Primitive,
     Sides,
-    quarter_turned,
     rectangle,
+    turn_quarter,
 )
 from .drawing import drawn_plan, drawn_slope
 
-RISE = q3 * q1 * V  # q3 is the share of the half width that the slope takes
-EAVE = q0 - RISE
+TOP_RISE = q3 * q1 * V  # q3 is the share of the half width that the slope takes
+LOWEST_EAVE = q0 - TOP_RISE
 
 
 def shape(p: Mapping[str, float]) -> tuple[float, ...]:
@@ -44,7 +44,7 @@ def canonical(theta: np.ndarray) -> np.ndarray:
     """The longer side is the length."""
     if theta[HALF_WIDTH] <= theta[HALF_LENGTH]:
         return theta
-    turned = quarter_turned(theta)
+    turned = turn_quarter(theta)
     turned[[Q1, Q2]] = theta[[Q2, Q1]]
     turned[Q3] = theta[Q3] * theta[Q1] * theta[HALF_WIDTH] / (theta[Q2] * theta[HALF_LENGTH])
     return turned
@@ -68,7 +68,7 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     return plan | {"height": inset * drawn_slope(rng, 45, 68)} | top
 
 
-def of_member(member: Sides) -> tuple[float, ...]:
+def read_member(member: Sides) -> tuple[float, ...]:
     slope = member.slopes[FRONT]
     return (
         member.top,
@@ -87,16 +87,16 @@ PRIMITIVE = Primitive(
     measures={
         "width": 2 * V,
         "length": 2 * U,
-        "height": RISE,
+        "height": TOP_RISE,
         "top_width": 2 * V - 2 * q3 * V,
-        "top_length": 2 * U - 2 * RISE / q2,
+        "top_length": 2 * U - 2 * TOP_RISE / q2,
     },
-    eave=EAVE,
+    eave=LOWEST_EAVE,
     planes=(
-        (0, q1, EAVE + q1 * V),
-        (0, -q1, EAVE + q1 * V),
-        (-q2, 0, EAVE + q2 * U),
-        (q2, 0, EAVE + q2 * U),
+        (0, q1, LOWEST_EAVE + q1 * V),
+        (0, -q1, LOWEST_EAVE + q1 * V),
+        (-q2, 0, LOWEST_EAVE + q2 * U),
+        (q2, 0, LOWEST_EAVE + q2 * U),
         (0, 0, q0),
     ),
     shape=shape,
@@ -110,5 +110,5 @@ PRIMITIVE = Primitive(
     ),
     canonical=canonical,
     draw=draw,
-    of_member=of_member,
+    read_member=read_member,
 )

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import FitError, InputError
-from .cants import CANTED, MEASURES, cants_named
+from .cants import CANTED, MEASURES, list_cants
 from .catalogue import CATALOGUE
 from .contract import LEVEL
-from .family import COMPONENTS, SIDES, eaves_of
+from .family import COMPONENTS, SIDES, list_eaves
 
 SIDED = CANTED | {f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew")}
 """Parameters of a member's sides and cants; a part that has one gives all of its shape side by
@@ -20,7 +20,7 @@ side.
 
 # degrees; steeper is a wall, and its height at an edge is beyond any file's digits
 STEEPEST_DEG = 89.0
-SHOWN = 8  # names in a sentence; more would hide what is said
+MOST_SHOWN_NAMES = 8  # names in a sentence; more would hide what is said
 
 
 def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> None:
@@ -54,17 +54,22 @@ def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> N
 def refuse_other_names(
     kind: str,
     parameters: Mapping[str, float],
-    needed: Sequence[str],
+    required: Sequence[str],
     allowed: Sequence[str],
     where: str,
 ) -> None:
     """Raise InputError where a parameter is missing or is none of the type's."""
-    missing = [name for name in needed if name not in parameters]
-    other = [name for name in parameters if name not in (*needed, *allowed)]
+    missing = [name for name in required if name not in parameters]
+    other = [name for name in parameters if name not in (*required, *allowed)]
     if missing or other:
-        got = f"none for {', '.join(missing)}" if missing else f"also {', '.join(other[:SHOWN])}"
+        got = (
+            f"none for {', '.join(missing)}"
+            if missing
+            else f"also {', '.join(other[:MOST_SHOWN_NAMES])}"
+        )
         raise InputError(
-            f"expected the parameters {', '.join(needed) or 'width, length'} of the type {kind} in "
+            f"expected the parameters {', '.join(required) or 'width, length'} of the type {kind} "
+            "in "
             f"{where}, got {got}; "
             "`hiproof build --shapes` lists those of every type"
         )
@@ -83,13 +88,13 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
         raise InputError(f"{where}: {error}") from error
     except ZeroDivisionError:
         q = np.full(3, np.inf)
-    slopes = [value for value, (low, _) in zip(q, shape.bounds, strict=False) if low >= 0.0]
+    slopes = [value for value, (lower, _) in zip(q, shape.bounds, strict=False) if lower >= 0.0]
     steepest = math.tan(math.radians(STEEPEST_DEG))
     if not all(0.0 <= slope <= steepest for slope in slopes):
-        told = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
+        text = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
         raise InputError(
             f"expected planes that rise from the eaves by less than {STEEPEST_DEG:g} degrees, got "
-            f"a {kind} roof of {told} "
+            f"a {kind} roof of {text} "
             f"in {where}; is one of its sizes negative, or too long?"
         )
 
@@ -98,32 +103,34 @@ def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> 
     """Raise InputError where parameters given side by side make no member of the family."""
     if kind in COMPONENTS:
         refuse_other_names(kind, parameters, list(CATALOGUE[kind].parameters), [], where)
-    needed = side_by_side_names(kind)
-    skews = [name.replace("pitch", "skew") for name in needed if name.startswith("pitch_")]
-    cants = [f"{what}_{cant}" for cant in cants_named(parameters) for what in MEASURES]
-    refuse_other_names(kind, parameters, [*needed, *cants], skews, where)
+    side_parameters = list_side_parameters(kind)
+    skews = [name.replace("pitch", "skew") for name in side_parameters if name.startswith("pitch_")]
+    cants = [f"{measure}_{cant}" for cant in list_cants(parameters) for measure in MEASURES]
+    refuse_other_names(kind, parameters, [*side_parameters, *cants], skews, where)
     for name, value in parameters.items():
-        low = 0.0 if name.startswith("pitch_") else -STEEPEST_DEG
-        if name.startswith(("pitch_", "skew_")) and not low <= value <= STEEPEST_DEG:
+        lower = 0.0 if name.startswith("pitch_") else -STEEPEST_DEG
+        if name.startswith(("pitch_", "skew_")) and not lower <= value <= STEEPEST_DEG:
             raise InputError(
-                f"expected {name} between {low:g} and {STEEPEST_DEG:g} degrees in {where}, got "
+                f"expected {name} between {lower:g} and {STEEPEST_DEG:g} degrees in {where}, got "
                 f"{value:g}; give degrees"
             )
 
 
-def names_of(kind: str) -> tuple[str, ...]:
+def list_parameters(kind: str) -> tuple[str, ...]:
     """The parameters of an ordinary roof of a type.
 
-    >>> names_of("hip"), names_of("corner")
+    >>> list_parameters("hip"), list_parameters("corner")
     (('width', 'length', 'height', 'ridge_length'), ('width', 'length', 'height', 'end_height'))
     """
     return CATALOGUE[kind].parameters
 
 
-def side_by_side_names(kind: str) -> tuple[str, ...]:
+def list_side_parameters(kind: str) -> tuple[str, ...]:
     """The parameters of a member of the family, each side's own; skews and cants, which are seldom
     there, left out.
     """
     shape = CATALOGUE[kind]
-    of_sides = [f"{what}_{SIDES[side]}" for side in eaves_of(shape) for what in ("pitch", "eave")]
+    of_sides = [
+        f"{subject}_{SIDES[side]}" for side in list_eaves(shape) for subject in ("pitch", "eave")
+    ]
     return ("width", "length", *(["height"] if LEVEL in shape.sides else []), *of_sides)

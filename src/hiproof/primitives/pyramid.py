@@ -14,8 +14,8 @@ from .contract import (
     SLOPE_MIN,
     Primitive,
     Vote,
-    quarter_turned,
     rectangle,
+    turn_quarter,
 )
 from .drawing import drawn_plan, drawn_slope
 from .gable import SLOPES
@@ -32,7 +32,7 @@ def canonical(theta: np.ndarray) -> np.ndarray:
     """The longer side is the length."""
     if theta[HALF_WIDTH] <= theta[HALF_LENGTH]:
         return theta
-    turned = quarter_turned(theta)
+    turned = turn_quarter(theta)
     turned[Q1] = theta[Q1] * theta[HALF_WIDTH] / theta[HALF_LENGTH]
     return turned
 
@@ -65,5 +65,5 @@ PRIMITIVE = Primitive(
     vote=Vote(),
     canonical=canonical,
     draw=draw,
-    of_member=lambda m: (m.apex(1), m.slopes[FRONT]),
+    read_member=lambda m: (m.apex(1), m.slopes[FRONT]),
 )

@@ -20,7 +20,7 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     tooth = {"width": p["width"] / teeth, "length": p["length"]}
     centres = [(2 * k + 1 - teeth) * tooth["width"] / 2 for k in range(teeth)]
     return [
-        (u, v + centre, z) for centre in centres for u, v, z in rectangle(tooth, high=p["height"])
+        (u, v + centre, z) for centre in centres for u, v, z in rectangle(tooth, upper=p["height"])
     ]
 
 
@@ -35,7 +35,7 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     }
 
 
-def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
+def saw_tooth(teeth: int, additions: tuple[Primitive, ...] = ()) -> Primitive:
     """The saw-tooth roof with `teeth` teeth; q0 is the height at each tooth's foot."""
     return Primitive(
         name="shed",
@@ -72,7 +72,7 @@ def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
         vote=Vote(turns=4, slopes=(0.2, 0.35, 0.5, 0.65, 0.8, 1.0)),
         half_turn_symmetric=False,
         strips=teeth,
-        more=more,
+        more=additions,
     )
 
 

@@ -72,7 +72,7 @@ PRIMITIVE = Primitive(
         DerivedStart("gable", (q0 - 0.4 * q1 * V, q1, 0.6)),
         *at_quarters("flat", (q0, 1.0, 0.25), (0, 1)),
     ),
-    of_member=lambda m: (
+    read_member=lambda m: (
         m.top,
         m.slopes[FRONT],
         (m.top - m.eaves[FRONT]) / (m.slopes[FRONT] * m.half[1]),

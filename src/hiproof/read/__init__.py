@@ -52,7 +52,7 @@ _HOME = {
     **dict.fromkeys(("read_points", "iter_points", "read_header", "PointFileHeader"), "pointcloud"),
     **dict.fromkeys(("read_footprints", "footprint_crs"), "footprints"),
     "check_overlap": "overlap",
-    **dict.fromkeys(("points_of_footprints", "PointGrid"), "assign"),
+    **dict.fromkeys(("assign_points", "PointGrid"), "assign"),
     **dict.fromkeys(("read_terrain", "Terrain", "TerrainChain"), "terrain"),
     **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
     **dict.fromkeys(("same_horizontal", "combine", "parse_crs"), "crs"),

@@ -16,7 +16,7 @@ from .thin import cell_range
 
 # of an outline; hardly a building has more corners, and growing it takes a quarter of a second
 MANY_VERTICES = 200
-CELL_M = 4.0  # m; a house covers a few dozen cells, and a cell holds few points beside it
+INDEX_CELL_M = 4.0  # m; a house covers a few dozen cells, and a cell holds few points beside it
 
 
 class PointGrid:
@@ -26,11 +26,11 @@ class PointGrid:
     >>> grid = PointGrid(np.array([[0.5, 0.5], [9.0, 9.0], [1.5, 0.5]]))
     >>> grid.inside(shapely.box(0, 0, 1, 1)).tolist()
     [0]
-    >>> grid.within(shapely.box(0, 0, 1, 1), 1.0).tolist()
+    >>> grid.find_within(shapely.box(0, 0, 1, 1), 1.0).tolist()
     [0, 2]
     """
 
-    def __init__(self, xy: np.ndarray, cell_m: float = CELL_M):
+    def __init__(self, xy: np.ndarray, cell_m: float = INDEX_CELL_M):
         """Index `xy` (n, 2 or more; further columns are ignored), world or local metres, all
         finite.
         """
@@ -69,27 +69,29 @@ class PointGrid:
             [self.order[start:stop] for start, stop in zip(starts, stops, strict=True)]
         )
 
-    def cell_range(self, low: float, high: float, axis: int) -> tuple[int, int]:
+    def cell_range(self, lower: float, upper: float, axis: int) -> tuple[int, int]:
         start = self.origin[axis]
-        return math.floor(low / self.cell_m) - start, math.floor(high / self.cell_m) - start
+        return math.floor(lower / self.cell_m) - start, math.floor(upper / self.cell_m) - start
 
     def inside(self, polygon: shapely.Polygon) -> np.ndarray:
         """Ascending indices of the points inside `polygon` or on its border."""
         if polygon.is_empty:
             return np.empty(0, np.int64)
-        found = self.candidates(polygon.bounds)
+        result = self.candidates(polygon.bounds)
         shapely.prepare(polygon)
-        x, y = self.xy.take(found, axis=0)[:, :2].T
-        return np.sort(found[shapely.intersects_xy(polygon, x, y)])
+        x, y = self.xy.take(result, axis=0)[:, :2].T
+        return np.sort(result[shapely.intersects_xy(polygon, x, y)])
 
-    def within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
+    def find_within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
         """Ascending indices of the points at most `distance_m` from `polygon` or inside it."""
         if polygon.is_empty:
             return np.empty(0, np.int64)
-        return self.inside(grown(polygon, distance_m, quad_segs=4) if distance_m else polygon)
+        return self.inside(
+            grow_polygon(polygon, distance_m, quad_segs=4) if distance_m else polygon
+        )
 
 
-def grown(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapely.Geometry:
+def grow_polygon(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapely.Geometry:
     """What lies at most `distance_m` from a polygon or inside it; of one with MANY_VERTICES to
     within a tenth of the distance.
 
@@ -100,7 +102,7 @@ def grown(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapel
     return shapely.buffer(polygon, distance_m, **options)
 
 
-def points_of_footprints(
+def assign_points(
     cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]
 ) -> list[np.ndarray]:
     """For each footprint the ascending indices into `cloud_xyz` (n, 2 or 3) of the points inside or
@@ -110,8 +112,8 @@ def points_of_footprints(
     what a building gets never depends on its neighbours.
     """
     grid = PointGrid(cloud_xyz)
-    return [grid.inside(plan_of(footprint)) for footprint in footprints]
+    return [grid.inside(project_footprint(footprint)) for footprint in footprints]
 
 
-def plan_of(footprint: Footprint | shapely.Polygon) -> shapely.Polygon:
+def project_footprint(footprint: Footprint | shapely.Polygon) -> shapely.Polygon:
     return footprint.polygon if isinstance(footprint, Footprint) else footprint

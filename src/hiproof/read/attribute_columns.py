@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-EXACT = 2.0**53  # whole numbers below it are themselves as decimals
+LARGEST_EXACT = 2.0**53  # whole numbers below it are themselves as decimals
 
 
-def as_declared(
+def restore_declared_types(
     names: Sequence[str],
     declared: Sequence[str],
     columns: list[np.ndarray],
@@ -32,12 +32,14 @@ def as_declared(
             whole.append(shortest(column) if column.dtype == np.float32 else column)
             continue
         is_known = np.isfinite(column)
-        known = column[is_known]
-        if (np.abs(known) >= EXACT).any() and len(again := known_of(name)) == len(known):
-            known = again
+        set_values = column[is_known]
+        if (np.abs(set_values) >= LARGEST_EXACT).any() and len(repeat := known_of(name)) == len(
+            set_values
+        ):
+            set_values = repeat
         values = np.full(len(column), None, dtype=object)
         values[is_known] = [
-            bool(value) if kind == "bool" else int(value) for value in known.tolist()
+            bool(value) if kind == "bool" else int(value) for value in set_values.tolist()
         ]
         whole.append(values)
     return whole
@@ -53,10 +55,10 @@ def shortest(column: np.ndarray) -> np.ndarray:
     return np.array([float(str(value)) for value in column])
 
 
-def where_known(name: str, where: str | None) -> str:
+def make_known_condition(name: str, where: str | None) -> str:
     """The condition `where`, if any, and that the attribute `name` is set.
 
-    >>> where_known("year", "year < 1950 or listed")
+    >>> make_known_condition("year", "year < 1950 or listed")
     '(year < 1950 or listed) and "year" is not null'
     """
     quoted = name.replace('"', '""')

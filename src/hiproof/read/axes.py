@@ -16,7 +16,7 @@ LEAST_UNIT_M, MOST_UNIT_M = 1e-3, 2000.0
 m.
 """
 
-ANGLES = ("degree", "radian", "grad", "gon", "arc-second", "arc-minute")
+ANGULAR_UNITS = ("degree", "radian", "grad", "gon", "arc-second", "arc-minute")
 """Starts of the names of units that count angles. WKT 1 declares units without their kind."""
 
 COMPASS = (
@@ -108,7 +108,7 @@ def check_height_axis(axis: Any, crs: Any, source: str) -> None:
 
 def check_unit(axis: Any, crs: Any, source: str) -> None:
     """Refuse an axis in a unit that is no length, or longer or shorter than any in use."""
-    is_angle = axis.unit_name.lower().startswith(ANGLES)
+    is_angle = axis.unit_name.lower().startswith(ANGULAR_UNITS)
     if is_angle or not LEAST_UNIT_M <= axis.unit_conversion_factor <= MOST_UNIT_M:
         raise InputError(
             f"expected {source} in a CRS that counts in metres, feet or another unit of length, "

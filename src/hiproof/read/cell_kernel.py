@@ -28,13 +28,13 @@ def mask_at(mask, xy, index, x_low, y_low):
     """The mask's byte (k,) at the whole-metre cells of the points `xy[index]`, 0 outside; its
     corner is (x_low, y_low).
     """
-    found = np.zeros(len(index), np.uint8)
+    result = np.zeros(len(index), np.uint8)
     for k in range(len(index)):
         column = np.int64(np.floor(xy[index[k], 0] - x_low))
         row = np.int64(np.floor(xy[index[k], 1] - y_low))
         if 0 <= column < mask.shape[0] and 0 <= row < mask.shape[1]:
-            found[k] = mask[column, row]
-    return found
+            result[k] = mask[column, row]
+    return result
 
 
 @compiled

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..frames import METRES, Units
-from .crs import units_named
+from .crs import find_named_units
 from .damage import Damaged, excerpt, readable, refuse
 from .plausible import is_plausible
 from .shells import read_vertices
@@ -39,46 +39,50 @@ class Feature(NamedTuple):
 
 
 def features(
-    path: Path, otherwise: Units = METRES, known: Units | None = None, damaged: Damaged = refuse
+    path: Path,
+    alternative: Units = METRES,
+    crs_units: Units | None = None,
+    damaged: Damaged = refuse,
 ) -> Iterator[Feature]:
     """Yield every document of a file, each by the transform and the CRS of the line before it that
     has them.
 
-    `otherwise` are the units where no CRS is named, `known` those of one of which more is known
-    than a name tells, if there is one. A feature that cannot be read is told to `damaged` and comes
-    without objects. Raises InputError as `documents` does.
+    `alternative` are the units where no CRS is named, `crs_units` those of one of which more is
+    known than a name tells, if there is one. A feature that cannot be read is told to `damaged` and
+    comes without objects. Raises InputError as `documents` does.
     """
-    transform, units = None, known or otherwise
+    transform, units = None, crs_units or alternative
     for document, place in documents(path, damaged):
         if not document:
             yield Feature({}, np.empty((0, 3)), place, units, True)
             continue
         if name := reference_system(document):
-            units = known or units_named(name, otherwise)
+            units = crs_units or find_named_units(name, alternative)
         try:
             transform = read_transform(document) or transform
             yield Feature(
                 read_objects(document), world_vertices(document, transform, units), place, units
             )
         except UNUSABLE as error:
-            told = InputError(
-                f"expected CityJSON that can be read in {place}, got {reason_of(error)}; mend it "
+            damage = InputError(
+                f"expected CityJSON that can be read in {place}, got {explain_error(error)}; mend "
+                "it "
                 "there"
             )
-            (refuse if document["type"] == "CityJSON" else damaged)(told)
+            (refuse if document["type"] == "CityJSON" else damaged)(damage)
             yield Feature({}, np.empty((0, 3)), place, units, True)
 
 
 def read_transform(document: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
     """Read the scale (3,) and the translation (3,) of a document, None where it has none."""
-    told = document.get("transform")
-    if told is None:
+    transform = document.get("transform")
+    if transform is None:
         return None
-    if not isinstance(told, dict):
-        raise ValueError(f"{excerpt(told)} as its transform")
-    scale, translate = (read_vertices([told.get(name)])[0] for name in ("scale", "translate"))
+    if not isinstance(transform, dict):
+        raise ValueError(f"{excerpt(transform)} as its transform")
+    scale, translate = (read_vertices([transform.get(name)])[0] for name in ("scale", "translate"))
     if not (np.isfinite(scale).all() and is_plausible(translate[None]).all()):
-        raise ValueError(f"a transform to no place on Earth ({excerpt(told)})")
+        raise ValueError(f"a transform to no place on Earth ({excerpt(transform)})")
     return scale, translate
 
 
@@ -103,19 +107,20 @@ def world_vertices(
 
 def unusable(id: str, feature: Feature, error: Exception) -> InputError:
     """Say in a sentence why the city object `id` of a feature cannot be used."""
-    where = (
+    place = (
         feature.place
         if f"building {id:.80} in " in feature.place
         else f"{id:.80} in {feature.place}"
     )
     return InputError(
-        f"expected {where} to be one that can be used, got {reason_of(error)}; mend it there, or "
+        f"expected {place} to be one that can be used, got {explain_error(error)}; mend it there, "
+        "or "
         "make the file anew with "
         "`hiproof build`"
     )
 
 
-def reason_of(error: Exception) -> str:
+def explain_error(error: Exception) -> str:
     """Say what was found in a document, to complete "got ..."."""
     return str(error) if type(error) is ValueError else repr(error)
 
@@ -128,7 +133,7 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
     Raises InputError for what is no text, no JSON, no object, or of another type.
     """
     if path.suffix.lower() != ".jsonl":
-        document = parsed(read_text(path), str(path))
+        document = parse_object(read_text(path), str(path))
         if document.get("type") != "CityJSON":
             raise InputError(
                 f'expected "type": "CityJSON" in {path}, got {document.get("type")!r}; is this '
@@ -149,7 +154,7 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
                     (damaged if seen_header else refuse)(error)
                     document = {}
                 seen_header = True
-                yield document, place_of(document, place)
+                yield document, name_place(document, place)
     except (OSError, UnicodeDecodeError) as error:
         raise unreadable(path, error) from error
     if not seen_header:
@@ -161,7 +166,7 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
 def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
     """Read a line of CityJSONSeq. Raises InputError for what is no header, or no feature after
     one."""
-    document = parsed(line, place)
+    document = parse_object(line, place)
     kind = document.get("type")
     if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
         raise InputError(
@@ -172,13 +177,13 @@ def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
     return document
 
 
-def place_of(document: dict[str, Any], place: str) -> str:
+def name_place(document: dict[str, Any], place: str) -> str:
     """Name the building of a feature beside its place in the file."""
     id = document.get("id")
     return f"building {id:.80} in {place}" if isinstance(id, str) and id else place
 
 
-def parsed(text: str, place: str) -> dict[str, Any]:
+def parse_object(text: str, place: str) -> dict[str, Any]:
     """A JSON object. Raises InputError naming the place."""
     try:
         value = json.loads(text, parse_constant=refuse_constant)
@@ -213,8 +218,8 @@ def read_text(path: Path) -> str:
 
 def unreadable(path: Path, error: Exception) -> InputError:
     """What to say of a file that is not there, or whose bytes are no text."""
-    found = "none" if isinstance(error, FileNotFoundError) else f"one that is not: {error}"
-    return InputError(f"expected a readable text file at {path}, got {found}; check the path")
+    text = "none" if isinstance(error, FileNotFoundError) else f"one that is not: {error}"
+    return InputError(f"expected a readable text file at {path}, got {text}; check the path")
 
 
 def reference_system(document: dict[str, Any]) -> str | None:

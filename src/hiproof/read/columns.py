@@ -21,8 +21,8 @@ def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:
     (1, 2, 3, 4)
     """
     names = [name.strip().strip("\"'").lower() for name in header]
-    found = []
-    for wanted in NAMES.values():
-        matches = [names.index(alias) for alias in wanted if alias in names]
-        found += matches[:1]
-    return tuple(found) if len(found) >= 3 and names[found[2]] in NAMES["z"] else None
+    result = []
+    for targets in NAMES.values():
+        matches = [names.index(alias) for alias in targets if alias in names]
+        result += matches[:1]
+    return tuple(result) if len(result) >= 3 and names[result[2]] in NAMES["z"] else None

@@ -31,11 +31,13 @@ def copc_record(
     first of each node.
     """
     header = laspy.LasHeader.read_from(file, read_evlrs=False)
-    nodes = nodes_meeting(facts, octree, box)
+    nodes = find_nodes(facts, octree, box)
     chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
     content = np.zeros(sum(points for points, _ in chunks) * facts.point_bytes, np.uint8)
     if len(nodes):
-        compressed = np.frombuffer(b"".join(bytes_of(file, node) for node in nodes), np.uint8)
+        compressed = np.frombuffer(
+            b"".join(read_node_bytes(file, node) for node in nodes), np.uint8
+        )
         laszip = np.frombuffer(facts.laszip, np.uint8)
         lazrs.decompress_points_with_chunk_table(
             compressed, laszip, content, chunks, selection.to_lazrs()
@@ -46,19 +48,19 @@ def copc_record(
     )
 
 
-def bytes_of(file: BinaryIO, node: np.void) -> bytes:
+def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:
     file.seek(int(node["start"]))
     return file.read(int(node["bytes"]))
 
 
-def nodes_meeting(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
+def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
     """The nodes that hold points and meet `box` in plan, in the order in which they stand in the
     file.
     """
-    low, high = cubes(facts, octree, octree.nodes)
-    meets = (low[:, :2] <= box[2:]).all(axis=1) & (high[:, :2] >= box[:2]).all(axis=1)
-    found = octree.nodes[meets]
-    return found[np.argsort(found["start"], kind="stable")]
+    lower, upper = cubes(facts, octree, octree.nodes)
+    meets = (lower[:, :2] <= box[2:]).all(axis=1) & (upper[:, :2] >= box[:2]).all(axis=1)
+    result = octree.nodes[meets]
+    return result[np.argsort(result["start"], kind="stable")]
 
 
 def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -67,8 +69,8 @@ def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarra
     """
     level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
     side = np.ldexp(2 * octree.half, -level)
-    low = octree.centre - octree.half + place * side
-    return low - facts.rounding, low + side + facts.rounding
+    lower = octree.centre - octree.half + place * side
+    return lower - facts.rounding, lower + side + facts.rounding
 
 
 def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
@@ -78,8 +80,10 @@ def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Oct
     if not len(nodes):
         return
     starts = np.cumsum([0, *nodes["points"][:-1]])
-    low, high = cubes(facts, octree, nodes)
-    outside = (np.minimum.reduceat(xyz, starts) < low) | (np.maximum.reduceat(xyz, starts) > high)
+    lower, upper = cubes(facts, octree, nodes)
+    outside = (np.minimum.reduceat(xyz, starts) < lower) | (
+        np.maximum.reduceat(xyz, starts) > upper
+    )
     if outside.any():
         level, *place = nodes["key"][np.argmax(outside.any(axis=1))].tolist()
         raise Implausible(

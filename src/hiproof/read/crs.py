@@ -52,16 +52,16 @@ def parse_crs(value: Any) -> CRS | None:
         text = str(value)[:60]
         raise InputError(
             f'expected a coordinate reference system such as "EPSG:7415", got {text!r} '
-            f"({reason_of(error)}); "
+            f"({explain_crs_error(error)}); "
             "give its EPSG code or its WKT"
         ) from error
 
 
-def reason_of(error: CRSError) -> str:
+def explain_crs_error(error: CRSError) -> str:
     """What PROJ says is wrong, without the definition, which pyproj repeats whole.
 
     >>> inner = "Internal Proj Error: proj_create: unrecognized format"
-    >>> reason_of(CRSError(f"Invalid projection: FOO[1]: ({inner})"))
+    >>> explain_crs_error(CRSError(f"Invalid projection: FOO[1]: ({inner})"))
     'unrecognized format'
     """
     reason = str(error).rpartition("Internal Proj Error: ")[2].removeprefix("proj_create: ")
@@ -144,23 +144,22 @@ def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
     return CRS.from_epsg(code) if code is not None else compound
 
 
-def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "auto") -> Units:
+def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str = "auto") -> Units:
     """Units that coordinates in `crs` count in; heights of a CRS without any are taken to be in the
     plan's unit.
 
-    `named` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS in
-    degrees, and for a name that contradicts the CRS; `source` is what the message calls the
+    `unit_name` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS
+    in degrees, and for a name that contradicts the CRS; `source` is what the message calls the
     coordinates.
 
-    >>> str(units_of(CRS("EPSG:2263"))), str(units_of(CRS("EPSG:2263+5703"))), str(units_of(None,
-    ...     named="foot"))
-    ('US survey foot', 'US survey foot, heights in metre', 'foot')
+    >>> str(find_units(CRS("EPSG:2263+5703"))), str(find_units(None, unit_name="foot"))
+    ('US survey foot, heights in metre', 'foot')
     """
     if crs is None:
-        return NAMED_UNITS[named]
+        return NAMED_UNITS[unit_name]
     plan = horizontal_crs(crs)
     if plan.is_vertical:
-        return units_of_heights_alone(plan, source, named)
+        return find_height_units(plan, source, unit_name)
     if plan.is_geographic or plan.is_geocentric:
         raise InputError(
             f"expected {source} in a projected CRS, got {crs.name} in "
@@ -170,14 +169,17 @@ def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "au
         )
     check_plan_axes(plan, source)
     across = plan.axis_info[0]
-    up = height_axis(crs) or across
-    check_height_axis(up, crs, source)
+    vertical = height_axis(crs) or across
+    check_height_axis(vertical, crs, source)
     units = Units(
-        across.unit_conversion_factor, up.unit_conversion_factor, across.unit_name, up.unit_name
+        across.unit_conversion_factor,
+        vertical.unit_conversion_factor,
+        across.unit_name,
+        vertical.unit_name,
     )
-    if named != "auto" and abs(NAMED_UNITS[named].plan / units.plan - 1) > 1e-9:
+    if unit_name != "auto" and abs(NAMED_UNITS[unit_name].plan / units.plan - 1) > 1e-9:
         raise InputError(
-            f"expected {source} in {named}, as --unit says, got {crs.name} in {units}; leave "
+            f"expected {source} in {unit_name}, as --unit says, got {crs.name} in {units}; leave "
             "--unit out, "
             "or say with --crs which CRS is right"
         )
@@ -192,30 +194,30 @@ def height_axis(crs: CRS) -> Any:
     return crs.axis_info[2] if len(crs.axis_info) == 3 and not crs.is_compound else None
 
 
-def units_of_heights_alone(heights: CRS, source: str, named: str) -> Units:
+def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
     """Units of coordinates whose CRS names heights alone: the plan's unit has to be that of the
     heights.
     """
-    units, up = NAMED_UNITS[named], heights.axis_info[0]
-    check_height_axis(up, heights, source)
-    if abs(up.unit_conversion_factor / units.plan - 1) > 1e-9:
+    units, vertical = NAMED_UNITS[unit_name], heights.axis_info[0]
+    check_height_axis(vertical, heights, source)
+    if abs(vertical.unit_conversion_factor / units.plan - 1) > 1e-9:
         raise InputError(
             f"expected {source} in a CRS of the plan, got {heights.name}, which names heights "
-            f"alone, in {up.unit_name}; "
+            f"alone, in {vertical.unit_name}; "
             "name both with --crs, such as EPSG:28992+5709"
         )
     return units
 
 
-def units_named(name: str | None, otherwise: Units = METRES) -> Units:
-    """Units of the CRS that a file names by URN or address, `otherwise` where it names none that is
-    known.
+def find_named_units(name: str | None, alternative: Units = METRES) -> Units:
+    """Units of the CRS that a file names by URN or address, `alternative` where it names none that
+    is known.
     """
     try:
         crs = parse_crs(name)
     except InputError:
-        return otherwise
-    return otherwise if crs is None else units_of(crs, "the models")
+        return alternative
+    return alternative if crs is None else find_units(crs, "the models")
 
 
 def same_heights(first: CRS, second: CRS) -> bool:
@@ -226,7 +228,7 @@ def same_heights(first: CRS, second: CRS) -> bool:
     ...     CRS("EPSG:2263+5703"))
     (True, False)
     """
-    if abs(units_of(first).height / units_of(second).height - 1) > 1e-9:
+    if abs(find_units(first).height / find_units(second).height - 1) > 1e-9:
         return False
     codes = [
         None if height is None else epsg_code(height)
@@ -235,10 +237,10 @@ def same_heights(first: CRS, second: CRS) -> bool:
     return None in codes or codes[0] == codes[1]
 
 
-def described(crs: CRS | None) -> str:
+def describe_crs(crs: CRS | None) -> str:
     """What a message calls a CRS: its EPSG code and name.
 
-    >>> described(CRS("EPSG:28992")), described(None)
+    >>> describe_crs(CRS("EPSG:28992")), describe_crs(None)
     ('EPSG:28992 (Amersfoort / RD New)', 'no CRS')
     """
     if crs is None:
@@ -247,7 +249,7 @@ def described(crs: CRS | None) -> str:
     return crs.name if code is None else f"EPSG:{code} ({crs.name})"
 
 
-def way_between(source: CRS, target: CRS) -> Transformer:
+def make_transformer(source: CRS, target: CRS) -> Transformer:
     """The transformation of plans from `source` to `target`, x before y.
 
     Raises InputError where there is none.
@@ -259,25 +261,26 @@ def way_between(source: CRS, target: CRS) -> Transformer:
         return Transformer.from_crs(source, target, always_xy=True)
     except ProjError as error:
         raise InputError(
-            f"expected a way from {described(source)} to {described(target)}, got none that PROJ "
+            f"expected a way from {describe_crs(source)} to {describe_crs(target)}, got none that "
+            "PROJ "
             "knows; "
             "check which CRS each file names, or reproject one of them"
         ) from error
 
 
-def degrees_of(crs: CRS, xy: np.ndarray) -> np.ndarray:
+def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
     """Longitude and latitude (n, 2) of positions (n, 2) in the plan of `crs`, NaN where it leaves
     the place open.
     """
     if not names_place(crs):
         return np.full(xy.shape, np.nan)
     try:
-        return np.column_stack(way_between(horizontal_crs(crs), WGS84).transform(*xy.T))
+        return np.column_stack(make_transformer(horizontal_crs(crs), WGS84).transform(*xy.T))
     except InputError:
         return np.full(xy.shape, np.nan)
 
 
-def best_of(crs: Any, target: Any, **options: Any) -> Any:
+def find_best_transformer(crs: Any, target: Any, **options: Any) -> Any:
     """pyproj's best transformation from `crs` to `target` that can be carried out here, None where
     there is none.
     """

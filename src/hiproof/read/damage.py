@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 from ..errors import InputError
-from ..log import LOGGER, counted
+from ..log import LOGGER, count_things
 
 T = TypeVar("T")
 Damaged = Callable[[InputError], None]
@@ -28,7 +28,7 @@ def refuse(error: InputError) -> None:
     raise error
 
 
-class LeftOut:
+class SkippedBuildings:
     """Tells of the damaged buildings of a file, the first MOST_TOLD in full, and counts them."""
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class LeftOut:
         if self.count <= MOST_TOLD:
             LOGGER.warning("left out: %s", error)
 
-    def sound(self, buildings: Iterator[T]) -> Iterator[T]:
+    def iterate_sound(self, buildings: Iterator[T]) -> Iterator[T]:
         """Yield `buildings`, those that could be read. Raises InputError where damage left none of
         them."""
         is_empty = True
@@ -52,7 +52,8 @@ class LeftOut:
         """Raise InputError where every building is damaged."""
         if self.count and all(are_damaged):
             raise InputError(
-                f"expected a building that can be read, got {counted(self.count, 'damaged one')} "
+                "expected a building that can be read, got "
+                f"{count_things(self.count, 'damaged one')} "
                 "and no other; "
                 "make the files anew with `hiproof build` or `hiproof reconstruct`"
             )
@@ -62,9 +63,9 @@ class LeftOut:
         """0 if every building could be read, else 2."""
         return 2 if self.count else 0
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """Say how many are left out, to complete a summary; empty if none is."""
-        return f", {counted(self.count, 'damaged building')} left out" if self.count else ""
+        return f", {count_things(self.count, 'damaged building')} left out" if self.count else ""
 
 
 def readable(value: Any) -> Any:

@@ -19,9 +19,9 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..extras import needed
-from ..masking import masked, remember
-from .wkb import as_polygons, geometry_of
+from ..extras import import_extra
+from ..masking import mask, remember
+from .wkb import as_polygons, decode_geometry
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
 SCHEMES = ("postgresql", "postgres")
@@ -43,7 +43,7 @@ def read_table(
     `where` is a condition beside the source's own. Raises InputError in a full sentence when the
     database, the table or the geometry column cannot be used.
     """
-    with opened(source, where) as table:
+    with open_source(source, where) as table:
         rows = list(table.rows())
     if not rows:
         raise InputError(
@@ -56,7 +56,7 @@ def read_table(
     geometries = np.empty(len(rows), object)
     geometries[:] = [shape for shape, _ in rows]
     return (
-        {"fields": names, "crs": crs_of(srids, table.name)},
+        {"fields": names, "crs": find_crs(srids, table.name)},
         np.arange(len(rows)),
         geometries,
         columns,
@@ -67,22 +67,23 @@ def table_crs(source: str) -> str | None:
     """The reference system of the table a source names, without reading its rows; raises InputError
     as `read_table`.
     """
-    with opened(source) as table:
-        return crs_of(table.srids(), table.name)
+    with open_source(source) as table:
+        return find_crs(table.srids(), table.name)
 
 
-def crs_of(srids: set[int], table: str) -> str | None:
-    known = srids - {0}
-    if len(known) > 1:
+def find_crs(srids: set[int], table: str) -> str | None:
+    known_srids = srids - {0}
+    if len(known_srids) > 1:
         raise InputError(
-            f"expected one reference system in {table}, got SRIDs {sorted(known)}; choose rows "
+            f"expected one reference system in {table}, got SRIDs {sorted(known_srids)}; choose "
+            "rows "
             "with &where="
         )
-    return f"EPSG:{known.pop()}" if known else None
+    return f"EPSG:{known_srids.pop()}" if known_srids else None
 
 
 @dataclass(frozen=True)
-class Table:
+class DatabaseTable:
     """A table with geometries in an open database, and the rows of it that are asked for."""
 
     cursor: Any
@@ -113,7 +114,10 @@ class Table:
             "{t} order by 2, 1"
         )
         for ewkb, attributes in self.cursor:
-            yield (geometry_of(as_polygons(bytes(ewkb))) if ewkb is not None else None), attributes
+            yield (
+                (decode_geometry(as_polygons(bytes(ewkb))) if ewkb is not None else None),
+                attributes,
+            )
 
     def srids(self) -> set[int]:
         self.query("select distinct ST_SRID({g}) from {t}")
@@ -121,7 +125,7 @@ class Table:
 
 
 @contextmanager
-def opened(source: str, condition: str | None = None) -> Iterator[Table]:
+def open_source(source: str, condition: str | None = None) -> Iterator[DatabaseTable]:
     """The table of a source in a database that stays open for the block, whose errors become
     InputErrors.
     """
@@ -135,7 +139,9 @@ def opened(source: str, condition: str | None = None) -> Iterator[Table]:
             connection.cursor() as cursor,
         ):
             connection.read_only = True
-            yield Table(cursor, table, geometry or geometry_column(cursor, table, source), where)
+            yield DatabaseTable(
+                cursor, table, geometry or geometry_column(cursor, table, source), where
+            )
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
         raise InputError(
@@ -152,13 +158,13 @@ def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
         raise InputError(
             f"expected a PostGIS table at {source}, got: {error}; check the address"
         ) from error
-    own = {name: query.pop(name, [None])[0] for name in ("table", "geometry", "where")}
-    if not own["table"]:
+    options = {name: query.pop(name, [None])[0] for name in ("table", "geometry", "where")}
+    if not options["table"]:
         raise InputError(
             f"expected a table in {source}, got none; add ?table=schema.name to the address"
         )
     dsn = urlunsplit(url._replace(query=urlencode(query, doseq=True)))
-    return dsn, own["table"], own["geometry"], own["where"]
+    return dsn, options["table"], options["geometry"], options["where"]
 
 
 def refuse_half_a_password(address: str) -> str:
@@ -166,7 +172,7 @@ def refuse_half_a_password(address: str) -> str:
     host and shown.
     """
     remember(address)
-    if ADDRESS.match(masked(address)) and not ADDRESS.match(address):
+    if ADDRESS.match(mask(address)) and not ADDRESS.match(address):
         raise InputError(
             f"expected %2F, %3F and %23 for / ? and # in the password of {address}, got the signs "
             "themselves"
@@ -181,15 +187,15 @@ def geometry_column(cursor: Any, table: str, source: str) -> str:
         "f_table_schema = %s)"
     )
     cursor.execute(sql, (name, schema, schema))
-    found = [column for (column,) in cursor.fetchall()]
-    if len(found) != 1:
-        got = ", ".join(found) or "none"
+    result = [column for (column,) in cursor.fetchall()]
+    if len(result) != 1:
+        got = ", ".join(result) or "none"
         raise InputError(
             f"expected one geometry column in {table}, got {got}; name it with &geometry="
         )
-    return found[0]
+    return result[0]
 
 
 def import_psycopg() -> Any:
     """What speaks to PostgreSQL. Raises InputError where it is missing."""
-    return needed("psycopg", "postgis", "databases")
+    return import_extra("psycopg", "postgis", "databases")

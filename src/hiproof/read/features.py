@@ -20,7 +20,7 @@ from .layers import virtual_layer
 SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")
 """How GDAL writes a date as text."""
 
-UNREADABLE = (ValueError, OverflowError, FieldError)
+READ_ERRORS = (ValueError, OverflowError, FieldError)
 """What pyogrio raises for a value that it cannot represent; text that is no UTF-8 is a ValueError,
 too.
 """
@@ -39,7 +39,7 @@ def read_layer(
     )
     try:
         return (*read(), [])
-    except UNREADABLE as error:
+    except READ_ERRORS as error:
         info = pyogrio.read_info(path, layer=layer)
         odd = (
             []
@@ -49,13 +49,15 @@ def read_layer(
         if not odd:
             raise
     meta, numbers, wkb, columns = read(columns=[name for name in info["fields"] if name not in odd])
-    known = dict(zip(meta["fields"], zip(columns, meta["dtypes"], strict=True), strict=True))
-    known |= {
+    columns_by_name = dict(
+        zip(meta["fields"], zip(columns, meta["dtypes"], strict=True), strict=True)
+    )
+    columns_by_name |= {
         name: (column_as_text(path, info["layer_name"], name, numbers), "object") for name in odd
     }
-    names = [name for name in info["fields"] if name in known]
-    meta = {**meta, "fields": names, "dtypes": [known[name][1] for name in names]}
-    return meta, numbers, wkb, [known[name][0] for name in names], odd
+    names = [name for name in info["fields"] if name in columns_by_name]
+    meta = {**meta, "fields": names, "dtypes": [columns_by_name[name][1] for name in names]}
+    return meta, numbers, wkb, [columns_by_name[name][0] for name in names], odd
 
 
 def is_readable(path: str, layer: str | int | None, name: str) -> bool:
@@ -64,7 +66,7 @@ def is_readable(path: str, layer: str | int | None, name: str) -> bool:
         pyogrio.raw.read(
             path, layer=layer, columns=[name], read_geometry=False, datetime_as_string=True
         )
-    except UNREADABLE:
+    except READ_ERRORS:
         return False
     return True
 
@@ -78,17 +80,17 @@ def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.
         _, _, _, columns = pyogrio.raw.read(
             source, fids=numbers, read_geometry=False, encoding="latin-1"
         )
-    except (*UNREADABLE, DataSourceError, FeatureError):
+    except (*READ_ERRORS, DataSourceError, FeatureError):
         columns = []
     if not columns:
         return np.full(len(numbers), None, dtype=object)
-    return np.array([tidied(value) for value in columns[0]], dtype=object)
+    return np.array([tidy_value(value) for value in columns[0]], dtype=object)
 
 
-def tidied(value: str | None) -> str | None:
+def tidy_value(value: str | None) -> str | None:
     """Text read as Latin-1 in the encoding that it has; a date in ISO's order of signs.
 
-    >>> tidied("1950/00/00"), tidied("Stra\\u00c3\\u009fe")
+    >>> tidy_value("1950/00/00"), tidy_value("Stra\\u00c3\\u009fe")
     ('1950-00-00', 'Straße')
     """
     if value is None:

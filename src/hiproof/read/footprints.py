@@ -18,30 +18,30 @@ from pyproj import CRS
 from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..geometry.rings import clockwise
-from ..log import counted
+from ..log import count_things
 from ..masking import remember
 from ..model import Footprint
 from ..settings import Settings
-from .attribute_columns import as_declared, where_known
+from .attribute_columns import make_known_condition, restore_declared_types
 from .crs import (
-    described,
+    describe_crs,
+    find_units,
+    make_transformer,
     names_heights_alone,
     names_place,
     parse_crs,
     same_horizontal,
-    units_of,
-    way_between,
 )
 from .database import is_database, read_table, table_crs
 from .features import read_layer
 from .geoparquet import is_parquet
-from .layers import list_layers, source_of
+from .layers import find_source, list_layers
 from .operations import find_operation, warn_if_coarse
-from .overlap import refuse_degrees, told_box
+from .overlap import format_box, refuse_degrees
 from .parquet_table import parquet_crs, read_parquet
 from .polygons import is_surface, simple_polygons
 from .remote import is_url
-from .wkb import geometries_of
+from .wkb import decode_geometries
 
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
 """What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
@@ -93,13 +93,13 @@ def read_footprints(
     ids = feature_ids(attributes, numbers, id_attribute, path)
     source = plan_crs(meta["crs"])
     surfaces = np.array([is_surface(geometry) for geometry in geometries])
-    geometries = transformed(geometries, source, target, path)
-    units = units_of(target or source, f"the footprints of {path}", read.unit)
+    geometries = transform_geometries(geometries, source, target, path)
+    units = find_units(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
     footprints = tuple(
         unique_ids(split_features(ids, geometries, surfaces, attributes, path), path)
     )
-    say_which_overlie(footprints, path)
+    warn_overlaps(footprints, path)
     return (
         footprints
         if bbox is None
@@ -123,8 +123,12 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
         return plan_crs(table_crs(str(path)))
     if is_parquet(path):
         return plan_crs(parquet_crs(path))
-    source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
-    return plan_crs(reading(lambda: pyogrio.read_info(source, layer=layer), path)["crs"])
+    source, layer = translate_read_errors(
+        lambda: find_source(str(path), choose_layer(path, layer)), path
+    )
+    return plan_crs(
+        translate_read_errors(lambda: pyogrio.read_info(source, layer=layer), path)["crs"]
+    )
 
 
 def plan_crs(text: str | CRS | None) -> CRS | None:
@@ -135,15 +139,15 @@ def plan_crs(text: str | CRS | None) -> CRS | None:
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
 
-def one_layer(path: str | Path, layer: str | int | None) -> str | int | None:
+def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
     """`layer`, or the only layer of a file that holds geometries.
 
     Raises InputError, listing them, where several do.
     """
     if layer is not None:
         return layer
-    named = reading(lambda: list_layers(str(path)), path)
-    layers = [name for name, geometry in named if geometry is not None]
+    layer_names = translate_read_errors(lambda: list_layers(str(path)), path)
+    layers = [name for name, geometry in layer_names if geometry is not None]
     if len(layers) > 1:
         raise InputError(
             f"expected one layer of footprints in {path}, got {len(layers)}: "
@@ -170,17 +174,19 @@ def read_features(
         return read_table(str(path), where)
     refuse_missing(path)
     if is_parquet(path):
-        found = read_parquet(
+        parquet = read_parquet(
             path, layer, where, lambda crs: bbox and box_in(plan_crs(crs), bbox, bbox_crs)
         )
-        refuse_nothing(path, len(found[1]), found[0]["total_bounds"], where, bbox)
-        refuse_lines(found[2], path)
-        return found
-    source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
-    info = reading(lambda: pyogrio.read_info(source, layer=layer), path)
-    chosen = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
-    meta, numbers, wkb, columns, as_text = reading(
-        lambda: read_layer(source, layer, **chosen), path, info
+        refuse_nothing(path, len(parquet[1]), parquet[0]["total_bounds"], where, bbox)
+        refuse_lines(parquet[2], path)
+        return parquet
+    source, layer = translate_read_errors(
+        lambda: find_source(str(path), choose_layer(path, layer)), path
+    )
+    info = translate_read_errors(lambda: pyogrio.read_info(source, layer=layer), path)
+    selection = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
+    meta, numbers, wkb, columns, as_text = translate_read_errors(
+        lambda: read_layer(source, layer, **selection), path, info
     )
     if as_text:
         names = ", ".join(as_text)
@@ -193,18 +199,27 @@ def read_features(
             f"expected polygons in {path}, got a table without geometry; name another file or layer"
         )
     refuse_nothing(path, len(wkb), info["total_bounds"], where, bbox)
-    geometries = geometries_of(wkb)
+    geometries = decode_geometries(wkb)
     refuse_lines(geometries, path)
 
-    def known_of(name: str) -> np.ndarray:
+    def read_column(name: str) -> np.ndarray:
         # of all columns: in some formats those left out are empty to the condition as well
-        known: dict[str, Any] = {**chosen, "layer": layer, "where": where_known(name, where)}
-        told, *_, values, _ = reading(
-            lambda: read_layer(source, read_geometry=False, **known), path, info
+        known_values: dict[str, Any] = {
+            **selection,
+            "layer": layer,
+            "where": make_known_condition(name, where),
+        }
+        entries, *_, values, _ = translate_read_errors(
+            lambda: read_layer(source, read_geometry=False, **known_values), path, info
         )
-        return values[list(told["fields"]).index(name)]
+        return values[list(entries["fields"]).index(name)]
 
-    return meta, numbers, geometries, as_declared(meta["fields"], meta["dtypes"], columns, known_of)
+    return (
+        meta,
+        numbers,
+        geometries,
+        restore_declared_types(meta["fields"], meta["dtypes"], columns, read_column),
+    )
 
 
 def refuse_nothing(
@@ -220,10 +235,10 @@ def refuse_nothing(
     if count:
         return
     if where or bbox:
-        said = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
-        lies = "" if bounds is None else f" ({told_box(bounds)})"
+        text = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
+        lies = "" if bounds is None else f" ({format_box(bounds)})"
         raise InputError(
-            f"expected footprints in {path}{lies} that {said} let through, got none; relax or "
+            f"expected footprints in {path}{lies} that {text} let through, got none; relax or "
             "leave out what does not fit"
         )
     raise InputError(
@@ -258,11 +273,13 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
     if crs is None or bbox_crs is None or same_horizontal(crs, bbox_crs):
         return bbox
     if not names_place(crs):
-        return tuple(np.array(bbox) * times_between(bbox_crs, crs))
-    return way_between(bbox_crs, crs).transform_bounds(*bbox)
+        return tuple(np.array(bbox) * compare_units(bbox_crs, crs))
+    return make_transformer(bbox_crs, crs).transform_bounds(*bbox)
 
 
-def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None) -> Any:
+def translate_read_errors(
+    read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None
+) -> Any:
     """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that
     helps; with the `info` of a layer, its attributes for a condition that does not go with them.
     """
@@ -275,9 +292,9 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
     except (FeatureError, ValueError) as error:
         if info is None or "SQL" not in str(error):
             raise unreadable(path, error) from error
-        told, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
+        reason, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
         raise InputError(
-            f"expected --where in SQL on the attributes of {path} ({names}), got: {told}; use "
+            f"expected --where in SQL on the attributes of {path} ({names}), got: {reason}; use "
             "these names"
         ) from error
     except DataLayerError as error:
@@ -291,10 +308,10 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
 
 def unreadable(path: str | Path, error: Exception) -> InputError:
     # what follows is advice on GDAL's own options
-    told = str(error).partition("; It might help")[0].rstrip(".")
+    reason = str(error).partition("; It might help")[0].rstrip(".")
     return InputError(
         f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, "
-        f"got: {told}; "
+        f"got: {reason}; "
         "check the file, or convert it with ogr2ogr"
     )
 
@@ -349,7 +366,8 @@ def feature_ids(
         missing = ids.count("")
         if missing:
             warnings.warn(
-                f"{path}: {counted(missing, 'feature')} without {name}; the number stands in for "
+                f"{path}: {count_things(missing, 'feature')} without {name}; the number stands in "
+                "for "
                 "it",
                 InputWarning,
             )
@@ -377,7 +395,7 @@ def id_text(value: Any) -> str:
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
-def transformed(
+def transform_geometries(
     geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path
 ) -> np.ndarray:
     """Geometries in plan in the target CRS.
@@ -387,25 +405,26 @@ def transformed(
     geometries = shapely.force_2d(geometries)
     if source is None or not source.is_geographic:
         advice = "name their CRS in the file (`ogr2ogr -a_srs EPSG:4326`), or reproject them"
-        named = "no CRS" if source is None else described(source)
+        text = "no CRS" if source is None else describe_crs(source)
         refuse_degrees(
-            shapely.bounds(geometries), f"the footprints of {path}, which names {named},", advice
+            shapely.bounds(geometries), f"the footprints of {path}, which names {text},", advice
         )
     if source is None and target is not None:
         warnings.warn(
-            f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning
+            f"{path}: names no CRS; taken to be in the cloud's, {describe_crs(target)}",
+            InputWarning,
         )
     if source is None or target is None or same_horizontal(source, target):
         return geometries
     if not names_place(source):
-        taken = (
-            f"names a local CRS, {described(source)}; taken to be in the cloud's, "
-            f"{described(target)}"
+        accepted = (
+            f"names a local CRS, {describe_crs(source)}; taken to be in the cloud's, "
+            f"{describe_crs(target)}"
         )
-        warnings.warn(f"{path}: {taken}", InputWarning)
-        return shapely.transform(geometries, lambda xy: xy * times_between(source, target))
-    transformer = way_between(source, target)
-    warn_if_coarse(find_operation(str(path), source, target, middle_of(geometries)))
+        warnings.warn(f"{path}: {accepted}", InputWarning)
+        return shapely.transform(geometries, lambda xy: xy * compare_units(source, target))
+    transformer = make_transformer(source, target)
+    warn_if_coarse(find_operation(str(path), source, target, find_middle(geometries)))
     moved = shapely.transform(
         geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1]))
     )
@@ -413,17 +432,17 @@ def transformed(
         raise InputError(
             f"expected footprints of {path} that can be moved from {source.name} to the cloud's "
             f"{target.name}, got "
-            f"coordinates outside that system; {advice_on(source)}"
+            f"coordinates outside that system; {advise(source)}"
         )
     return moved
 
 
-def times_between(source: CRS, target: CRS) -> float:
+def compare_units(source: CRS, target: CRS) -> float:
     """How many units of `target` one of `source` is in plan."""
-    return units_of(source, "the footprints").plan / units_of(target).plan
+    return find_units(source, "the footprints").plan / find_units(target).plan
 
 
-def middle_of(geometries: np.ndarray) -> tuple[float, float]:
+def find_middle(geometries: np.ndarray) -> tuple[float, float]:
     """The middle (x, y) of the geometries, by the medians of their boxes;
 
     (0, 0) where none has any.
@@ -434,7 +453,7 @@ def middle_of(geometries: np.ndarray) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def advice_on(source: CRS) -> str:
+def advise(source: CRS) -> str:
     """What to do about coordinates that the CRS `source` cannot have."""
     if source.is_geographic:
         return (
@@ -473,21 +492,22 @@ def split_features(
                 for number, polygon in parts
             ]
     if split:
-        many = counted(len(split), "feature") + " of several polygons"
+        many = count_things(len(split), "feature") + " of several polygons"
         warnings.warn(
             f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...",
             InputWarning,
         )
     if surfaces.any():
-        bodies = counted(int(surfaces.sum()), "feature") + " of faces in space"
+        bodies = count_things(int(surfaces.sum()), "feature") + " of faces in space"
         warnings.warn(
             f"{path}: {bodies}; the area that they cover from above is the outline", InputWarning
         )
     if mended:
-        warnings.warn(f"{path}: {counted(mended, 'invalid footprint')} repaired", InputWarning)
+        warnings.warn(f"{path}: {count_things(mended, 'invalid footprint')} repaired", InputWarning)
     if empty:
         warnings.warn(
-            f"{path}: {counted(empty, 'feature')} with no area that a building could have; such "
+            f"{path}: {count_things(empty, 'feature')} with no area that a building could have; "
+            "such "
             "get no model, but a status",
             InputWarning,
         )
@@ -498,16 +518,16 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
     """Ids made unique by a suffix `_2`, `_3`; a copy of an earlier polygon names it in its
     attribute `copy_of`.
     """
-    taken = {footprint.id for footprint in footprints}
-    used: set[str] = set()
+    ids = {footprint.id for footprint in footprints}
+    in_use: set[str] = set()
     first_by_shape: dict[bytes, str] = {}
     result, copies, renamed = [], 0, 0
     for footprint in footprints:
         id, suffix = footprint.id, 2
-        while id in used or (suffix > 2 and id in taken):
+        while id in in_use or (suffix > 2 and id in ids):
             id, suffix = f"{footprint.id}_{suffix}", suffix + 1
         renamed += id != footprint.id
-        used.add(id)
+        in_use.add(id)
         shape = shapely.normalize(footprint.polygon).wkb
         original = first_by_shape.setdefault(shape, id)
         attributes = footprint.attributes
@@ -516,20 +536,21 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
         result.append(Footprint(id, footprint.polygon, attributes))
     if renamed:
         warnings.warn(
-            f"{path}: {counted(renamed, 'footprint')} with the id of an earlier one got a suffix "
+            f"{path}: {count_things(renamed, 'footprint')} with the id of an earlier one got a "
+            "suffix "
             "such as _2",
             InputWarning,
         )
     if copies:
         warnings.warn(
-            f"{path}: {counted(copies, 'footprint')} with the polygon of another; see the "
+            f"{path}: {count_things(copies, 'footprint')} with the polygon of another; see the "
             "attribute copy_of",
             InputWarning,
         )
     return result
 
 
-def say_which_overlie(footprints: Sequence[Footprint], path: str | Path) -> None:
+def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
     """One line where footprints lie on larger ones: each gets a model of the same points, and the
     models overlap.
     """
@@ -542,7 +563,7 @@ def say_which_overlie(footprints: Sequence[Footprint], path: str | Path) -> None
             pairs, np.argsort(shapely.area(polygons[pairs]), axis=0), axis=0
         )
         warnings.warn(
-            f"{path}: {counted(len(np.unique(smaller)), 'footprint')} on top of a larger one "
+            f"{path}: {count_things(len(np.unique(smaller)), 'footprint')} on top of a larger one "
             f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have the "
             "same points and overlap; "
             "keep one of them",

@@ -71,7 +71,10 @@ class GeoKeys:
             raise CRSError(f"a key directory of {len(directory)} bytes that tells of {count} keys")
         entries = struct.iter_unpack("<4H", directory[8 : 8 + 8 * count])
         return cls(
-            {key: value_at(place, length, at, doubles, texts) for key, place, length, at in entries}
+            {
+                key: value_at(place, length, position, doubles, texts)
+                for key, place, length, position in entries
+            }
         )
 
     def code(self, key: int) -> int:
@@ -105,8 +108,8 @@ class GeoKeys:
 
     def citation(self) -> str:
         """What the file calls its projection."""
-        told = self.values.get(PROJECTED_CITATION) or self.values.get(CITATION)
-        return str(told or "a projection of its own").replace('"', "'")
+        citation = self.values.get(PROJECTED_CITATION) or self.values.get(CITATION)
+        return str(citation or "a projection of its own").replace('"', "'")
 
     def plan_unit(self) -> tuple[str, float] | None:
         """Name and length (m) of the unit in plan, None where no key names it."""
@@ -114,7 +117,7 @@ class GeoKeys:
         if code == USER_DEFINED:
             size = self.values.get(PLAN_UNIT_SIZE)
             return ("unit of its own", float(size)) if isinstance(size, float) else None
-        return None if code == UNDEFINED else unit_of_code(code)
+        return None if code == UNDEFINED else decode_unit(code)
 
     def heights(self) -> CRS | None:
         """The CRS of the heights, None without any.
@@ -122,27 +125,30 @@ class GeoKeys:
         Where code and unit disagree the unit counts.
         """
         code, unit = self.code(VERTICAL_CRS), self.code(VERTICAL_UNIT)
-        named = heights_of_code(code) if code in EPSG_CODES else None
+        vertical_crs = decode_vertical_crs(code) if code in EPSG_CODES else None
         if unit in (UNDEFINED, USER_DEFINED):
-            return named
-        name, factor = unit_of_code(unit)
-        if named is not None and abs(named.axis_info[0].unit_conversion_factor / factor - 1) < 1e-9:
-            return named
-        return heights_in("height" if named is None else named.name, name, factor)
+            return vertical_crs
+        name, factor = decode_unit(unit)
+        if (
+            vertical_crs is not None
+            and abs(vertical_crs.axis_info[0].unit_conversion_factor / factor - 1) < 1e-9
+        ):
+            return vertical_crs
+        return heights_in("height" if vertical_crs is None else vertical_crs.name, name, factor)
 
 
-def value_at(place: int, length: int, at: int, doubles: bytes, texts: bytes) -> Any:
+def value_at(place: int, length: int, position: int, doubles: bytes, texts: bytes) -> Any:
     """The value of one entry of a directory, None where it points beyond its record."""
     if place == 0:
-        return at
-    if place == DOUBLES and 8 * (at + 1) <= len(doubles):
-        return struct.unpack_from("<d", doubles, 8 * at)[0]
-    if place == TEXTS and at < len(texts):
-        return texts[at : at + length].decode("latin-1").split("\0")[0].strip("| ")
+        return position
+    if place == DOUBLES and 8 * (position + 1) <= len(doubles):
+        return struct.unpack_from("<d", doubles, 8 * position)[0]
+    if place == TEXTS and position < len(texts):
+        return texts[position : position + length].decode("latin-1").split("\0")[0].strip("| ")
     return None
 
 
-def crs_of_keys(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CRS | None:
+def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CRS | None:
     """The CRS of plan and heights, of heights alone where there is no plan, None without either.
 
     Raises CRSError where the keys define one that cannot be understood.
@@ -152,16 +158,16 @@ def crs_of_keys(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> C
     return heights if plan is None else combine(plan, heights)
 
 
-def heights_of_code(code: int) -> CRS:
+def decode_vertical_crs(code: int) -> CRS:
     """A vertical CRS by EPSG's code or by one of GeoTIFF 1.0's own."""
     if code in GEOTIFF_HEIGHTS:
         return CRS.from_epsg(GEOTIFF_HEIGHTS[code])
     if code in ELLIPSOIDAL:
         return heights_in("ellipsoidal height", "metre", 1.0)
-    named = CRS.from_epsg(code)
-    if not named.is_vertical:
-        raise CRSError(f"EPSG:{code} ({named.name}) in place of a height system")
-    return named
+    named_crs = CRS.from_epsg(code)
+    if not named_crs.is_vertical:
+        raise CRSError(f"EPSG:{code} ({named_crs.name}) in place of a height system")
+    return named_crs
 
 
 @functools.cache
@@ -176,7 +182,7 @@ def linear_units() -> dict[int, tuple[str, float]]:
     }
 
 
-def unit_of_code(code: int) -> tuple[str, float]:
+def decode_unit(code: int) -> tuple[str, float]:
     """Name and length (m) of a unit. Raises CRSError for a code that is no unit of length."""
     if code not in linear_units():
         raise CRSError(f"a unit of the code {code}, which is no unit of length")
@@ -188,11 +194,11 @@ def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
     if unit is None or abs(crs.axis_info[0].unit_conversion_factor / unit[1] - 1) < 1e-9:
         return crs
     name, factor = unit
-    told = crs.to_json_dict()
-    for axis in told["coordinate_system"]["axis"]:
+    definition = crs.to_json_dict()
+    for axis in definition["coordinate_system"]["axis"]:
         axis["unit"] = {"type": "LinearUnit", "name": name, "conversion_factor": factor}
-    told.pop("id", None)
-    return CRS.from_json_dict({**told, "name": f"{crs.name} ({name})"})
+    definition.pop("id", None)
+    return CRS.from_json_dict({**definition, "name": f"{crs.name} ({name})"})
 
 
 def local_crs(name: str, unit: str, factor: float) -> CRS:

@@ -20,10 +20,10 @@ import shapely
 from pyproj import CRS
 
 from ..errors import InputError
-from ..extras import needed
+from ..extras import import_extra
 from .crs import parse_crs
-from .remote import is_url, opened
-from .wkb import geometries_of
+from .remote import is_url, open_binary
+from .wkb import decode_geometries
 
 MAGIC = b"PAR1"
 """The first bytes of every Parquet file."""
@@ -34,7 +34,7 @@ SUFFIXES = (".parquet", ".geoparquet")
 LONGITUDE_LATITUDE = "OGC:CRS84"
 """The CRS of a file that names none (GeoParquet 1.1, section "crs")."""
 
-SIDES = ("xmin", "ymin", "xmax", "ymax")
+BOX_COLUMNS = ("xmin", "ymin", "xmax", "ymax")
 """The sides of a box, as columns of boxes are named."""
 
 LISTS = {
@@ -90,7 +90,7 @@ def open_parquet(path: str | Path) -> Iterator[Any]:
     if is_url(path):
         import_fsspec()
     # exact ranges: a Parquet file tells where everything lies
-    with opened(path, "GeoParquet footprints", cache_type="none") as source:
+    with open_binary(path, "GeoParquet footprints", cache_type="none") as source:
         try:
             with parquet.ParquetFile(source, pre_buffer=True) as file:
                 yield file
@@ -139,12 +139,12 @@ def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], .
 
     covering = (told.get("covering") or {}).get("bbox")
     if covering:
-        return tuple(tuple(covering[side]) for side in SIDES)
+        return tuple(tuple(covering[side]) for side in BOX_COLUMNS)
     kind = {field.name: field.type for field in schema}.get("bbox")
     if kind is None or not types.is_struct(kind):
         return None
     names = {field.name for field in kind.fields}
-    return tuple(("bbox", side) for side in SIDES) if names.issuperset(SIDES) else None
+    return tuple(("bbox", side) for side in BOX_COLUMNS) if names.issuperset(BOX_COLUMNS) else None
 
 
 def attribute_names(file: Any, column: GeometryColumn) -> list[str]:
@@ -190,15 +190,15 @@ def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry |
     if None in leaves:
         return list(groups)
     boxes = np.array(
-        [[bound_of(file, i, leaf, k) for k, leaf in enumerate(leaves)] for i in groups]
+        [[read_bound(file, i, leaf, k) for k, leaf in enumerate(leaves)] for i in groups]
     )
-    boxes = boxes.reshape(-1, len(SIDES))
+    boxes = boxes.reshape(-1, len(BOX_COLUMNS))
     unknown = ~np.isfinite(boxes).all(axis=1)
     met = shapely.intersects(shapely.box(*np.where(unknown[:, None], 0.0, boxes).T), extent)
     return np.flatnonzero(met | unknown).tolist()
 
 
-def bound_of(file: Any, group: int, leaf: Any, side: int) -> float:
+def read_bound(file: Any, group: int, leaf: Any, side: int) -> float:
     """The least (of xmin and ymin) or greatest value of a column in a row group; NaN where the file
     does not tell.
     """
@@ -241,14 +241,14 @@ def geometries_in(table: Any, column: GeometryColumn) -> np.ndarray:
     if column.encoding not in LISTS:
         bodies = np.empty(len(table), object)
         bodies[:] = values.to_pylist()
-        return geometries_of(bodies)
+        return decode_geometries(bodies)
     geometries = np.empty(len(table), object)
     known = values.drop_null().combine_chunks()
-    geometries[values.is_valid().to_numpy()] = surfaces_of(known, LISTS[column.encoding])
+    geometries[values.is_valid().to_numpy()] = convert_surfaces(known, LISTS[column.encoding])
     return geometries
 
 
-def surfaces_of(lists: Any, kind: shapely.GeometryType) -> np.ndarray:
+def convert_surfaces(lists: Any, kind: shapely.GeometryType) -> np.ndarray:
     """Surfaces (n,) of Arrow's lists of coordinates, none of them null."""
     from pyarrow import types
 
@@ -265,10 +265,10 @@ def surfaces_of(lists: Any, kind: shapely.GeometryType) -> np.ndarray:
 
 def import_pyarrow() -> Any:
     """What reads and writes GeoParquet. Raises InputError where it is missing."""
-    needed("pyarrow", "parquet", "GeoParquet")
-    return needed("pyarrow.parquet", "parquet", "GeoParquet")
+    import_extra("pyarrow", "parquet", "GeoParquet")
+    return import_extra("pyarrow.parquet", "parquet", "GeoParquet")
 
 
 def import_fsspec() -> Any:
     """What reads GeoParquet by address. Raises InputError where it is missing."""
-    return needed("fsspec", "parquet", "GeoParquet by address")
+    return import_extra("fsspec", "parquet", "GeoParquet by address")

@@ -18,12 +18,12 @@ import laspy
 import numpy as np
 
 from ..errors import InputError, InputWarning
-from ..log import counted
+from ..log import count_things
 from .copc import check_nodes, copc_record
 from .las_header import LasFacts, check_all_points, check_points, read_facts
 from .plausible import Implausible
-from .remote import is_url, opened
-from .runs import boxes_of_runs
+from .remote import is_url, open_binary
+from .runs import compute_run_boxes
 
 # xyz (n, 3) float64, classification (n,) uint8 or None
 Chunk = tuple[np.ndarray, np.ndarray | None]
@@ -32,7 +32,7 @@ WANTED = FIELDS.base() | FIELDS.Z | FIELDS.CLASSIFICATION | FIELDS.FLAGS
 
 
 @contextmanager
-def explained(path: str | Path) -> Iterator[None]:
+def translate_errors(path: str | Path) -> Iterator[None]:
     """Turn whatever laspy and lazrs raise on a damaged file into one InputError."""
     try:
         yield
@@ -63,14 +63,14 @@ def read_las_header(path: str | Path) -> laspy.LasHeader:
 
     Raises InputError when it cannot be read or cannot be true.
     """
-    facts_of(path)
-    with explained(path), opened(path) as file, laspy.open(file) as reader:
+    read_checked_facts(path)
+    with translate_errors(path), open_binary(path) as file, laspy.open(file) as reader:
         return reader.header
 
 
-def facts_of(path: str | Path) -> LasFacts:
+def read_checked_facts(path: str | Path) -> LasFacts:
     """What the header says, once it has been found possible. Raises InputError otherwise."""
-    with explained(path):
+    with translate_errors(path):
         return facts_at(str(path), None if is_url(path) else Path(path).stat().st_mtime_ns)
 
 
@@ -79,7 +79,7 @@ def facts_at(path: str, changed: int | None) -> LasFacts:
     """Found once a process for the file that was `changed` then: an indexed file is opened for each
     of its squares.
     """
-    with opened(path) as file:
+    with open_binary(path) as file:
         return read_facts(file)
 
 
@@ -99,22 +99,27 @@ def las_chunks(
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
         return
-    facts, low, high, left_out = facts_of(path), np.full(3, np.inf), np.full(3, -np.inf), 0
-    with explained(path):
+    facts, lower, upper, left_out = (
+        read_checked_facts(path),
+        np.full(3, np.inf),
+        np.full(3, -np.inf),
+        0,
+    )
+    with translate_errors(path):
         for record in records(
             path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()
         ):
             xyz = coordinates(record)
             lowest, highest = check_points(xyz, facts)
-            low, high = np.minimum(low, lowest), np.maximum(high, highest)
+            lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
             if noted is not None:
-                noted.append(boxes_of_runs(xyz))
-            chunk = present(xyz, record)
+                noted.append(compute_run_boxes(xyz))
+            chunk = drop_withheld(xyz, record)
             left_out += len(xyz) - len(chunk[0])
             yield chunk
         if runs is None and facts.count:
-            check_all_points(low, high, facts)
-    tell_of_withheld(left_out, path)
+            check_all_points(lower, upper, facts)
+    log_withheld(left_out, path)
 
 
 def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Any]:
@@ -122,7 +127,7 @@ def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) ->
     none empty.
     """
     with (
-        opened(path) as file,
+        open_binary(path) as file,
         laspy.open(file, decompression_selection=WANTED, read_evlrs=False) as reader,
     ):
         for first, end in runs:
@@ -132,32 +137,34 @@ def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) ->
                 count = min(chunk_points, end - start)
                 record = reader.read_points(count)
                 if len(record) != count:
-                    raise ValueError(f"it ends {counted(count - len(record), 'point')} too early")
+                    raise ValueError(
+                        f"it ends {count_things(count - len(record), 'point')} too early"
+                    )
                 yield record
 
 
 def is_copc(path: str | Path) -> bool:
     """Whether the file is cloud-optimised: the first VLR is COPC's by its standard."""
-    with explained(path), opened(path) as file:
+    with translate_errors(path), open_binary(path) as file:
         head = file.read(400)
     return head[375 + 2 : 375 + 6] == b"copc"
 
 
 def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chunk:
-    facts = facts_of(path)
-    with explained(path), opened(path) as file:
+    facts = read_checked_facts(path)
+    with translate_errors(path), open_binary(path) as file:
         if facts.octree is None:
             raise Implausible(
                 "its first record says that it is COPC, and none tells of an octree; it is damaged"
             )
         nodes, record = copc_record(file, facts, facts.octree, box, WANTED)
         xyz = coordinates(record)
-        low, high = check_points(xyz, facts)
+        lower, upper = check_points(xyz, facts)
         check_nodes(xyz, nodes, facts, facts.octree)
         if 0 < len(xyz) == facts.count:
-            check_all_points(low, high, facts)
-        chunk = present(xyz, record)
-    tell_of_withheld(len(xyz) - len(chunk[0]), path)
+            check_all_points(lower, upper, facts)
+        chunk = drop_withheld(xyz, record)
+    log_withheld(len(xyz) - len(chunk[0]), path)
     return chunk
 
 
@@ -170,7 +177,7 @@ def coordinates(record) -> np.ndarray:
     return xyz
 
 
-def present(xyz: np.ndarray, record) -> Chunk:
+def drop_withheld(xyz: np.ndarray, record) -> Chunk:
     """Coordinates (n, 3) and classes of a record without the points flagged as withheld, that is,
     deleted.
     """
@@ -179,11 +186,11 @@ def present(xyz: np.ndarray, record) -> Chunk:
     return (xyz[~withheld], classification[~withheld]) if withheld.any() else (xyz, classification)
 
 
-def tell_of_withheld(count: int, path: str | Path) -> None:
+def log_withheld(count: int, path: str | Path) -> None:
     """Say once how many points of a file were left out as withheld: by the chunk, a tile of a
     country takes a thousand lines.
     """
     if count:
         warnings.warn(
-            f"{path}: {counted(count, 'point')} flagged as withheld left out", InputWarning
+            f"{path}: {count_things(count, 'point')} flagged as withheld left out", InputWarning
         )

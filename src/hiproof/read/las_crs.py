@@ -7,8 +7,8 @@ from __future__ import annotations
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from .crs import UnknownCRS, combine, names_heights_alone, reason_of, vertical_crs
-from .geokeys import DIRECTORY, DOUBLES, TEXTS, crs_of_keys
+from .crs import UnknownCRS, combine, explain_crs_error, names_heights_alone, vertical_crs
+from .geokeys import DIRECTORY, DOUBLES, TEXTS, decode_crs
 
 WKT = 2112
 """Number of the record that holds a WKT."""
@@ -19,21 +19,21 @@ def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
 
     Heights may come from the keys beside a WKT.
     """
-    text = wkt_of(records.get(WKT, b""))
-    found, faults = [], []
+    text = decode_wkt(records.get(WKT, b""))
+    result, faults = [], []
     for is_there, read in (
         (bool(text), lambda: CRS.from_wkt(text)),
         (
             DIRECTORY in records,
-            lambda: crs_of_keys(*(records.get(id, b"") for id in (DIRECTORY, DOUBLES, TEXTS))),
+            lambda: decode_crs(*(records.get(id, b"") for id in (DIRECTORY, DOUBLES, TEXTS))),
         ),
     ):
         try:
-            found.append(read() if is_there else None)
+            result.append(read() if is_there else None)
         except CRSError as error:
-            found.append(None)
-            faults.append(reason_of(error))
-    by_text, by_keys = found
+            result.append(None)
+            faults.append(explain_crs_error(error))
+    by_text, by_keys = result
     if by_text is None and by_keys is None:
         return UnknownCRS(faults[0]) if faults else None
     if by_text is None:
@@ -43,7 +43,7 @@ def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
     return combine(by_text, by_keys if names_heights_alone(by_keys) else vertical_crs(by_keys))
 
 
-def wkt_of(content: bytes) -> str:
+def decode_wkt(content: bytes) -> str:
     """The text of a record of WKT: UTF-8 by the standard, Latin-1 where a writer did not know."""
     try:
         text = content.decode()

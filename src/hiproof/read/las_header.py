@@ -18,7 +18,7 @@ from typing import BinaryIO, NamedTuple
 import lazrs
 import numpy as np
 
-from .plausible import MOST_HEIGHT, MOST_PLAN, Implausible, bounds_of
+from .plausible import MOST_HEIGHT, MOST_PLAN, Implausible, compute_bounds
 
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}  # by minor version
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # by point format, without extra bytes
@@ -87,7 +87,7 @@ def read_facts(file: BinaryIO) -> LasFacts:
     file.seek(0)
     facts = parse_header(file.read(max(HEADER_BYTES.values())), size)
     check_layout(facts)
-    records = dict(records_of(file, facts))
+    records = dict(iterate_records(file, facts))
     projection = {
         number: content for (user, number), content in records.items() if user == "LASF_Projection"
     }
@@ -171,7 +171,7 @@ def check_layout(facts: LasFacts) -> None:
         )
 
 
-def records_of(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:
+def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:
     """Variable length records as ((user id, number), content), none of which may reach beyond its
     place.
     """
@@ -241,14 +241,14 @@ def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
         return 0
     full = (len(chunks) - 1) * chunk_points
     if compressor == LAYERED:
-        return full + points_of_last_chunk(file, facts, chunks)
+        return full + count_last_chunk(file, facts, chunks)
     # the only second count: the last chunk of older formats has none
     if facts.count_by_return > facts.count:
         return facts.count_by_return
     if not full < facts.count <= full + chunk_points:
-        most = full + chunk_points
+        limit = full + chunk_points
         raise Implausible(
-            f"its header tells of {facts.count} points, its chunks hold from {full + 1} to {most}"
+            f"its header tells of {facts.count} points, its chunks hold from {full + 1} to {limit}"
         )
     return facts.count
 
@@ -282,7 +282,7 @@ def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
     return chunks
 
 
-def points_of_last_chunk(file: BinaryIO, facts: LasFacts, chunks: list[tuple[int, int]]) -> int:
+def count_last_chunk(file: BinaryIO, facts: LasFacts, chunks: list[tuple[int, int]]) -> int:
     """How many points the last chunk says it holds: after its first point, since LAS 1.4's
     formats.
     """
@@ -296,17 +296,20 @@ def check_coordinates(facts: LasFacts) -> None:
     """
     if not ((facts.scales > 0) & (facts.scales <= COARSEST_SCALE)).all():
         raise Implausible(
-            f"its header has the scales {listed(facts.scales)}; they must be above 0 and at most 10"
+            f"its header has the scales {format_list(facts.scales)}; they must be above 0 and at "
+            "most 10"
         )
     reach = 2.0**31 * facts.scales + facts.rounding
-    most = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])
-    ordered = (facts.mins <= facts.maxs) & (np.maximum(abs(facts.mins), abs(facts.maxs)) <= most)
+    limit = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])
+    ordered = (facts.mins <= facts.maxs) & (np.maximum(abs(facts.mins), abs(facts.maxs)) <= limit)
     reached = (facts.mins >= facts.offsets - reach) & (facts.maxs <= facts.offsets + reach)
     if not (ordered & reached).all():
         raise Implausible(
-            f"its header's bounds ({listed(facts.mins)}) to ({listed(facts.maxs)}) cannot be those "
+            f"its header's bounds ({format_list(facts.mins)}) to ({format_list(facts.maxs)}) "
+            "cannot be those "
             "of coordinates "
-            f"with the offset ({listed(facts.offsets)}) and the scale ({listed(facts.scales)})"
+            f"with the offset ({format_list(facts.offsets)}) and the scale "
+            f"({format_list(facts.scales)})"
         )
 
 
@@ -317,13 +320,16 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
     *centre, half, _, page, page_bytes = struct.unpack_from("<5d2Q", info)
-    low, high = np.array(centre) - half - facts.rounding, np.array(centre) + half + facts.rounding
-    if facts.count and not ((facts.mins >= low) & (facts.maxs <= high)).all():
+    lower, upper = (
+        np.array(centre) - half - facts.rounding,
+        np.array(centre) + half + facts.rounding,
+    )
+    if facts.count and not ((facts.mins >= lower) & (facts.maxs <= upper)).all():
         raise Implausible(
-            f"its octree of half width {half:g} about ({listed(centre)}) does not hold its "
+            f"its octree of half width {half:g} about ({format_list(centre)}) does not hold its "
             "header's bounds"
         )
-    nodes = nodes_of_pages(file, facts, page, page_bytes)
+    nodes = walk_pages(file, facts, page, page_bytes)
     points = int(nodes["points"].sum(dtype=np.int64))
     if points != facts.count:
         raise Implausible(
@@ -332,12 +338,12 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
     return replace(facts, octree=Octree(nodes, np.array(centre), half))
 
 
-def nodes_of_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> np.ndarray:
+def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> np.ndarray:
     """All nodes that hold points; every page is visited once, so the walk ends."""
-    waiting, seen, found = [(page, page_bytes)], set(), [np.empty(0, NODES)]
+    waiting, visited, result = [(page, page_bytes)], set(), [np.empty(0, NODES)]
     while waiting:
         start, length = waiting.pop()
-        if start in seen:
+        if start in visited:
             raise Implausible(
                 f"its octree's page at byte {start} points to itself or is pointed to twice"
             )
@@ -346,24 +352,24 @@ def nodes_of_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) 
                 f"its octree's page of {length} bytes at byte {start} is beyond its {facts.size} "
                 "bytes"
             )
-        seen.add(start)
+        visited.add(start)
         file.seek(start)
         nodes = np.frombuffer(file.read(length // NODES.itemsize * NODES.itemsize), NODES)
-        held = nodes[nodes["points"] > 0]
-        ends = held["start"] + np.maximum(held["bytes"], 0).astype(np.uint64)
+        fixed = nodes[nodes["points"] > 0]
+        ends = fixed["start"] + np.maximum(fixed["bytes"], 0).astype(np.uint64)
         if (
             (nodes["points"] < -1).any()
-            or (held["bytes"] <= 0).any()
+            or (fixed["bytes"] <= 0).any()
             or (ends > facts.points_end).any()
         ):
             raise Implausible(
                 f"a node of its octree's page at byte {start} is beyond its points or of negative "
                 "size"
             )
-        found.append(held)
+        result.append(fixed)
         below = nodes[nodes["points"] == -1]
         waiting += zip(below["start"].tolist(), below["bytes"].tolist(), strict=True)
-    return np.concatenate(found)
+    return np.concatenate(result)
 
 
 def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:
@@ -372,24 +378,28 @@ def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarr
 
     Raises Implausible where points lie outside the header's bounds.
     """
-    low, high = bounds_of(xyz) if len(xyz) else (facts.mins, facts.maxs)
-    if not ((low >= facts.mins - facts.rounding) & (high <= facts.maxs + facts.rounding)).all():
+    lower, upper = compute_bounds(xyz) if len(xyz) else (facts.mins, facts.maxs)
+    if not ((lower >= facts.mins - facts.rounding) & (upper <= facts.maxs + facts.rounding)).all():
         raise Implausible(
-            f"it has points from ({listed(low)}) to ({listed(high)}), outside its header's bounds "
-            f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its header or its points are "
+            f"it has points from ({format_list(lower)}) to ({format_list(upper)}), outside its "
+            "header's bounds "
+            f"({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its header or its points "
+            "are "
             "damaged"
         )
-    return low, high
+    return lower, upper
 
 
-def check_all_points(low: np.ndarray, high: np.ndarray, facts: LasFacts) -> None:
-    """Raise Implausible where all points together, from `low` (3,) to `high` (3,), fall short of
+def check_all_points(lower: np.ndarray, upper: np.ndarray, facts: LasFacts) -> None:
+    """Raise Implausible where all points together, from `lower` (3,) to `upper` (3,), fall short of
     the header's bounds.
     """
-    if not ((low <= facts.mins + SHORT) & (high >= facts.maxs - SHORT)).all():
+    if not ((lower <= facts.mins + SHORT) & (upper >= facts.maxs - SHORT)).all():
         raise Implausible(
-            f"its points reach from ({listed(low)}) to ({listed(high)}), its header's bounds from "
-            f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its scale, its count or its bounds "
+            f"its points reach from ({format_list(lower)}) to ({format_list(upper)}), its header's "
+            "bounds from "
+            f"({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its scale, its count or "
+            "its bounds "
             "are wrong"
         )
 
@@ -400,5 +410,5 @@ write those of the tile.
 """
 
 
-def listed(values: Iterable[float]) -> str:
+def format_list(values: Iterable[float]) -> str:
     return ", ".join(f"{value:.10g}" for value in values)

@@ -31,25 +31,26 @@ def read_lax(path: str | Path) -> RunIndex | None:
     """
     if is_url(path):
         return None
-    beside = next(
+    lax_path = next(
         (p for p in (Path(path).with_suffix(end) for end in (".lax", ".LAX")) if p.is_file()), None
     )
-    if beside is None:
+    if lax_path is None:
         return None
     points = read_las_header(path).point_count
     try:
-        index, told = parsed(np.fromfile(beside, "<u4"))
-        if told != points or index.runs.max(initial=0) > points:
-            raise ValueError(f"it tells of {told} points, the file has {points}")
+        index, indexed_points = parse_index(np.fromfile(lax_path, "<u4"))
+        if indexed_points != points or index.runs.max(initial=0) > points:
+            raise ValueError(f"it tells of {indexed_points} points, the file has {points}")
     except (ValueError, IndexError, OSError) as error:
         warnings.warn(
-            f"{beside}: is left aside as an index of {path} ({error}); make it again", InputWarning
+            f"{lax_path}: is left aside as an index of {path} ({error}); make it again",
+            InputWarning,
         )
         return None
     return index
 
 
-def parsed(words: np.ndarray) -> tuple[RunIndex, int]:
+def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
     """The index in a file's words, and how many points its cells hold;
 
     ValueError or IndexError for another file.
@@ -60,17 +61,17 @@ def parsed(words: np.ndarray) -> tuple[RunIndex, int]:
     if words[3] or words[7] or words[8] or words[14]:
         raise ValueError("expected a whole quadtree with counts of 32 bits")
     min_x, max_x, min_y, max_y = words[9:13].view("<f4")
-    boxes, cell_of, runs, told, at = [], [], [], 0, 16
+    boxes, cell_of, runs, indexed_points, position = [], [], [], 0, 16
     for cell in range(int(words[15])):
-        index, count, held = (int(word) for word in words[at : at + 3])
-        own = words[at + 3 : at + 3 + 2 * count].reshape(count, 2)
+        index, count, fixed = (int(word) for word in words[position : position + 3])
+        intervals = words[position + 3 : position + 3 + 2 * count].reshape(count, 2)
         boxes.append(cell_box(index, (min_x, min_y, max_x, max_y)))
         cell_of.append(np.full(count, cell))
-        runs.append(own.astype(np.int64) + [0, 1])
-        told, at = told + held, at + 3 + 2 * count
+        runs.append(intervals.astype(np.int64) + [0, 1])
+        indexed_points, position = indexed_points + fixed, position + 3 + 2 * count
     if not boxes:
         raise ValueError("it has no cells")
-    return RunIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), told
+    return RunIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), indexed_points
 
 
 def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
@@ -81,10 +82,15 @@ def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, fl
     while index >= 4**level:
         index -= 4**level
         level += 1
-    low, high = list(root[:2]), list(root[2:])
+    lower, upper = list(root[:2]), list(root[2:])
     for step in range(level - 1, -1, -1):
         for axis in (0, 1):
-            middle = (low[axis] + high[axis]) / np.float32(2)
-            (low if index >> 2 * step & 1 + axis else high)[axis] = middle
+            middle = (lower[axis] + upper[axis]) / np.float32(2)
+            (lower if index >> 2 * step & 1 + axis else upper)[axis] = middle
     blur = 2 * float(np.spacing(np.abs(np.array(root)).max()))
-    return float(low[0]) - blur, float(low[1]) - blur, float(high[0]) + blur, float(high[1]) + blur
+    return (
+        float(lower[0]) - blur,
+        float(lower[1]) - blur,
+        float(upper[0]) + blur,
+        float(upper[1]) + blur,
+    )

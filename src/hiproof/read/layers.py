@@ -29,7 +29,7 @@ def list_layers(path: str) -> list[tuple[str, str | None]]:
     return list(zip(names.tolist(), kinds.tolist(), strict=True))
 
 
-def source_of(path: str, layer: str | int | None) -> tuple[str, str | int | None]:
+def find_source(path: str, layer: str | int | None) -> tuple[str, str | int | None]:
     """What pyogrio can open in place of `path`, and the layer there."""
     try:
         pyogrio.read_info(path, layer=layer)

@@ -20,9 +20,9 @@ from pyproj.exceptions import ProjError
 from pyproj.transformer import AreaOfInterest, TransformerGroup
 
 from ..errors import InputWarning
-from .crs import described, parse_crs
+from .crs import describe_crs, parse_crs
 
-COARSE_M = 1.0
+COARSE_OPERATION_M = 1.0
 """Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their
 neighbours' roofs.
 """
@@ -50,7 +50,7 @@ class Operation:
     @property
     def is_coarse(self) -> bool:
         """Whether the operation may put things COARSE_M or more beside their place."""
-        return self.accuracy_m is None or self.accuracy_m >= COARSE_M
+        return self.accuracy_m is None or self.accuracy_m >= COARSE_OPERATION_M
 
     @property
     def remark(self) -> str:
@@ -62,11 +62,11 @@ class Operation:
         accuracy = (
             "to an unknown accuracy" if self.accuracy_m is None else f"to {self.accuracy_m:g} m"
         )
-        ways = f"{described(parse_crs(self.source))} to {described(parse_crs(self.target))}"
-        said = f"{self.subject}: transformed from {ways} {accuracy} ({self.name})"
+        ways = f"{describe_crs(parse_crs(self.source))} to {describe_crs(parse_crs(self.target))}"
+        text = f"{self.subject}: transformed from {ways} {accuracy} ({self.name})"
         if not self.missing_grids:
             return (
-                f"{said}; PROJ knows no better way, so check that the models lie where they should"
+                f"{text}; PROJ knows no better way, so check that the models lie where they should"
             )
         files = " ".join(f"--file {grid}" for grid in self.missing_grids)
         better = (
@@ -75,7 +75,7 @@ class Operation:
             else f", accurate to {self.missing_accuracy_m:g} m,"
         )
         return (
-            f"{said}; a better way{better} needs {', '.join(self.missing_grids)}, which is not "
+            f"{text}; a better way{better} needs {', '.join(self.missing_grids)}, which is not "
             "installed: "
             f"run `projsync {files}`, or set PROJ_NETWORK=ON"
         )
@@ -103,8 +103,8 @@ def is_current(operation: Operation) -> bool:
     """Check whether PROJ still uses this operation: not where a grid has been installed or removed
     since.
     """
-    now = operation_at(operation.source, operation.target, operation.place)
-    return (now.name, now.accuracy_m) == (operation.name, operation.accuracy_m)
+    current = operation_at(operation.source, operation.target, operation.place)
+    return (current.name, current.accuracy_m) == (operation.name, operation.accuracy_m)
 
 
 def warn_if_coarse(operation: Operation) -> None:
@@ -119,19 +119,19 @@ def operation_at(source: str, target: str, place: tuple[float, float]) -> Operat
     transformer = Transformer.from_crs(source, target, always_xy=True)
     transformer.transform(*place)
     try:
-        used = transformer.get_last_used_operation()
+        in_use = transformer.get_last_used_operation()
     except ProjError:  # a single operation, which is the transformer itself
-        used = transformer
-    accuracy = used.accuracy if used.accuracy is not None and used.accuracy >= 0 else None
+        in_use = transformer
+    accuracy = in_use.accuracy if in_use.accuracy is not None and in_use.accuracy >= 0 else None
     better = [
         way for way in missing_ways(source, target, place) if is_better(way.accuracy, accuracy)
     ]
-    found = Operation("", source, target, place, used.description, accuracy)
+    operation = Operation("", source, target, place, in_use.description, accuracy)
     if not better:
-        return found
+        return operation
     grids = tuple(dict.fromkeys(grid.short_name for grid in better[0].grids if not grid.available))
     missing_accuracy = better[0].accuracy if better[0].accuracy >= 0 else None
-    return dataclasses.replace(found, missing_grids=grids, missing_accuracy_m=missing_accuracy)
+    return dataclasses.replace(operation, missing_grids=grids, missing_accuracy_m=missing_accuracy)
 
 
 def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:

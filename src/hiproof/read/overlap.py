@@ -17,20 +17,20 @@ from ..errors import InputError
 from ..frames import METRES, Units
 from ..model import Footprint
 from .crs import (
-    degrees_of,
-    described,
+    convert_to_degrees,
+    describe_crs,
     epsg_code,
     horizontal_crs,
+    make_transformer,
     names_place,
     parse_crs,
     same_horizontal,
-    way_between,
 )
 
 DEGREES_WIDE = 0.2  # no building is narrower in metres, hardly a tile wider in degrees
 # degrees that a CRS is commonly used beyond its area: a zone is kept at the border of the next
 AREA_MARGIN = 2.0
-NEIGHBOURS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
+NEIGHBOUR_SHIFTS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
 FOOT_M = 0.3048  # m, by definition
 
 
@@ -59,57 +59,70 @@ def check_overlap(
         return
     files = units.from_metres(files.reshape(-1, 2)).reshape(-1, 4)
     moved = units.from_metres((boxes[:, :2] + boxes[:, 2:]) / 2)
-    middles = reprojected(moved, cloud_crs, footprints_crs)
+    middles = reproject_positions(moved, cloud_crs, footprints_crs)
     guess = next(
-        (what for what, xy in slips(middles, footprints_crs, cloud_crs) if any_inside(xy, files)),
+        (
+            subject
+            for subject, xy in slips(middles, footprints_crs, cloud_crs)
+            if any_inside(xy, files)
+        ),
         None,
     )
     raise InputError(
         f"expected footprints that overlap the cloud in {extent(files[:, :2], files[:, 2:])} "
-        f"({described(cloud_crs)}), "
-        f"got footprints in {extent(middles, middles)} ({described(footprints_crs)}); "
+        f"({describe_crs(cloud_crs)}), "
+        f"got footprints in {extent(middles, middles)} ({describe_crs(footprints_crs)}); "
         + (guess or "check the CRS each file names, or say the cloud's with --crs")
     )
 
 
-def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tuple[str, np.ndarray]]:
-    """What footprints at `xy` (n, 2), in their own CRS `named`, may be instead, and where the
+def slips(
+    xy: np.ndarray, named_crs: CRS | None, cloud: CRS | None
+) -> Iterator[tuple[str, np.ndarray]]:
+    """What footprints at `xy` (n, 2), in their own CRS `named_crs`, may be instead, and where the
     cloud's CRS has them then.
 
     Where only one side names a CRS the other is taken to be in it.
     """
-    swapped, own, target = xy[:, ::-1], named or cloud, cloud or named
+    swapped, source, target = xy[:, ::-1], named_crs or cloud, cloud or named_crs
     yield (
         "their x and y look swapped: swap them, in the footprints or in the cloud",
-        reprojected(swapped, own, target),
+        reproject_positions(swapped, source, target),
     )
     if target is not None:
-        if not same_horizontal(own, target):
+        if not same_horizontal(source, target):
             text = (
-                f"their coordinates look like the cloud's {described(target)}: name that CRS in "
+                f"their coordinates look like the cloud's {describe_crs(target)}: name that CRS in "
                 "the footprints"
             )
             yield f"{text}, or the cloud's own with --crs if it is another", xy
         degrees = parse_crs("EPSG:4326")
-        for what, pairs in (("longitude and latitude", xy), ("latitude and longitude", swapped)):
+        for subject, pairs in (("longitude and latitude", xy), ("latitude and longitude", swapped)):
             if (np.abs(pairs) <= (180, 90)).all():
                 text = (
-                    f"they look like {what} in degrees: name EPSG:4326 in the footprints, with "
+                    f"they look like {subject} in degrees: name EPSG:4326 in the footprints, with "
                     "longitude first"
                 )
-                yield text, reprojected(pairs, degrees, target)
+                yield text, reproject_positions(pairs, degrees, target)
         yield (
             "the cloud looks like longitude and latitude in degrees: reproject it",
-            reprojected(xy, own, degrees),
+            reproject_positions(xy, source, degrees),
         )
         # a side that names its CRS is doubted only where the other names one, too
-        for neighbour in neighbours(own if cloud is not None else None):
-            text = f"they look like {described(neighbour)}: name the right zone in the footprints"
-            yield text, reprojected(xy, neighbour, target)
-        if named is not None:
-            for near in (*neighbours(target), *utm_zones(reprojected(xy, own, degrees))):
-                text = f"the cloud looks like {described(near)}: name the right zone with --crs"
-                yield text, reprojected(xy, own, near)
+        for neighbour in neighbours(source if cloud is not None else None):
+            text = (
+                f"they look like {describe_crs(neighbour)}: name the right zone in the footprints"
+            )
+            yield text, reproject_positions(xy, neighbour, target)
+        if named_crs is not None:
+            for nearby in (
+                *neighbours(target),
+                *utm_zones(reproject_positions(xy, source, degrees)),
+            ):
+                text = (
+                    f"the cloud looks like {describe_crs(nearby)}: name the right zone with --crs"
+                )
+                yield text, reproject_positions(xy, source, nearby)
     yield (
         "they look like metres and the cloud like feet: name CRSs, or the cloud's --unit",
         xy / FOOT_M,
@@ -125,7 +138,7 @@ def neighbours(crs: CRS | None) -> Iterator[CRS]:
     code = None if crs is None else epsg_code(horizontal_crs(crs))
     if code is None:
         return
-    for step in NEIGHBOURS:
+    for step in NEIGHBOUR_SHIFTS:
         try:
             neighbour = CRS.from_epsg(code + step)
         except CRSError:
@@ -149,23 +162,23 @@ def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
         yield from map(CRS.from_epsg, north if lat > 0 else [32700 + zone])
 
 
-def reprojected(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
+def reproject_positions(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
     """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either
     is unknown.
     """
-    transformer = None if source is None or target is None else transformer_between(source, target)
+    transformer = None if source is None or target is None else find_transformer(source, target)
     return xy if transformer is None else np.column_stack(transformer.transform(*xy.T))
 
 
 @functools.lru_cache(maxsize=8)
-def transformer_between(source: CRS, target: CRS) -> Transformer | None:
+def find_transformer(source: CRS, target: CRS) -> Transformer | None:
     """From `source` to `target`, None where they are the same or PROJ knows no way; kept, for it
     takes long to choose one.
     """
     if same_horizontal(source, target) or not (names_place(source) and names_place(target)):
         return None
     try:
-        return way_between(source, target)
+        return make_transformer(source, target)
     except InputError:
         return None
 
@@ -175,17 +188,18 @@ def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
     return len(shapely.STRtree(shapely.points(finite)).query(shapely.box(*boxes.T))[0]) > 0
 
 
-def refuse_degrees(boxes: np.ndarray, what: str, advice: str) -> None:
+def refuse_degrees(boxes: np.ndarray, subject: str, advice: str) -> None:
     """Raise InputError where the `boxes` (n, 4) of things without a CRS look like degrees;
 
     NaN where one is empty.
     """
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
-    low, high = boxes[:, :2], boxes[:, 2:]
+    lower, upper = boxes[:, :2], boxes[:, 2:]
     degrees = (np.abs(boxes) <= (180, 90, 180, 90)).all()
-    if len(boxes) and degrees and np.median((high - low).max(axis=1)) < DEGREES_WIDE:
+    if len(boxes) and degrees and np.median((upper - lower).max(axis=1)) < DEGREES_WIDE:
         raise InputError(
-            f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like "
+            f"expected {subject} in metres, got coordinates in {extent(lower, upper)}, which look "
+            "like "
             f"degrees; {advice}"
         )
 
@@ -197,14 +211,14 @@ def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
     area = horizontal_crs(crs).area_of_use
     if area is None or area.west > area.east:
         return None
-    lon, lat = np.median(degrees_of(crs, xy), axis=0)
+    lon, lat = np.median(convert_to_degrees(crs, xy), axis=0)
     if area.west - AREA_MARGIN <= lon <= area.east + AREA_MARGIN and (
         area.south - AREA_MARGIN <= lat <= area.north + AREA_MARGIN
     ):
         return None
-    where = f"{lon:.1f} E {lat:.1f} N" if np.isfinite((lon, lat)).all() else "nowhere on Earth"
+    text = f"{lon:.1f} E {lat:.1f} N" if np.isfinite((lon, lat)).all() else "nowhere on Earth"
     place = f"{area.west:.0f} to {area.east:.0f} E, {area.south:.0f} to {area.north:.0f} N"
-    return f"{where}, far from where {described(crs)} is used ({place})"
+    return f"{text}, far from where {describe_crs(crs)} is used ({place})"
 
 
 def stretch(crs: CRS, xy: np.ndarray) -> float:
@@ -212,7 +226,7 @@ def stretch(crs: CRS, xy: np.ndarray) -> float:
     directions; 1 where unknown.
     """
     plan = horizontal_crs(crs)
-    lon, lat = np.median(degrees_of(crs, xy), axis=0)
+    lon, lat = np.median(convert_to_degrees(crs, xy), axis=0)
     if not (plan.is_projected and np.isfinite((lon, lat)).all()):
         return 1.0
     try:
@@ -222,17 +236,17 @@ def stretch(crs: CRS, xy: np.ndarray) -> float:
     return max(factors.meridional_scale, factors.parallel_scale, key=lambda scale: abs(scale - 1.0))
 
 
-def extent(low: np.ndarray, high: np.ndarray) -> str:
-    """Where boxes from `low` to `high` (n, 2) lie, as text."""
-    (xmin, ymin), (xmax, ymax) = np.nanmin(low, axis=0), np.nanmax(high, axis=0)
+def extent(lower: np.ndarray, upper: np.ndarray) -> str:
+    """Where boxes from `lower` to `upper` (n, 2) lie, as text."""
+    (xmin, ymin), (xmax, ymax) = np.nanmin(lower, axis=0), np.nanmax(upper, axis=0)
     digits = 5 if max(map(abs, (xmin, ymin, xmax, ymax))) <= 180 else 1
     return f"x {xmin:.{digits}f} to {xmax:.{digits}f}, y {ymin:.{digits}f} to {ymax:.{digits}f}"
 
 
-def told_box(box: Sequence[float]) -> str:
+def format_box(box: Sequence[float]) -> str:
     """A box as `--bbox` takes it.
 
-    >>> told_box((84600, 447300.25, 85000, 447700))
+    >>> format_box((84600, 447300.25, 85000, 447700))
     '84600,447300.25,85000,447700'
     """
     return ",".join(f"{side:.10g}" for side in box)

@@ -17,7 +17,7 @@ import shapely
 
 from ..errors import InputError
 from .geoparquet import geometries_in, geometry_column, import_pyarrow, open_parquet, read_rows
-from .stac import Document, asset_of, items_meeting, read_document
+from .stac import Document, find_asset, items_meeting, read_document
 
 KEYWORD = "overture"
 """What stands for the release in place of a file of footprints."""
@@ -59,7 +59,7 @@ def read_overture(
     import_pyarrow()
     release, collection = find_collection(catalogue, kind)
     items = items_meeting(collection, extent)
-    tables = [read_file(asset_of(item, ".parquet"), extent) for item in items]
+    tables = [read_file(find_asset(item, ".parquet"), extent) for item in items]
     if not sum(map(len, tables)):
         raise InputError(
             f"expected footprints of Overture's type {kind} in the extent of the clouds "
@@ -75,7 +75,7 @@ def read_overture(
         "attribution": ATTRIBUTION,
         "catalogue": catalogue,
         "footprints": len(table),
-        "sources": sources_of(table),
+        "sources": summarise_sources(table),
     }
     return OvertureFootprints(table.drop_columns(["sources"]), note)
 
@@ -88,12 +88,12 @@ def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
     if THEME not in document.children():
         releases = document.children()
         latest = document.content.get("latest") or max(releases, default="")
-        document = child_of(document, str(latest))
+        document = find_child(document, str(latest))
     release = document.content.get("release:version") or document.content.get("id")
-    return str(release), child_of(child_of(document, THEME), kind)
+    return str(release), find_child(find_child(document, THEME), kind)
 
 
-def child_of(document: Document, name: str) -> Document:
+def find_child(document: Document, name: str) -> Document:
     """The child of a document in the folder `name`. Raises InputError where there is none."""
     children = document.children()
     if name not in children:
@@ -134,7 +134,7 @@ def joined(tables: list[Any]) -> Any:
     return table.sort_by("id")
 
 
-def sources_of(table: Any) -> list[dict[str, Any]]:
+def summarise_sources(table: Any) -> list[dict[str, Any]]:
     """The data sets from which the rows of a table come, with their licences where these are told
     and how many rows each has a share in.
     """

@@ -54,10 +54,10 @@ def read_parquet(
         extent = None if box is None else shapely.box(*box)
         table, numbers = read_rows(file, column, names, extent)
     if where and len(table):
-        chosen = rows_where(table.select(names), where, path)
+        chosen = select_rows(table.select(names), where, path)
         table, numbers = table.take(chosen), numbers[chosen]
     meta = {"fields": names, "crs": column.crs, "total_bounds": column.bounds}
-    columns = [values_of(table.column(name)) for name in names]
+    columns = [convert_values(table.column(name)) for name in names]
     return meta, numbers, geometries_in(table, column), columns
 
 
@@ -70,7 +70,7 @@ def refuse_layer(path: str | Path, layer: str | int | None) -> None:
         )
 
 
-def values_of(column: Any) -> np.ndarray:
+def convert_values(column: Any) -> np.ndarray:
     """Plain values (n,) of a column, None where a row has none; lists and fields of fields as JSON
     text.
     """
@@ -99,7 +99,7 @@ def values_of(column: Any) -> np.ndarray:
     return values
 
 
-def rows_where(table: Any, where: str, path: str | Path) -> np.ndarray:
+def select_rows(table: Any, where: str, path: str | Path) -> np.ndarray:
     """Numbers of the rows of `table` that meet a condition in SQL, as SQLite understands it."""
     import pyarrow
 
@@ -134,4 +134,4 @@ def plain_column(column: Any) -> Any:
     rare |= types.is_duration(kind) or types.is_time(kind) or types.is_null(kind)
     if not rare:
         return column
-    return pyarrow.array(values_of(column).tolist(), from_pandas=True)
+    return pyarrow.array(convert_values(column).tolist(), from_pandas=True)

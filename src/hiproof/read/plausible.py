@@ -32,18 +32,18 @@ def is_plausible(xyz: np.ndarray) -> np.ndarray:
     ...     0.0]])).tolist()
     [True, False, False]
     """
-    most = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])[: xyz.shape[1]]
-    return (np.abs(xyz) <= most).all(axis=1)
+    limit = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])[: xyz.shape[1]]
+    return (np.abs(xyz) <= limit).all(axis=1)
 
 
-def bounds_of(xyz: np.ndarray) -> np.ndarray:
+def compute_bounds(xyz: np.ndarray) -> np.ndarray:
     """The lowest and the highest coordinates (2, 3) of points (n, 3), n of 1 or more;
 
     NaN where one is.
 
     A column at a time, a ninth of the time that `xyz.min(axis=0)` takes.
 
-    >>> bounds_of(np.array([[3.0, 4.0, 0.0], [1.0, 9.0, 0.0]])).tolist()
+    >>> compute_bounds(np.array([[3.0, 4.0, 0.0], [1.0, 9.0, 0.0]])).tolist()
     [[1.0, 4.0, 0.0], [3.0, 9.0, 0.0]]
     """
     return np.array([[column.min() for column in xyz.T], [column.max() for column in xyz.T]])

@@ -14,13 +14,13 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import InputError
-from ..log import counted
+from ..log import count_things
 from .columns import find_columns
 from .las import Chunk
-from .remote import opened
-from .text import TextLayout, classes_of, parse_rows
+from .remote import open_binary
+from .text import TextLayout, parse_rows, read_classes
 
-TYPES = {
+PLY_TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
@@ -46,7 +46,7 @@ def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
 
     Raises InputError for a header or a body that is not one.
     """
-    with opened(path) as file:
+    with open_binary(path) as file:
         layout = read_ply_header(file, path)
         refuse_missing_bytes(file, layout, path)
         remaining = layout.count
@@ -54,7 +54,7 @@ def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
             table = read_vertices(
                 file, layout, min(remaining, chunk_points), path, layout.count - remaining
             )
-            yield np.ascontiguousarray(table[:, :3]), classes_of(table)
+            yield np.ascontiguousarray(table[:, :3]), read_classes(table)
             remaining -= len(table)
 
 
@@ -62,10 +62,11 @@ def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) ->
     """Hold the count against the file's size before room is made for so many."""
     start, end = file.tell(), file.seek(0, 2)
     file.seek(start)
-    least = len("0 0 0") if layout.byte_order == "" else record_type(layout).itemsize
-    if layout.count * least > end - start:
+    count = len("0 0 0") if layout.byte_order == "" else record_type(layout).itemsize
+    if layout.count * count > end - start:
         raise InputError(
-            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, "
+            f"expected {count_things(layout.count, 'vertex', 'vertices')} in {path} as its header "
+            "says, "
             f"got {end - start} bytes of them; "
             "the file is truncated: copy or download it again"
         )
@@ -82,19 +83,20 @@ def read_vertices(
     """The next `count` vertices as a float64 table of x, y, z and, where there is one, class."""
     if layout.byte_order == "":
         table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
-        found = len(table)
+        result = len(table)
     else:
         dtype = record_type(layout)
         buffer = file.read(dtype.itemsize * count)
-        found = len(buffer) // dtype.itemsize
-        records = np.frombuffer(buffer, dtype, found)
+        result = len(buffer) // dtype.itemsize
+        records = np.frombuffer(buffer, dtype, result)
         table = np.column_stack(
             [records[layout.properties[column][0]].astype(float) for column in layout.columns]
         )
-    if found < count:
+    if result < count:
         raise InputError(
-            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, "
-            f"got {read + found}; "
+            f"expected {count_things(layout.count, 'vertex', 'vertices')} in {path} as its header "
+            "says, "
+            f"got {read + result}; "
             "the file is truncated: copy or download it again"
         )
     return table
@@ -116,11 +118,11 @@ def read_ply_header(file: BinaryIO, path: str | Path) -> PlyLayout:
                     raise unreadable(path, f"{words[2][:20]!r} vertices")
                 count = int(words[2])
         elif words[0] == "property" and element == "vertex":
-            if len(words) != 3 or words[1] not in TYPES:
+            if len(words) != 3 or words[1] not in PLY_TYPES:
                 raise unreadable(path, f"the vertex property {' '.join(words[1:])!r}")
             if words[2] in dict(properties):
                 raise unreadable(path, f"the vertex property {words[2]!r} twice")
-            properties.append((words[2], TYPES[words[1]]))
+            properties.append((words[2], PLY_TYPES[words[1]]))
     columns = find_columns([name for name, _ in properties])
     if byte_order is None or count is None or columns is None:
         raise unreadable(path, "a header without format, vertices or their x, y, z")

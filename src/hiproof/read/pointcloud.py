@@ -16,22 +16,22 @@ import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..frames import METRES, Units
-from ..log import counted
+from ..log import count_things
 from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
 from .crs import (
     UnknownCRS,
-    described,
+    describe_crs,
+    find_units,
     names_place,
     parse_crs,
     same_heights,
     same_horizontal,
-    units_of,
     vertical_crs,
 )
 from .las_crs import las_crs
-from .plausible import MOST_HEIGHT, MOST_PLAN, bounds_of, is_plausible
+from .plausible import MOST_HEIGHT, MOST_PLAN, compute_bounds, is_plausible
 from .remote import is_url
 from .runs import RUN_POINTS
 
@@ -60,7 +60,7 @@ Only "las" is asked for more: parts of a file, a CRS.
 """
 
 POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
-FORMATS = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
+FORMAT_NAMES = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
 PACKED = {
     b"\x1f\x8b": "gunzip",
     b"PK\x03\x04": "unzip",
@@ -72,7 +72,7 @@ PACKED = {
 ELSEWHERE = {b"ASTM-E57": "E57", b"# .PCD": "PCD"}
 CHUNK_POINTS = 5 * RUN_POINTS  # 30 MB while they are sorted
 
-COARSE_M = (
+COARSE_STEP_M = (
     # coordinates in larger steps are told of: they add a third of it to the noise, as much as a
     # good scanner has
     0.05
@@ -117,14 +117,14 @@ def read_points(
     headers = {str(file): las_file_header(file) for file in files}
     crs_of = {file: header and header.crs for file, header in headers.items()}
     crs = common_crs(crs_of, parse_crs(read.crs), read.unit)
-    units = units_of(crs, "the point cloud", read.unit)
-    say_how_coarse([header for header in headers.values() if header], units)
+    units = find_units(crs, "the point cloud", read.unit)
+    warn_coarse([header for header in headers.values() if header], units)
     clouds = [chunk for file in files for chunk in iter_points(file, box=box, units=units)]
     xyz = np.concatenate([cloud.xyz for cloud in clouds]) if clouds else np.empty((0, 3))
     if not len(xyz):
-        where = "" if box is None else f" inside the box {tuple(float(side) for side in box)}"
+        text = "" if box is None else f" inside the box {tuple(float(side) for side in box)}"
         raise InputError(
-            f"expected points{where} in {', '.join(map(str, files))}, got none; "
+            f"expected points{text} in {', '.join(map(str, files))}, got none; "
             + (
                 "check the file"
                 if box is None
@@ -152,18 +152,18 @@ def iter_points(
     these lie goes to `noted` (see runs.py). Raises InputError as `read_points` does, an empty file
     excepted, which yields nothing.
     """
-    kind, most = file_kind(path), chunk_points or CHUNK_POINTS
+    kind, limit = file_kind(path), chunk_points or CHUNK_POINTS
     # whose points lie within its header's bounds, and these are plausible (las_header.py)
     if kind == "las":
         chunks = las.las_chunks(
-            path, most, None if box is None else box_in_file(box, units), runs, noted
+            path, limit, None if box is None else box_in_file(box, units), runs, noted
         )
     else:
-        chunks = plausible_chunks(READERS[kind].chunks(path, most), path)
+        chunks = plausible_chunks(READERS[kind].chunks(path, limit), path)
     for xyz, classes in chunks:
         xyz = xyz if units.are_metres else units.to_metres(xyz)
         if box is not None:
-            xyz, classes = chosen(xyz, classes, in_box(xyz, box))
+            xyz, classes = select_classes(xyz, classes, in_box(xyz, box))
         if len(xyz):
             yield PointCloud(xyz, classes, None, (str(path),), units)
 
@@ -179,11 +179,11 @@ def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[
         if not finite.all():
             keep = np.all(finite, axis=1)
             dropped += len(xyz) - int(keep.sum())
-            xyz, classes = chosen(xyz, classes, keep)
+            xyz, classes = select_classes(xyz, classes, keep)
         yield xyz, classes
     if dropped:
         warnings.warn(
-            f"{path}: {counted(dropped, 'point')} with NaN or infinite coordinates left out",
+            f"{path}: {count_things(dropped, 'point')} with NaN or infinite coordinates left out",
             InputWarning,
         )
 
@@ -202,11 +202,11 @@ def as_input_error(error: Exception, path: str | Path) -> InputError:
 
 def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
     """Raise InputError for finite coordinates (n, 3) that no place on Earth has."""
-    if not len(xyz) or is_plausible(bounds_of(xyz)).all():
+    if not len(xyz) or is_plausible(compute_bounds(xyz)).all():
         return
-    beyond = ~is_plausible(np.nan_to_num(xyz, posinf=0.0, neginf=0.0))
-    if beyond.any():
-        point = ", ".join(f"{value:g}" for value in xyz[np.argmax(beyond)])
+    mask = ~is_plausible(np.nan_to_num(xyz, posinf=0.0, neginf=0.0))
+    if mask.any():
+        point = ", ".join(f"{value:g}" for value in xyz[np.argmax(mask)])
         raise InputError(
             f"expected coordinates up to {MOST_PLAN:g} and heights up to {MOST_HEIGHT:g} in "
             f"{path}, got the point {point}; "
@@ -221,13 +221,13 @@ def read_header(path: str | Path) -> PointFileHeader:
     header = las_file_header(path)
     if header is not None:
         return header
-    count, low, high, steps = 0, np.full(3, np.inf), np.full(3, -np.inf), (0.0, 0.0)
+    count, lower, upper, steps = 0, np.full(3, np.inf), np.full(3, -np.inf), (0.0, 0.0)
     for cloud in iter_points(path):
-        steps = steps if count else steps_of(cloud.xyz)
+        steps = steps if count else find_steps(cloud.xyz)
         count += len(cloud)
-        lowest, highest = bounds_of(cloud.xyz)
-        low, high = np.minimum(low, lowest), np.maximum(high, highest)
-    return PointFileHeader(str(path), (*low.tolist(), *high.tolist()), count, steps=steps)
+        lowest, highest = compute_bounds(cloud.xyz)
+        lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
+    return PointFileHeader(str(path), (*lower.tolist(), *upper.tolist()), count, steps=steps)
 
 
 def las_file_header(path: str | Path) -> PointFileHeader | None:
@@ -241,26 +241,26 @@ def las_file_header(path: str | Path) -> PointFileHeader | None:
         str(path),
         bounds,
         header.point_count,
-        las_crs(las.facts_of(path).projection),
+        las_crs(las.read_checked_facts(path).projection),
         header.point_format.id,
         steps,
     )
 
 
-def steps_of(xyz: np.ndarray) -> tuple[float, float]:
+def find_steps(xyz: np.ndarray) -> tuple[float, float]:
     """The largest of STEPS in which coordinates (n, 3) come, in plan and in height;
 
     0 where they are finer or too few.
 
-    >>> steps_of(np.arange(600.0).reshape(-1, 3) * [0.5, 1.0, 0.01])
+    >>> find_steps(np.arange(600.0).reshape(-1, 3) * [0.5, 1.0, 0.01])
     (0.5, 0.0)
     """
-    fewest, most = STEP_POINTS
-    apart = xyz[:most] - xyz[:1]
-    if len(xyz) < fewest:
+    minimum, limit = STEP_POINTS
+    gap = xyz[:limit] - xyz[:1]
+    if len(xyz) < minimum:
         return 0.0, 0.0
 
-    def step_of(values: np.ndarray) -> float:
+    def find_step(values: np.ndarray) -> float:
         return next(
             (
                 step
@@ -270,27 +270,27 @@ def steps_of(xyz: np.ndarray) -> tuple[float, float]:
             0.0,
         )
 
-    return step_of(apart[:, :2]), step_of(apart[:, 2])
+    return find_step(gap[:, :2]), find_step(gap[:, 2])
 
 
-def say_how_coarse(headers: list[PointFileHeader], units: Units) -> None:
+def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
     """One line where coordinates, in `units`, come in larger steps than COARSE_M: roofs are then no
     finer.
     """
     coarse = {}
     for header in headers:
         plan_m, height_m = header.steps[0] * units.plan, header.steps[1] * units.height
-        told = [
+        phrases = [
             f"{m:.3g} m in {way}"
             for m, way in ((plan_m, "plan"), (height_m, "height"))
-            if m > COARSE_M
+            if m > COARSE_STEP_M
         ]
-        if told:
-            coarse[header.path] = " and ".join(told)
+        if phrases:
+            coarse[header.path] = " and ".join(phrases)
     if coarse:
         path, steps = next(iter(coarse.items()))
         warnings.warn(
-            f"{path}{and_others(list(coarse))}: coordinates come in steps of {steps}, and roofs "
+            f"{path}{format_others(list(coarse))}: coordinates come in steps of {steps}, and roofs "
             "are no finer; "
             "write the file anew from its source with steps of 0.01 m or less",
             InputWarning,
@@ -317,14 +317,14 @@ def expand_path(path: str | Path) -> list[str | Path]:
         return [path]
     folder = Path(path)
     if folder.is_dir():
-        found = sorted(
+        result = sorted(
             p for p in folder.iterdir() if p.suffix.lower() in POINT_SUFFIXES and p.is_file()
         )
-        if not found:
+        if not result:
             raise InputError(
-                f"expected point files in the folder {path}, got none; it may hold {FORMATS}"
+                f"expected point files in the folder {path}, got none; it may hold {FORMAT_NAMES}"
             )
-        return without_other_text(found)
+        return drop_other_text(result)
     if folder.exists():
         return [folder]
     matches = sorted(
@@ -337,7 +337,7 @@ def expand_path(path: str | Path) -> list[str | Path]:
     return [Path(match) for match in matches]
 
 
-def without_other_text(files: list[Path]) -> list[str | Path]:
+def drop_other_text(files: list[Path]) -> list[str | Path]:
     """The point files of a folder without text that holds no points, as long as there are others: a
     delivery's notes and lists.
     """
@@ -349,8 +349,10 @@ def without_other_text(files: list[Path]) -> list[str | Path]:
     if not points:
         return list(files)
     if len(points) < len(files):
-        left = ", ".join(file.name for file in files if file not in points)
-        warnings.warn(f"{files[0].parent}: text without points is left aside: {left}", InputWarning)
+        remainder = ", ".join(file.name for file in files if file not in points)
+        warnings.warn(
+            f"{files[0].parent}: text without points is left aside: {remainder}", InputWarning
+        )
     return list(points)
 
 
@@ -379,20 +381,20 @@ def file_kind(path: str | Path) -> str:
     for start, name in ELSEWHERE.items():
         if head.startswith(start):
             raise InputError(
-                f"expected {FORMATS} at {path}, got {name}; convert it first (`pdal translate "
+                f"expected {FORMAT_NAMES} at {path}, got {name}; convert it first (`pdal translate "
                 f"{path} {Path(path).with_suffix('.laz')}`)"
             )
     for start, program in PACKED.items():
         if head.startswith(start):
             raise InputError(
-                f"expected {FORMATS} at {path}, got a packed file; unpack it first: {program} "
+                f"expected {FORMAT_NAMES} at {path}, got a packed file; unpack it first: {program} "
                 f"{path}"
             )
     got = (
         "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
     )
     raise InputError(
-        f"expected {FORMATS} at {path}, got {got} that starts with {head[:4]!r}; "
+        f"expected {FORMAT_NAMES} at {path}, got {got} that starts with {head[:4]!r}; "
         "if it is text with x y z on each line, rename it to .xyz"
     )
 
@@ -405,41 +407,43 @@ def file_crs(path: str | Path) -> Any:
     return None if header is None or isinstance(header.crs, UnknownCRS) else header.crs
 
 
-def common_crs(crs_of: dict[str, Any], given: Any = None, unit: str = "auto") -> Any:
-    """The one CRS of point files, from what each names: `given` where that is a CRS, else the
+def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto") -> Any:
+    """The one CRS of point files, from what each names: `arguments` where that is a CRS, else the
     files' own.
 
-    Files that name none go with those that do, and files overruled by `given` go with it, with an
-    InputWarning each. Raises InputError, naming both files, where two disagree, and for a CRS that
-    cannot be understood while neither `given` nor a `unit` stands in for it.
+    Files that name none go with those that do, and files overruled by `arguments` go with it, with
+    an InputWarning each. Raises InputError, naming both files, where two disagree, and for a CRS
+    that cannot be understood while neither `arguments` nor a `unit` stands in for it.
     """
-    if given is None and unit == "auto":
+    if arguments is None and unit == "auto":
         refuse_unknown(crs_of)
-    named = {
+    named_crs = {
         path: crs
         for path, crs in crs_of.items()
         if crs is not None and not isinstance(crs, UnknownCRS)
     }
-    if given is not None:
-        overruled = [path for path, crs in named.items() if not same_horizontal(crs, given)]
+    if arguments is not None:
+        overruled = [path for path, crs in named_crs.items() if not same_horizontal(crs, arguments)]
         if overruled:
             warnings.warn(
-                f"{overruled[0]}{and_others(overruled)}: taken in {described(given)}, as told, "
-                f"although its header names {described(named[overruled[0]])}",
+                f"{overruled[0]}{format_others(overruled)}: taken in {describe_crs(arguments)}, as "
+                "told, "
+                f"although its header names {describe_crs(named_crs[overruled[0]])}",
                 InputWarning,
             )
-        return given
-    first = next(iter(named), "")
-    for path, crs in named.items():
-        refuse_two(named[first], first, crs, path)
-    unnamed = [path for path in crs_of if path not in named]
-    if named and unnamed:
+        return arguments
+    first = next(iter(named_crs), "")
+    for path, crs in named_crs.items():
+        refuse_two(named_crs[first], first, crs, path)
+    unnamed = [path for path in crs_of if path not in named_crs]
+    if named_crs and unnamed:
         warnings.warn(
-            f"{unnamed[0]}{and_others(unnamed)}: names no CRS; taken in {described(named[first])} "
+            f"{unnamed[0]}{format_others(unnamed)}: names no CRS; taken in "
+            f"{describe_crs(named_crs[first])} "
             f"as {first} is",
             InputWarning,
         )
-    return max(named.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
+    return max(named_crs.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
 
 
 def refuse_unknown(crs_of: dict[str, Any]) -> None:
@@ -460,23 +464,23 @@ def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
     unknown goes with any.
     """
     for file in files if crs is not None else ():
-        own = file_crs(file)
-        if names_place(own):
-            refuse_two(crs, source, own, str(file))
+        own_crs = file_crs(file)
+        if names_place(own_crs):
+            refuse_two(crs, source, own_crs, str(file))
 
 
 def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -> None:
     """Raise InputError where two CRSs differ in plan or in heights."""
     if first != second and not (same_horizontal(first, second) and same_heights(first, second)):
         raise InputError(
-            f"expected all clouds in one CRS, got {described(first)} in {first_source} and "
-            f"{described(second)} in "
+            f"expected all clouds in one CRS, got {describe_crs(first)} in {first_source} and "
+            f"{describe_crs(second)} in "
             f"{second_source}; reproject one of them, or say with --crs which is right where a "
             "header is wrong"
         )
 
 
-def and_others(paths: list[str]) -> str:
+def format_others(paths: list[str]) -> str:
     return f" and {len(paths) - 1} more" if len(paths) > 1 else ""
 
 
@@ -490,7 +494,7 @@ def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
     return np.concatenate([cloud.classes for cloud in clouds])
 
 
-def chosen(
+def select_classes(
     xyz: np.ndarray, classes: np.ndarray | None, keep: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray | None]:
     return xyz[keep], None if classes is None else classes[keep]

@@ -8,17 +8,17 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from ..geometry.rings import enclosed
+from ..geometry.rings import repair_polygons
 from .plausible import is_plausible
 
 # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
 SLIVER_SHARE = 0.01
 SLIVER_M2 = 0.5  # m2; what repairing a polygon leaves beside it, less than any building
 JOIN_M = 0.001  # m; faces of one body that are as far apart were one before they were rounded
-LEVEL = 0.01  # units of height that a flat outline's heights may differ by
+LEVEL_SHARE = 0.01  # units of height that a flat outline's heights may differ by
 DEGENERATE_M2 = 1e-6  # m2; numerically nothing
 # beyond any building; what is kept of terrain around one grows with the square of it
-WIDEST_M = 4000.0
+WIDEST_BUILDING_M = 4000.0
 MOST_MEETINGS = 20_000  # of edges that follow not on one another: mending takes time for each
 EDGES_A_LOOK = 256  # edges looked up at once: memory stays small for outlines of any length
 
@@ -42,9 +42,9 @@ def simple_polygons(
     members = [shapely.force_2d(member) for member in polygons_in(geometry)]
     if is_body:  # walls stand on a line
         members = [member for member in members if member.area > DEGENERATE_M2]
-    flat = [polygon for member in members for polygon in repaired(member)]
+    flat = [polygon for member in members for polygon in repair_polygon(member)]
     if is_body or overlap(flat):
-        flat = united(flat)
+        flat = unite_polygons(flat)
     return flat or [shapely.Polygon()]
 
 
@@ -58,7 +58,7 @@ def is_surface(geometry: shapely.Geometry | None) -> bool:
         return False
     z = shapely.get_coordinates(polygons, include_z=True)[:, 2]
     z = z[np.isfinite(z)]
-    return len(z) > 0 and float(np.ptp(z)) > LEVEL
+    return len(z) > 0 and float(np.ptp(z)) > LEVEL_SHARE
 
 
 def overlap(polygons: list[shapely.Polygon]) -> bool:
@@ -70,7 +70,7 @@ def overlap(polygons: list[shapely.Polygon]) -> bool:
     return bool((shapely.area(shapely.intersection(*pairs)) > DEGENERATE_M2).any())
 
 
-def united(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
+def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
     """What polygons cover together, without the hairline gaps that rounding leaves between
     faces.
     """
@@ -99,18 +99,20 @@ def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
     return [part for part in parts if part.geom_type == "Polygon" and not part.is_empty]
 
 
-def repaired(polygon: shapely.Polygon) -> list[shapely.Polygon]:
+def repair_polygon(polygon: shapely.Polygon) -> list[shapely.Polygon]:
     """`polygon` itself where it is valid, else the valid polygons that make_valid finds, without
     slivers; none where it is no building's: without numbers, wider than WIDEST_M, or tangled beyond
     MOST_MEETINGS.
     """
     if not is_buildings_size(polygon):
         return []
-    found = [polygon] if shapely.is_valid(polygon) else polygons_in(mended(polygon))
-    total = sum(part.area for part in found)
-    least = min(SLIVER_M2, SLIVER_SHARE * total)
+    result = [polygon] if shapely.is_valid(polygon) else polygons_in(fill_rings(polygon))
+    total = sum(part.area for part in result)
+    smallest = min(SLIVER_M2, SLIVER_SHARE * total)
     return [
-        part for part in found if part.area > max(least if len(found) > 1 else 0.0, DEGENERATE_M2)
+        part
+        for part in result
+        if part.area > max(smallest if len(result) > 1 else 0.0, DEGENERATE_M2)
     ]
 
 
@@ -119,17 +121,19 @@ def is_buildings_size(polygon: shapely.Polygon) -> bool:
     building is wide.
     """
     xy = shapely.get_coordinates(polygon)
-    return len(xy) > 0 and bool(is_plausible(xy).all() and np.ptp(xy, axis=0).max() <= WIDEST_M)
+    return len(xy) > 0 and bool(
+        is_plausible(xy).all() and np.ptp(xy, axis=0).max() <= WIDEST_BUILDING_M
+    )
 
 
-def mended(polygon: shapely.Polygon) -> shapely.Geometry | None:
+def fill_rings(polygon: shapely.Polygon) -> shapely.Geometry | None:
     """The area its rings enclose, what they enclose twice counted once;
 
     None where too many edges meet to say.
     """
     if meetings(polygon) > MOST_MEETINGS:
         return None
-    return enclosed(polygon)
+    return repair_polygons(polygon)
 
 
 def meetings(polygon: shapely.Polygon) -> int:
@@ -138,10 +142,10 @@ def meetings(polygon: shapely.Polygon) -> int:
     """
     xy, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
     edges = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]])
-    tree, found = shapely.STRtree(edges), 0
+    tree, count = shapely.STRtree(edges), 0
     for start in range(0, len(edges), EDGES_A_LOOK):
         first, second = tree.query(edges[start : start + EDGES_A_LOOK])
-        found += int((second > first + start + 1).sum())
-        if found > MOST_MEETINGS:
+        count += int((second > first + start + 1).sum())
+        if count > MOST_MEETINGS:
             break
-    return found
+    return count

@@ -17,25 +17,25 @@ import numpy as np
 from pyproj import CRS
 
 from ..errors import DamagedRaster, InputError, InputWarning
-from ..extras import needed
+from ..extras import import_extra
 from ..frames import Units
-from ..masking import masked, remember
+from ..masking import mask, remember
 from .crs import (
+    find_units,
     horizontal_crs,
+    make_transformer,
     names_place,
     parse_crs,
     same_horizontal,
-    units_of,
     vertical_crs,
-    way_between,
 )
 from .plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from .raster_checks import (
     alpha_band,
     band_unit,
     height_band,
+    read_scaling,
     refuse_without_position,
-    scale_and_offset,
 )
 
 TILE_PX = 512
@@ -49,7 +49,7 @@ MOST_TILES_CHECKED = 4000
 of thousands of buildings.
 """
 
-CODES = (
+NODATA_CODES = (
     0.0,
     -1.0,
     -9.0,
@@ -105,14 +105,14 @@ class RasterTerrain:
         `units` are those of `crs`, which need naming where there is none.
         """
         remember(str(path))
-        self.path, self.source = str(path), f"terrain model {Path(masked(str(path))).name}"
+        self.path, self.source = str(path), f"terrain model {Path(mask(str(path))).name}"
         self.crs = parse_crs(crs)
         self.tiles: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
         refuse_without_position(self.dataset, self.path)
         self.band = height_band(self.dataset, self.path)
         self.alpha = alpha_band(self.dataset)
-        self.scale, self.offset = scale_and_offset(self.dataset, self.band, self.path)
-        self.units = units or units_of(self.crs or self.own_crs, f"the terrain model {path}")
+        self.scale, self.offset = read_scaling(self.dataset, self.band, self.path)
+        self.units = units or find_units(self.crs or self.own_crs, f"the terrain model {path}")
         self.transformer = self.make_transformer()
         self.metres_in_height = self.height_unit()
 
@@ -152,12 +152,12 @@ class RasterTerrain:
 
         None where they are the same in plan, or one is unknown or local.
         """
-        own = self.own_crs
-        if self.crs is None or own is None or same_horizontal(self.crs, own):
+        own_crs = self.own_crs
+        if self.crs is None or own_crs is None or same_horizontal(self.crs, own_crs):
             return None
-        if not (names_place(self.crs) and names_place(own)):
+        if not (names_place(self.crs) and names_place(own_crs)):
             return None
-        return way_between(self.crs, own)
+        return make_transformer(self.crs, own_crs)
 
     def height_unit(self) -> float:
         """Metres in one unit of the raster's heights: as its band says, else its CRS, else as the
@@ -166,16 +166,16 @@ class RasterTerrain:
         Heights over a plan in degrees are metres. Those over a plan in feet that name no unit are
         taken for feet.
         """
-        named, own = band_unit(self.dataset.units[self.band - 1], self.path), self.own_crs
-        if named is not None:
-            return named
-        if own is None:
+        unit, own_crs = band_unit(self.dataset.units[self.band - 1], self.path), self.own_crs
+        if unit is not None:
+            return unit
+        if own_crs is None:
             return self.units.height
-        plan = horizontal_crs(own)
-        if vertical_crs(own) is None and (plan.is_geographic or plan.is_geocentric):
+        plan = horizontal_crs(own_crs)
+        if vertical_crs(own_crs) is None and (plan.is_geographic or plan.is_geocentric):
             return 1.0
-        units = units_of(own, f"the terrain model {self.path}")
-        if vertical_crs(own) is None and not units.are_metres:
+        units = find_units(own_crs, f"the terrain model {self.path}")
+        if vertical_crs(own_crs) is None and not units.are_metres:
             warnings.warn(
                 f"{self.path}: names no unit of its heights; taken as {units.height_name}",
                 InputWarning,
@@ -197,12 +197,14 @@ class RasterTerrain:
         # centre's value.
         column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
         row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
-        found = np.full(len(row), np.nan)
-        for tile, here in by_tile(row, column):
-            found[here] = bilinear(
-                self.tile(*tile), row[here] - tile[0] * TILE_PX, column[here] - tile[1] * TILE_PX
+        result = np.full(len(row), np.nan)
+        for tile, current in by_tile(row, column):
+            result[current] = bilinear(
+                self.tile(*tile),
+                row[current] - tile[0] * TILE_PX,
+                column[current] - tile[1] * TILE_PX,
             )
-        heights[inside] = found
+        heights[inside] = result
         return heights
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
@@ -213,13 +215,13 @@ class RasterTerrain:
         coded = np.zeros(len(row), bool)
         column = np.clip(np.floor(column[inside]), 0, self.dataset.width - 1).astype(int)
         row = np.clip(np.floor(row[inside]), 0, self.dataset.height - 1).astype(int)
-        found = np.zeros(len(row), bool)
-        for tile, here in by_tile(row, column):
+        result = np.zeros(len(row), bool)
+        for tile, current in by_tile(row, column):
             pixels = self.tile(*tile)
-            found[here] = np.isinf(
-                pixels[row[here] - tile[0] * TILE_PX, column[here] - tile[1] * TILE_PX]
+            result[current] = np.isinf(
+                pixels[row[current] - tile[0] * TILE_PX, column[current] - tile[1] * TILE_PX]
             )
-        coded[inside] = found
+        coded[inside] = result
         return coded
 
     def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -252,8 +254,8 @@ class RasterTerrain:
         places = np.column_stack([row, column])[inside]
         tiles, index = np.unique(np.floor(places / TILE_PX), axis=0, return_inverse=True)
         step = -(-max(len(tiles), 1) // MOST_TILES_CHECKED)
-        asked = np.asarray(xy_world)[inside][index.ravel() % step == 0]
-        return bool(np.isfinite(self.height_at(asked)).any())
+        sample = np.asarray(xy_world)[inside][index.ravel() % step == 0]
+        return bool(np.isfinite(self.height_at(sample)).any())
 
     def tile(self, row: int, column: int) -> np.ndarray:
         """Heights (m) of a tile and one more row and column, where the raster has them: NaN without
@@ -262,7 +264,7 @@ class RasterTerrain:
         key = (row, column)
         if key not in self.tiles:
             stored, heights = self.stored_and_heights(row, column)
-            is_code = np.isin(stored, CODES) & np.isfinite(heights)
+            is_code = np.isin(stored, NODATA_CODES) & np.isfinite(heights)
             if is_code.any():
                 heights[is_code & np.isin(stored, self.codes)] = np.inf
             self.tiles[key] = heights
@@ -310,7 +312,7 @@ class RasterTerrain:
         ]
         stored = np.concatenate([stored[np.isfinite(heights)] for stored, heights in pairs])
         heights = np.concatenate([heights[np.isfinite(heights)] for _, heights in pairs])
-        return tuple(code for code in CODES if is_isolated(heights, stored == code))
+        return tuple(code for code in NODATA_CODES if is_isolated(heights, stored == code))
 
 
 def by_tile(row: np.ndarray, column: np.ndarray) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
@@ -319,10 +321,10 @@ def by_tile(row: np.ndarray, column: np.ndarray) -> Iterator[tuple[tuple[int, in
     tiles, index = np.unique(places.astype(int), axis=0, return_inverse=True)
     order = np.argsort(index.ravel(), kind="stable")
     ends = np.cumsum(np.bincount(index.ravel(), minlength=len(tiles)))
-    for tile, here in (
+    for tile, current in (
         zip(tiles.tolist(), np.split(order, ends[:-1]), strict=True) if len(tiles) else ()
     ):
-        yield (tile[0], tile[1]), here
+        yield (tile[0], tile[1]), current
 
 
 def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
@@ -344,8 +346,8 @@ def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
     coded = int(is_coded.sum())
     if coded < FEWEST_CODED or coded == len(heights):
         return False
-    near = np.abs(heights - heights[is_coded][0]) < ISOLATED_M
-    return int((near & ~is_coded).sum()) < MOST_BETWEEN * coded
+    mask = np.abs(heights - heights[is_coded][0]) < ISOLATED_M
+    return int((mask & ~is_coded).sum()) < MOST_BETWEEN * coded
 
 
 def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
@@ -364,8 +366,8 @@ def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
     weights = np.stack(
         [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
     )
-    known = np.isfinite(values)
-    weights, values = np.where(known, weights, 0.0), np.where(known, values, 0.0)
+    mask = np.isfinite(values)
+    weights, values = np.where(mask, weights, 0.0), np.where(mask, values, 0.0)
     total = weights.sum(axis=0)
     has_any = total > 1e-9
     return np.where(has_any, (weights * values).sum(axis=0) / np.where(has_any, total, 1.0), np.nan)
@@ -373,4 +375,4 @@ def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
 
 def import_rasterio() -> Any:
     """What reads rasters. Raises InputError where it is missing."""
-    return needed("rasterio", "terrain", "terrain models")
+    return import_extra("rasterio", "terrain", "terrain models")

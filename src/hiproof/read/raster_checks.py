@@ -84,13 +84,13 @@ def height_band(dataset: Any, path: str) -> int:
     bands = [number for number, kind in enumerate(kinds, 1) if kind != "alpha"]
     band = bands[0] if bands else 1
     if kinds[band - 1] in PICTURE or str(dataset.dtypes[band - 1]).startswith("complex"):
-        what = (
+        text = (
             "complex numbers"
             if "complex" in str(dataset.dtypes[band - 1])
             else f"a picture (band {kinds[band - 1]})"
         )
         raise InputError(
-            f"expected a raster of heights at {path}, got {what}; name a terrain model"
+            f"expected a raster of heights at {path}, got {text}; name a terrain model"
         )
     if len(bands) > 1:
         warnings.warn(
@@ -108,7 +108,7 @@ def alpha_band(dataset: Any) -> int | None:
     return kinds.index("alpha") + 1 if "alpha" in kinds[1:] else None
 
 
-def scale_and_offset(dataset: Any, band: int, path: str) -> tuple[float, float]:
+def read_scaling(dataset: Any, band: int, path: str) -> tuple[float, float]:
     """What a stored value is multiplied by and what is added to it then.
 
     Raises InputError where they give no height.

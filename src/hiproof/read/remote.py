@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import InputError
-from ..extras import needed
+from ..extras import import_extra
 from ..masking import remember
 
 BLOCK_BYTES = 1 << 20  # bytes a request; a server's answer takes longer than a megabyte's way
@@ -28,7 +28,9 @@ def is_url(path: str | Path) -> bool:
 
 
 @contextmanager
-def opened(path: str | Path, expected: str = "a point cloud", **reading: Any) -> Iterator[BinaryIO]:
+def open_binary(
+    path: str | Path, expected: str = "a point cloud", **reading: Any
+) -> Iterator[BinaryIO]:
     """A seekable binary file at a path or an address.
 
     `reading` are options of fsspec's files. Raises InputError, which says what was `expected`,
@@ -45,7 +47,7 @@ def open_address(url: str, expected: str = "a point cloud", **reading: Any) -> B
     remember(url)
     try:
         # buffered once more: fsspec's own files read lines of any length only
-        options = {"block_size": BLOCK_BYTES, **reading, **options_of(url)}
+        options = {"block_size": BLOCK_BYTES, **reading, **choose_options(url)}
         return io.BufferedReader(fsspec.open(url, "rb", **options).open())
     except ImportError as error:
         raise InputError(
@@ -53,13 +55,13 @@ def open_address(url: str, expected: str = "a point cloud", **reading: Any) -> B
         ) from error
     except Exception as error:  # each of fsspec's file systems raises errors of its own
         # of what it cannot reach fsspec itself tells the address alone
-        told = error.__cause__ or error
+        cause = error.__cause__ or error
         raise InputError(
-            f"expected {expected} at {url}, got: {str(told) or type(told).__name__}; check it"
+            f"expected {expected} at {url}, got: {str(cause) or type(cause).__name__}; check it"
         ) from error
 
 
-def options_of(url: str) -> dict[str, Any]:
+def choose_options(url: str) -> dict[str, Any]:
     """What fsspec's file system for an address is told, beside its defaults."""
     if not url.lower().startswith(("http://", "https://")):
         return {}
@@ -71,4 +73,4 @@ def options_of(url: str) -> dict[str, Any]:
 
 def import_fsspec() -> Any:
     """What reads files by address. Raises InputError where it is missing."""
-    return needed("fsspec", "city", "files by address")
+    return import_extra("fsspec", "city", "files by address")

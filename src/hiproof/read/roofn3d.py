@@ -19,14 +19,14 @@ import numpy as np
 import shapely
 
 from ..errors import InputError, InputWarning
-from ..log import counted
+from ..log import count_things
 
-TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
+ROOFN3D_TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
 """Our catalogue's name of each RoofN3D class."""
 
 FIELD_LIMIT = 1 << 30  # bytes of a field; csv's own limit is below a large roof's points
 UNASSIGNED = -1  # label of a point on no surface
-UNITS_PER_M = 1000  # points are matched to surfaces by their millimetres: the file rounds
+ROOFN3D_UNITS_PER_M = 1000  # points are matched to surfaces by their millimetres: the file rounds
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,22 @@ def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
     Raises InputError for a file of another layout and for coordinates that are no numbers, naming
     the row.
     """
-    seen: set[str] = set()
+    visited: set[str] = set()
     repeated = 0
     for number, row in rows(path, ("id", "class", "points", "outline")):
-        if row["id"] in seen:
+        if row["id"] in visited:
             repeated += 1
             continue
-        seen.add(row["id"])
+        visited.add(row["id"])
         with naming_row(path, number):
             points, outline = coordinates(row["points"]), polygon(row["outline"])
         class_name = (row["class"] or "").strip()
-        yield RoofN3DRecord(row["id"], TYPES.get(class_name.lower()), class_name, points, outline)
+        yield RoofN3DRecord(
+            row["id"], ROOFN3D_TYPES.get(class_name.lower()), class_name, points, outline
+        )
     if repeated:
         warnings.warn(
-            f"{path}: {counted(repeated, 'row')} with the id of an earlier one left out",
+            f"{path}: {count_things(repeated, 'row')} with the id of an earlier one left out",
             InputWarning,
         )
 
@@ -110,7 +112,7 @@ def surface_offsets(path: str | Path) -> dict[str, list[int]]:
     return offsets
 
 
-def rows(path: str | Path, needed: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
+def rows(path: str | Path, required: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
     """Number (the header is 1) and fields by name of each row.
 
     Raises InputError when a needed column is missing.
@@ -119,14 +121,14 @@ def rows(path: str | Path, needed: tuple[str, ...]) -> Iterator[tuple[int, dict[
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
-            missing = [name for name in needed if name not in (reader.fieldnames or [])]
+            missing = [name for name in required if name not in (reader.fieldnames or [])]
             if missing:
                 got = (
                     ", ".join(name[:30] for name in (reader.fieldnames or [])[:8])
                     or "an empty file"
                 )
                 raise InputError(
-                    f"expected RoofN3D's columns {', '.join(needed)} in {path}, got {got}; "
+                    f"expected RoofN3D's columns {', '.join(required)} in {path}, got {got}; "
                     "name roofn3d_buildings.csv or roofn3d_surfacegrowing.csv as downloaded"
                 )
             for number, row in enumerate(reader, start=2):
@@ -164,7 +166,9 @@ def coordinates(wkt: str) -> np.ndarray:
     numbers = wkt[start + 1 : end].replace(",", " ").replace("(", " ").replace(")", " ").split()
     values = np.array(numbers, dtype=float)
     if len(values) % 3:
-        raise ValueError(f"{counted(len(values), 'number')}, which is no whole number of x y z")
+        raise ValueError(
+            f"{count_things(len(values), 'number')}, which is no whole number of x y z"
+        )
     return values.reshape(-1, 3)
 
 
@@ -179,5 +183,5 @@ def polygon(wkt: str) -> shapely.Polygon:
 
 def point_keys(points: np.ndarray) -> np.ndarray:
     """Coordinates (n, 3) as one comparable value (n,) each, to the millimetre."""
-    units = np.ascontiguousarray(np.rint(points * UNITS_PER_M).astype(np.int64))
+    units = np.ascontiguousarray(np.rint(points * ROOFN3D_UNITS_PER_M).astype(np.int64))
     return units.view([("", np.int64)] * 3).ravel()

@@ -29,17 +29,17 @@ class RunIndex:
     cell_of: np.ndarray
     runs: np.ndarray
 
-    def runs_meeting(self, boxes: np.ndarray) -> np.ndarray:
+    def find_runs(self, boxes: np.ndarray) -> np.ndarray:
         """Runs (k, 2) in ascending order that hold every point inside any of `boxes` (m, 4), and
         others.
         """
         cells = shapely.STRtree(shapely.box(*self.boxes.T))
         met = np.zeros(len(self.boxes), bool)
         met[cells.query(shapely.box(*boxes.T))[1]] = True
-        return joined(self.runs[met[self.cell_of]])
+        return join_runs(self.runs[met[self.cell_of]])
 
 
-def joined(runs: np.ndarray) -> np.ndarray:
+def join_runs(runs: np.ndarray) -> np.ndarray:
     """Runs (k, 2) in ascending order, those that overlap or are less than RUN_POINTS apart made
     one.
     """
@@ -51,20 +51,20 @@ def joined(runs: np.ndarray) -> np.ndarray:
     return np.column_stack([runs[first, 0], np.maximum.reduceat(runs[:, 1], first)])
 
 
-def boxes_of_runs(xyz: np.ndarray) -> np.ndarray:
+def compute_run_boxes(xyz: np.ndarray) -> np.ndarray:
     """Boxes (k, 4) in plan of every RUN_POINTS of the points (n, 3), in their order.
 
-    >>> boxes_of_runs(np.array([[3.0, 4.0, 0.0], [1.0, 9.0, 0.0]])).tolist()
+    >>> compute_run_boxes(np.array([[3.0, 4.0, 0.0], [1.0, 9.0, 0.0]])).tolist()
     [[1.0, 4.0, 3.0, 9.0]]
     """
     starts = np.arange(0, len(xyz), RUN_POINTS)
-    low, high = (
+    lower, upper = (
         reduced.reduceat(xyz[:, :2], starts, axis=0) for reduced in (np.minimum, np.maximum)
     )
-    return np.hstack([low, high])
+    return np.hstack([lower, upper])
 
 
-def index_of_boxes(boxes: np.ndarray, points: int) -> RunIndex | None:
+def make_index(boxes: np.ndarray, points: int) -> RunIndex | None:
     """The index of a file of so many `points` whose every RUN_POINTS lie in one of `boxes` (k, 4),
     in their order; None where there are more or fewer boxes than that.
     """

@@ -17,7 +17,7 @@ from .damage import excerpt
 Rings = tuple[tuple[int, ...], ...]
 
 
-class Surface(NamedTuple):
+class ShellSurface(NamedTuple):
     """A face of a shell: its rings of vertex numbers, and what its semantics say of it."""
 
     rings: Rings
@@ -25,32 +25,32 @@ class Surface(NamedTuple):
     semantics: dict[str, Any]
 
 
-def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Surface]:
+def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[ShellSurface]:
     """Read the faces of one shell over `count` vertices.
 
     `values` are the numbers of the faces' semantics among `surfaces`, None where a file has none; a
     face beyond their end has none either.
     """
-    faces = [read_rings(face, count) for face in list_of(shell, "a shell")]
-    numbers = list_of([] if values is None else values, "semantic values")
-    known = list_of(surfaces, "semantic surfaces")
-    told = (
-        {} if number is None else surface_at(number, known)
+    faces = [read_rings(face, count) for face in require_list(shell, "a shell")]
+    numbers = require_list([] if values is None else values, "semantic values")
+    surface_semantics = require_list(surfaces, "semantic surfaces")
+    semantics_list = (
+        {} if number is None else surface_at(number, surface_semantics)
         for number in chain(numbers, repeat(None))
     )
     return [
-        Surface(rings, semantics.get("type", WALL), semantics)
-        for rings, semantics in zip(faces, told)  # noqa: B905
+        ShellSurface(rings, semantics.get("type", WALL), semantics)
+        for rings, semantics in zip(faces, semantics_list)  # noqa: B905
     ]
 
 
 def read_rings(face: Any, count: int) -> Rings:
-    return tuple(tuple(read_ring(ring, count)) for ring in list_of(face, "a face"))
+    return tuple(tuple(read_ring(ring, count)) for ring in require_list(face, "a face"))
 
 
 def read_ring(ring: Any, count: int) -> list[int]:
     """Read a ring of vertex numbers below `count`."""
-    for number in list_of(ring, "a ring"):
+    for number in require_list(ring, "a ring"):
         if type(number) is not int:
             raise ValueError(f"the vertex {excerpt(number)}, which is no number of one")
         if not 0 <= number < count:
@@ -68,9 +68,9 @@ def surface_at(number: Any, surfaces: list[Any]) -> dict[str, Any]:
     return semantics
 
 
-def list_of(value: Any, what: str) -> list[Any]:
+def require_list(value: Any, subject: str) -> list[Any]:
     if not isinstance(value, list):
-        raise ValueError(f"{excerpt(value)} as {what}")
+        raise ValueError(f"{excerpt(value)} as {subject}")
     return value
 
 
@@ -78,18 +78,18 @@ def read_geometries(city_object: Any) -> list[dict[str, Any]]:
     """Read the geometries of a city object, each an object of its own."""
     if not isinstance(city_object, dict):
         raise ValueError(f"{excerpt(city_object)} as a city object")
-    found = list_of(city_object.get("geometry") or [], "its geometries")
-    for geometry in found:
+    result = require_list(city_object.get("geometry") or [], "its geometries")
+    for geometry in result:
         if not isinstance(geometry, dict):
             raise ValueError(f"{excerpt(geometry)} as a geometry")
         if not isinstance(geometry.get("semantics") or {}, dict):
             raise ValueError(f"{excerpt(geometry['semantics'])} as semantics")
-    return found
+    return result
 
 
 def read_vertices(vertices: Any) -> np.ndarray:
     """Read the vertices (n, 3) of a document, in the numbers of the file."""
-    found = np.array(list_of(vertices, "vertices"), float)
-    if found.size and (found.ndim != 2 or found.shape[1] != 3):
+    result = np.array(require_list(vertices, "vertices"), float)
+    if result.size and (result.ndim != 2 or result.shape[1] != 3):
         raise ValueError(f"vertices of {excerpt(vertices[0])}, where each is three numbers")
-    return found.reshape(-1, 3)
+    return result.reshape(-1, 3)

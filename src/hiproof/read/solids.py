@@ -18,12 +18,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..frames import METRES
-from ..log import counted
+from ..log import count_things
 from ..model import WALL, Face, Solid
 from .cityjson import UNUSABLE, Feature, features, unusable
-from .crs import units_named
+from .crs import find_named_units
 from .damage import Damaged, refuse
-from .shells import list_of, read_geometries, read_shell
+from .shells import read_geometries, read_shell, require_list
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
@@ -71,7 +71,7 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
     yield from readers[suffix](path, damaged)
 
 
-def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
+def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
     """The shells of one city object under its id."""
     for k, solid in enumerate(solids):
         yield (name if k == 0 else f"{name}#{k + 1}"), solid
@@ -95,7 +95,7 @@ def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tupl
                 "Building"
             ):
                 continue
-            found = [
+            result = [
                 solid
                 for geometry in read_geometries(city_object)
                 if not str(geometry.get("lod", "")).startswith("0")
@@ -104,7 +104,7 @@ def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tupl
         except UNUSABLE as error:
             damaged(unusable(name, feature, error))
             continue
-        yield from numbered(name, found)
+        yield from number_solids(name, result)
 
 
 def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Solid]:
@@ -119,10 +119,10 @@ def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Soli
     elif kind not in ("MultiSolid", "CompositeSolid"):
         return []
     shells = []
-    for s, solid in enumerate(list_of(boundaries, "boundaries")):
-        for k, shell in enumerate(list_of(solid, "the boundaries of a solid")):
-            named = values[s][k] if values and values[s] else None
-            shells.append(shell_solid(shell, named, surfaces, vertices, inward=k > 0))
+    for s, solid in enumerate(require_list(boundaries, "boundaries")):
+        for k, shell in enumerate(require_list(solid, "the boundaries of a solid")):
+            named_crs = values[s][k] if values and values[s] else None
+            shells.append(shell_solid(shell, named_crs, surfaces, vertices, inward=k > 0))
     return shells
 
 
@@ -130,14 +130,14 @@ def shell_solid(
     shell: Any, values: Any, surfaces: Any, vertices: np.ndarray, inward: bool = False
 ) -> Solid:
     """One shell (faces of rings of indices) with its semantics, on the vertices it uses."""
-    found = read_shell(shell, values, surfaces, len(vertices))
-    used = sorted({index for surface in found for ring in surface.rings for index in ring})
-    number = {index: k for k, index in enumerate(used)}
+    result = read_shell(shell, values, surfaces, len(vertices))
+    in_use = sorted({index for surface in result for ring in surface.rings for index in ring})
+    number = {index: k for k, index in enumerate(in_use)}
     faces = []
-    for surface in found:
+    for surface in result:
         rings = tuple(tuple(number[index] for index in ring) for ring in surface.rings)
         faces.append(Face(tuple(ring[::-1] for ring in rings) if inward else rings, surface.kind))
-    return Solid(vertices[used], tuple(faces))
+    return Solid(vertices[in_use], tuple(faces))
 
 
 # CityGML
@@ -161,16 +161,16 @@ def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str,
             str(path), events=("end",), huge_tree=True, resolve_entities=False
         ):
             if local_name(element) == "Envelope" and not members:
-                units = units_named(element.get("srsName"))
+                units = find_named_units(element.get("srsName"))
             if local_name(element) not in ("cityObjectMember", "featureMember"):
                 continue
             members += 1
             try:
-                found = list(member_solids(element, path))
+                solids = list(member_solids(element, path))
             except InputError as error:
                 damaged(error)
-                found = []
-            for name, solid in found:
+                solids = []
+            for name, solid in solids:
                 yield name, replace(solid, vertices=units.to_metres(solid.vertices))
             element.clear()
             while element.getprevious() is not None:
@@ -202,13 +202,13 @@ def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
     ]
     for owner in owners or list(member)[:1]:
         solids, place = [], f"{gml_id(owner) or 'a building without an id'} in {path}"
-        for element in own_descendants(owner):
+        for element in iterate_own_descendants(owner):
             if local_name(element) == "Solid":
                 solids += gml_shells(element, polygons, place)
         if not solids:
-            loose = [element for element in own_descendants(owner) if is_loose(element)]
+            loose = [element for element in iterate_own_descendants(owner) if is_loose(element)]
             solids = [polygons_solid(loose, place)] if loose else []
-        yield from numbered(gml_id(owner) or "unnamed", solids)
+        yield from number_solids(gml_id(owner) or "unnamed", solids)
 
 
 def is_loose(element: Any) -> bool:
@@ -219,12 +219,12 @@ def is_loose(element: Any) -> bool:
     return not any(local_name(ancestor).startswith("lod0") for ancestor in element.iterancestors())
 
 
-def own_descendants(owner: Any) -> Iterator[Any]:
+def iterate_own_descendants(owner: Any) -> Iterator[Any]:
     """Elements below `owner` that do not belong to one of its building parts."""
     for child in owner:
         if local_name(child) != "BuildingPart":
             yield child
-            yield from own_descendants(child)
+            yield from iterate_own_descendants(child)
 
 
 def surface_kind(polygon: Any, default: str | None) -> str | None:
@@ -294,6 +294,6 @@ def ring_points(ring: Any, place: str) -> list[tuple[float, ...]]:
     if len(values) % 3:
         raise InputError(
             f"expected three coordinates a point in a gml:LinearRing of {place}, got "
-            f"{counted(len(values), 'number')}; export the file anew, in 3D"
+            f"{count_things(len(values), 'number')}; export the file anew, in 3D"
         )
     return [tuple(values[k : k + 3]) for k in range(0, len(values), 3)]

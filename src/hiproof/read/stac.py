@@ -15,7 +15,7 @@ import shapely
 
 from ..errors import InputError
 from .geoparquet import import_fsspec
-from .remote import options_of
+from .remote import choose_options
 
 TRIES = 3  # of a document: of hundreds of requests a server closes one now and then
 PAUSE_S = 0.5  # s between two of them
@@ -44,7 +44,7 @@ def read_document(address: str) -> Document:
     fsspec = import_fsspec()
     for left in reversed(range(TRIES)):
         try:
-            files, path = fsspec.core.url_to_fs(address, **options_of(address))
+            files, path = fsspec.core.url_to_fs(address, **choose_options(address))
             content = json.loads(files.cat_file(path))
             if not isinstance(content, dict):
                 raise ValueError("no document")
@@ -86,7 +86,7 @@ def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
     return bool(shapely.intersects(shapely.box(*box[:2], *box[half : half + 2]), extent))
 
 
-def asset_of(item: Document, suffix: str) -> str:
+def find_asset(item: Document, suffix: str) -> str:
     """The address of the file of an item whose name ends in `suffix`, one by HTTP before others.
 
     Raises InputError where it lists none.

@@ -45,7 +45,7 @@ class TerrainChain:
         """Height (n,) at `xy_world` (n, 2), NaN where none knows."""
         return self.heights_and_sources(xy_world)[0]
 
-    def known_heights(self, xy_world: np.ndarray, fewest: int) -> np.ndarray:
+    def find_known_heights(self, xy_world: np.ndarray, minimum: int) -> np.ndarray:
         """Heights (n,) of the first terrain that knows so many of `xy_world` (n, 2) and does not
         guess (by a true `is_guess`); NaN where there is none.
         """
@@ -55,7 +55,7 @@ class TerrainChain:
                 if getattr(terrain, "is_guess", False)
                 else terrain.height_at(xy_world)
             )
-            if np.isfinite(heights).sum() >= fewest:
+            if np.isfinite(heights).sum() >= minimum:
                 return heights
         return np.full(len(xy_world), np.nan)
 

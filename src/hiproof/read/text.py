@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..log import counted
+from ..log import count_things
 from .columns import find_columns
 from .las import Chunk
-from .remote import opened
+from .remote import open_binary
 
 COMMENTS = ("#", "//")
 
@@ -41,7 +41,7 @@ def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
     layout = sniff(path)
     read = 0
     with (
-        opened(path) as binary,
+        open_binary(path) as binary,
         io.TextIOWrapper(binary, encoding="utf-8-sig", errors="replace") as file,
     ):
         list(islice(file, layout.skip))
@@ -50,7 +50,7 @@ def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
             read += len(table)
             if len(table):
                 # in one piece, as from other files: what is compiled for these takes it
-                yield np.ascontiguousarray(table[:, :3]), classes_of(table)
+                yield np.ascontiguousarray(table[:, :3]), read_classes(table)
             if len(table) < chunk_points:
                 return
 
@@ -71,13 +71,13 @@ def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int
     except (ValueError, IndexError) as error:
         raise InputError(
             f"expected three numbers x y z on every line of {path}, got another after "
-            f"{counted(read, 'point')} ({error}); "
+            f"{count_things(read, 'point')} ({error}); "
             "write one point a line with a decimal point, the columns separated by blanks, commas, "
             "semicolons or tabs"
         ) from error
 
 
-def classes_of(table: np.ndarray) -> np.ndarray | None:
+def read_classes(table: np.ndarray) -> np.ndarray | None:
     if table.shape[1] < 4:
         return None
     return np.clip(np.nan_to_num(table[:, 3]), 0, 255).astype(np.uint8)
@@ -88,7 +88,7 @@ def sniff(path: str | Path) -> TextLayout:
 
     Raises InputError when they are no text or hold no three numbers.
     """
-    with opened(path) as file:
+    with open_binary(path) as file:
         head = file.read(65536)
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError(
@@ -116,7 +116,9 @@ def sniff(path: str | Path) -> TextLayout:
             return TextLayout(number, delimiter, find_columns(names) or (0, 1, 2))
         if columns := find_columns(fields):
             names = fields
-            following = next((rest for rest in lines[number + 1 :] if rest.strip()), None)
+            following = next(
+                (remainder for remainder in lines[number + 1 :] if remainder.strip()), None
+            )
             if following and not line.lstrip().startswith(COMMENTS):
                 return TextLayout(number + 1, find_delimiter(following), columns)
         elif number > 20:

@@ -28,16 +28,16 @@ def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     return rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2)
 
 
-def thin_to_count(xyz: np.ndarray, most: int) -> np.ndarray:
-    """At most `most` of the points (n, 3): those whose coordinates' hashes are the lowest, in the
+def thin_to_count(xyz: np.ndarray, limit: int) -> np.ndarray:
+    """At most `limit` of the points (n, 3): those whose coordinates' hashes are the lowest, in the
     order they came in.
 
     A hash is as good as a draw, so density falls evenly, but it depends on the point alone: the
     same set of points leaves the same ones, however it was cut and whatever order it came in.
     """
-    if len(xyz) <= most:
+    if len(xyz) <= limit:
         return xyz
-    return xyz[np.sort(np.argsort(hashes(xyz), kind="stable")[:most])]
+    return xyz[np.sort(np.argsort(hashes(xyz), kind="stable")[:limit])]
 
 
 def without_repeats(xyz: np.ndarray) -> np.ndarray:
@@ -77,10 +77,10 @@ def rank_in_cells(
     if not len(xyz):
         return np.empty((0, 3))
     xyz, cell_m = np.ascontiguousarray(xyz, float), float(cell_m)
-    low, size = cell_range(xyz, cell_m)
-    keys = cell_keys(xyz, cell_m, *low, size[0])
+    lower, size = cell_range(xyz, cell_m)
+    keys = cell_keys(xyz, cell_m, *lower, size[0])
     occupied, cell_of, counts = occupied_cells(keys, size[0] * size[1])
-    corner = (np.column_stack([occupied % size[0], occupied // size[0]]) + low) * cell_m
+    corner = (np.column_stack([occupied % size[0], occupied // size[0]]) + lower) * cell_m
     units = [np.rint((xyz[:, axis] - corner[cell_of, axis]) * UNITS_PER_M) for axis in (0, 1)]
     mean = np.column_stack([np.bincount(cell_of, values) for values in units]) / counts[:, None]
     heights = np.rint(xyz[:, 2] * UNITS_PER_M).astype(np.int64)
@@ -89,17 +89,17 @@ def rank_in_cells(
     if len(occupied) <= MOST_COUNTED:  # cell by cell, so that little is left to be sorted
         order = order[np.argsort(cell_of.astype(np.uint16), kind="stable")]
     ascending = np.sort(order, kind="stable") % span + lowest
-    chosen = np.cumsum(counts) - counts + np.minimum(rank(counts), counts - 1)
-    return np.column_stack([corner + mean / UNITS_PER_M, ascending[chosen] / UNITS_PER_M])
+    selection = np.cumsum(counts) - counts + np.minimum(rank(counts), counts - 1)
+    return np.column_stack([corner + mean / UNITS_PER_M, ascending[selection] / UNITS_PER_M])
 
 
 def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
     """The first cell (column, row) of the world's grid that holds one of `xy` (n, 2 or more), n >
     0, and the (columns, rows).
     """
-    low = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
-    high = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
-    return (low[0], low[1]), (high[0] - low[0] + 1, high[1] - low[1] + 1)
+    lower = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
+    upper = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
+    return (lower[0], lower[1]), (upper[0] - lower[0] + 1, upper[1] - lower[1] + 1)
 
 
 def occupied_cells(keys: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

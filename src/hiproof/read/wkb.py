@@ -9,33 +9,33 @@ import struct
 import numpy as np
 import shapely
 
-POINT, LINE, POLYGON, MULTI_POLYGON, COLLECTION = 1, 2, 3, 6, 7
+POINT, LINE_TYPE, POLYGON_TYPE, MULTI_POLYGON, COLLECTION = 1, 2, 3, 6, 7
 """Kinds of geometry in the plan by their number in WKB (OGC 06-103r4, table 7)."""
 
 POLYHEDRAL_SURFACE, TIN, TRIANGLE = 15, 16, 17
 """Kinds of surface in space by their number there."""
 
-AS_POLYGONS = {POLYHEDRAL_SURFACE: MULTI_POLYGON, TIN: MULTI_POLYGON, TRIANGLE: POLYGON}
+AS_POLYGONS = {POLYHEDRAL_SURFACE: MULTI_POLYGON, TIN: MULTI_POLYGON, TRIANGLE: POLYGON_TYPE}
 """Surfaces that are laid out in bytes as polygons are, and differ by their number alone."""
 
 Z_FLAG, M_FLAG, SRID_FLAG = 1 << 31, 1 << 30, 1 << 29
 """Bits of the number in PostGIS's WKB; ISO adds 1000 for z, 2000 for m, 3000 for both."""
 
 
-def geometries_of(wkb: np.ndarray) -> np.ndarray:
+def decode_geometries(wkb: np.ndarray) -> np.ndarray:
     """Geometries (n,) of WKB (n,), None where there is none or it cannot be read; unclosed rings
     are closed.
     """
-    known = np.array(
+    decoded = np.array(
         [as_polygons(body) if body is not None else None for body in wkb], dtype=object
     )
     try:
-        return shapely.from_wkb(known, on_invalid="fix")
+        return shapely.from_wkb(decoded, on_invalid="fix")
     except (shapely.errors.ShapelyError, NotImplementedError, ValueError):
-        return np.array([geometry_of(body) for body in known], dtype=object)
+        return np.array([decode_geometry(body) for body in decoded], dtype=object)
 
 
-def geometry_of(body: bytes | None) -> shapely.Geometry | None:
+def decode_geometry(body: bytes | None) -> shapely.Geometry | None:
     """One geometry, None where it cannot be read."""
     try:
         return shapely.from_wkb(body, on_invalid="fix")
@@ -51,7 +51,7 @@ def as_polygons(body: bytes) -> bytes:
     >>> shapely.from_wkb(as_polygons(bytes(body))).geom_type
     'Polygon'
     """
-    if len(body) < 5 or kind_of(body, 0)[1] not in {*AS_POLYGONS, COLLECTION}:
+    if len(body) < 5 or decode_kind(body, 0)[1] not in {*AS_POLYGONS, COLLECTION}:
         return body
     renamed = bytearray(body)
     try:
@@ -61,28 +61,30 @@ def as_polygons(body: bytes) -> bytes:
     return bytes(renamed)
 
 
-def kind_of(body: bytes | bytearray, at: int) -> tuple[str, int, int, int]:
-    """Byte order, kind, dimensions and first byte of the content of the geometry at byte `at`."""
-    order = "<" if body[at] else ">"
-    (code,) = struct.unpack_from(f"{order}I", body, at + 1)
+def decode_kind(body: bytes | bytearray, position: int) -> tuple[str, int, int, int]:
+    """Byte order, kind, dimensions and first byte of the content of the geometry at byte
+    `position`.
+    """
+    order = "<" if body[position] else ">"
+    (code,) = struct.unpack_from(f"{order}I", body, position + 1)
     iso, kind = divmod(code & ~(Z_FLAG | M_FLAG | SRID_FLAG), 1000)
     has_z, has_m = bool(code & Z_FLAG) or iso in (1, 3), bool(code & M_FLAG) or iso in (2, 3)
-    return order, kind, 2 + has_z + has_m, at + (9 if code & SRID_FLAG else 5)
+    return order, kind, 2 + has_z + has_m, position + (9 if code & SRID_FLAG else 5)
 
 
-def rename(body: bytearray, at: int) -> int:
-    """Rename the surfaces within the geometry at byte `at`; the byte after it."""
-    order, kind, dimensions, start = kind_of(body, at)
-    (code,) = struct.unpack_from(f"{order}I", body, at + 1)
-    struct.pack_into(f"{order}I", body, at + 1, code - kind + AS_POLYGONS.get(kind, kind))
+def rename(body: bytearray, position: int) -> int:
+    """Rename the surfaces within the geometry at byte `position`; the byte after it."""
+    order, kind, dimensions, start = decode_kind(body, position)
+    (code,) = struct.unpack_from(f"{order}I", body, position + 1)
+    struct.pack_into(f"{order}I", body, position + 1, code - kind + AS_POLYGONS.get(kind, kind))
     if kind == POINT:
         return start + 8 * dimensions
     (count,) = struct.unpack_from(f"{order}I", body, start)
     start += 4
-    if kind == LINE:
+    if kind == LINE_TYPE:
         return start + 8 * dimensions * count
     for _ in range(count):
-        if kind in (POLYGON, TRIANGLE):
+        if kind in (POLYGON_TYPE, TRIANGLE):
             (points,) = struct.unpack_from(f"{order}I", body, start)
             start += 4 + 8 * dimensions * points
         else:

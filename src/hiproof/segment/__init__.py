@@ -13,6 +13,6 @@ scores      figures of a classification
 from __future__ import annotations
 
 from .inference import NOT_ROOF, Segmentation, segment
-from .posterior import combine, most_probable
+from .posterior import choose_most_probable, combine
 
-__all__ = ["NOT_ROOF", "Segmentation", "combine", "most_probable", "segment"]
+__all__ = ["NOT_ROOF", "Segmentation", "choose_most_probable", "combine", "segment"]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .sampling import arranged, thin_to_grid
+from .sampling import arrange_cloud, thin_to_grid
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Arrangement:
     interpolation; `sampled` the number of distinct points.
     """
 
-    chosen: np.ndarray
+    select: np.ndarray
     features: np.ndarray
     groups: tuple[np.ndarray, ...]
     radii: np.ndarray
@@ -51,7 +51,7 @@ def arrange(xyz: np.ndarray, layout: Layout) -> Arrangement:
     """
     thinned = thin_to_grid(xyz, layout.thinned)
     local = np.ascontiguousarray(xyz[thinned] - xyz[thinned].mean(axis=0), dtype=float)
-    order, *described = arranged(local, layout.points, *layout.levels, layout.neighbours)
+    order, *described = arrange_cloud(local, layout.points, *layout.levels, layout.neighbours)
     features, groups, radii, up_indices, up_weights = described
-    chosen = thinned[np.resize(order, layout.points)]
-    return Arrangement(chosen, features, groups, radii, up_indices, up_weights, len(order))
+    selection = thinned[np.resize(order, layout.points)]
+    return Arrangement(selection, features, groups, radii, up_indices, up_weights, len(order))

@@ -39,8 +39,8 @@ def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Pat
         except (FitError, InputError) as error:
             failures[path] = str(error)
     if not labelled:
-        why = "; ".join(f"{path}: {reason}" for path, reason in failures.items())
-        raise InputError(f"expected at least one building to label, got none ({why})")
+        text = "; ".join(f"{path}: {reason}" for path, reason in failures.items())
+        raise InputError(f"expected at least one building to label, got none ({text})")
     write_points(out, labelled, model.types, crs, units)
     write_table(out.with_suffix(".csv"), labelled, model.types)
     return failures
@@ -58,8 +58,8 @@ def write_points(
         header.add_crs(crs)
     las = laspy.LasData(header)
     las.x, las.y, las.z = xyz.T
-    las.roof_type = np.concatenate([found.labels + 1 for *_, found in labelled]).astype(np.uint8)
-    las.not_roof = np.concatenate([found.not_roof for *_, found in labelled]).astype(np.float32)
+    las.roof_type = np.concatenate([result.labels + 1 for *_, result in labelled]).astype(np.uint8)
+    las.not_roof = np.concatenate([result.not_roof for *_, result in labelled]).astype(np.float32)
     las.building = np.concatenate(
         [np.full(len(points), number) for number, _, points, _ in labelled]
     )
@@ -81,10 +81,10 @@ def write_table(
         with open(path, "w", newline="", encoding="utf-8") as file:
             table = csv.writer(file)
             table.writerow(["building", "file", "points", "roof_share", "type", *types])
-            for number, source, points, found in labelled:
-                probabilities = [f"{found.types[name]:.4f}" for name in types]
-                share = f"{found.is_roof.mean():.3f}"
-                table.writerow([number, source, len(points), share, found.type, *probabilities])
+            for number, source, points, result in labelled:
+                probabilities = [f"{result.types[name]:.4f}" for name in types]
+                share = f"{result.is_roof.mean():.3f}"
+                table.writerow([number, source, len(points), share, result.type, *probabilities])
     except OSError as error:
         raise OutputError(
             f"expected to write {path}, got: {error}; choose another --out"

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import FitError, InputError, SettingsError
-from ..extras import needed
-from ..log import counted
+from ..extras import import_extra
+from ..log import count_things
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
-from .nearest import nearest_of
+from .nearest import find_nearest_type
 
 FORMAT = "hiproof-roof-types-2"
 INPUT_NAMES = (
@@ -37,7 +37,7 @@ INPUT_NAMES = (
 OUTPUT_NAMES = ("point_logits", "type_logits")
 SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "roof_types.onnx"
 NOT_ROOF = -1  # label of what is no roof
-FEWEST_POINTS = 10  # points; fewer fill no neighbourhood
+FEWEST_CLOUD_POINTS = 10  # points; fewer fill no neighbourhood
 # A roof point left out costs a fit more than a point of a wall left in, which its outliers bear.
 SURELY_NOT_ROOF = 0.8
 CARRIED_NEIGHBOURS = 3  # sampled points that a point's label is the mean of, as in PointNet++
@@ -89,12 +89,12 @@ class Segmentation:
         """(n,) weight of each point in a fit: 0 where it is surely no roof, else 1; all 1 where
         hardly any is left.
         """
-        kept = self.not_roof < SURELY_NOT_ROOF
-        return kept.astype(float) if kept.sum() >= FEWEST_POINTS else np.ones(len(kept))
+        mask = self.not_roof < SURELY_NOT_ROOF
+        return mask.astype(float) if mask.sum() >= FEWEST_CLOUD_POINTS else np.ones(len(mask))
 
 
 @dataclass(frozen=True)
-class Model:
+class LoadedNetwork:
     """A loaded ONNX network with what its file says of itself."""
 
     session: Any
@@ -129,14 +129,14 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
     type_probability = softmax(type_logits[0] + barred)
     types = dict(zip(model.types, map(float, type_probability), strict=True))
     logits = point_logits[: arranged.sampled] + np.append(barred, 0.0)
-    return Segmentation(types, logits, xyz[arranged.chosen[: arranged.sampled]], xyz)
+    return Segmentation(types, logits, xyz[arranged.select[: arranged.sampled]], xyz)
 
 
-def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
+def barred_types(model: LoadedNetwork, allowed: tuple[str, ...]) -> np.ndarray:
     """Log prior (types,) of a choice among `allowed` types, or those nearest to them, only: 0 or
     minus infinity; empty allows all.
     """
-    classes = {nearest_of(name, model.types) for name in allowed}
+    classes = {find_nearest_type(name, model.types) for name in allowed}
     if allowed and not classes & set(model.types):
         raise SettingsError(
             f"expected fit.types to name types the network knows ({', '.join(model.types)}), got "
@@ -145,15 +145,15 @@ def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
     return np.array([0.0 if not allowed or name in classes else -np.inf for name in model.types])
 
 
-def run(model: Model, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
+def run(model: LoadedNetwork, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
     """Point logits (B N, types + 1) and type logits (B, types) of arranged buildings."""
     point_logits, type_logits = model.session.run(
-        list(OUTPUT_NAMES), stacked(arrangements, model.layout)
+        list(OUTPUT_NAMES), stack_arrangements(arrangements, model.layout)
     )
     return point_logits, type_logits
 
 
-def stacked(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
+def stack_arrangements(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
     """The graph's inputs by name for B buildings: flat over buildings, indices counting rows of the
     level above.
     """
@@ -204,9 +204,9 @@ def checked_points(points: np.ndarray) -> np.ndarray:
         raise InputError(
             f"expected points as an (n, 3) array of numbers, got shape {xyz.shape} of {xyz.dtype}"
         )
-    if len(xyz) < FEWEST_POINTS:
+    if len(xyz) < FEWEST_CLOUD_POINTS:
         raise FitError(
-            f"expected at least {FEWEST_POINTS} points to recognise a roof, got {len(xyz)}; "
+            f"expected at least {FEWEST_CLOUD_POINTS} points to recognise a roof, got {len(xyz)}; "
             "give the whole building or reconstruct without the network"
         )
     xyz = xyz[:, :3].astype(float)
@@ -218,23 +218,24 @@ def checked_points(points: np.ndarray) -> np.ndarray:
         )
     if np.ptp(xyz[:, :2], axis=0).max() < 1e-6:
         raise FitError(
-            f"expected points spread over a roof, got {counted(len(xyz), 'point')} all in one place"
+            f"expected points spread over a roof, got {count_things(len(xyz), 'point')} all in one "
+            "place"
         )
     return xyz - xyz[0]
 
 
 @lru_cache(maxsize=4)
-def load(weights: str, device: str = "cpu") -> Model:
+def load(weights: str, device: str = "cpu") -> LoadedNetwork:
     """The network in the ONNX file `weights`, loaded once a process, on one thread.
 
     Raises as `segment` does.
     """
     onnxruntime = import_onnxruntime()
     if device == "cuda" and "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
-        found = ", ".join(onnxruntime.get_available_providers())
+        text = ", ".join(onnxruntime.get_available_providers())
         raise SettingsError(
             "expected a CUDA device for segment.device = 'cuda', but ONNX Runtime here offers "
-            f"only {found}; "
+            f"only {text}; "
             "install onnxruntime-gpu or set it to 'cpu'"
         )
     if not Path(weights).is_file():
@@ -269,15 +270,15 @@ def load(weights: str, device: str = "cpu") -> Model:
     layout = json.loads(metadata["layout"])
     layout["levels"] = tuple(layout["levels"])
     types = tuple(json.loads(metadata["types"]))
-    return Model(session, types, Layout(**layout))
+    return LoadedNetwork(session, types, Layout(**layout))
 
 
-def import_onnxruntime(otherwise: str = "") -> Any:
+def import_onnxruntime(alternative: str = "") -> Any:
     """What runs the network.
 
     Raises InputError where it is missing, with how to do without it, if that can be.
     """
-    return needed("onnxruntime", "network", "recognising roofs", otherwise)
+    return import_extra("onnxruntime", "network", "recognising roofs", alternative)
 
 
 def first_line(error: Exception) -> str:

@@ -9,17 +9,24 @@ from collections.abc import Iterable
 from ..primitives import CATALOGUE
 
 
-def nearest_of(name: str, known: Iterable[str]) -> str:
-    """`name`, or the first of the `known` types with its code; `name` also where there is none.
+def find_nearest_type(name: str, known_types: Iterable[str]) -> str:
+    """`name`, or the first of the `known_types` types with its code;
 
-    >>> nearest_of("side_hip", ("gable", "hip", "pyramid")), nearest_of("shed", ("gable", "hip"))
+    `name` also where there is none.
+
+    >>> find_nearest_type("side_hip", ("gable", "hip", "pyramid")), find_nearest_type("shed",
+    ...     ("gable", "hip"))
     ('hip', 'shed')
     """
-    known = tuple(known)
-    if name in known or name not in CATALOGUE:
+    known_types = tuple(known_types)
+    if name in known_types or name not in CATALOGUE:
         return name
     code = CATALOGUE[name].citygml_code
     return next(
-        (other for other in known if other in CATALOGUE and CATALOGUE[other].citygml_code == code),
+        (
+            other
+            for other in known_types
+            if other in CATALOGUE and CATALOGUE[other].citygml_code == code
+        ),
         name,
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .nearest import nearest_of
+from .nearest import find_nearest_type
 
 if TYPE_CHECKING:
     from ..model import Fit
@@ -48,18 +48,18 @@ def combine(
     >>> combine({"gable": 0.5, "hip": 0.5}, {"gable": 100.0, "hip": 260.0})["gable"] > 0.9
     True
     """
-    known = {name: bic for name, bic in bics.items() if np.isfinite(bic)}
-    names = [name for name in types if types[name] > 0 or name in known]
-    names += [name for name in known if name not in types]
-    if not known or not types:
+    finite_bics = {name: bic for name, bic in bics.items() if np.isfinite(bic)}
+    names = [name for name in types if types[name] > 0 or name in finite_bics]
+    names += [name for name in finite_bics if name not in types]
+    if not finite_bics or not types:
         evidence_exponent = 1.0 if not types else 0.0
-        names = names if types else list(known)
+        names = names if types else list(finite_bics)
     if not names:
         return {}
-    given_up = min(known.values(), default=0.0) + 2 * (
+    given_up = min(finite_bics.values(), default=0.0) + 2 * (
         GIVEN_UP_NATS + GIVEN_UP_NATS_A_POINT * points
     )
-    bic = np.array([known.get(name, given_up) for name in names])
+    bic = np.array([finite_bics.get(name, given_up) for name in names])
     log_posterior = (
         np.array(list(log_prior(types, tuple(names)).values())) - evidence_exponent * bic / 2
     )
@@ -76,19 +76,19 @@ def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str,
     A network may be wrong with confidence; no evidence could undo a prior of zero.
     """
     return {
-        name: float(np.log(max(prior_of(name, types), SMALLEST_PRIOR)))
+        name: float(np.log(max(find_prior(name, types), SMALLEST_PRIOR)))
         for name in names or tuple(types)
     }
 
 
-def prior_of(name: str, types: dict[str, float]) -> float:
+def find_prior(name: str, types: dict[str, float]) -> float:
     """The probability of a type; of one that the network does not know that of the nearest, else
     the mean.
     """
-    return types.get(nearest_of(name, types), 1.0 / max(len(types), 1))
+    return types.get(find_nearest_type(name, types), 1.0 / max(len(types), 1))
 
 
-def most_probable(
+def choose_most_probable(
     fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]
 ) -> tuple[Fit, dict[str, float]]:
     """The fit to build, and the posterior by type, best first.
@@ -99,15 +99,15 @@ def most_probable(
     `fit_roof` with its points bound; it is called a second time only where the network disagrees
     with the evidence.
     """
-    found = fit(())
-    posterior = combine(types, found.bics, found.points_used)
+    result = fit(())
+    posterior = combine(types, result.bics, result.points_used)
     best = next(iter(posterior))
-    if best == found.type:
-        return found, posterior
-    named = fit((best,))
-    farther = expected_distance(named) - expected_distance(found)
-    keeps_name = named.objective == "paper" or farther <= FARTHER_AT_MOST_M
-    return (named if keeps_name else found), posterior
+    if best == result.type:
+        return result, posterior
+    names = fit((best,))
+    farther = expected_distance(names) - expected_distance(result)
+    keeps_name = names.objective == "paper" or farther <= FARTHER_AT_MOST_M
+    return (names if keeps_name else result), posterior
 
 
 def expected_distance(fit: Fit) -> float:

@@ -1,8 +1,8 @@
 """Compiled arrangement of a cloud: the parts of PointNet++ that choose, describe and group points
 and carry no weights.
 
-`arranged` is the one entry; everything it calls is compiled into it, so that a process loads one
-function.
+`arrange_cloud` is the one entry; everything it calls is compiled into it, so that a process loads
+one function.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from ..compiled import compiled
 
-FEATURES = (
+POINT_FEATURES = (
     "x",
     "y",
     "z",
@@ -36,7 +36,7 @@ HARMONIC_WIDTH = math.radians(12.0)
 
 
 @compiled
-def arranged(xyz, count, level1, level2, level3, group_size):
+def arrange_cloud(xyz, count, level1, level2, level3, group_size):
     """Everything the network takes of a cloud `xyz` (n, 3), metres about an origin near it, n >= 1.
 
     `count` points are chosen, of which each level keeps a prefix; where n is smaller, they repeat
@@ -47,36 +47,36 @@ def arranged(xyz, count, level1, level2, level3, group_size):
     """
     x, y, z = xyz[:, 0].copy(), xyz[:, 1].copy(), xyz[:, 2].copy()
     order, cover, nearest, reach = farthest_points(x, y, z, count)
-    found = len(order)
+    result = len(order)
     surface = local_surfaces(x, y, z, order, nearest, reach)
-    middle, spacing = np.median(z), math.log(max(cover[found // 2], 1e-3))
+    middle, spacing = np.median(z), math.log(max(cover[result // 2], 1e-3))
     x, y, z = x[order], y[order], z[order]
-    features = described(x, y, z - middle, surface, spacing, count)
+    features = describe_points(x, y, z - middle, surface, spacing, count)
     balls = BALL_FACTOR * np.maximum(cover, 1e-3)
     radius1, radius2, radius3 = (
-        balls[min(level1, found) - 1],
-        balls[min(level2, found) - 1],
-        balls[min(level3, found) - 1],
+        balls[min(level1, result) - 1],
+        balls[min(level2, result) - 1],
+        balls[min(level3, result) - 1],
     )
     groups = (
-        grouped(x, y, z, level1, min(count, found), group_size, radius1)[0],
-        grouped(x, y, z, level2, min(level1, found), group_size, radius2)[0],
-        grouped(x, y, z, level3, min(level2, found), group_size, radius3)[0],
+        group_points(x, y, z, level1, min(count, result), group_size, radius1)[0],
+        group_points(x, y, z, level2, min(level1, result), group_size, radius2)[0],
+        group_points(x, y, z, level3, min(level2, result), group_size, radius3)[0],
     )
-    up1, distance1 = grouped(x, y, z, level1, min(level3, found), INTERPOLATED, np.inf)
-    up2, distance2 = grouped(x, y, z, count, min(level1, found), INTERPOLATED, np.inf)
+    up1, distance1 = group_points(x, y, z, level1, min(level3, result), INTERPOLATED, np.inf)
+    up2, distance2 = group_points(x, y, z, count, min(level1, result), INTERPOLATED, np.inf)
     weights = inverse_shares(distance1), inverse_shares(distance2)
     radii = np.array([radius1, radius2, radius3], np.float32)
     return order, features, groups, radii, (up1, up2), weights
 
 
 @compiled
-def described(x, y, z, surface, spacing, count):
+def describe_points(x, y, z, surface, spacing, count):
     """Features (count, 11) of points (s,) and their `surface` (s, 7) in the building's own axes,
     repeated to `count`.
     """
     cosine, sine = canonical_axes(x, y, surface)
-    features = np.empty((count, len(FEATURES)), np.float32)
+    features = np.empty((count, len(POINT_FEATURES)), np.float32)
     for row in range(count):
         s = row % len(x)
         features[row, 0] = (cosine * x[s] + sine * y[s]) / POSITION_SCALE[0]
@@ -107,22 +107,22 @@ def farthest_points(x, y, z, count):
     count, keep = min(count, n), min(SURFACE_NEIGHBOURS, n)
     order, cover = np.empty(count, np.int64), np.empty(count)
     nearest, reach = np.empty((count, keep), np.int64), np.empty(count)
-    away = (x - x.mean()) ** 2 + (y - y.mean()) ** 2 + (z - z.mean()) ** 2
-    current = int(np.argmax(away))
+    distance = (x - x.mean()) ** 2 + (y - y.mean()) ** 2 + (z - z.mean()) ** 2
+    current = int(np.argmax(distance))
     uncovered = np.full(n, np.inf)
     bits = uncovered.view(np.int64)  # numbers that are not negative sort like their bits
     shortest = np.empty(keep)
     for k in range(count):
         order[k] = current
-        farthest = cover_from(x, y, z, current, away, uncovered, bits)
+        farthest = cover_points(x, y, z, current, distance, uncovered, bits)
         shortest[:] = np.inf
         last = np.inf
         # Clouds often come sorted by place: from the point outwards few others are nearer than the
         # last one kept.
         for start, stop, step in ((current, n, 1), (current - 1, -1, -1)):
             for i in range(start, stop, step):
-                if away[i] < last:
-                    insert(shortest, nearest[k], keep - 1, away[i], i)
+                if distance[i] < last:
+                    insert(shortest, nearest[k], keep - 1, distance[i], i)
                     last = shortest[keep - 1]
         current = 0
         while bits[current] < farthest:
@@ -132,16 +132,16 @@ def farthest_points(x, y, z, count):
 
 
 @compiled
-def cover_from(x, y, z, current, away, uncovered, bits):
-    """Squared distances of all points from the `current` one into `away`, and into `uncovered`
+def cover_points(x, y, z, current, distance, uncovered, bits):
+    """Squared distances of all points from the `current` one into `distance`, and into `uncovered`
     those from the nearest chosen one, the largest of whose `bits` are returned: LLVM compares
     several integers at a time, but not floats.
     """
     cx, cy, cz = x[current], y[current], z[current]
     for i in range(len(x)):
-        away[i] = (x[i] - cx) ** 2 + (y[i] - cy) ** 2 + (z[i] - cz) ** 2
+        distance[i] = (x[i] - cx) ** 2 + (y[i] - cy) ** 2 + (z[i] - cz) ** 2
     for i in range(len(x)):
-        uncovered[i] = uncovered[i] if uncovered[i] < away[i] else away[i]
+        uncovered[i] = uncovered[i] if uncovered[i] < distance[i] else distance[i]
     farthest = bits[0]
     for i in range(len(x)):
         farthest = max(farthest, bits[i])
@@ -196,8 +196,10 @@ def plane_normal(xx, xy, xz, yy, yz, zz):
     call it vertical.
     """
     mean = (xx + yy + zz) / 3
-    aside = xy * xy + xz * xz + yz * yz
-    scale = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * aside) / 6)
+    perpendicular = xy * xy + xz * xz + yz * yz
+    scale = math.sqrt(
+        ((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * perpendicular) / 6
+    )
     if scale < 1e-12:
         return 0.0, 0.0, 1.0, mean
     a, b, c = (xx - mean) / scale, (yy - mean) / scale, (zz - mean) / scale
@@ -244,14 +246,16 @@ def canonical_axes(x, y, surface):
     for turn in range(3):
         real, imaginary = 0.0, 0.0
         for s in range(n):
-            aside = azimuth[s] - kappa
-            aside -= math.pi / 2 * round(aside / (math.pi / 2))
-            near = (
-                weight[s] if turn == 0 else weight[s] * math.exp(-((aside / HARMONIC_WIDTH) ** 2))
+            perpendicular = azimuth[s] - kappa
+            perpendicular -= math.pi / 2 * round(perpendicular / (math.pi / 2))
+            nearby = (
+                weight[s]
+                if turn == 0
+                else weight[s] * math.exp(-((perpendicular / HARMONIC_WIDTH) ** 2))
             )
             real, imaginary = (
-                real + near * math.cos(4 * aside),
-                imaginary + near * math.sin(4 * aside),
+                real + nearby * math.cos(4 * perpendicular),
+                imaginary + nearby * math.sin(4 * perpendicular),
             )
         kappa += math.atan2(imaginary, real) / 4
     cosine, sine = math.cos(kappa), math.sin(kappa)
@@ -265,7 +269,7 @@ def canonical_axes(x, y, surface):
 
 
 @compiled
-def grouped(x, y, z, centres, sources, count, radius):
+def group_points(x, y, z, centres, sources, count, radius):
     """The nearest `count` of the first `sources` points within `radius` of each of the first
     `centres`, which repeat from the start where the points end: indices and distances (centres,
     count).
@@ -274,16 +278,16 @@ def grouped(x, y, z, centres, sources, count, radius):
     ball must hold a source, as it does where the centres are among them.
     """
     indices, distances = np.zeros((centres, count), np.int64), np.empty((centres, count))
-    away, shortest = np.empty(sources), np.empty(count)
+    distance, shortest = np.empty(sources), np.empty(count)
     for s in range(centres):
         cx, cy, cz = x[s % len(x)], y[s % len(x)], z[s % len(x)]
         for m in range(sources):
-            away[m] = (x[m] - cx) ** 2 + (y[m] - cy) ** 2 + (z[m] - cz) ** 2
+            distance[m] = (x[m] - cx) ** 2 + (y[m] - cy) ** 2 + (z[m] - cz) ** 2
         shortest[:] = np.inf
         last = np.nextafter(radius * radius, np.inf)
         for m in range(sources):
-            if away[m] < last:
-                insert(shortest, indices[s], count - 1, away[m], m)
+            if distance[m] < last:
+                insert(shortest, indices[s], count - 1, distance[m], m)
                 last = min(last, shortest[count - 1])
         for k in range(count):
             if shortest[k] == np.inf:
@@ -311,26 +315,26 @@ def thin_to_grid(xyz, count, chunk=500_000):
     n = len(xyz)
     if n <= count:
         return np.arange(n)
-    low = xyz.min(axis=0)
-    extent = np.maximum(xyz.max(axis=0) - low, 1e-6)
+    smallest = xyz.min(axis=0)
+    extent = np.maximum(xyz.max(axis=0) - smallest, 1e-6)
     cell = max(np.sqrt(extent[0] * extent[1] / count), extent.max() / 1e6)
     while True:
-        kept = first_of_each_cell(xyz, low, cell, chunk)
-        if len(kept) <= count:
-            return kept
-        cell *= max(1.1, np.sqrt(len(kept) / count))
+        selection = thin_to_cells(xyz, smallest, cell, chunk)
+        if len(selection) <= count:
+            return selection
+        cell *= max(1.1, np.sqrt(len(selection) / count))
 
 
-def first_of_each_cell(xyz, low, cell, chunk):
+def thin_to_cells(xyz, lower, cell, chunk):
     """Indices of the first point in each cube of side `cell`, ascending."""
-    seen = np.empty(0, np.int64)
-    kept = []
+    visited = np.empty(0, np.int64)
+    selection = []
     for start in range(0, len(xyz), chunk):
-        steps = np.floor((xyz[start : start + chunk] - low) / cell).astype(np.int64)
+        steps = np.floor((xyz[start : start + chunk] - lower) / cell).astype(np.int64)
         keys, first = np.unique(
             (steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_index=True
         )
-        new = ~np.isin(keys, seen, assume_unique=True)
-        seen = np.union1d(seen, keys[new])
-        kept.append(start + first[new])
-    return np.sort(np.concatenate(kept))
+        new = ~np.isin(keys, visited, assume_unique=True)
+        visited = np.union1d(visited, keys[new])
+        selection.append(start + first[new])
+    return np.sort(np.concatenate(selection))

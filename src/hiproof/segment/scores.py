@@ -23,10 +23,10 @@ class Scores:
     confusion: np.ndarray
 
     @classmethod
-    def of(cls, true: np.ndarray, told: np.ndarray, names: tuple[str, ...]) -> Scores:
-        """Scores of class indices `true` (n,) and `told` (n,), both in 0 .. len(names) - 1."""
+    def of(cls, true: np.ndarray, predicted: np.ndarray, names: tuple[str, ...]) -> Scores:
+        """Scores of class indices `true` (n,) and `predicted` (n,), both in 0 .. len(names) - 1."""
         size = len(names)
-        counts = np.bincount(np.asarray(true) * size + np.asarray(told), minlength=size * size)
+        counts = np.bincount(np.asarray(true) * size + np.asarray(predicted), minlength=size * size)
         return cls(tuple(names), counts.reshape(size, size))
 
     @property

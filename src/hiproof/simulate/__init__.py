@@ -15,7 +15,7 @@ edits            what a person may do to a building's parameters
 
 from .compounds import COMPOUND_KINDS, random_compound
 from .neighbourhood import demo_files
-from .roofs import SimBuilding, building_of, random_building
+from .roofs import SimBuilding, random_building, read_truth
 from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
 from .scene import SOURCES, Defects
 from .shapes import NOT_ROOF, ROOF_TYPES
@@ -30,10 +30,10 @@ __all__ = [
     "Scan",
     "ScanSettings",
     "SimBuilding",
-    "building_of",
     "demo_files",
     "random_building",
     "random_compound",
+    "read_truth",
     "scan",
     "scan_solids",
     "training_sample",

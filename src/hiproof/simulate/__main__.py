@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..errors import HiproofError
-from ..log import counted
+from ..log import count_things
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, help="Simulated towns with their truth."
@@ -30,7 +30,8 @@ def neighbourhood(
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error
     typer.echo(
-        f"{counted(counts['buildings'], 'building')}, {counted(counts['points'], 'point')} in {out}"
+        f"{count_things(counts['buildings'], 'building')}, "
+        f"{count_things(counts['points'], 'point')} in {out}"
     )
 
 
@@ -52,13 +53,13 @@ def city(
         for counts in write_city(out, City(buildings, seed, density, tile)):
             total += counts.points
             typer.echo(
-                f"{counts.tile}: {counted(counts.buildings, 'building')}, "
-                f"{counted(counts.points, 'point')}"
+                f"{counts.tile}: {count_things(counts.buildings, 'building')}, "
+                f"{count_things(counts.points, 'point')}"
             )
     except HiproofError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error
-    typer.echo(f"{counted(buildings, 'building')}, {counted(total, 'point')} in {out}")
+    typer.echo(f"{count_things(buildings, 'building')}, {count_things(total, 'point')} in {out}")
 
 
 if __name__ == "__main__":

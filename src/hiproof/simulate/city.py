@@ -19,16 +19,16 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from .relief import Relief
-from .roofs import SimBuilding, turned
+from .roofs import SimBuilding, turn_points
 from .scanner import ScanSettings
-from .survey import Bounds, Flight, patches_of, survey, write_footprints, write_laz
-from .town import Lot, furnished, street_side
+from .survey import Bounds, Flight, divide_into_patches, survey, write_footprints, write_laz
+from .town import Lot, furnish_lot, street_side
 
-ORIGIN_XY = np.array([95000.0, 455000.0])
-GROUND_M = 15.0  # m, heights of hills over valleys
+CITY_ORIGIN_XY = np.array([95000.0, 455000.0])
+GROUND_BORDER_M = 15.0  # m, heights of hills over valleys
 # rad; streets along no axis, so that nothing leans on the axes by chance
 HEADING = math.radians(11.0)
-BLOCK_M = np.array([100.0, 64.0])
+CITY_BLOCK_M = np.array([100.0, 64.0])
 STREET_M = 10.0  # m between blocks, pavements included
 BUILDINGS_A_BLOCK = 9.6  # on average, from which a city's number of blocks is told
 WORKS_SHARE = 0.12  # of the blocks hold works instead of houses, as at a town's edge
@@ -96,25 +96,25 @@ class City:
     def blocks_a_row(self) -> int:
         """As many as make the city about square."""
         blocks = self.buildings / BUILDINGS_A_BLOCK
-        return max(1, round(math.sqrt(blocks * BLOCK_M[1] / BLOCK_M[0])))
+        return max(1, round(math.sqrt(blocks * CITY_BLOCK_M[1] / CITY_BLOCK_M[0])))
 
     @property
     def terrain(self) -> Relief:
-        return Relief.random(np.random.default_rng([self.seed, 1]), GROUND_M, ORIGIN_XY)
+        return Relief.random(np.random.default_rng([self.seed, 1]), GROUND_BORDER_M, CITY_ORIGIN_XY)
 
     @property
     def flight(self) -> Flight:
-        return Flight(heading=HEADING + math.radians(35.0), origin=ORIGIN_XY)
+        return Flight(heading=HEADING + math.radians(35.0), origin=CITY_ORIGIN_XY)
 
 
 def block_buildings(seed: int, i: int, j: int, terrain: Relief) -> list[SimBuilding]:
     """The buildings of block (i, j): two rows of houses back to back, or one of works."""
     rng = np.random.default_rng([seed, 11, i, j])
-    corner = ORIGIN_XY + turned(BLOCK_M * [[i, j]], HEADING)[0]
-    length, depth = BLOCK_M - STREET_M
+    corner = CITY_ORIGIN_XY + turn_points(CITY_BLOCK_M * [[i, j]], HEADING)[0]
+    length, depth = CITY_BLOCK_M - STREET_M
     if rng.random() < WORKS_SHARE:
         return street_side(rng, drawn_names(rng, WORKS), corner, HEADING, length, depth, terrain)
-    opposite = corner + turned(np.array([[length, depth]]), HEADING)[0]
+    opposite = corner + turn_points(np.array([[length, depth]]), HEADING)[0]
     half = depth / 2 - 1.0
     front = street_side(rng, drawn_names(rng, HOUSES), corner, HEADING, length, half, terrain)
     back = street_side(
@@ -137,16 +137,17 @@ class Stock:
 
     def __init__(self, city: City):
         self.city, self.terrain = city, city.terrain
-        self.blocks, self.first = self.counted()
-        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * BLOCK_M
-        lower = np.array(self.blocks) * BLOCK_M
+        self.blocks, self.first = self.count_blocks()
+        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * CITY_BLOCK_M
+        lower = np.array(self.blocks) * CITY_BLOCK_M
         plan = (
-            turned((lower[:, None] + corners).reshape(-1, 2), HEADING).reshape(-1, 4, 2) + ORIGIN_XY
+            turn_points((lower[:, None] + corners).reshape(-1, 2), HEADING).reshape(-1, 4, 2)
+            + CITY_ORIGIN_XY
         )
         self.low, self.high = plan.min(axis=1), plan.max(axis=1)
-        self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.lots_of)
+        self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.draw_lots)
 
-    def counted(self) -> tuple[list[tuple[int, int]], list[int]]:
+    def count_blocks(self) -> tuple[list[tuple[int, int]], list[int]]:
         """Blocks, and the number of buildings before each; the last block may be cut short."""
         blocks, first, total, k = [], [], 0, 0
         while total < self.city.buildings:
@@ -157,7 +158,7 @@ class Stock:
             k += 1
         return blocks, first
 
-    def lots_of(self, block: int) -> tuple[Lot, ...]:
+    def draw_lots(self, block: int) -> tuple[Lot, ...]:
         """The lots of a block, drawn by its number alone;
 
         `lots` keeps those of the blocks asked for last.
@@ -165,25 +166,25 @@ class Stock:
         start, seed, (i, j) = self.first[block], self.city.seed, self.blocks[block]
         buildings = block_buildings(seed, i, j, self.terrain)[: self.city.buildings - start]
         return tuple(
-            furnished(np.random.default_rng([seed, 12, i, j, k]), f"b{start + k:07d}", building)
+            furnish_lot(np.random.default_rng([seed, 12, i, j, k]), f"b{start + k:07d}", building)
             for k, building in enumerate(buildings, 1)
         )
 
-    def blocks_near(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Numbers of the blocks that reach within SURROUNDINGS_M of the rectangle from `low` to
-        `high` (2,).
+    def find_blocks(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+        """Numbers of the blocks that reach within SURROUNDINGS_M of the rectangle from `lower` to
+        `upper` (2,).
         """
-        is_near = (self.low < high + SURROUNDINGS_M) & (self.high > low - SURROUNDINGS_M)
+        is_near = (self.low < upper + SURROUNDINGS_M) & (self.high > lower - SURROUNDINGS_M)
         return np.flatnonzero(is_near.all(axis=1))
 
     def near(self, bounds: Bounds) -> list[Lot]:
         """All lots of the blocks that reach into `bounds`, their trees and shadows included."""
-        blocks = self.blocks_near(np.array(bounds[:2]), np.array(bounds[2:]))
+        blocks = self.find_blocks(np.array(bounds[:2]), np.array(bounds[2:]))
         return [lot for block in blocks for lot in self.lots(int(block))]
 
     def patches(self, bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
         """The patches of `bounds` in or beside the city; the country around it is not surveyed."""
-        return [patch for patch in patches_of(bounds) if len(self.blocks_near(*patch))]
+        return [patch for patch in divide_into_patches(bounds) if len(self.find_blocks(*patch))]
 
     def tiles(self) -> Iterator[Bounds]:
         """Squares of the city's tile size, on round coordinates, that touch a block."""
@@ -229,15 +230,15 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
             stock.patches(bounds), lots, stock.terrain, city.flight, city.seed, settings
         )
         points = write_laz(folder / "tiles" / f"{name}.laz", clouds, np.array([*bounds[:2], 0.0]))
-        own = [lot for lot in lots if holds(bounds, lot)]
-        if own:
-            write_footprints(footprints, own, append=footprints.exists())
+        selected_lots = [lot for lot in lots if holds(bounds, lot)]
+        if selected_lots:
+            write_footprints(footprints, selected_lots, append=footprints.exists())
         with truth.open("a") as file:
             file.writelines(
                 json.dumps({"id": lot.id, "tile": name, **lot.building.truth()}) + "\n"
-                for lot in own
+                for lot in selected_lots
             )
-        yield Written(name, len(own), points)
+        yield Written(name, len(selected_lots), points)
 
 
 def holds(bounds: Bounds, lot: Lot) -> bool:

@@ -34,7 +34,7 @@ COMPOUND_KINDS = (
 DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 
-class Layout:
+class CompoundLayout:
     """The building's axes: parts are placed by their centre (u, v) and a number of quarter
     turns.
     """
@@ -74,15 +74,15 @@ def random_compound(
     kind = COMPOUND_KINDS[rng.integers(len(COMPOUND_KINDS))] if kind is None else kind
     if kind not in COMPOUND_KINDS:
         raise InputError(f"expected a kind of compound ({', '.join(COMPOUND_KINDS)}), got {kind!r}")
-    layout = Layout(rng.uniform(-math.pi, math.pi) if kappa is None else kappa)
+    layout = CompoundLayout(rng.uniform(-math.pi, math.pi) if kappa is None else kappa)
     if kind in ("L", "T", "U", "cross"):
-        parts = winged(rng, layout, kind)
+        parts = make_winged(rng, layout, kind)
     else:
         parts = OTHERS[kind](rng, layout)
     return assemble(tuple(parts), kind, origin)
 
 
-def winged(rng: np.random.Generator, layout: Layout, kind: str) -> list[Part]:
+def make_winged(rng: np.random.Generator, layout: CompoundLayout, kind: str) -> list[Part]:
     """A main body with one or two wings at right angles, all gables, all hips or all flat."""
     type = str(rng.choice(("gable", "hip", "flat"), p=(0.6, 0.2, 0.2)))
     width, eave = rng.uniform(6.5, 11.0), random_eave(rng)
@@ -126,7 +126,7 @@ def regular(type: str, length: float, width: float, slope: float) -> dict[str, f
     return parameters
 
 
-def extended(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def make_extended(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """A house with a lower annex along its eave: a flat roof, or a lean-to that rises towards the
     house.
     """
@@ -147,21 +147,25 @@ def extended(rng: np.random.Generator, layout: Layout) -> list[Part]:
     ]
 
 
-def two_level_blocks(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def make_level_blocks(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """Two flat blocks side by side, a storey or more apart."""
-    low, high = random_parameters(rng, "flat"), random_parameters(rng, "flat")
-    high = high | {"width": low["width"] * float(rng.uniform(0.6, 1.0))}
+    parameters, upper = random_parameters(rng, "flat"), random_parameters(rng, "flat")
+    upper = upper | {"width": parameters["width"] * float(rng.uniform(0.6, 1.0))}
     eave = random_eave(rng)
-    v = (low["width"] - high["width"]) / 2
+    v = (parameters["width"] - upper["width"]) / 2
     return [
-        layout.part("flat", low, 0.0, 0.0, eave),
+        layout.part("flat", parameters, 0.0, 0.0, eave),
         layout.part(
-            "flat", high, (low["length"] + high["length"]) / 2, v, eave + rng.uniform(1.2, 6.0)
+            "flat",
+            upper,
+            (parameters["length"] + upper["length"]) / 2,
+            v,
+            eave + rng.uniform(1.2, 6.0),
         ),
     ]
 
 
-def saw_tooth_hall_and_office(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def saw_tooth_hall_and_office(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """A saw-tooth hall with a flat-roofed office along the foot of its first tooth."""
     hall, eave = random_parameters(rng, "shed"), rng.uniform(4.5, 7.0)
     office = {"length": hall["length"], "width": float(rng.uniform(5.0, 9.0))}
@@ -172,7 +176,7 @@ def saw_tooth_hall_and_office(rng: np.random.Generator, layout: Layout) -> list[
     ]
 
 
-def houses_in_a_row(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def houses_in_a_row(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """Terraced houses: slices of one depth whose ridges run along the row, some stepped, now and
     then a flat one.
     """
@@ -188,7 +192,7 @@ def houses_in_a_row(rng: np.random.Generator, layout: Layout) -> list[Part]:
     return parts
 
 
-def dormered(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def make_dormered(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """A house with one to four dormers of one shape, on one slope or on both."""
     type = "gable" if rng.random() < 0.75 else "hip"
     width, slope = rng.uniform(8.0, 11.0), math.tan(math.radians(rng.uniform(38, 52)))
@@ -231,7 +235,7 @@ def dormer(
     return type, float(depth), float(front), (float(front * slope + wall), rise)
 
 
-def winged_hip_roof(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def winged_hip_roof(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """A hip with two lower wings alike, gables or hips, on one side of it or on both."""
     type = str(rng.choice(("gable", "hip")))
     width, eave = rng.uniform(8.0, 12.0), random_eave(rng)
@@ -250,7 +254,7 @@ def winged_hip_roof(rng: np.random.Generator, layout: Layout) -> list[Part]:
     ]
 
 
-def hips_that_share_a_corner(rng: np.random.Generator, layout: Layout) -> list[Part]:
+def make_corner_hips(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
     """Two hips of one width, slope and eave that share a corner: their ridges meet there at one
     height.
     """
@@ -271,11 +275,11 @@ def hips_that_share_a_corner(rng: np.random.Generator, layout: Layout) -> list[P
 
 
 OTHERS = {
-    "extension": extended,
-    "two_level": two_level_blocks,
+    "extension": make_extended,
+    "two_level": make_level_blocks,
     "saw_tooth_hall": saw_tooth_hall_and_office,
     "row": houses_in_a_row,
-    "dormered": dormered,
+    "dormered": make_dormered,
     "winged_hip": winged_hip_roof,
-    "L_of_hips": hips_that_share_a_corner,
+    "L_of_hips": make_corner_hips,
 }

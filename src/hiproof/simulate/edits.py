@@ -11,7 +11,7 @@ import numpy as np
 from ..model import Building
 from ..primitives.catalogue import CATALOGUE
 
-KINDS = ("parameter", "type", "ridge", "eave", "turn", "move", "size", "add", "remove")
+EDIT_KINDS = ("parameter", "type", "ridge", "eave", "turn", "move", "size", "add", "remove")
 
 
 def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int, dict[str, Any]]:
@@ -20,7 +20,7 @@ def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int,
     Parameters become anything from a hundredth to four times what they were, now and then below
     zero or none at all; types any other; parts go up to 5 m aside, and turn anywhere.
     """
-    kind = str(rng.choice(KINDS))
+    kind = str(rng.choice(EDIT_KINDS))
     index = int(rng.integers(len(building.parts)))
     part, z = building.parts[index], float(building.roof.frame.origin[2])
     x0, y0, x1, y1 = building.roof.outline.bounds
@@ -61,7 +61,7 @@ def random_value(rng: np.random.Generator, value: float) -> float:
     )
 
 
-def edited(rng: np.random.Generator, building: Building) -> Building:
+def edit_at_random(rng: np.random.Generator, building: Building) -> Building:
     """The building after a random edit.
 
     Raises the HiproofError of an edit that makes no building.

@@ -28,7 +28,7 @@ class Beams:
     def __len__(self) -> int:
         return len(self.xy0)
 
-    def chosen(self, keep: np.ndarray) -> Beams:
+    def select(self, keep: np.ndarray) -> Beams:
         return Beams(self.xy0[keep], self.slope[keep], self.shift[keep])
 
 
@@ -94,7 +94,7 @@ def random_swaths(
     return swaths
 
 
-def beams_of(
+def make_beams(
     rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius: float, z_ref: float
 ) -> Beams:
     """Beams of `swath` that cross the disc of `radius` about `centre` (2,) at height `z_ref`."""
@@ -138,7 +138,7 @@ def lattice(
     return along, phase, steps * swath.point_spacing + across
 
 
-def joined(beams: list[Beams]) -> Beams:
+def join_beams(beams: list[Beams]) -> Beams:
     if len(beams) == 1:
         return beams[0]
     return Beams(

@@ -12,10 +12,18 @@ from pathlib import Path
 import numpy as np
 
 from .relief import Relief
-from .roofs import SimBuilding, turned
+from .roofs import SimBuilding, turn_points
 from .scanner import ScanSettings
-from .survey import CRS, Flight, patches_of, survey, write_footprints, write_laz, write_terrain
-from .town import Lot, furnished, street_side
+from .survey import (
+    CRS,
+    Flight,
+    divide_into_patches,
+    survey,
+    write_footprints,
+    write_laz,
+    write_terrain,
+)
+from .town import Lot, furnish_lot, street_side
 
 DEMO_SEED = 5  # whose neighbourhood has every roof type
 ORIGIN_XY = np.array([92000.0, 451000.0])
@@ -28,8 +36,8 @@ STREETS = (
     ("saw_tooth_hall", "monopitch", "asymmetric_gable", "mansard", "gambrel"),
 )
 STREET_WIDTH_M = 9.0  # m between the rows of houses
-BORDER_M = 8.0  # m of ground around the outermost houses, for their terrain
-FILES = ("cloud.laz", "footprints.gpkg", "terrain.tif", "truth.json")
+TERRAIN_BORDER_M = 8.0  # m of ground around the outermost houses, for their terrain
+DEMO_FILES = ("cloud.laz", "footprints.gpkg", "terrain.tif", "truth.json")
 SCAN = ScanSettings(density=8.0, range_noise_m=0.02, horizontal_noise_m=0.04, beam_radius_m=0.1)
 
 
@@ -40,7 +48,7 @@ def demo_files() -> dict[str, Path]:
     ['cloud', 'footprints', 'terrain', 'truth']
     """
     folder = resources.files("hiproof") / "data" / "demo"
-    return {Path(name).stem: Path(str(folder / name)) for name in FILES}
+    return {Path(name).stem: Path(str(folder / name)) for name in DEMO_FILES}
 
 
 def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
@@ -52,17 +60,17 @@ def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
     for names in STREETS:
         side = street_side(rng, names, start, heading, math.inf, math.inf, terrain)
         top = max(depth_across(building, start, heading) for building in side)
-        start = start + turned(np.array([[0.0, top + STREET_WIDTH_M]]), heading)[0]
+        start = start + turn_points(np.array([[0.0, top + STREET_WIDTH_M]]), heading)[0]
         buildings += side
     return [
-        furnished(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)
+        furnish_lot(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)
     ], terrain
 
 
 def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
     """How far a building reaches from a street that begins at `start` (2,), m."""
     corners = np.array(building.footprint.exterior.coords) - start
-    return float(turned(corners, -heading)[:, 1].max())
+    return float(turn_points(corners, -heading)[:, 1].max())
 
 
 def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
@@ -76,15 +84,15 @@ def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     import_rasterio()
     lots, terrain = neighbourhood(seed)
     corners = np.array([lot.building.footprint.bounds for lot in lots])
-    low, high = (
-        np.floor(corners[:, :2].min(axis=0)) - BORDER_M,
-        np.ceil(corners[:, 2:].max(axis=0)) + BORDER_M,
+    lower, upper = (
+        np.floor(corners[:, :2].min(axis=0)) - TERRAIN_BORDER_M,
+        np.ceil(corners[:, 2:].max(axis=0)) + TERRAIN_BORDER_M,
     )
-    bounds = (*low, *high)
+    bounds = (*lower, *upper)
     flight = Flight(heading=math.radians(70.0), origin=ORIGIN_XY - 250.0)
     folder.mkdir(parents=True, exist_ok=True)
-    clouds = survey(patches_of(bounds), lots, terrain, flight, seed, SCAN)
-    points = write_laz(folder / "cloud.laz", clouds, np.array([*low, 0.0]))
+    clouds = survey(divide_into_patches(bounds), lots, terrain, flight, seed, SCAN)
+    points = write_laz(folder / "cloud.laz", clouds, np.array([*lower, 0.0]))
     write_footprints(folder / "footprints.gpkg", lots)
     write_terrain(folder / "terrain.tif", bounds, terrain)
     truth = {

@@ -52,7 +52,7 @@ class Relief:
             amplitude * np.sin(kx * x + ky * y + phase) for kx, ky, phase, amplitude in self.waves
         )
 
-    def moved(self, shift: np.ndarray) -> Relief:
+    def move(self, shift: np.ndarray) -> Relief:
         """The same terrain in a frame whose points are those of this one plus `shift` (3,)."""
         return Relief(self.waves, self.base + float(shift[2]), self.origin + shift[:2])
 

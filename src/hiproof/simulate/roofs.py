@@ -39,7 +39,7 @@ class SimBuilding:
     @property
     def largest(self) -> Part:
         """The part of the largest outline."""
-        return largest_of(self.roof)
+        return find_largest_part(self.roof)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -106,21 +106,21 @@ def assemble(
 ) -> SimBuilding:
     """`parts` as a building on the ground at `origin`; the outline is the union of their pieces."""
     roof = Roof(parts, united_outline(parts), LocalFrame(np.asarray(origin, float)))
-    return SimBuilding(largest_of(roof).type, kind, roof, float(origin[2]))
+    return SimBuilding(find_largest_part(roof).type, kind, roof, float(origin[2]))
 
 
-def largest_of(roof: Roof) -> Part:
+def find_largest_part(roof: Roof) -> Part:
     """The part of the largest outline, what others hide of it included."""
     return max(roof.parts, key=lambda part: part.area)
 
 
-def building_of(truth: dict) -> SimBuilding:
+def read_truth(truth: dict) -> SimBuilding:
     """The building whose `SimBuilding.truth` was written to a file.
 
     Raises InputError for anything else.
 
     >>> building = random_building(np.random.default_rng(3), "mansard")
-    >>> building_of(building.truth()).outline.equals_exact(building.outline, 1e-9)
+    >>> read_truth(building.truth()).outline.equals_exact(building.outline, 1e-9)
     True
     """
     try:
@@ -141,11 +141,13 @@ def building_of(truth: dict) -> SimBuilding:
         ) from error
 
 
-def turned_building(building: SimBuilding, angle: float) -> SimBuilding:
+def turn_building(building: SimBuilding, angle: float) -> SimBuilding:
     """The building turned by `angle` (rad) about its frame's origin."""
     parts = []
     for part in building.roof.parts:
-        translation = np.append(turned(part.translation[None, :2], angle)[0], part.translation[2])
+        translation = np.append(
+            turn_points(part.translation[None, :2], angle)[0], part.translation[2]
+        )
         parts.append(make_part(part.type, part.parameters, part.kappa + angle, translation))
     return assemble(tuple(parts), building.kind, building.roof.frame.origin)
 
@@ -158,13 +160,14 @@ def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
     if len(outlines) == 1:
         return outlines[0]
     aligned = [
-        shapely.transform(outline, lambda xy: turned(xy, -parts[0].kappa)) for outline in outlines
+        shapely.transform(outline, lambda xy: turn_points(xy, -parts[0].kappa))
+        for outline in outlines
     ]
     union = shapely.union_all(aligned, grid_size=1e-6).normalize().reverse()
-    return shapely.transform(union.simplify(0.0), lambda xy: turned(xy, parts[0].kappa))
+    return shapely.transform(union.simplify(0.0), lambda xy: turn_points(xy, parts[0].kappa))
 
 
-def turned(xy: np.ndarray, angle: float) -> np.ndarray:
+def turn_points(xy: np.ndarray, angle: float) -> np.ndarray:
     """Plan points (n, 2) turned by `angle` (rad) about the origin."""
     cosine, sine = math.cos(angle), math.sin(angle)
     return xy @ np.array([(cosine, sine), (-sine, cosine)])
@@ -185,4 +188,4 @@ def random_parameters(
     slopes or eaves.
     """
     width = float(rng.uniform(5.0, 13.0)) if width is None else float(width)
-    return get(type).drawn(rng, width)
+    return get(type).draw_parameters(rng, width)

@@ -12,7 +12,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Solid
-from .flight import Beams, beams_of, joined, random_swaths
+from .flight import Beams, join_beams, make_beams, random_swaths
 from .raycast import cast_convex, cast_crowns, cast_triangles
 from .roofs import SimBuilding
 from .scene import (
@@ -22,11 +22,11 @@ from .scene import (
     Defects,
     Scene,
     building_bodies,
+    make_scene,
     random_scene,
-    scene_of,
     solids_scene,
 )
-from .shapes import NOT_ROOF, label_of
+from .shapes import NOT_ROOF, find_label
 
 MERGED_RETURNS_M = 0.6  # m; a pulse of some nanoseconds cannot tell surfaces nearer to each other
 LEAF_PATH_M = 1.8  # m that a beam goes through leaves on average before it meets one
@@ -67,10 +67,10 @@ class Scan:
     def __len__(self) -> int:
         return len(self.points)
 
-    def chosen(self, keep: np.ndarray) -> Scan:
+    def select(self, keep: np.ndarray) -> Scan:
         return Scan(self.points[keep], self.label[keep], self.source[keep])
 
-    def moved(self, shift: np.ndarray) -> Scan:
+    def move(self, shift: np.ndarray) -> Scan:
         return Scan(self.points + shift, self.label, self.source)
 
 
@@ -85,7 +85,7 @@ def scan(
     >>> cloud.points.shape[1], int(cloud.label.max())
     (3, 2)
     """
-    settings = checked(settings or ScanSettings())
+    settings = check_settings(settings or ScanSettings())
     scene = random_scene(rng, building, settings.defects)
     outline = (
         building.outline
@@ -93,7 +93,7 @@ def scan(
         else building.outline.buffer(settings.margin_m, quad_segs=2)
     )
     z_roof = building.roof.parts[0].translation[2]
-    return scan_scene(scene, outline, z_roof, rng, settings).moved(building.roof.frame.origin)
+    return scan_scene(scene, outline, z_roof, rng, settings).move(building.roof.frame.origin)
 
 
 def scan_solids(
@@ -109,22 +109,22 @@ def scan_solids(
     Of the defects only the scanner's own happen (missing strips, swath edges, partial roofs,
     outliers). Raises InputError without solids.
     """
-    settings = checked(settings or ScanSettings())
+    settings = check_settings(settings or ScanSettings())
     if not solids:
         raise InputError(
             "expected at least one solid to scan, got none; check the file that was read"
         )
     types = [None] * len(solids) if types is None else types
-    labels = [label_of(type) for type in types]
+    labels = [find_label(type) for type in types]
     vertices = np.concatenate([solid.vertices for solid in solids])
     origin = np.append(np.round(vertices[:, :2].mean(axis=0)), vertices[:, 2].min())
-    scene = solids_scene([solid.moved(-origin) for solid in solids], labels)
+    scene = solids_scene([solid.move(-origin) for solid in solids], labels)
     cells = shapely.polygons(scene.triangles[:, :, :2])
     plan = shapely.union_all(cells[shapely.area(cells) > 1e-6])
     height = float(vertices[:, 2].max() - origin[2])
     return scan_scene(
         scene, plan.buffer(settings.margin_m, quad_segs=2), height / 2, rng, settings
-    ).moved(origin)
+    ).move(origin)
 
 
 def scan_scene(
@@ -146,11 +146,11 @@ def scan_scene(
         rng, settings.density, tan_max, settings.registration_m, defects.swath_edge, reach / 2
     )
     radius = reach + tan_max * z_ref
-    beams = [beams_of(rng, swath, centre, radius, z_ref) for swath in swaths]
+    beams = [make_beams(rng, swath, centre, radius, z_ref) for swath in swaths]
     if rng.random() < defects.missing_strip:
         beams[0] = without_strip(rng, beams[0], swaths[0].heading, centre, reach)
-    cloud = returns(scene, joined(beams), rng, settings)
-    cloud = cloud.chosen(shapely.contains_xy(area, cloud.points[:, 0], cloud.points[:, 1]))
+    cloud = returns(scene, join_beams(beams), rng, settings)
+    cloud = cloud.select(shapely.contains_xy(area, cloud.points[:, 0], cloud.points[:, 1]))
     if rng.random() < defects.partial and len(cloud):
         cloud = without_corner(rng, cloud, centre, reach)
     if defects.outliers > 0 and len(cloud):
@@ -166,12 +166,12 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
     n = len(z_hit)
     xy0, slope, shift = beams.xy0, beams.slope, beams.shift
     if settings.beam_radius_m > 0:
-        aside = rng.normal(0.0, settings.beam_radius_m / 2, (n, 2))
-        z_aside, source_aside, label_aside = first_hits(scene, xy0 + aside, slope)
+        perpendicular = rng.normal(0.0, settings.beam_radius_m / 2, (n, 2))
+        z_aside, source_aside, label_aside = first_hits(scene, xy0 + perpendicular, slope)
         share = rng.uniform(0.5, 1.0, n)
-        near = np.abs(z_aside - z_hit) < MERGED_RETURNS_M
-        split = np.flatnonzero(~near & (rng.random(n) < 0.4))
-        z_hit = np.where(near, share * z_hit + (1 - share) * z_aside, z_hit)
+        mask = np.abs(z_aside - z_hit) < MERGED_RETURNS_M
+        split = np.flatnonzero(~mask & (rng.random(n) < 0.4))
+        z_hit = np.where(mask, share * z_hit + (1 - share) * z_aside, z_hit)
         z_hit, source, label = (
             np.concatenate([first, second[split]])
             for first, second in ((z_hit, z_aside), (source, source_aside), (label, label_aside))
@@ -180,8 +180,10 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
             np.concatenate([values, values[split]]) for values in (xy0, slope, shift)
         )
     if len(scene.crowns):
-        z_hit, source, label, kept = caught_by_leaves(scene, xy0, slope, z_hit, source, label, rng)
-        xy0, slope, shift = xy0[kept], slope[kept], shift[kept]
+        z_hit, source, label, selection = caught_by_leaves(
+            scene, xy0, slope, z_hit, source, label, rng
+        )
+        xy0, slope, shift = xy0[selection], slope[selection], shift[selection]
     noise = rng.standard_normal((len(z_hit), 3))
     points = np.empty((len(z_hit), 3))
     points[:, :2] = xy0 + slope * z_hit[:, None] + settings.horizontal_noise_m * noise[:, :2]
@@ -224,12 +226,12 @@ def caught_by_leaves(
     z_crown = np.full(len(xy0), -np.inf)
     cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
     caught = z_crown > z_hit
-    below = ~caught | (rng.random(len(xy0)) < 0.33)
-    kept = np.concatenate([np.flatnonzero(caught), np.flatnonzero(below)])
+    mask = ~caught | (rng.random(len(xy0)) < 0.33)
+    selection = np.concatenate([np.flatnonzero(caught), np.flatnonzero(mask)])
     leaves = int(caught.sum())
-    z, sources, labels = z_hit[kept], source[kept], label[kept]
+    z, sources, labels = z_hit[selection], source[selection], label[selection]
     z[:leaves], sources[:leaves], labels[:leaves] = z_crown[caught], SOURCE_TREE, NOT_ROOF
-    return z, sources, labels, kept
+    return z, sources, labels, selection
 
 
 def without_strip(
@@ -238,7 +240,7 @@ def without_strip(
     """Some scan lines lost: a band of 0.8 to 3 m across the flight."""
     along = (beams.xy0 - centre) @ (math.cos(heading), math.sin(heading))
     start, width = rng.uniform(-0.7, 0.7) * reach, rng.uniform(0.8, 3.0)
-    return beams.chosen((along < start) | (along > start + width))
+    return beams.select((along < start) | (along > start + width))
 
 
 def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, reach: float) -> Scan:
@@ -248,18 +250,20 @@ def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, re
     angle, radius = rng.uniform(-math.pi, math.pi), reach * rng.uniform(0.25, 0.6)
     middle = centre + 0.8 * reach * np.array([math.cos(angle), math.sin(angle)])
     keep = ((cloud.points[:, :2] - middle) ** 2).sum(axis=1) > radius**2
-    return cloud.chosen(keep) if keep.sum() > 0.4 * len(keep) else cloud
+    return cloud.select(keep) if keep.sum() > 0.4 * len(keep) else cloud
 
 
 def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
     """A few returns from nothing: birds above, multiple reflections below."""
     count = rng.poisson(share * len(cloud))
-    at = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(0.0, 1.0, (count, 3)) * (
+    position = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(
+        0.0, 1.0, (count, 3)
+    ) * (
         0.3,
         0.3,
         3.0,
     )
-    points = np.concatenate([cloud.points, at])
+    points = np.concatenate([cloud.points, position])
     label = np.concatenate([cloud.label, np.full(count, NOT_ROOF, np.int8)])
     return Scan(
         points, label, np.concatenate([cloud.source, np.full(count, SOURCE_CLUTTER, np.int8)])
@@ -285,10 +289,10 @@ def uniform_points(
 
 def bare_scene(building: SimBuilding) -> Scene:
     """The building alone on level ground."""
-    return scene_of(building_bodies(building))
+    return make_scene(building_bodies(building))
 
 
-def checked(settings: ScanSettings) -> ScanSettings:
+def check_settings(settings: ScanSettings) -> ScanSettings:
     """`settings`, or InputError where a scanner could not have them."""
     if not 0.05 <= settings.density <= 1000:
         raise InputError(

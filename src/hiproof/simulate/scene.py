@@ -15,8 +15,8 @@ from ..errors import InputError
 from ..geometry.rings import ring_normal
 from ..model import ROOF, Piece, Solid
 from .relief import Plane, Relief
-from .roofs import SimBuilding, random_parameters, turned
-from .shapes import NOT_ROOF, ROOF_TYPES, box, label_of, make_part
+from .roofs import SimBuilding, random_parameters, turn_points
+from .shapes import NOT_ROOF, ROOF_TYPES, box, find_label, make_part
 
 # what a beam met, by its place in SOURCES
 SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)
@@ -80,7 +80,7 @@ class Body:
     shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 
-def halfspaces_of(piece: Piece) -> np.ndarray:
+def list_halfspaces(piece: Piece) -> np.ndarray:
     """Outline edges, then planes, as rows (nx, ny, nz, d) with n . p <= d inside.
 
     Raises InputError when not convex.
@@ -107,31 +107,31 @@ def halfspaces_of(piece: Piece) -> np.ndarray:
     return np.concatenate([walls, roofs])
 
 
-def disc_of(body: Body) -> tuple[float, float, float, float]:
+def bound_body(body: Body) -> tuple[float, float, float, float]:
     """(x, y, z, radius): beams up to 45 degrees off the vertical that hit the body above ground
     pass this disc at z.
     """
     corners = shapely.get_coordinates(body.piece.outline)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    x, y = (low + high) / 2 + body.shift[:2]
-    radius = math.hypot(*(high - low)) / 2
+    smallest, largest = corners.min(axis=0), corners.max(axis=0)
+    x, y = (smallest + largest) / 2 + body.shift[:2]
+    radius = math.hypot(*(largest - smallest)) / 2
     planes = body.piece.planes
     peak = (corners @ planes[:, :2].T + planes[:, 2]).max(axis=0).min()
     half_height = peak / 2
     return x, y, half_height + body.shift[2], radius + half_height + DISC_SLACK_M
 
 
-def scene_of(
+def make_scene(
     bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: Plane | Relief | None = None
 ) -> Scene:
     """Bodies packed for the beams; `crowns` and `terrain` are in the scene's frame."""
     sides, discs, source, label = [np.empty((0, 4))], [], [], []
     for body in bodies:
-        rows = halfspaces_of(body.piece)
+        rows = list_halfspaces(body.piece)
         rows[:, 3] += rows[:, :3] @ body.shift
         tops = len(body.piece.planes)
         sides.append(rows)
-        discs.append(disc_of(body))
+        discs.append(bound_body(body))
         source += [body.wall_source] * (len(rows) - tops) + [body.top_source] * tops
         label += [NOT_ROOF] * (len(rows) - tops) + [body.label] * tops
     return Scene(
@@ -148,7 +148,7 @@ def scene_of(
 def building_bodies(building: SimBuilding) -> list[Body]:
     """The building's pieces, each roof labelled with its part's type."""
     return [
-        Body(piece, label=label_of(part.type))
+        Body(piece, label=find_label(part.type))
         for part in building.roof.parts
         for piece in part.pieces
     ]
@@ -164,7 +164,7 @@ def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defec
         bodies += neighbour(rng, building)
     crowns = trees(rng, building) if has_tree else None
     terrain = Plane(*rng.normal(0.0, 0.03, 2)) if defects != Defects.none() else None
-    return scene_of(bodies, crowns, terrain)
+    return make_scene(bodies, crowns, terrain)
 
 
 def superstructures(
@@ -240,7 +240,7 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
     type = ROOF_TYPES[rng.choice((0, 1, 2, 3))]
     parameters = random_parameters(rng, type)
     gap = 0.0 if rng.random() < 0.4 else rng.uniform(0.5, 4.0)
-    outline = shapely.transform(building.outline, lambda xy: turned(xy, -part.kappa))
+    outline = shapely.transform(building.outline, lambda xy: turn_points(xy, -part.kappa))
     u_low, v_low, u_high, v_high = outline.bounds
     sign = rng.choice((-1.0, 1.0))
     if rng.random() < 0.6:
@@ -249,7 +249,7 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
     else:
         u = (u_low + u_high) / 2 + rng.normal(0.0, 1.0)
         v = (v_high if sign > 0 else v_low) + sign * (gap + parameters["width"] / 2)
-    x, y = turned(np.array([[u, v]]), part.kappa)[0]
+    x, y = turn_points(np.array([[u, v]]), part.kappa)[0]
     eave = max(2.2, part.translation[2] + rng.normal(0.0, 1.5))
     body = make_part(type, parameters, part.kappa, np.array([x, y, eave]))
     return [Body(piece, SOURCE_CLUTTER, SOURCE_CLUTTER) for piece in body.pieces]
@@ -263,9 +263,9 @@ def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
     centre = corners.mean(axis=0)
     crowns = []
     for _ in range(1 + int(rng.integers(3))):
-        at = rng.integers(len(corners))
+        position = rng.integers(len(corners))
         share = 0.3 * rng.random()
-        foot = (1 - share) * corners[at] + share * corners[(at + 1) % len(corners)]
+        foot = (1 - share) * corners[position] + share * corners[(position + 1) % len(corners)]
         outward = (foot - centre) / max(math.hypot(*(foot - centre)), 1e-9)
         radius, half_height = rng.uniform(1.2, 3.8), rng.uniform(1.5, 4.5)
         foot = foot + outward * radius * rng.uniform(0.3, 1.1) + rng.normal(0.0, 0.5, 2)
@@ -274,24 +274,24 @@ def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
 
 
 def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
-    """Any closed solids as triangles; their RoofSurfaces carry `labels` (of `label_of`)."""
+    """Any closed solids as triangles; their RoofSurfaces carry `labels` (of `find_label`)."""
     triangles, source, label = [np.empty((0, 3, 3))], [], []
     for solid, roof_label in zip(solids, labels, strict=True):
         for face in solid.faces:
-            pieces = triangulated(solid.vertices, face.rings)
+            pieces = triangulate(solid.vertices, face.rings)
             is_roof = face.kind == ROOF
             triangles.append(pieces)
             source += [SOURCE_ROOF if is_roof else SOURCE_WALL] * len(pieces)
             label += [roof_label if is_roof else NOT_ROOF] * len(pieces)
     return replace(
-        scene_of([]),
+        make_scene([]),
         triangles=np.concatenate(triangles),
         triangle_source=np.array(source, np.int8),
         triangle_label=np.array(label, np.int8),
     )
 
 
-def triangulated(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np.ndarray:
+def triangulate(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np.ndarray:
     """Triangles (m, 3, 3) of one planar polygon with holes, cut in the coordinate plane it faces
     most.
     """
@@ -300,9 +300,11 @@ def triangulated(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np
         return outer[None]
     normal = ring_normal(outer)
     drop = int(np.argmax(np.abs(normal)))
-    kept = [axis for axis in range(3) if axis != drop]
+    selection = [axis for axis in range(3) if axis != drop]
     flat = shapely.make_valid(
-        shapely.Polygon(outer[:, kept], [vertices[list(ring)][:, kept] for ring in rings[1:]])
+        shapely.Polygon(
+            outer[:, selection], [vertices[list(ring)][:, selection] for ring in rings[1:]]
+        )
     )
     if abs(normal[drop]) < 1e-9 or flat.area < 1e-9:
         return np.empty((0, 3, 3))
@@ -310,7 +312,7 @@ def triangulated(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np
     cells = cells[shapely.area(cells) > 0]
     corners = shapely.get_coordinates(cells).reshape(-1, 4, 2)[:, :3]
     out = np.empty((len(corners), 3, 3))
-    out[:, :, kept] = corners
+    out[:, :, selection] = corners
     offset = normal @ outer.mean(axis=0)
-    out[:, :, drop] = (offset - corners @ normal[kept]) / normal[drop]
+    out[:, :, drop] = (offset - corners @ normal[selection]) / normal[drop]
     return out

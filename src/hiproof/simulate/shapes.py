@@ -22,7 +22,7 @@ network tells apart.
 """
 
 
-def label_of(type: str | None) -> int:
+def find_label(type: str | None) -> int:
     """The label of a roof's points: the place of its type in the catalogue, NOT_ROOF for what is
     none.
     """

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import OutputError
-from .flight import Beams, Swath, beams_of, joined
+from .flight import Beams, Swath, join_beams, make_beams
 from .relief import Relief
-from .roofs import turned
+from .roofs import turn_points
 from .scanner import Scan, ScanSettings, returns, with_outliers
 from .scene import SOURCE_GROUND, SOURCE_TREE
 from .town import Lot, town_scene
@@ -42,7 +42,7 @@ class Flight:
     line_distance_m: float = 620.0
     registration_m: float = 0.02
 
-    def swaths_over(
+    def plan_swaths(
         self, seed: int, centre: np.ndarray, radius: float, density: float
     ) -> list[Swath]:
         """Swaths of all flight lines that see the disc of `radius` about `centre`; together they
@@ -50,7 +50,7 @@ class Flight:
         """
         half_width = self.altitude_m * math.tan(math.radians(self.half_view_deg))
         spacing = math.sqrt(2 * half_width / self.line_distance_m / density)
-        along, across = turned((centre - self.origin)[None], -self.heading)[0]
+        along, across = turn_points((centre - self.origin)[None], -self.heading)[0]
         first = math.ceil((across - radius - half_width) / self.line_distance_m)
         last = math.floor((across + radius + half_width) / self.line_distance_m)
         swaths = []
@@ -73,12 +73,12 @@ class Flight:
         return swaths
 
 
-def patches_of(bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
+def divide_into_patches(bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
     """Lowest and highest corners (2,) of the patches of at most PATCH_M that tile `bounds`."""
-    low, high = np.array(bounds[:2]), np.array(bounds[2:])
-    columns, rows = np.ceil((high - low) / PATCH_M).astype(int)
-    corners = [low + PATCH_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
-    return [(corner, np.minimum(corner + PATCH_M, high)) for corner in corners]
+    lower, upper = np.array(bounds[:2]), np.array(bounds[2:])
+    columns, rows = np.ceil((upper - lower) / PATCH_M).astype(int)
+    corners = [lower + PATCH_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
+    return [(corner, np.minimum(corner + PATCH_M, upper)) for corner in corners]
 
 
 def survey(
@@ -94,45 +94,50 @@ def survey(
     `lots` must hold every lot that reaches into the patches.
     """
     lot_bounds = np.array([lot.bounds for lot in lots]).reshape(-1, 4)
-    for low, high in patches:
+    for lower, upper in patches:
         # Shadows and leaning trees of the next patch reach this far.
-        near = np.all((lot_bounds[:, :2] < high + 20.0) & (lot_bounds[:, 2:] > low - 20.0), axis=1)
-        patch_lots = [lots[k] for k in np.flatnonzero(near)]
-        yield surveyed_patch(low, high, patch_lots, terrain, flight, seed, settings)
+        mask = np.all(
+            (lot_bounds[:, :2] < upper + 20.0) & (lot_bounds[:, 2:] > lower - 20.0), axis=1
+        )
+        patch_lots = [lots[k] for k in np.flatnonzero(mask)]
+        yield surveyed_patch(lower, upper, patch_lots, terrain, flight, seed, settings)
 
 
 def surveyed_patch(
-    low: np.ndarray,
-    high: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
     lots: list[Lot],
     terrain: Relief,
     flight: Flight,
     seed: int,
     settings: ScanSettings,
 ) -> Scan:
-    """Points of one patch between its corners `low` and `high` (2,), drawn from a seed of its
+    """Points of one patch between its corners `lower` and `upper` (2,), drawn from a seed of its
     place.
     """
-    xy_centre = (low + high) / 2
+    xy_centre = (lower + upper) / 2
     centre = np.array([*xy_centre, float(terrain.height_at(xy_centre[None])[0])])
     rng = np.random.default_rng([seed, 3, *(np.round(xy_centre * 100).astype(np.int64) % 2**32)])
-    reach = math.hypot(*(high - low)) / 2
-    swaths = flight.swaths_over(seed, xy_centre, reach, settings.density)
-    beams = joined([beams_of(rng, swath, np.zeros(2), reach + 8.0, 4.0) for swath in swaths])
+    reach = math.hypot(*(upper - lower)) / 2
+    swaths = flight.plan_swaths(seed, xy_centre, reach, settings.density)
+    beams = join_beams([make_beams(rng, swath, np.zeros(2), reach + 8.0, 4.0) for swath in swaths])
     cloud = returns(
-        town_scene(lots, terrain, centre), within(beams, high - xy_centre + 12.0), rng, settings
+        town_scene(lots, terrain, centre),
+        select_beams(beams, upper - xy_centre + 12.0),
+        rng,
+        settings,
     )
-    cloud = with_outliers(rng, cloud, OUTLIER_SHARE).moved(centre)
-    inside = np.all((cloud.points[:, :2] >= low) & (cloud.points[:, :2] < high), axis=1)
-    return cloud.chosen(inside)
+    cloud = with_outliers(rng, cloud, OUTLIER_SHARE).move(centre)
+    inside = np.all((cloud.points[:, :2] >= lower) & (cloud.points[:, :2] < upper), axis=1)
+    return cloud.select(inside)
 
 
-def within(beams: Beams, half_size: np.ndarray) -> Beams:
+def select_beams(beams: Beams, half_size: np.ndarray) -> Beams:
     """Beams that meet the ground within the rectangle of `half_size` (2,) about the origin."""
-    return beams.chosen((np.abs(beams.xy0) < half_size).all(axis=1))
+    return beams.select((np.abs(beams.xy0) < half_size).all(axis=1))
 
 
-def classes_of(cloud: Scan) -> np.ndarray:
+def assign_classes(cloud: Scan) -> np.ndarray:
     """ASPRS classes: ground 2, trees 5, all that is built 6, as producers deliver them."""
     classes = np.full(len(cloud), CLASS_BUILDING, np.uint8)
     classes[cloud.source == SOURCE_GROUND] = CLASS_GROUND
@@ -160,7 +165,7 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
             for cloud in clouds:
                 record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
                 record.x, record.y, record.z = cloud.points.T
-                record.classification = classes_of(cloud)
+                record.classification = assign_classes(cloud)
                 record.return_number[:] = record.number_of_returns[:] = 1
                 writer.write_points(record)
                 count += len(cloud)

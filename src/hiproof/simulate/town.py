@@ -18,8 +18,8 @@ from ..frames import LocalFrame
 from ..model import Roof
 from .compounds import COMPOUND_KINDS, random_compound
 from .relief import Relief
-from .roofs import SimBuilding, largest_of, random_building, turned, turned_building
-from .scene import Body, Defects, Scene, building_bodies, scene_of, superstructures, trees
+from .roofs import SimBuilding, find_largest_part, random_building, turn_building, turn_points
+from .scene import Body, Defects, Scene, building_bodies, make_scene, superstructures, trees
 
 TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, antenna=0.1)
 
@@ -38,11 +38,11 @@ class Lot:
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """Plan bounds in the world, trees included."""
-        low, high = np.array(self.building.footprint.bounds).reshape(2, 2)
+        lower, upper = np.array(self.building.footprint.bounds).reshape(2, 2)
         if len(self.crowns):
-            low = np.minimum(low, (self.crowns[:, :2] - self.crowns[:, 3:4]).min(axis=0))
-            high = np.maximum(high, (self.crowns[:, :2] + self.crowns[:, 3:4]).max(axis=0))
-        return (*low, *high)
+            lower = np.minimum(lower, (self.crowns[:, :2] - self.crowns[:, 3:4]).min(axis=0))
+            upper = np.maximum(upper, (self.crowns[:, :2] + self.crowns[:, 3:4]).max(axis=0))
+        return (*lower, *upper)
 
 
 def make(rng: np.random.Generator, name: str, kappa: float) -> SimBuilding:
@@ -62,13 +62,15 @@ def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBu
     return replace(building, roof=replace(building.roof, frame=frame), z_ground=z_ground)
 
 
-def houses_of(row: SimBuilding) -> list[SimBuilding]:
+def build_row(row: SimBuilding) -> list[SimBuilding]:
     """A row of houses as single buildings with common walls, all in the row's frame."""
     roofs = [Roof((part,), part.pieces[0].outline, row.roof.frame) for part in row.roof.parts]
-    return [SimBuilding(largest_of(roof).type, "terraced", roof, row.z_ground) for roof in roofs]
+    return [
+        SimBuilding(find_largest_part(roof).type, "terraced", roof, row.z_ground) for roof in roofs
+    ]
 
 
-def furnished(rng: np.random.Generator, id: str, building: SimBuilding) -> Lot:
+def furnish_lot(rng: np.random.Generator, id: str, building: SimBuilding) -> Lot:
     """The lot of `building` with what stands on it and beside it."""
     bodies = building_bodies(building) + superstructures(rng, building, TOWN_DEFECTS)
     crowns = np.empty((0, 5))
@@ -97,26 +99,26 @@ def street_side(
     along, placed = 0.0, []
     for name in names:
         building = make(rng, name, heading + rng.normal(0.0, 0.015))
-        low, high = extent(building, heading)
-        if high[1] - low[1] > depth:
-            building = turned_building(building, math.pi / 2)
-            low, high = extent(building, heading)
-        if high[1] - low[1] > depth:
+        lower, upper = extent(building, heading)
+        if upper[1] - lower[1] > depth:
+            building = turn_building(building, math.pi / 2)
+            lower, upper = extent(building, heading)
+        if upper[1] - lower[1] > depth:
             continue
-        if along + high[0] - low[0] > length:
+        if along + upper[0] - lower[0] > length:
             break
-        setback = min(rng.uniform(0.0, 4.0), depth - (high[1] - low[1]))
-        offset = np.array([[along - low[0], setback - low[1]]])
-        building = standing_at(building, start + turned(offset, heading)[0], terrain)
+        setback = min(rng.uniform(0.0, 4.0), depth - (upper[1] - lower[1]))
+        offset = np.array([[along - lower[0], setback - lower[1]]])
+        building = standing_at(building, start + turn_points(offset, heading)[0], terrain)
         is_terrace = building.kind == "row" and rng.random() < 0.5
-        placed += houses_of(building) if is_terrace else [building]
-        along += high[0] - low[0] + rng.uniform(2.5, 7.0)
+        placed += build_row(building) if is_terrace else [building]
+        along += upper[0] - lower[0] + rng.uniform(2.5, 7.0)
     return placed
 
 
 def extent(building: SimBuilding, heading: float) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner (2,) of the outline in axes turned by `heading`."""
-    corners = turned(shapely.get_coordinates(building.outline), -heading)
+    corners = turn_points(shapely.get_coordinates(building.outline), -heading)
     return corners.min(axis=0), corners.max(axis=0)
 
 
@@ -129,4 +131,4 @@ def town_scene(lots: list[Lot], terrain: Relief, centre: np.ndarray) -> Scene:
     ]
     crowns = np.concatenate([np.empty((0, 5)), *(lot.crowns for lot in lots)])
     crowns[:, :3] -= centre
-    return scene_of(bodies, crowns, terrain.moved(-centre))
+    return make_scene(bodies, crowns, terrain.move(-centre))

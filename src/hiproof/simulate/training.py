@@ -13,9 +13,9 @@ from ..primitives import CATALOGUE
 from .roofs import random_building
 from .scanner import Scan, ScanSettings, scan
 from .scene import SOURCE_ROOF, Defects
-from .shapes import ROOF_TYPES, label_of
+from .shapes import ROOF_TYPES, find_label
 
-ATTEMPTS = 40  # draws until a cloud has the points asked for, then a sentence says that it has not
+MAX_DRAWS = 40  # draws until a cloud has the points asked for, then a sentence says that it has not
 
 
 def training_sample(
@@ -40,17 +40,17 @@ def training_sample(
     unknown = [type for type in types if type not in CATALOGUE]
     if unknown or not len(types):
         raise InputError(f"expected roof types among {', '.join(CATALOGUE)}, got {list(types)!r}")
-    low, high = n_points
+    lower, upper = n_points
     kind = int(rng.integers(len(types)))
-    for _ in range(ATTEMPTS):
+    for _ in range(MAX_DRAWS):
         building = random_building(rng, types[kind])
         settings = random_settings(rng, building.outline.area, density, n_points, defects)
         cloud = scan(building, rng, settings)
-        if len(cloud) >= low and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * low:
-            return as_sample(rng, cloud, types, kind, high)
+        if len(cloud) >= lower and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * lower:
+            return as_sample(rng, cloud, types, kind, upper)
     raise InputError(
         f"expected point counts {n_points} that a density of {density} points/m2 can reach, got "
-        f"none in {ATTEMPTS} "
+        f"none in {MAX_DRAWS} "
         "buildings; widen one of them"
     )
 
@@ -65,12 +65,12 @@ def random_settings(
     """A scanner at random whose density, within `density`, gives a building of `area_m2` about
     `n_points`.
     """
-    low = min(max(density[0], n_points[0] / area_m2), density[1])
-    high = max(min(density[1], 1.2 * n_points[1] / area_m2), low)
+    smallest = min(max(density[0], n_points[0] / area_m2), density[1])
+    largest = max(min(density[1], 1.2 * n_points[1] / area_m2), smallest)
     logarithm, range_noise, horizontal, beam, angle, margin = rng.random(6)
     return replace(
         ScanSettings(),
-        density=math.exp(math.log(low) + logarithm * (math.log(high) - math.log(low))),
+        density=math.exp(math.log(smallest) + logarithm * (math.log(largest) - math.log(smallest))),
         range_noise_m=0.01 + 0.05 * range_noise,
         horizontal_noise_m=0.01 + 0.14 * horizontal**2,
         beam_radius_m=0.25 * beam,
@@ -81,11 +81,11 @@ def random_settings(
 
 
 def as_sample(
-    rng: np.random.Generator, cloud: Scan, types: Sequence[str], kind: int, high: int
+    rng: np.random.Generator, cloud: Scan, types: Sequence[str], kind: int, upper: int
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    if len(cloud) > high:
-        cloud = cloud.chosen(np.sort(rng.choice(len(cloud), high, replace=False)))
+    if len(cloud) > upper:
+        cloud = cloud.select(np.sort(rng.choice(len(cloud), upper, replace=False)))
     index = np.full(len(CATALOGUE) + 1, len(types))  # the last for NOT_ROOF
     for position, type in enumerate(types):
-        index[label_of(type)] = position
+        index[find_label(type)] = position
     return cloud.points - cloud.points.mean(axis=0), index[cloud.label], kind

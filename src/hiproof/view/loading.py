@@ -11,10 +11,10 @@ from ..evaluate.models import read_models, run_models
 from ..evaluate.run import run_record, run_units, way_to_models
 from ..formats import FORMATS
 from ..read.cityjson import documents, reference_system
-from ..read.crs import units_named
+from ..read.crs import find_named_units
 from ..read.damage import Damaged, refuse
 from ..write.attribute_list import OWN, PARTS_LAYER
-from ..write.tables.postgis import Row, load_rows
+from ..write.tables.postgis import DatabaseRow, load_rows
 
 PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
 MOST_SRID = 998_999  # of a reference system of PostGIS
@@ -29,35 +29,35 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", damaged: Damag
     a database that cannot be written.
     """
     rows = database_rows(folder, damaged)
-    srid = srid_of(next(documents(run_models(folder)))[0])
+    srid = find_srid(next(documents(run_models(folder)))[0])
     return load_rows(dsn, rows, part_rows(Path(folder) / FORMATS["gpkg"].file), srid, prefix)
 
 
-def database_rows(folder: Path, damaged: Damaged = refuse) -> Iterator[Row]:
+def database_rows(folder: Path, damaged: Damaged = refuse) -> Iterator[DatabaseRow]:
     """Yield the rows of a run's buildings, coordinates in the units of its files; those that are
     damaged, or whose id comes again, are told to `damaged` and left out."""
     path, record = run_models(folder), run_record(folder)
     header, _ = next(documents(path))
-    units = way_to_models(record) or units_named(reference_system(header), run_units(record))
-    models = read_models(path, known=units, damaged=damaged, must_be_valid=True)
-    seen: set[str] = set()
+    units = way_to_models(record) or find_named_units(reference_system(header), run_units(record))
+    models = read_models(path, crs_units=units, damaged=damaged, must_be_valid=True)
+    visited: set[str] = set()
     for model in models:
-        if model.id in seen:
+        if model.id in visited:
             damaged(
                 InputError(
                     f"expected buildings of different ids in {path}, got {model.id!r:.80} again"
                 )
             )
         elif not model.is_damaged:
-            seen.add(model.id)
+            visited.add(model.id)
             status, roof_type = (
                 model.text(f"{OWN}{name}") or None for name in ("status", "roof_type")
             )
-            told = model.attributes, model.solid, model.part_types, units, model.grade or None
-            yield Row(model.id, status, roof_type, *told)
+            contents = model.attributes, model.solid, model.part_types, units, model.grade or None
+            yield DatabaseRow(model.id, status, roof_type, *contents)
 
 
-def srid_of(header: dict[str, Any]) -> int:
+def find_srid(header: dict[str, Any]) -> int:
     """Return the EPSG code of the metadata's reference system; 0 (unknown to PostGIS) without
     one."""
     code = (reference_system(header) or "").rpartition("/")[2]
@@ -83,10 +83,10 @@ def part_rows(path: Path) -> Iterator[list[tuple]]:
             return
         start = 0
         while True:
-            some = read_some(path, start)
-            yield some
-            start += len(some)
-            if len(some) < PARTS_AT_ONCE:
+            subset = read_some(path, start)
+            yield subset
+            start += len(subset)
+            if len(subset) < PARTS_AT_ONCE:
                 return
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ValueError) as error:
         raise InputError(
@@ -101,10 +101,10 @@ def read_some(path: Path, start: int) -> list[tuple]:
     import pyogrio
 
     columns = [attribute.name for attribute in PARTS_LAYER]
-    meta, _, wkb, found = pyogrio.raw.read(
+    meta, _, wkb, result = pyogrio.raw.read(
         path, layer="parts", columns=columns, skip_features=start, max_features=PARTS_AT_ONCE
     )
-    by_name = dict(zip(meta["fields"], found, strict=True))
+    by_name = dict(zip(meta["fields"], result, strict=True))
     if missing := [name for name in columns if name not in by_name]:
         raise ValueError(f"no column {missing[0]} in the layer parts")
     for attribute in PARTS_LAYER:

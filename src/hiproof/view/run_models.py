@@ -17,11 +17,11 @@ from ..parametric.file import DAMAGED, opened_parameters
 from ..parametric.record import refuse_other_kinds
 from ..read.cityjson import documents, reference_system
 from ..read.damage import Damaged, refuse
-from ..write.meshes.viewed import ViewedModel, told_beside
+from ..write.meshes.viewed import ViewedModel, merge_values
 from ..write.parameters import crs_text
-from ..write.reprojected import crs_of_files
+from ..write.reprojected import choose_file_crs
 
-TOLD = ("type", "parameters", "position", "rotation")
+SHOWN_PART_KEYS = ("type", "parameters", "position", "rotation")
 
 
 def run_crs_text(folder: Path) -> str | None:
@@ -29,7 +29,9 @@ def run_crs_text(folder: Path) -> str | None:
     none."""
     header, _ = next(documents(run_models(folder)))
     record = run_record(folder)
-    return crs_text(crs_of_files(run_crs(record), run_out_crs(record))) or reference_system(header)
+    return crs_text(choose_file_crs(run_crs(record), run_out_crs(record))) or reference_system(
+        header
+    )
 
 
 def run_buildings(folder: Path, damaged: Damaged = refuse) -> Iterator[ViewedModel]:
@@ -52,7 +54,7 @@ def run_buildings(folder: Path, damaged: Damaged = refuse) -> Iterator[ViewedMod
                     continue
                 refuse_other_run(record, model.id, path)
                 try:
-                    attributes = told_beside({"parameters": parameters_text(record)}, attributes)
+                    attributes = merge_values({"parameters": parameters_text(record)}, attributes)
                 except InputError as error:
                     damaged(InputError(f"building {model.id:.80} in {path}: {error}"))
                     continue
@@ -65,10 +67,12 @@ def run_buildings(folder: Path, damaged: Damaged = refuse) -> Iterator[ViewedMod
 def refuse_other_run(record: dict[str, Any], id: str, path: Path) -> None:
     """Raise InputError where `record` of the parameters is of another building than `id`, whose
     model stands in its place."""
-    known = str(record.get("id"))
-    if id != known and not id.startswith(f"{known}.."):  # where an id comes twice, models number it
+    record_id = str(record.get("id"))
+    if id != record_id and not id.startswith(
+        f"{record_id}.."
+    ):  # where an id comes twice, models number it
         raise InputError(
-            f"expected {path} of the same run as the models, got {known!r} where these have "
+            f"expected {path} of the same run as the models, got {record_id!r} where these have "
             f"{id!r}; "
             "make both anew with `hiproof build`"
         )
@@ -78,7 +82,9 @@ def parameters_text(record: dict[str, Any]) -> str | None:
     """What the parameters say of a building as JSON, its parts without outlines; None where it has
     no parts."""
     refuse_other_kinds(record)
-    parts = [{name: part.get(name) for name in TOLD} for part in record.get("parts") or ()]
+    parts = [
+        {name: part.get(name) for name in SHOWN_PART_KEYS} for part in record.get("parts") or ()
+    ]
     return (
         json.dumps({"origin": record.get("origin"), "parts": parts}, separators=(",", ":"))
         if parts

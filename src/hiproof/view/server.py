@@ -17,11 +17,11 @@ from ..loopback import HTML, SAFE, Answer, LoopbackHandler, LoopbackServer
 from ..write.colours import page_colours
 
 # Of a file or folder of tiles: no drive, no way up, nothing hidden.
-NAME = re.compile(r"[\w-][\w.-]{0,200}", re.ASCII)
+TILE_FILE_NAME = re.compile(r"[\w-][\w.-]{0,200}", re.ASCII)
 NO_SOURCE = "'none'"
-KINDS = {".json": "application/json", ".glb": "model/gltf-binary"}
+CONTENT_TYPES = {".json": "application/json", ".glb": "model/gltf-binary"}
 
-ASSETS = {
+VIEW_ASSETS = {
     "common": ("hiproof.evaluate", "page.css"),
     "style": ("hiproof.view", "view.css"),
     "viewer": ("hiproof.evaluate", "viewer.js"),
@@ -31,19 +31,21 @@ ASSETS = {
 }
 
 
-def server_of(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
+def make_server(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
     """A server of the page at `/` and of the files of the folder `tileset`; 0 is any free `port`.
 
     Raises InputError where the port is taken.
     """
-    return LoopbackServer(partial(Handler, directory=str(tileset), page=page_of(title)), port)
+    return LoopbackServer(
+        partial(ViewHandler, directory=str(tileset), page=render_page(title)), port
+    )
 
 
-def page_of(title: str) -> str:
+def render_page(title: str) -> str:
     """The page as text, scripts and styles in it."""
     texts = {
         name: (files(package) / "assets" / file).read_text("utf-8")
-        for name, (package, file) in ASSETS.items()
+        for name, (package, file) in VIEW_ASSETS.items()
     }
     content = {
         "title": escape(title),
@@ -57,16 +59,16 @@ def page_of(title: str) -> str:
     return page
 
 
-def policy_of(page: str) -> str:
+def make_policy(page: str) -> str:
     """Return the Content-Security-Policy that lets this page run the scripts and styles that stand
     in it, and no other.
 
-    >>> policy_of("<style>a</style>")[:91]
+    >>> make_policy("<style>a</style>")[:91]
     "default-src 'none'; script-src 'none'; style-src 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuY"
     """
     sources = {
         kind: " ".join(
-            digest_of(text) for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
+            hash_text(text) for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
         )
         for kind in ("script", "style")
     }
@@ -76,37 +78,39 @@ def policy_of(page: str) -> str:
     return policy
 
 
-def digest_of(text: str) -> str:
+def hash_text(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-class Handler(LoopbackHandler):
+class ViewHandler(LoopbackHandler):
     """Serves the page and the files of a folder; it lists none and follows no way out of it."""
 
     def __init__(self, *args, directory: str, page: str, **named) -> None:
         self.folder, self.page, self.policy = (
             Path(directory).resolve(),
             page.encode(),
-            policy_of(page),
+            make_policy(page),
         )
         super().__init__(*args, **named)
 
     def answer(self, method: str, body: bytes) -> Answer:
         if method != "GET":
-            return self.refused(405, "expected GET: this page only shows")
+            return self.refuse(405, "expected GET: this page only shows")
         path = urlsplit(self.path).path
         if path in ("/", "/index.html"):
             return Answer(200, self.page, HTML, {"Content-Security-Policy": self.policy})
         file = file_at(self.folder, path)
         if file is None:
-            return self.refused(404, "expected a file of the tiles, got another name")
-        return Answer(200, file.read_bytes(), KINDS.get(file.suffix, "application/octet-stream"))
+            return self.refuse(404, "expected a file of the tiles, got another name")
+        return Answer(
+            200, file.read_bytes(), CONTENT_TYPES.get(file.suffix, "application/octet-stream")
+        )
 
 
 def file_at(folder: Path, path: str) -> Path | None:
     """Return the file below `folder` that an address names, None where there is none."""
     names = unquote(path).split("/")[1:]
-    if not all(NAME.fullmatch(name) for name in names):
+    if not all(TILE_FILE_NAME.fullmatch(name) for name in names):
         return None
     file = folder.joinpath(*names).resolve()
     return file if file.is_file() and file.is_relative_to(folder) else None

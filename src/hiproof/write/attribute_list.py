@@ -22,7 +22,7 @@ class Attribute(NamedTuple):
     meaning: str
 
 
-class Table(NamedTuple):
+class AttributeTable(NamedTuple):
     """Attributes that stand together; `prefix` precedes their names in files."""
 
     title: str
@@ -459,36 +459,36 @@ EVERY_FORMAT = (
     "`buildings.parquet`"
 )
 TABLES = (
-    Table("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
-    Table("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
-    Table("Buildings, as OpenStreetMap tags them (`--osm-tags`)", EVERY_FORMAT, OSM),
-    Table(
+    AttributeTable("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
+    AttributeTable("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
+    AttributeTable("Buildings, as OpenStreetMap tags them (`--osm-tags`)", EVERY_FORMAT, OSM),
+    AttributeTable(
         "Building parts (`--parts-as buildingparts`)",
         "`buildings.gml`, `buildings.city.jsonl`",
         BUILDING_PART,
     ),
-    Table("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
-    Table(
+    AttributeTable("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
+    AttributeTable(
         "Parameters: the first line",
         "`parameters.jsonl`; its schema: `hiproof build --schema`",
         HEAD,
     ),
-    Table("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
-    Table("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
-    Table(
+    AttributeTable("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
+    AttributeTable("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
+    AttributeTable(
         "Parts",
         "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; where each "
         "shows, in plan",
         PARTS_LAYER,
     ),
-    Table(
+    AttributeTable(
         "Roof surfaces as polygons",
         "the layer `roof_surfaces` of `buildings.gpkg`, `roof_surfaces.parquet`, PostGIS: "
         "PREFIX_roofs",
         SURFACES_LAYER,
     ),
-    Table("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
-    Table("PostGIS: PREFIX_buildings", "`hiproof load`", POSTGIS_BUILDINGS),
+    AttributeTable("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
+    AttributeTable("PostGIS: PREFIX_buildings", "`hiproof load`", POSTGIS_BUILDINGS),
 )
 
 PREFACE = """# Attributes
@@ -515,7 +515,7 @@ def files_text() -> str:
     )
 
 
-def table_text(table: Table) -> str:
+def table_text(table: AttributeTable) -> str:
     rows = [
         f"| `{table.prefix}{name}` | {kind} | {unit} | {meaning} |"
         for name, kind, unit, meaning in table.attributes

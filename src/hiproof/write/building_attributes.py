@@ -15,13 +15,13 @@ from ..status import Status
 from .attribute_list import OWN, PREFIX
 from .osm_tags import osm_tags
 from .reprojected import Reprojected
-from .roof_figures import RoofFigures, ground_height, roof_figures
-from .values import metres, plain, plain_text, rounded
+from .roof_figures import RoofFigures, find_ground_height, roof_figures
+from .values import metres, plain, plain_text, round_value
 
 FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
 
 
-def figures_of(building: Building) -> RoofFigures | None:
+def measure_figures(building: Building) -> RoofFigures | None:
     """Figures of the building's solid, None without one."""
     return None if building.built is None else roof_figures(building.solid)
 
@@ -41,7 +41,9 @@ def building_attributes(
     coordinates are in other `units`, which `hiproof_units` then says. What each is stands in
     attribute_list.py.
     """
-    own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
+    input_attributes = {
+        plain_text(name): plain(value) for name, value in building.attributes.items()
+    }
     computed = {
         prefix + name: value for name, value in roofer_attributes(building, figures).items()
     }
@@ -54,7 +56,7 @@ def building_attributes(
         computed[OWN + "units"] = (
             f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
         )
-    return own | {name: plain(value) for name, value in computed.items()}
+    return input_attributes | {name: plain(value) for name, value in computed.items()}
 
 
 def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
@@ -71,15 +73,15 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
         is_block = building.status in FALLBACKS and len(building.parts) == 1
         mode = "lod11_fallback" if is_block else "standard"
     return {
-        "h_ground": metres(ground_height(building, figures)),
+        "h_ground": metres(find_ground_height(building, figures)),
         **shape,
         "roof_type": roof_type,
         "roof_n_surfaces": None if figures is None else figures.roof_faces,
-        "slope": None if figures is None else rounded(figures.slope_deg, 4),
-        "azimuth": None if figures is None else rounded(figures.azimuth_deg, 4),
-        "rmse_lod22": rounded(quality.rmse),
-        "pt_density": rounded(quality.density),
-        "nodata_frac": rounded(quality.nodata_share),
+        "slope": None if figures is None else round_value(figures.slope_deg, 4),
+        "azimuth": None if figures is None else round_value(figures.azimuth_deg, 4),
+        "rmse_lod22": round_value(quality.rmse),
+        "pt_density": round_value(quality.density),
+        "nodata_frac": round_value(quality.nodata_share),
         "extrusion_mode": mode,
     }
 
@@ -92,7 +94,7 @@ def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
         "h_roof_70p": metres(figures.h_70p),
         "h_roof_max": metres(figures.h_max),
         "h_roof_ridge": metres(figures.h_ridge),
-        "volume_lod22": rounded(figures.volume_m3, 4),
+        "volume_lod22": round_value(figures.volume_m3, 4),
     }
 
 
@@ -108,30 +110,30 @@ def hiproof_attributes(
         "quality": None if building.grade is None else building.grade.code,
         "detail": building.detail or building.status.value,
         "roof_type": kind,
-        "roof_type_probability": None if probability is None else rounded(probability),
+        "roof_type_probability": None if probability is None else round_value(probability),
         "network_type": recognised,
         "network_type_probability": None
         if recognised is None
-        else rounded(building.recognised[recognised]),
+        else round_value(building.recognised[recognised]),
         "h_eave": None if figures is None else metres(figures.h_eave),
         "parts": len(building.parts),
         "points": int(quality.points),
-        "psd_mean": rounded(quality.psd_mean),
-        "psd_std": rounded(quality.psd_std),
-        "p95": rounded(quality.p95),
-        "share_within_20cm": rounded(quality.share_within_20cm),
-        "outline_iou": rounded(quality.outline_iou),
-        "unexplained_area_m2": rounded(quality.unexplained_area_m2),
+        "psd_mean": round_value(quality.psd_mean),
+        "psd_std": round_value(quality.psd_std),
+        "p95": round_value(quality.p95),
+        "share_within_20cm": round_value(quality.share_within_20cm),
+        "outline_iou": round_value(quality.outline_iou),
+        "unexplained_area_m2": round_value(quality.unexplained_area_m2),
         "ground_source": building.ground_source or None,
-        "shift_x": rounded(building.shift[0]),
-        "shift_y": rounded(building.shift[1]),
+        "shift_x": round_value(building.shift[0]),
+        "shift_y": round_value(building.shift[1]),
         "iso19107_lod22": None
         if building.built is None
-        else codes_as_written(building.solid, units),
+        else check_as_written(building.solid, units),
     }
 
 
-def codes_as_written(solid: Solid, units: Units) -> str:
+def check_as_written(solid: Solid, units: Units) -> str:
     """Codes of ISO 19107 that hold against the solid where it is written, as JSON.
 
     Only solids that pass the check get here; in another CRS they are checked again.
@@ -143,5 +145,5 @@ def codes_as_written(solid: Solid, units: Units) -> str:
     there = Units(units.plan, units.height).to_metres(
         np.round(units.from_metres(solid.vertices), 4)
     )
-    about_origin = Solid(there, solid.faces).moved(-np.floor(there.min(axis=0)))
+    about_origin = Solid(there, solid.faces).move(-np.floor(there.min(axis=0)))
     return json.dumps(sorted({finding.code for finding in check_solid(about_origin)}))

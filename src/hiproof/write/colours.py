@@ -46,10 +46,10 @@ RESIDUAL_STOPS = (
 """Colour from each distance in metres upwards, blue near and red far."""
 
 
-def legend_of(kind: str | None) -> str:
+def list_legend(kind: str | None) -> str:
     """Return the entry of a legend that lists a roof type.
 
-    >>> legend_of("side_mansard"), legend_of("free")
+    >>> list_legend("side_mansard"), list_legend("free")
     ('mansard', 'other')
     """
     return CATALOGUE[kind].legend if kind in CATALOGUE else OTHER
@@ -61,7 +61,7 @@ def type_colour(kind: str | None) -> str:
     >>> type_colour("gable")
     '#b84f0c'
     """
-    return ROOF_COLOURS[legend_of(kind)]
+    return ROOF_COLOURS[list_legend(kind)]
 
 
 def type_colours() -> dict[str, str]:
@@ -72,7 +72,7 @@ def type_colours() -> dict[str, str]:
 def page_colours() -> dict[str, Any]:
     """Return what a page needs to colour models and to draw its legend."""
     return {
-        "legends": {kind: legend_of(kind) for kind in CATALOGUE},
+        "legends": {kind: list_legend(kind) for kind in CATALOGUE},
         "type": ROOF_COLOURS,
         "wall": WALL_COLOUR,
         "mark": MARK_COLOUR,

@@ -128,7 +128,7 @@ def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
     """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends
     well; see `atomic`.
     """
-    with atomic(path) as hidden, opened(hidden, Path(path)) as file:
+    with atomic(path) as hidden, open_hidden(hidden, Path(path)) as file:
         yield file
 
 
@@ -139,14 +139,14 @@ def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
     """
     hidden = hidden_name(Path(os.path.realpath(path)))
     try:
-        with opened(hidden, Path(path)) as file:
+        with open_hidden(hidden, Path(path)) as file:
             yield file
     finally:
         remove(hidden)
 
 
 @contextmanager
-def opened(hidden: Path, path: Path) -> Iterator[BinaryIO]:
+def open_hidden(hidden: Path, path: Path) -> Iterator[BinaryIO]:
     """Yield a buffered file at `hidden`, whose errors speak of `path`."""
     try:
         raw = OutputFile(hidden, path)

@@ -20,7 +20,7 @@ from ..errors import OutputError
 from ..model import Building
 from .head import FileHead
 from .roof_figures import RoofFigures
-from .shapes import Shapes, shapes_of
+from .shapes import Shapes, make_shapes
 
 NOTHING = (np.nan,) * 6
 EXTENT, ENDS = ".extent", ".ends"
@@ -43,7 +43,7 @@ class Sheet:
     @functools.cached_property
     def shapes(self) -> Shapes:
         """What is drawn of the building beside its own solid."""
-        return shapes_of(self.building, self.figures, self.head.write, self.head.prefix)
+        return make_shapes(self.building, self.figures, self.head.write, self.head.prefix)
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,10 @@ def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
     """Write the buildings `parts` to `file`, without compression."""
     arrays: dict[str, Any] = {}
     for kind in parts[0] if parts else ():
-        several = [part[kind] for part in parts]
-        arrays[kind] = np.frombuffer(b"".join(fragment.text for fragment in several), np.uint8)
-        arrays[kind + ENDS] = np.cumsum(
-            [len(fragment.text) for fragment in several], dtype=np.int64
-        )
-        arrays[kind + EXTENT] = np.array(
-            [fragment.extent or NOTHING for fragment in several], float
-        )
+        items = [part[kind] for part in parts]
+        arrays[kind] = np.frombuffer(b"".join(fragment.text for fragment in items), np.uint8)
+        arrays[kind + ENDS] = np.cumsum([len(fragment.text) for fragment in items], dtype=np.int64)
+        arrays[kind + EXTENT] = np.array([fragment.extent or NOTHING for fragment in items], float)
     np.savez(file, **arrays)
 
 
@@ -86,8 +82,8 @@ def load_fragments(path: Path) -> Iterator[Fragments]:
             columns = [
                 column(arrays[kind], arrays[kind + ENDS], arrays[kind + EXTENT]) for kind in kinds
             ]
-            for several in zip(*columns, strict=True):
-                yield dict(zip(kinds, several, strict=True))
+            for items in zip(*columns, strict=True):
+                yield dict(zip(kinds, items, strict=True))
     except (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile) as error:
         raise OutputError(
             f"expected a work tile's buildings in {path}, got: {error}; begin anew with --restart"
@@ -100,5 +96,7 @@ def column(joined: np.ndarray, ends: np.ndarray, extents: np.ndarray) -> list[Fr
     """
     content, starts = joined.tobytes(), [0, *ends.tolist()]
     texts = [content[start:end] for start, end in itertools.pairwise(starts)]
-    known = [None if np.isnan(extent[0]) else tuple(extent) for extent in extents.tolist()]
-    return [Fragment(text, extent) for text, extent in zip(texts, known, strict=True)]
+    extents_or_none = [
+        None if np.isnan(extent[0]) else tuple(extent) for extent in extents.tolist()
+    ]
+    return [Fragment(text, extent) for text, extent in zip(texts, extents_or_none, strict=True)]

@@ -34,10 +34,10 @@ class FileHead:
     @functools.cached_property
     def units(self) -> FileUnits:
         """Units of the coordinates in each file, and the way to its CRS."""
-        from ..read.crs import parse_crs, units_of
+        from ..read.crs import find_units, parse_crs
 
         return FileUnits.of(
-            self.crs, units_of(parse_crs(self.crs), named=self.unit), self.write.out_crs
+            self.crs, find_units(parse_crs(self.crs), unit_name=self.unit), self.write.out_crs
         )
 
     @functools.cached_property
@@ -46,6 +46,6 @@ class FileHead:
 
         Parameters stay in the run's.
         """
-        from .reprojected import crs_of_files
+        from .reprojected import choose_file_crs
 
-        return crs_of_files(self.crs, self.write.out_crs) if self.write.out_crs else self.crs
+        return choose_file_crs(self.crs, self.write.out_crs) if self.write.out_crs else self.crs

@@ -62,14 +62,14 @@ def srs_name(crs: Any) -> str | None:
     if crs is None:
         return None
     plan, height = horizontal_crs(crs), vertical_crs(crs)
-    both = () if height is None else (epsg_code(plan), epsg_code(height))
-    codes = both if both and None not in both else (epsg_code(crs) or epsg_code(plan),)
+    combined = () if height is None else (epsg_code(plan), epsg_code(height))
+    codes = combined if combined and None not in combined else (epsg_code(crs) or epsg_code(plan),)
     if None in codes:
         return None
     if plan.axis_info[0].direction == "north":
         return "EPSG:" + "+".join(map(str, codes))
-    named = [f"crs:EPSG::{code}" for code in codes]
-    return f"urn:ogc:def:{named[0]}" if len(named) == 1 else f"urn:ogc:def:crs,{','.join(named)}"
+    names = [f"crs:EPSG::{code}" for code in codes]
+    return f"urn:ogc:def:{names[0]}" if len(names) == 1 else f"urn:ogc:def:crs,{','.join(names)}"
 
 
 def reference_system(crs: Any) -> str | None:
@@ -109,28 +109,33 @@ class FileUnits:
     table: Units = METRES
 
     @classmethod
-    def of(cls, crs: Any, own: Units | None = None, out_crs: str = "") -> FileUnits:
+    def of(cls, crs: Any, world_units: Units | None = None, out_crs: str = "") -> FileUnits:
         """Units of files of a run in `crs`, written in `out_crs` where that is one;
 
-        `own` are those of coordinates without a CRS, or without a name for it.
+        `world_units` are those of coordinates without a CRS, or without a name for it.
 
         >>> files = FileUnits.of("EPSG:2263+5703")
         >>> str(files.gml), str(files.cityjson), str(files.table)
         ('US survey foot, heights in metre', 'US survey foot', 'US survey foot')
         """
-        from ..read.crs import horizontal_crs, parse_crs, units_named, units_of
-        from .reprojected import crs_of_files, reprojected
+        from ..read.crs import find_named_units, find_units, horizontal_crs, parse_crs
+        from .reprojected import choose_file_crs, make_reprojection
 
-        own = own or units_of(parse_crs(crs))
-        there = parse_crs(crs_of_files(crs, out_crs) if out_crs else crs)
-        plan = own if there is None else units_of(horizontal_crs(there))
-        other = units_of(there) if out_crs else own
-        named = (units_named(name, other) for name in (srs_name(there), reference_system(there)))
+        world_units = world_units or find_units(parse_crs(crs))
+        there = parse_crs(choose_file_crs(crs, out_crs) if out_crs else crs)
+        plan = world_units if there is None else find_units(horizontal_crs(there))
+        other = find_units(there) if out_crs else world_units
+        names = (
+            find_named_units(name, other) for name in (srs_name(there), reference_system(there))
+        )
         return cls(
-            *(reprojected(crs, there, own, units) if out_crs else units for units in (*named, plan))
+            *(
+                make_reprojection(crs, there, world_units, units) if out_crs else units
+                for units in (*names, plan)
+            )
         )
 
-    def told(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, Any]:
         """What the record of a run says of units."""
         metres = {"metres_in_plan_unit": self.gml.plan, "metres_in_height_unit": self.gml.height}
         return {"coordinates": str(self.gml), "attributes": "metre", **metres}

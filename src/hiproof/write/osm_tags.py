@@ -10,8 +10,8 @@ import numpy as np
 from ..model import ROOF, Building
 from ..primitives.catalogue import CATALOGUE
 from .attribute_list import OSM
-from .roof_figures import RoofFigures, ground_height
-from .values import rounded
+from .roof_figures import RoofFigures, find_ground_height
+from .values import round_value
 
 ONE_ENDED = ("side_hip", "side_half_hip")
 
@@ -34,22 +34,22 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
         return {tag.name: None for tag in OSM}
     main = building.model.main
     roof = [i for i, face in enumerate(building.solid.faces) if face.kind == ROOF]
-    shown = [i for i in roof if building.solid.faces[i].part == main] or roof
-    largest = max(shown, key=lambda i: figures.face_area_m2[i])
+    visible = [i for i in roof if building.solid.faces[i].part == main] or roof
+    largest = max(visible, key=lambda i: figures.face_area_m2[i])
     lowest = min(
         building.solid.vertices[list(ring), 2].min()
-        for i in shown
+        for i in visible
         for ring in building.solid.faces[i].rings
     )
-    ground = min(ground_height(building, figures), figures.h_base)
+    ground = min(find_ground_height(building, figures), figures.h_base)
     values = (
         osm_shape(building.parts[main].type),
         figures.h_max - lowest,
-        direction_of(building, main, figures.face_azimuth_deg[largest]),
+        find_direction(building, main, figures.face_azimuth_deg[largest]),
         figures.face_slope_deg[largest],
         figures.h_max - ground,
     )
-    return {tag.name: told(value) for tag, value in zip(OSM, values, strict=True)}
+    return {tag.name: format_number(value) for tag, value in zip(OSM, values, strict=True)}
 
 
 def osm_shape(name: str) -> str | None:
@@ -57,7 +57,7 @@ def osm_shape(name: str) -> str | None:
     return CATALOGUE[name].osm_shape if name in CATALOGUE else None
 
 
-def direction_of(building: Building, main: int, azimuth_deg: float) -> float:
+def find_direction(building: Building, main: int, azimuth_deg: float) -> float:
     """The direction that the hipped end of part `main` looks in, else that of its largest face."""
     part = building.parts[main]
     return (
@@ -65,8 +65,8 @@ def direction_of(building: Building, main: int, azimuth_deg: float) -> float:
     )
 
 
-def told(value: Any) -> Any:
+def format_number(value: Any) -> Any:
     """A number to the centimetre or hundredth of a degree, None where it is none."""
     if isinstance(value, (float, np.floating)):
-        return rounded(float(value), 2) if math.isfinite(value) else None
+        return round_value(float(value), 2) if math.isfinite(value) else None
     return value

@@ -16,13 +16,13 @@ import numpy as np
 from ..errors import InputError
 from ..frames import METRES, Units
 from ..read.crs import (
-    best_of,
     combine,
-    described,
+    describe_crs,
+    find_best_transformer,
+    find_units,
     horizontal_crs,
     parse_crs,
     same_horizontal,
-    units_of,
     vertical_crs,
 )
 
@@ -47,77 +47,82 @@ class Reprojected(Units):
         Raises InputError for places that have none there.
         """
         world = np.asarray(world, float)
-        own = self.own.from_metres(world)
-        found = np.stack(self.plan_way.transform(own[..., 0], own[..., 1]), axis=-1)
+        coordinates = self.own.from_metres(world)
+        result = np.stack(
+            self.plan_way.transform(coordinates[..., 0], coordinates[..., 1]), axis=-1
+        )
         if world.shape[-1] == 3:
-            found = np.concatenate(
-                [found, self.height_from(own, world[..., 2])[..., None]], axis=-1
+            result = np.concatenate(
+                [result, self.convert_heights(coordinates, world[..., 2])[..., None]], axis=-1
             )
-        if not np.isfinite(found).all() and np.isfinite(world).all():
+        if not np.isfinite(result).all() and np.isfinite(world).all():
             raise InputError(
                 "expected buildings inside the area of --out-crs, got some that have no place in "
                 "it; name a CRS of theirs"
             )
-        return found
+        return result
 
     def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
         """World metres of the file's coordinates (..., 2) or (..., 3)."""
         coordinates = np.asarray(coordinates, float)
         x, y = coordinates[..., 0], coordinates[..., 1]
-        found = self.own.to_metres(
+        result = self.own.to_metres(
             np.stack(self.plan_way.transform(x, y, direction="INVERSE"), axis=-1)
         )
         if coordinates.shape[-1] == 2:
-            return found
+            return result
         z = coordinates[..., 2] * self.height
         if self.height_way is not None:
             z = (
                 self.height_way.transform(x, y, z / self.height_m, direction="INVERSE")[2]
                 * self.own.height
             )
-        return np.concatenate([found, z[..., None]], axis=-1)
+        return np.concatenate([result, z[..., None]], axis=-1)
 
-    def height_from(self, own: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Heights (...) in the file's unit of heights `z` (...) in metres, at coordinates `own`
-        (..., 3) of the first CRS.
+    def convert_heights(self, coordinates: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Heights (...) in the file's unit of heights `z` (...) in metres, at coordinates
+        `coordinates` (..., 3) of the first CRS.
         """
         if self.height_way is not None:
             z = self.height_m * np.asarray(
-                self.height_way.transform(own[..., 0], own[..., 1], own[..., 2])[2]
+                self.height_way.transform(
+                    coordinates[..., 0], coordinates[..., 1], coordinates[..., 2]
+                )[2]
             )
         return z / self.height
 
 
-def crs_of_files(crs: Any, asked: str) -> Any:
-    """The CRS in which files of a run in `crs` are written: the one `asked` for, with the run's
+def choose_file_crs(crs: Any, requested: str) -> Any:
+    """The CRS in which files of a run in `crs` are written: the one `requested` for, with the run's
     heights where it names none.
 
     Raises InputError for one that is no projection, or where the run's is not known.
 
-    >>> described(crs_of_files("EPSG:7415", "EPSG:25831"))
+    >>> describe_crs(choose_file_crs("EPSG:7415", "EPSG:25831"))
     'ETRS89 / UTM zone 31N + NAP height'
     """
-    crs, out = parse_crs(crs), parse_crs(asked)
+    crs, out = parse_crs(crs), parse_crs(requested)
     if out is None:
         return crs
     if crs is None:
         raise InputError(
-            f"expected a CRS of the clouds to go to {described(out)} from, got none; say which "
+            f"expected a CRS of the clouds to go to {describe_crs(out)} from, got none; say which "
             "with --crs"
         )
     plan = horizontal_crs(out)
     if not plan.is_projected:
         raise InputError(
-            f"expected a projected CRS for --out-crs, got {described(out)}, in which no solid has "
+            f"expected a projected CRS for --out-crs, got {describe_crs(out)}, in which no solid "
+            "has "
             "a size; name a UTM zone or a "
             "national grid (`hiproof convert` to 3D Tiles places models on the globe by itself)"
         )
     return combine(out, vertical_crs(crs)) if len(out.axis_info) < 3 else out
 
 
-def reprojected(crs: Any, out: Any, own: Units, units: Units) -> Units:
-    """The way from world metres of `crs` (units `own`) to the coordinates of `out` in a file that
-    counts in `units`.
+def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> Units:
+    """The way from world metres of `crs` (units `source_units`) to the coordinates of `out` in a
+    file that counts in `units`.
 
     Raises InputError where pyproj knows none, of heights without a grid that is at hand.
     """
@@ -125,19 +130,20 @@ def reprojected(crs: Any, out: Any, own: Units, units: Units) -> Units:
     heights = has_heights(out) and not same_height_system(crs, out)
     if same_horizontal(crs, out) and not heights:
         return units
-    plan = best_of(horizontal_crs(crs), horizontal_crs(out), allow_ballpark=False)
+    plan = find_best_transformer(horizontal_crs(crs), horizontal_crs(out), allow_ballpark=False)
     if plan is None:
         raise InputError(
-            f"expected a CRS that pyproj can go to from {described(crs)}, got {described(out)}; "
+            f"expected a CRS that pyproj can go to from {describe_crs(crs)}, got "
+            f"{describe_crs(out)}; "
             "name one of the same part of the Earth"
         )
     way = height_way(crs, out) if heights else None
     return Reprojected(
         *(units.plan, units.height, units.plan_name, units.height_name),
-        own,
+        source_units,
         plan,
         way,
-        units_of(out).height,
+        find_units(out).height,
     )
 
 
@@ -146,7 +152,7 @@ def height_way(crs: Any, out: Any) -> Any:
 
     Raises InputError where heights or a grid are missing.
     """
-    way = best_of(crs, out, allow_ballpark=False) if has_heights(crs) else None
+    way = find_best_transformer(crs, out, allow_ballpark=False) if has_heights(crs) else None
     if way is None:
         missing = (
             "no grid between them is here (`projsync` gets some)"
@@ -154,7 +160,8 @@ def height_way(crs: Any, out: Any) -> Any:
             else "the clouds' names none"
         )
         raise InputError(
-            f"expected heights that pyproj can take from {described(crs)} to {described(out)}, but "
+            f"expected heights that pyproj can take from {describe_crs(crs)} to "
+            f"{describe_crs(out)}, but "
             f"{missing}; "
             "name the plan alone with --out-crs, heights then stay as they are"
         )
@@ -167,5 +174,5 @@ def has_heights(crs: Any) -> bool:
 
 def same_height_system(crs: Any, out: Any) -> bool:
     """Whether both count heights from the same level in the same unit."""
-    ours, theirs = vertical_crs(crs), vertical_crs(out)
-    return ours is not None and theirs is not None and ours.equals(theirs)
+    own_names, theirs = vertical_crs(crs), vertical_crs(out)
+    return own_names is not None and theirs is not None and own_names.equals(theirs)

@@ -60,7 +60,7 @@ class RoofFigures:
         return "multiple horizontal" if self.h_max - self.h_min > LEVEL_RIDGE_M else "horizontal"
 
 
-def ground_height(building: Building, figures: RoofFigures | None) -> float:
+def find_ground_height(building: Building, figures: RoofFigures | None) -> float:
     """Height of the building's ground: what reconstruction found, else the base of its solid, else
     NaN.
     """
@@ -84,7 +84,7 @@ def roof_figures(solid: Solid) -> RoofFigures:
     >>> figures.volume_m3, figures.h_70p, figures.roofer_type
     (60.0, 3.0, 'horizontal')
     """
-    if not solid.of_kind(ROOF):
+    if not solid.select_faces(ROOF):
         raise ValueError("its solid has no RoofSurface")
     fan, face_of = face_fans(solid)
     origin = solid.vertices.mean(axis=0)
@@ -100,15 +100,15 @@ def roof_figures(solid: Solid) -> RoofFigures:
     plan = triangles[roof, 2]
     edges = roof_edges(corners[roof, 1:], fan[roof, 1:], area[face_of[roof]])
     heights = roof_heights(np.sort(corners[roof, :, 2], axis=1), plan, float(origin[2]))
-    eave = eave_height(edges) + float(origin[2])
+    eave = find_eave_height(edges) + float(origin[2])
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
         **heights,
-        h_ridge=ridge_height(edges) + float(origin[2]),
+        h_ridge=find_ridge_height(edges) + float(origin[2]),
         # it is rounded, and no eave leaves the roof
         h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),
-        h_base=base_height(solid),
+        h_base=find_base_height(solid),
         volume_m3=solid.volume,
         plan_area_m2=float(plan.sum()),
         roof_area_m2=float(size.sum()),
@@ -126,11 +126,11 @@ def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, 
     triangles by their corners' heights `z` (t, 3) over `z_origin`, in order, and their areas in
     plan (t,).
     """
-    from .roof_levels import level_of_share  # compiled, as above
+    from .roof_levels import find_level  # compiled, as above
 
     heights = {"h_min": z[:, 0].min(), "h_max": z[:, 2].max()}
     heights |= {
-        name: level_of_share(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))
+        name: find_level(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))
     }
     return {name: float(height + z_origin) for name, height in heights.items()}
 
@@ -173,9 +173,9 @@ def slopes_and_azimuths(area: np.ndarray, is_roof: np.ndarray) -> tuple[np.ndarr
     return slope, azimuth
 
 
-def base_height(solid: Solid) -> float:
+def find_base_height(solid: Solid) -> float:
     """Lowest height of the ground surface, or of the whole solid where none is marked."""
-    ground = [index for face in solid.of_kind(GROUND) for ring in face.rings for index in ring]
+    ground = [index for face in solid.select_faces(GROUND) for ring in face.rings for index in ring]
     return float(solid.vertices[ground or slice(None), 2].min())
 
 
@@ -212,7 +212,7 @@ def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdg
     )
 
 
-def ridge_height(edges: RoofEdges) -> float:
+def find_ridge_height(edges: RoofEdges) -> float:
     """Height of the longest level ridge among the roof's edges, NaN if it has none."""
     usable = np.flatnonzero(edges.falls_away & edges.is_level)
     key = edges.number[usable]
@@ -225,7 +225,7 @@ def ridge_height(edges: RoofEdges) -> float:
     return float(height[np.lexsort((height, edges.length[ridges]))[-1]])
 
 
-def eave_height(edges: RoofEdges) -> float:
+def find_eave_height(edges: RoofEdges) -> float:
     """Height that half of the length of the eaves lies below.
 
     Eaves are level edges of one roof face alone that does not fall away from them; of a roof
@@ -238,9 +238,9 @@ def eave_height(edges: RoofEdges) -> float:
         == 1
     )
     eaves = outer & edges.is_level & ~edges.falls_away
-    chosen = eaves if eaves.any() else outer
+    selection = eaves if eaves.any() else outer
     # nor does the order hang on it
-    height, length = np.round(edges.height[chosen], 4), edges.length[chosen]
+    height, length = np.round(edges.height[selection], 4), edges.length[selection]
     order = np.argsort(height, kind="stable")
     return float(
         height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)]

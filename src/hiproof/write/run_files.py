@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from ..formats import FORMATS, Format, asked_files, asked_fragments, module_of
+from ..formats import FORMATS, Format, import_format, requested_files, requested_fragments
 from ..model import Building
 from ..settings import Settings
 from ..status import Status
-from .building_attributes import building_attributes, figures_of
+from .building_attributes import building_attributes, measure_figures
 from .fragments import Fragments, Sheet
 from .head import FileHead
 from .roof_figures import RoofFigures
@@ -38,29 +38,29 @@ def write_all(
     """
     broken, head = [], FileHead(crs)
     with ExitStack() as stack:
-        files = asked_files(Settings(), Path(folder))
+        files = requested_files(Settings(), Path(folder))
         # The table does most of its work at the end: entered last it is closed first, and its
         # failure stops the others.
         writers = [
-            stack.enter_context(writer_of(FORMATS[name], path, head))
+            stack.enter_context(make_writer(FORMATS[name], path, head))
             for name, path in files.items()
         ]
-        for asked in buildings:
-            building, figures = measured(asked)
-            if building is not asked:
-                broken.append(str(asked.id))
+        for given_building in buildings:
+            building, figures = measure_or_drop_solid(given_building)
+            if building is not given_building:
+                broken.append(str(given_building.id))
             for writer in writers:
                 writer.add(building, figures)
     return broken
 
 
-def writer_of(format: Format, path: Path, head: FileHead) -> BuildingWriter:
+def make_writer(format: Format, path: Path, head: FileHead) -> BuildingWriter:
     """The incremental writer of a file of a run."""
-    return module_of(format.module).writer(path, head, **format.given)
+    return import_format(format.module).writer(path, head, **format.given)
 
 
 def fragments(
-    asked: Building, names: tuple[str, str], head: FileHead
+    requested: Building, names: tuple[str, str], head: FileHead
 ) -> tuple[Building, Fragments]:
     """The texts of one building, `names` being its CityJSON id and its gml:id, and the building
     they tell of.
@@ -68,13 +68,13 @@ def fragments(
     They are those of the files that a run writes, `head` what these have in common, the offset of
     the CityJSON file included. A solid that cannot be measured is left out, as in `write_all`.
     """
-    building, figures = measured(asked)
+    building, figures = measure_or_drop_solid(requested)
     attributes = building_attributes(
         building, figures, units=head.units.gml, osm=head.write.osm_tags
     )
     sheet = Sheet(building, figures, attributes, *names, head)
-    kinds = asked_fragments(head.write)
-    return building, {kind: module_of(kind).fragment(sheet) for kind in kinds}
+    kinds = requested_fragments(head.write)
+    return building, {kind: import_format(kind).fragment(sheet) for kind in kinds}
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
@@ -85,7 +85,7 @@ def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: Fil
     """
     with ExitStack() as stack:
         opened = [
-            (stack.enter_context(writer_of(FORMATS[name], path, head)), FORMATS[name].fragment)
+            (stack.enter_context(make_writer(FORMATS[name], path, head)), FORMATS[name].fragment)
             for name, path in files.items()
         ]
         for part in parts:
@@ -93,12 +93,12 @@ def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: Fil
                 writer.put(part[content])
 
 
-def measured(building: Building) -> tuple[Building, RoofFigures | None]:
+def measure_or_drop_solid(building: Building) -> tuple[Building, RoofFigures | None]:
     """`building` and the figures of its solid; without the solid if that cannot be measured."""
     try:
         if building.built is not None and not np.isfinite(building.solid.vertices).all():
             raise ValueError("its solid has coordinates that are not numbers")
-        return building, figures_of(building)
+        return building, measure_figures(building)
     except (ValueError, IndexError) as error:
         detail = f"{Status.INTERNAL_ERROR.value} ({error})"
         return dataclasses.replace(

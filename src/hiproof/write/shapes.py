@@ -57,26 +57,26 @@ class Shapes:
 NO_SHAPES = Shapes()
 
 
-def shapes_of(
+def make_shapes(
     building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX
 ) -> Shapes:
     """The shapes of `building` that `write` asks for;
 
     `figures` are those of its solid, None without one.
     """
-    asked = set(write.lods)
-    if building.built is None or figures is None or (asked == {"2.2"} and write.parts_as == "one"):
+    lods = set(write.lods)
+    if building.built is None or figures is None or (lods == {"2.2"} and write.parts_as == "one"):
         return NO_SHAPES
     solid = building.solid
-    ground = solid.of_kind(GROUND)[0]
-    cut = cut_into_parts(solid) if write.parts_as == "buildingparts" or "1.3" in asked else ()
-    parts = part_shapes(building, cut, asked, prefix) if write.parts_as == "buildingparts" else ()
-    lod12 = whole_block(solid, ground, figures) if asked & {"1.2", "1.3"} else None
+    ground = solid.select_faces(GROUND)[0]
+    cut = cut_into_parts(solid) if write.parts_as == "buildingparts" or "1.3" in lods else ()
+    parts = part_shapes(building, cut, lods, prefix) if write.parts_as == "buildingparts" else ()
+    lod12 = whole_block(solid, ground, figures) if lods & {"1.2", "1.3"} else None
     return Shapes(
-        outline=ground if "0" in asked else None,
+        outline=ground if "0" in lods else None,
         z_edge=metres(figures.h_eave),
-        lod12=lod12 if "1.2" in asked else None,
-        lod13=None if parts or "1.3" not in asked else stepped(cut, figures) or lod12,
+        lod12=lod12 if "1.2" in lods else None,
+        lod13=None if parts or "1.3" not in lods else make_stepped_block(cut, figures) or lod12,
         parts=parts,
     )
 
@@ -93,10 +93,10 @@ def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
     """
     from ..compose.blocks import block
 
-    return block(solid.plan_of(ground), figures.h_base, metres(figures.h_70p))
+    return block(solid.project_face(ground), figures.h_base, metres(figures.h_70p))
 
 
-def stepped(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
+def make_stepped_block(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
     """LoD1.3 as one solid: a block for each building part, as high as seven tenths of its own roof
     lie below.
     """
@@ -107,17 +107,18 @@ def stepped(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None
 
 
 def part_shapes(
-    building: Building, cut: tuple[BuildingPart, ...], asked: set[str], prefix: str
+    building: Building, cut: tuple[BuildingPart, ...], requested: set[str], prefix: str
 ) -> tuple[PartShape, ...]:
     """The building parts with what their roof parts are."""
     primitives = [
-        part_values(building, number, shown) for number, shown in enumerate(building.shown_areas())
+        part_values(building, number, visible)
+        for number, visible in enumerate(building.compute_visible_areas())
     ]
     return tuple(
         part_shape(
             part,
             [primitives[member] for member in part.members if member < len(primitives)],
-            asked,
+            requested,
             prefix,
         )
         for part in cut
@@ -125,14 +126,16 @@ def part_shapes(
 
 
 def part_shape(
-    part: BuildingPart, primitives: list[dict[str, Any]], asked: set[str], prefix: str
+    part: BuildingPart, primitives: list[dict[str, Any]], requested: set[str], prefix: str
 ) -> PartShape:
     """A building part of these roof parts with its figures, block and attributes."""
     from ..compose.blocks import block
 
     figures = roof_figures(part.solid)
     types = tuple(values["type"] for values in primitives)
-    lod13 = block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in asked else None
+    lod13 = (
+        block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in requested else None
+    )
     return PartShape(
         part.solid, figures, lod13, types, part_attributes(primitives, figures, prefix)
     )
@@ -142,13 +145,13 @@ def part_attributes(
     primitives: list[dict[str, Any]], figures: RoofFigures, prefix: str
 ) -> dict[str, Any]:
     """Attributes of a building part by name."""
-    found = {
+    result = {
         **shape_attributes(figures),
         "roof_type": figures.roofer_type,
         "roof_n_surfaces": figures.roof_faces,
     }
     return {
-        **{prefix + name: plain(found[name]) for name in OF_PARTS},
+        **{prefix + name: plain(result[name]) for name in OF_PARTS},
         f"{OWN}h_eave": plain(metres(figures.h_eave)),
         f"{OWN}roof_type": primitives[0]["type"] if primitives else None,
         f"{OWN}primitives": [

@@ -13,14 +13,14 @@ import numpy as np
 WIDEST = -123456789.1234
 
 
-def rounded(value: float, digits: int = 6) -> float:
+def round_value(value: float, digits: int = 6) -> float:
     """`value` rounded, minus zero being zero; NaN and infinities stay."""
     return round(float(value), digits) + 0.0
 
 
 def metres(value: float) -> float:
     """Rounded to a tenth of a millimetre, as coordinates are written."""
-    return rounded(value, 4)
+    return round_value(value, 4)
 
 
 def plain(value: Any) -> Any:

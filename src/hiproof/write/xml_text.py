@@ -8,7 +8,11 @@ from typing import Any
 PLAIN = re.compile(r"[ !#-%'-;=?-~]*")  # printable ASCII without what must be escaped
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
-GENERIC = {int: "gen:intAttribute", float: "gen:doubleAttribute", str: "gen:stringAttribute"}
+GENERIC_ATTRIBUTES = {
+    int: "gen:intAttribute",
+    float: "gen:doubleAttribute",
+    str: "gen:stringAttribute",
+}
 QUOTED = ESCAPES | str.maketrans({'"': "&quot;", "\n": "&#10;", "\t": "&#9;"})
 
 
@@ -33,12 +37,12 @@ def generic_attribute(name: str, value: Any) -> str:
     """A gen:*Attribute of the value's kind; None is left out."""
     if value is None:
         return ""
-    tag = GENERIC.get(type(value), GENERIC[str])
+    tag = GENERIC_ATTRIBUTES.get(type(value), GENERIC_ATTRIBUTES[str])
     text = str(value).lower() if isinstance(value, bool) else xml_text(value)
     return f'<{tag} name="{xml_attribute(name)}"><gen:value>{text}</gen:value></{tag}>'
 
 
-def attribute_set(name: str, values: dict[str, Any]) -> str:
+def format_attribute_set(name: str, values: dict[str, Any]) -> str:
     """A gen:genericAttributeSet of `values` by name."""
     inside = "".join(generic_attribute(key, value) for key, value in values.items())
     return (

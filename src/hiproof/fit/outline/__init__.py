@@ -22,19 +22,19 @@ import shapely
 
 from ..direction import main_direction
 from ..walls import on_walls
-from .cost import Border, Drawing, costs_by_depth, drawing_of
-from .lines import area_of, find_corners, lines_through, quarter_gap
-from .moves import redrawn
+from .cost import Border, Drawing, costs_by_depth, make_drawing
+from .lines import compute_area, find_corners, make_lines, quarter_gap
+from .moves import redraw
 from .rough import LEAST_COURT_M2, Rough, largest, rough_outline
-from .settle import settled
+from .settle import settle_lines
 from .spread import unevenness
-from .steps import RUN, stepped
+from .steps import RUN, add_steps
 
 __all__ = ["estimate_outline"]
 
 # m over which a side is soft: the scanner's noise in plan; density outside over that inside: points
 # of walls and trees
-BLUR_M, STRAY = 0.15, math.exp(-4.0)
+OUTLINE_BLUR_M, STRAY = 0.15, math.exp(-4.0)
 # nats: of a line, of a further direction, of a line in that, of a sharp corner, where points are
 # spread by chance
 PRICES = (3.0, 3.0, 1.0, 6.0)
@@ -49,7 +49,7 @@ MOST_DENSE = 40.0
 # rad; within it the direction of slopes and that of the outline are one
 SAME_DIRECTION_RAD = math.radians(1.5)
 # m around a court's first drawing in which its corners lie; points of twice that bear on it
-AROUND_M = 2.0
+BORDER_REACH_M = 2.0
 MOSTLY_INSIDE = 0.8  # of a court's area
 STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
@@ -71,12 +71,12 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     """
     points = np.ascontiguousarray(points, float)
     rough = rough_outline(points)
-    own = main_direction(shapely.Polygon(rough.rings[0][0]))
-    kappa = own if kappa is None else kappa
-    other = own if abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD else kappa
+    direction = main_direction(shapely.Polygon(rough.rings[0][0]))
+    kappa = direction if kappa is None else kappa
+    other = direction if abs(quarter_gap(kappa - direction)) > SAME_DIRECTION_RAD else kappa
     ways = (kappa, other, other)
-    cloud = cloud_of(points, rough)
-    outline, *courts = [ring_of(starts, ways, cloud) for starts in rough.rings]
+    cloud = make_cloud(points, rough)
+    outline, *courts = [draw_ring(starts, ways, cloud) for starts in rough.rings]
     return with_courts(outline, courts)
 
 
@@ -94,7 +94,7 @@ class Cloud(NamedTuple):
     dearness: float
 
 
-def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
+def make_cloud(points: np.ndarray, rough: Rough) -> Cloud:
     """What `points` (n, 2 or 3) say of the rings to be drawn."""
     xy = points[:, :2]
     wall = (
@@ -104,7 +104,7 @@ def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
     )
     outer = wall.copy()
     outer[wall] = shapely.dwithin(rough.shape.boundary, shapely.points(xy[wall]), OUTER_M)
-    density = (~wall).sum() / sum(area_of(starts[0]) for starts in rough.rings)
+    density = (~wall).sum() / sum(compute_area(starts[0]) for starts in rough.rings)
     return Cloud(
         xy,
         wall,
@@ -115,21 +115,21 @@ def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
     )
 
 
-def ring_of(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> shapely.Polygon:
+def draw_ring(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> shapely.Polygon:
     """One ring: the cheapest of the drawings from its `starts` on, each along one of the `ways`
     (rad).
     """
     drawings = []
     for corners, way in zip(starts, ways, strict=True):
         angle = along_y(corners, way)
-        border = border_of(cloud, corners, angle)
-        found = drawn(
-            lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing
+        border = make_border(cloud, corners, angle)
+        outline = draw_outline(
+            make_lines(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing
         )
-        drawings.append((found.cost, found.lines + [angle, 0.0]))
+        drawings.append((outline.cost, outline.lines + [angle, 0.0]))
     _, lines = min(drawings, key=itemgetter(0))
     # walls well inside stand below eaves that reach out
-    lines = settled(lines, cloud.xy[cloud.telling], cloud.density)
+    lines = settle_lines(lines, cloud.xy[cloud.telling], cloud.density)
     corners = np.empty_like(lines)
     find_corners(lines, corners)
     return shapely.Polygon(corners)
@@ -143,16 +143,16 @@ def along_y(corners: np.ndarray, way: float) -> float:
     return way if y >= x else way + 0.5 * math.pi
 
 
-def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
+def make_border(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
     """What bears on a ring that begins with `corners` (n, 2), in axes turned by `angle` (rad): some
     of the points, and the prices.
     """
     xy, wall = turned_back(cloud.xy[cloud.telling], angle), cloud.wall[cloud.telling]
-    start, court = turned_back(corners, angle), area_of(corners) < 0.0
-    low, high = start.min(axis=0) - AROUND_M, start.max(axis=0) + AROUND_M
+    start, court = turned_back(corners, angle), compute_area(corners) < 0.0
+    lower, upper = start.min(axis=0) - BORDER_REACH_M, start.max(axis=0) + BORDER_REACH_M
     if court:
-        near = ((xy > low - AROUND_M) & (xy < high + AROUND_M)).all(axis=1)
-        xy, wall = xy[near], wall[near]
+        mask = ((xy > lower - BORDER_REACH_M) & (xy < upper + BORDER_REACH_M)).all(axis=1)
+        xy, wall = xy[mask], wall[mask]
     step = math.ceil(cloud.density / MOST_DENSE)
     order = np.argsort(xy[::step, 1], kind="stable") * step
     x, y = np.ascontiguousarray(xy[order].T)
@@ -161,8 +161,10 @@ def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
     prices = (
         cloud.dearness * price * dense**growth for price, growth in zip(PRICES, GROWTH, strict=True)
     )
-    box = low[0], high[0], low[1], high[1]
-    return Border(x, y, wall[order], density, court, box, BLUR_M, costs_by_depth(STRAY), *prices)
+    box = lower[0], upper[0], lower[1], upper[1]
+    return Border(
+        x, y, wall[order], density, court, box, OUTLINE_BLUR_M, costs_by_depth(STRAY), *prices
+    )
 
 
 def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shapely.Polygon:
@@ -172,8 +174,8 @@ def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shap
     """
     for court in courts:
         roof = largest(shapely.difference(outline, court))
-        gone = outline.area - roof.area
-        if MOSTLY_INSIDE * court.area < gone < court.area + LEAST_COURT_M2:
+        missing = outline.area - roof.area
+        if MOSTLY_INSIDE * court.area < missing < court.area + LEAST_COURT_M2:
             outline = roof
     return outline
 
@@ -186,12 +188,12 @@ def turned_back(xy: np.ndarray, angle: float) -> np.ndarray:
     return xy @ np.array([[c, -s], [s, c]])
 
 
-def drawn(lines: np.ndarray, border: Border, step_m: float) -> Drawing:
+def draw_outline(lines: np.ndarray, border: Border, step_m: float) -> Drawing:
     """The cheapest drawing found from `lines` (n, 2) on, mostly along the axes: few of them at
     first, then with what breaks them.
     """
-    drawing = redrawn(drawing_of(lines, 0.0, border), border, step_m)
+    drawing = redraw(make_drawing(lines, 0.0, border), border, step_m)
     for longest in (1, RUN):  # bays of single sides come first: fewer runs go wrong
-        broken = stepped(drawing, border, longest)
-        drawing = redrawn(broken, border, step_m) if broken.cost < drawing.cost else drawing
+        broken = add_steps(drawing, border, longest)
+        drawing = redraw(broken, border, step_m) if broken.cost < drawing.cost else drawing
     return drawing

@@ -26,10 +26,11 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.point_in_polygon import flips
-from .lines import SAME_RAD, area_of, find_corners, quarter_gap
+from .lines import SAME_RAD, compute_area, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
 
-FINE = 100  # places a blur at which costs are kept; between them they are straight, to 5e-5 nats
+# places a blur at which costs are kept; between them they are straight, to 5e-5 nats
+TABLE_STEPS_PER_M = 100
 QUARTER = 0.5 * math.pi  # rad; lines so far apart have one direction
 # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
 SHARP = math.cos(math.radians(120.0))
@@ -46,21 +47,21 @@ Drawing = namedtuple("Drawing", "lines kappa corners own structure cost")
 
 
 @compiled
-def drawing_of(lines, kappa, border):
+def make_drawing(lines, kappa, border):
     """The drawing of `lines`; its cost is infinite where they are no polygon."""
-    corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
+    corners, costs = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
-        return Drawing(lines, kappa, corners, own, np.inf, np.inf)
+        return Drawing(lines, kappa, corners, costs, np.inf, np.inf)
     squared, inside = nearest_sides(
         corners, border.x, border.y, border.court, SURE_BLURS * border.blur
     )
-    for k in range(len(own)):
-        own[k] = point_cost(squared[k], inside[k], border.wall[k], border)
+    for k in range(len(costs)):
+        costs[k] = point_cost(squared[k], inside[k], border.wall[k], border)
     misfit, structure = (
-        border.density * area_of(corners) + own.sum(),
+        border.density * compute_area(corners) + costs.sum(),
         structure_cost(lines, kappa, border),
     )
-    return Drawing(lines, kappa, corners, own, structure, misfit + structure)
+    return Drawing(lines, kappa, corners, costs, structure, misfit + structure)
 
 
 @compiled
@@ -69,12 +70,12 @@ def is_allowed(corners, border):
     it may.
     """
     if not border.court:
-        return area_of(corners) > 0.0
+        return compute_area(corners) > 0.0
     x_low, x_high, y_low, y_high = border.box
     for i in range(len(corners)):
         if not (x_low <= corners[i, 0] <= x_high and y_low <= corners[i, 1] <= y_high):
             return False
-    return area_of(corners) < 0.0
+    return compute_area(corners) < 0.0
 
 
 @compiled
@@ -97,11 +98,11 @@ def is_among(way, ways):
     """Whether one of `ways` (n,), angles from -45 to 45 degrees, is the same as `way`; those at the
     ends are one.
     """
-    found = False
+    result = False
     for other in ways:
-        apart = abs(way - other)
-        found |= (apart < SAME_RAD) | (apart > QUARTER - SAME_RAD)
-    return found
+        gap = abs(way - other)
+        result |= (gap < SAME_RAD) | (gap > QUARTER - SAME_RAD)
+    return result
 
 
 @compiled
@@ -117,15 +118,15 @@ def nearest_sides(corners, x, y, court, reach):
     for i in range(len(corners)):
         k = i + 1 if i + 1 < len(corners) else 0
         x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[k, 0], corners[k, 1]
-        low, high = min(y0, y1) - reach, max(y0, y1) + reach
-        if low <= y[-1] and high >= y[0]:
-            near = slice(np.searchsorted(y, low), np.searchsorted(y, high))
-            beside_side(x0, y0, x1, y1, x[near], y[near], squared[near], inside[near])
+        lower, upper = min(y0, y1) - reach, max(y0, y1) + reach
+        if lower <= y[-1] and upper >= y[0]:
+            nearby = slice(np.searchsorted(y, lower), np.searchsorted(y, upper))
+            update_nearest(x0, y0, x1, y1, x[nearby], y[nearby], squared[nearby], inside[nearby])
     return squared, inside
 
 
 @compiled
-def beside_side(x0, y0, x1, y1, x, y, squared, inside):
+def update_nearest(x0, y0, x1, y1, x, y, squared, inside):
     """What `nearest_sides` says of points at x, y (n,) after one side more."""
     dx, dy = x1 - x0, y1 - y0
     length = max(dx * dx + dy * dy, 1e-18)
@@ -141,16 +142,16 @@ def point_cost(squared, inside, wall, border):
     is, against one deep inside; that of a `wall` is compared with one on the border.
     """
     depth = math.sqrt(squared) / border.blur
-    return known_cost(depth if inside else -depth, wall, border.costs)
+    return interpolate_cost(depth if inside else -depth, wall, border.costs)
 
 
 @compiled
-def known_cost(depth, wall, costs):
+def interpolate_cost(depth, wall, costs):
     """`cost_at_depth` from its table `costs`, straight between its places."""
-    place = (min(max(depth, -SURE_BLURS), SURE_BLURS) + SURE_BLURS) * FINE
+    place = (min(max(depth, -SURE_BLURS), SURE_BLURS) + SURE_BLURS) * TABLE_STEPS_PER_M
     k = min(int(place), costs.shape[1] - 2)
-    own = costs[int(wall)]
-    return own[k] + (place - k) * (own[k + 1] - own[k])
+    table = costs[int(wall)]
+    return table[k] + (place - k) * (table[k + 1] - table[k])
 
 
 @functools.cache
@@ -158,7 +159,7 @@ def costs_by_depth(stray: float) -> np.ndarray:
     """What points of the roof and of walls cost (2, 2 SURE_BLURS FINE + 1) from sure outside to
     sure inside.
     """
-    depths = np.linspace(-SURE_BLURS, SURE_BLURS, round(2 * SURE_BLURS * FINE) + 1)
+    depths = np.linspace(-SURE_BLURS, SURE_BLURS, round(2 * SURE_BLURS * TABLE_STEPS_PER_M) + 1)
     return np.array(
         [[cost_at_depth(depth, wall, stray) for depth in depths.tolist()] for wall in (False, True)]
     )
@@ -175,83 +176,90 @@ def cost_at_depth(depth, wall, stray):
 
 
 @compiled
-def cost_of_change(lines, drawing, i, count, fresh, border, limit):
-    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the
+def evaluate_change(lines, drawing, i, count, new_items, border, limit):
+    """What `lines` cost that have the first `new_items` corners in place of the `count` + 1 of the
     drawing from `i` on; infinite as soon as that is known to be above `limit`.
     """
-    corners = corners_of_change(lines, drawing, i, count, fresh, border)
+    corners = compute_changed_corners(lines, drawing, i, count, new_items, border)
     if len(corners) == 0:
         return np.inf
-    near = points_near(drawing.corners, corners, i, count, fresh, border)
+    nearby = select_points(drawing.corners, corners, i, count, new_items, border)
     cost = without_points(lines, drawing, corners, border)
-    for k in near:
+    for k in nearby:
         cost -= drawing.own[k]
     if cost > limit:  # no point gains by being there
         return np.inf
     squared, inside = nearest_sides(
-        corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur
+        corners, border.x[nearby], border.y[nearby], border.court, SURE_BLURS * border.blur
     )
-    for k in range(len(near)):
-        cost += point_cost(squared[k], inside[k], border.wall[near[k]], border)
+    for k in range(len(nearby)):
+        cost += point_cost(squared[k], inside[k], border.wall[nearby[k]], border)
         if cost > limit:
             return np.inf
     return cost
 
 
 @compiled
-def changed(lines, drawing, i, count, fresh, border):
-    """The drawing of `lines` that have the first `fresh` corners in place of the `count` + 1 of the
-    drawing from `i` on.
+def apply_change(lines, drawing, i, count, new_items, border):
+    """The drawing of `lines` that have the first `new_items` corners in place of the `count` + 1 of
+    the drawing from `i` on.
 
     Points away from the corners that come and go cost what they did.
     """
-    corners, own = corners_of_change(lines, drawing, i, count, fresh, border), drawing.own.copy()
+    corners, costs = (
+        compute_changed_corners(lines, drawing, i, count, new_items, border),
+        drawing.own.copy(),
+    )
     if len(corners) == 0:
-        return Drawing(lines, drawing.kappa, corners, own, np.inf, np.inf)
-    near = points_near(drawing.corners, corners, i, count, fresh, border)
+        return Drawing(lines, drawing.kappa, corners, costs, np.inf, np.inf)
+    nearby = select_points(drawing.corners, corners, i, count, new_items, border)
     cost = without_points(lines, drawing, corners, border)
     squared, inside = nearest_sides(
-        corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur
+        corners, border.x[nearby], border.y[nearby], border.court, SURE_BLURS * border.blur
     )
-    for k in range(len(near)):
-        own[near[k]] = point_cost(squared[k], inside[k], border.wall[near[k]], border)
-        cost += own[near[k]] - drawing.own[near[k]]
+    for k in range(len(nearby)):
+        costs[nearby[k]] = point_cost(squared[k], inside[k], border.wall[nearby[k]], border)
+        cost += costs[nearby[k]] - drawing.own[nearby[k]]
     return Drawing(
-        lines, drawing.kappa, corners, own, structure_cost(lines, drawing.kappa, border), cost
+        lines, drawing.kappa, corners, costs, structure_cost(lines, drawing.kappa, border), cost
     )
 
 
 @compiled
-def corners_of_change(lines, drawing, i, count, fresh, border):
-    """The corners (n, 2) of a drawing's lines changed as `changed` has it; none where they are no
-    polygon.
+def compute_changed_corners(lines, drawing, i, count, new_items, border):
+    """The corners (n, 2) of a drawing's lines changed as `apply_change` has it; none where they are
+    no polygon.
     """
     corners, old = np.empty((len(lines), 2)), drawing.corners
-    for k in range(fresh, len(lines)):
-        corners[k] = old[(i + count + 1 + k - fresh) % len(old)]
-    if len(lines) < 3 or not find_corners(lines, corners, fresh) or not is_allowed(corners, border):
+    for k in range(new_items, len(lines)):
+        corners[k] = old[(i + count + 1 + k - new_items) % len(old)]
+    if (
+        len(lines) < 3
+        or not find_corners(lines, corners, new_items)
+        or not is_allowed(corners, border)
+    ):
         return corners[:0]
     return corners
 
 
 @compiled
-def points_near(old, corners, i, count, fresh, border):
+def select_points(old, corners, i, count, new_items, border):
     """The points (m,), ascending, near the box around the corners that come and go."""
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
-    for k in range(count + 1 + fresh):
-        ring, at = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
-        x, y = ring[at, 0], ring[at, 1]
+    for k in range(count + 1 + new_items):
+        ring, position = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
+        x, y = ring[position, 0], ring[position, 1]
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
     reach = SURE_BLURS * border.blur
     first, last = (
         np.searchsorted(border.y, y_low - reach),
         np.searchsorted(border.y, y_high + reach),
     )
-    near, m = np.empty(last - first, np.int64), 0
+    nearby, m = np.empty(last - first, np.int64), 0
     for k in range(first, last):
-        near[m] = k
+        nearby[m] = k
         m += int(x_low - reach < border.x[k] < x_high + reach)
-    return near[:m]
+    return nearby[:m]
 
 
 @compiled
@@ -260,7 +268,7 @@ def without_points(lines, drawing, corners, border):
     structure = structure_cost(lines, drawing.kappa, border)
     return (
         drawing.cost
-        + border.density * (area_of(corners) - area_of(drawing.corners))
+        + border.density * (compute_area(corners) - compute_area(drawing.corners))
         + structure
         - drawing.structure
     )

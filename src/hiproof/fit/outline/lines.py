@@ -23,7 +23,7 @@ SAME_RAD = 1e-6  # rad; numerically parallel
 quarter_gap = compiled(direction.quarter_gap)
 
 
-def lines_through(corners: np.ndarray) -> np.ndarray:
+def make_lines(corners: np.ndarray) -> np.ndarray:
     """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise, or of a court,
     clockwise.
     """
@@ -36,35 +36,35 @@ def lines_through(corners: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def find_corners(lines, corners, fresh=-1):
+def find_corners(lines, corners, smallest=-1):
     """Write the corners (n, 2) of `lines`;
 
     False where they are no simple polygon run through in order.
 
-    With `fresh`, only the first so many: the others are there, and the sides between them run on
+    With `smallest`, only the first so many: the others are there, and the sides between them run on
     and cross none of each other.
     """
     n = len(lines)
-    fresh = n if fresh < 0 else min(fresh, n)
-    for i in range(fresh):
-        before, r_before, after, r_after = (
+    smallest = n if smallest < 0 else min(smallest, n)
+    for i in range(smallest):
+        previous, r_before, following, r_after = (
             lines[i - 1, 0],
             lines[i - 1, 1],
             lines[i, 0],
             lines[i, 1],
         )
-        sine = math.sin(after - before)
-        if abs(sine) < SHARPEST or math.cos(after - before) < BACK:
+        sine = math.sin(following - previous)
+        if abs(sine) < SHARPEST or math.cos(following - previous) < BACK:
             return False
-        corners[i, 0] = (r_before * math.sin(after) - r_after * math.sin(before)) / sine
-        corners[i, 1] = (r_after * math.cos(before) - r_before * math.cos(after)) / sine
-    asked = min(fresh + 1, n)
-    for k in range(asked):
+        corners[i, 0] = (r_before * math.sin(following) - r_after * math.sin(previous)) / sine
+        corners[i, 1] = (r_after * math.cos(previous) - r_before * math.cos(following)) / sine
+    wanted_count = min(smallest + 1, n)
+    for k in range(wanted_count):
         i = (k - 1) % n
         along = math.cos(lines[i, 0]) * (corners[k, 1] - corners[i, 1])
         if along - math.sin(lines[i, 0]) * (corners[k, 0] - corners[i, 0]) < -1e-9:
             return False
-    for k in range(asked):
+    for k in range(wanted_count):
         if crosses_another(corners, (k - 1) % n):
             return False
     return True
@@ -74,25 +74,25 @@ def find_corners(lines, corners, fresh=-1):
 def crosses_another(corners, i):
     """Whether side i crosses another that is not next to it."""
     n = len(corners)
-    before, after = i - 1 if i > 0 else n - 1, i + 1 if i + 1 < n else 0
+    previous, count = i - 1 if i > 0 else n - 1, i + 1 if i + 1 < n else 0
     x, y = corners[i, 0], corners[i, 1]
-    u, v = corners[after, 0] - x, corners[after, 1] - y
+    u, v = corners[count, 0] - x, corners[count, 1] - y
     for j in range(n):
         k = j + 1 if j + 1 < n else 0
         start = u * (corners[j, 1] - y) - v * (corners[j, 0] - x)
         end = u * (corners[k, 1] - y) - v * (corners[k, 0] - x)
         # ends on either side of the line of side i
-        if start * end < 0.0 and j != i and j != before and j != after:
+        if start * end < 0.0 and j != i and j != previous and j != count:
             p, q = corners[k, 0] - corners[j, 0], corners[k, 1] - corners[j, 1]
-            one = p * (y - corners[j, 1]) - q * (x - corners[j, 0])
+            item = p * (y - corners[j, 1]) - q * (x - corners[j, 0])
             other = p * (y + v - corners[j, 1]) - q * (x + u - corners[j, 0])
-            if one * other < 0.0:
+            if item * other < 0.0:
                 return True
     return False
 
 
 @compiled
-def area_of(corners):
+def compute_area(corners):
     """Area (m2) of the polygon, positive where it runs counter-clockwise."""
     doubled = 0.0
     for i in range(len(corners)):
@@ -110,7 +110,7 @@ def shares_direction(lines, i):
 
 
 @compiled
-def replaced(lines, i, count, azimuth, distance):
+def replace_lines(lines, i, count, azimuth, distance):
     """The lines with one in place of `count` from `i` on; it comes first."""
     return replaced_by(lines, i, count, np.array([[azimuth, distance]]))
 
@@ -127,6 +127,6 @@ def replaced_by(lines, i, count, flight):
 
 
 @compiled
-def dropped(lines, i):
+def drop_line(lines, i):
     """The lines without line `i`; the one after it comes first."""
     return replaced_by(lines, i, 1, lines[:0])

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from .cost import Drawing, changed, cost_of_change, drawing_of
-from .lines import SAME_RAD, dropped, quarter_gap, replaced, shares_direction
+from .cost import Drawing, apply_change, evaluate_change, make_drawing
+from .lines import SAME_RAD, drop_line, quarter_gap, replace_lines, shares_direction
 
 LONGEST_RUN = 3  # lines that become one
 TURN_RAD = math.radians(35.0)  # of a line, at most
@@ -28,26 +28,26 @@ GAIN = 1e-6  # nats; numerically none
 
 
 @compiled
-def redrawn(drawing, border, step_m):
+def redraw(drawing, border, step_m):
     """The drawing with no change left that pays; lines that replace others are moved by `step_m` at
     first.
     """
-    drawing = simplified(drawing, border, step_m)
+    drawing = simplify_drawing(drawing, border, step_m)
     for _ in range(ROUNDS):
-        before = drawing.cost
+        cost = drawing.cost
         for step in STEPS_M:
-            drawing = shifted(drawing, border, step)
+            drawing = shift_lines(drawing, border, step)
         for turn in TURNS_RAD:
-            drawing = turned(drawing, border, turn)
-        if drawing.cost < before:
-            drawing = simplified(drawing, border, step_m)
-        if drawing.cost > before - 0.1:
+            drawing = turn_lines(drawing, border, turn)
+        if drawing.cost < cost:
+            drawing = simplify_drawing(drawing, border, step_m)
+        if drawing.cost > cost - 0.1:
             break
     return drawing
 
 
 @compiled
-def simplified(drawing, border, step_m):
+def simplify_drawing(drawing, border, step_m):
     """The change that gains most is made, again and again; after each only the gains of lines
     beside it are asked anew.
     """
@@ -59,14 +59,16 @@ def simplified(drawing, border, step_m):
         i = int(np.argmax(gains))
         if gains[i] <= GAIN:
             break
-        cost, lines, count, fresh = best_change(drawing, i, border)
+        cost, lines, count, new_items = best_change(drawing, i, border)
         gains[i] = drawing.cost - cost  # those of lines far off may be of an earlier drawing
         if gains[i] <= GAIN:
             continue
-        known, gains = gains, np.full(len(lines), np.inf)
+        old_gains, gains = gains, np.full(len(lines), np.inf)
         for k in range(REACHED + 1, len(lines) - REACHED):
-            gains[k] = known[(i + count + 1 - fresh + k) % len(known)]
-        drawing = first_shifted(changed(lines, drawing, i, count, fresh, border), border, step_m)
+            gains[k] = old_gains[(i + count + 1 - new_items + k) % len(old_gains)]
+        drawing = shift_first_line(
+            apply_change(lines, drawing, i, count, new_items, border), border, step_m
+        )
     return drawing
 
 
@@ -77,19 +79,19 @@ def best_change(drawing, i, border):
     are new.
     """
     n = len(drawing.lines)
-    best, lines, gone, fresh = drawing.cost, drawing.lines, 1, 1
+    best, lines, missing, new_items = drawing.cost, drawing.lines, 1, 1
     if n > 3:
-        new = dropped(drawing.lines, i)
-        cost = cost_of_change(new, drawing, i, 1, 1, border, best)
+        new = drop_line(drawing.lines, i)
+        cost = evaluate_change(new, drawing, i, 1, 1, border, best)
         if cost < best:
             best, lines = cost, new
     for count in range(1, min(LONGEST_RUN, n - 2) + 1):
         for azimuth, distance in joint_lines(drawing, i, count):
-            new = replaced(drawing.lines, i, count, azimuth, distance)
-            cost = cost_of_change(new, drawing, i, count, 2, border, best)
+            new = replace_lines(drawing.lines, i, count, azimuth, distance)
+            cost = evaluate_change(new, drawing, i, count, 2, border, best)
             if cost < best:
-                best, lines, gone, fresh = cost, new, count, 2
-    return best, lines, gone, fresh
+                best, lines, missing, new_items = cost, new, count, 2
+    return best, lines, missing, new_items
 
 
 @compiled
@@ -101,27 +103,27 @@ def joint_lines(drawing, i, count):
     single line also along that of any longer one.
     """
     lines, corners, n = drawing.lines, drawing.corners, len(drawing.lines)
-    found, m = np.empty((n + 8, 2)), 0
+    result, m = np.empty((n + 8, 2)), 0
     first, last = lines[i], lines[(i + count - 1) % n]
     if count > 1 and math.cos(first[0] - last[0]) < math.cos(TURN_RAD * APART[count]):
-        return found[:0]
+        return result[:0]
     start, end = corners[i], corners[(i + count) % n]
     chord = math.atan2(start[0] - end[0], end[1] - start[1])
-    middle = middle_of(corners, i, count)
-    ways = ways_of(drawing, i, count, chord)
+    middle = compute_middle(corners, i, count)
+    ways = list_azimuths(drawing, i, count, chord)
     for way in ways:
         unchanged = count == 1 and abs(math.sin(way - first[0])) < SAME_RAD
         if not unchanged and math.cos(way - chord) > math.cos(TURN_RAD):
-            found[m] = way, middle[0] * math.cos(way) + middle[1] * math.sin(way)
+            result[m] = way, middle[0] * math.cos(way) + middle[1] * math.sin(way)
             m += 1
     if count == LONGEST_RUN:
-        found[m], found[m + 1] = first, last
+        result[m], result[m + 1] = first, last
         m += 2
-    return found[:m]
+    return result[:m]
 
 
 @compiled
-def ways_of(drawing, i, count, chord):
+def list_azimuths(drawing, i, count, chord):
     """Azimuths (m,) that the one line for `count` from `i` on may have: nearest to the `chord` of
     all that are common.
     """
@@ -148,7 +150,7 @@ def side_length(corners, i):
 
 
 @compiled
-def middle_of(corners, i, count):
+def compute_middle(corners, i, count):
     """The middle (2,) of `count` sides from `i` on, weighted by their lengths; of a run of three
     without the second.
     """
@@ -163,40 +165,40 @@ def middle_of(corners, i, count):
 
 
 @compiled
-def shifted(drawing, border, step):
+def shift_lines(drawing, border, step):
     """Each line moved by multiples of `step` (m) for as long as that is cheaper."""
     for _ in range(SHIFT_ROUNDS):
-        before = drawing.cost
+        cost = drawing.cost
         for _ in range(len(drawing.lines)):
-            drawing = first_shifted(drawing, border, step)
+            drawing = shift_first_line(drawing, border, step)
             lines, corners = np.roll(drawing.lines, -2), np.roll(drawing.corners, -2)  # a line on
             drawing = Drawing(
                 lines, drawing.kappa, corners, drawing.own, drawing.structure, drawing.cost
             )
-        if drawing.cost >= before - GAIN:
+        if drawing.cost >= cost - GAIN:
             break
     return drawing
 
 
 @compiled
-def first_shifted(drawing, border, step):
+def shift_first_line(drawing, border, step):
     """The first line moved by multiples of `step` (m) for as long as that is cheaper."""
     for sign in (1.0, -1.0):
         moved = False
         while True:
             lines = drawing.lines.copy()
             lines[0, 1] += sign * step
-            enough = drawing.cost - GAIN
-            if not cost_of_change(lines, drawing, 0, 1, 2, border, enough) < enough:
+            is_enough = drawing.cost - GAIN
+            if not evaluate_change(lines, drawing, 0, 1, 2, border, is_enough) < is_enough:
                 break
-            drawing, moved = changed(lines, drawing, 0, 1, 2, border), True
+            drawing, moved = apply_change(lines, drawing, 0, 1, 2, border), True
         if moved:
             break
     return drawing
 
 
 @compiled
-def turned(drawing, border, step):
+def turn_lines(drawing, border, step):
     """All lines of each direction turned about their middles by multiples of `step` (rad) for as
     long as that is cheaper.
     """
@@ -212,10 +214,10 @@ def turned(drawing, border, step):
                 )
                 for j in range(len(lines)):
                     if abs(quarter_gap(lines[j, 0] - drawing.lines[i, 0])) < SAME_RAD:
-                        x, y = middle_of(drawing.corners, j, 1)
+                        x, y = compute_middle(drawing.corners, j, 1)
                         lines[j, 0] += sign * step
                         lines[j, 1] = x * math.cos(lines[j, 0]) + y * math.sin(lines[j, 0])
-                new = drawing_of(lines, drawing.kappa + (sign * step if main else 0.0), border)
+                new = make_drawing(lines, drawing.kappa + (sign * step if main else 0.0), border)
                 if not new.cost < drawing.cost - GAIN:
                     break
                 drawing, moved = new, True

@@ -14,7 +14,7 @@ import shapely
 
 from ...geometry.alpha_shape import SPACINGS, alpha_shape, default_radius
 from ..walls import on_walls
-from .lines import BACK, SHARPEST, find_corners, lines_through
+from .lines import BACK, SHARPEST, find_corners, make_lines
 
 # points for each of the roof, beyond which walls below wide eaves, as drones see them, would make
 # the spacing half the roof's; airborne scans have fewer, and all that is told in spacings was
@@ -28,7 +28,7 @@ CLOSING_SPACINGS, PUSH_SPACINGS = 1.0, 0.5
 SIMPLIFY_SPACINGS = (0.7, 0.4, 0.2)
 # m; closer points drop corners like those: of twice as many no drawing gets better, all take longer
 LEAST_SPACING_M = 0.35
-COARSER, TRIES = 1.3, 12  # factor between tries at few corners, and how many tries
+COARSER, RADII_TRIED = 1.3, 12  # factor between tries at few corners, and how many tries
 LEAST_COURT_M2 = 4.0  # m2; as of buildings
 MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
@@ -61,7 +61,8 @@ def rough_outline(points: np.ndarray) -> Rough:
     ]
     unit = max(spacing, LEAST_SPACING_M)
     rings = [
-        [corners_of(ring, spacings * unit) for spacings in SIMPLIFY_SPACINGS] for ring in filled
+        [simplify_corners(ring, spacings * unit) for spacings in SIMPLIFY_SPACINGS]
+        for ring in filled
     ]
     return Rough(
         rings[:1] + [[corners[::-1].copy() for corners in court] for court in rings[1:]],
@@ -85,15 +86,15 @@ def with_large_holes(polygon: shapely.Polygon) -> shapely.Polygon:
     return shapely.Polygon(polygon.exterior, holes)
 
 
-def corners_of(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray:
+def simplify_corners(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray:
     """Its corners less those within so much of a straight line, or within more where they are too
     many.
     """
-    for k in range(TRIES):
+    for k in range(RADII_TRIED):
         simple = largest(shapely.simplify(polygon, tolerance_m * COARSER**k))
         corners = without_straight_corners(counter_clockwise(simple))
         if 3 < len(corners) <= MOST_CORNERS and find_corners(
-            lines_through(corners), np.empty_like(corners)
+            make_lines(corners), np.empty_like(corners)
         ):
             return corners
     return counter_clockwise(shapely.minimum_rotated_rectangle(polygon))
@@ -121,7 +122,7 @@ def without_straight_corners(corners: np.ndarray) -> np.ndarray:
     straightest first.
     """
     while len(corners) > 4:
-        azimuth = lines_through(corners)[:, 0]
+        azimuth = make_lines(corners)[:, 0]
         turn = azimuth - np.roll(azimuth, 1)
         bend = np.where(np.cos(turn) < BACK, 0.0, np.abs(np.sin(turn)))
         if bend.min() > SHARPEST + 0.02:

@@ -28,22 +28,22 @@ STEP_M = 0.02
 OFFSETS_M = np.arange(-0.5, 0.7, STEP_M)
 # places a step at which densities are kept; between them they are straight, to a thousandth of
 # their logarithm
-FINE = 32
+OFFSET_STEPS = 32
 DEEP_M, SHALLOW_M, OUTSIDE_M = (
     2.0,
     0.4,
     0.8,
 )  # the density is that between shallow and deep; points further out are stray
-LEAST_DENSITY, STRAY = 0.3, 0.02  # shares of the outline's density
+LEAST_DENSITY, STRAY_SHARE = 0.3, 0.02  # shares of the outline's density
 # of a side longer than that, its ends do not count: points there may be another side's
 END_M, LONG_M = 0.3, 1.0
 # points across a side; fewer tell nothing; m that a side may be moved beyond the last row
-FEWEST, FARTHEST_M = 4, 0.4
+FEWEST, FARTHEST_MOVE_M = 4, 0.4
 # points closer across the side are of one row where most of the depth is between rows
-ROW_M, MOSTLY = 0.1, 0.6
+ROW_M, MOSTLY_ON_POINTS = 0.1, 0.6
 
 
-def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
+def settle_lines(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
     """The `lines` (n, 2) of an outline, each moved to where the points `xy` (m, 2) across it put
     it.
     """
@@ -79,17 +79,19 @@ def log_densities() -> np.ndarray:
 @compiled
 def log_densities_at(first, count):
     """What `log_densities` says, from the depth `first` on for `count` steps."""
-    table = np.empty((len(BLURS_M) * len(WALLS_M), FINE, count))
+    table = np.empty((len(BLURS_M) * len(WALLS_M), OFFSET_STEPS, count))
     for b, blur in enumerate(BLURS_M):
         for m, walls in enumerate(WALLS_M):
-            for p in range(FINE):
+            for p in range(OFFSET_STEPS):
                 for k in range(count):
-                    away = (first + (k + p / FINE) * STEP_M) / blur
-                    density = 1.0 if away > 0.0 else 0.0
-                    if abs(away) <= SURE_BLURS:
-                        wall = math.exp(-0.5 * away * away) / (blur * math.sqrt(2.0 * math.pi))
-                        density = share_inside(away) + walls * wall
-                    table[len(WALLS_M) * b + m, p, k] = math.log(density + STRAY)
+                    distance = (first + (k + p / OFFSET_STEPS) * STEP_M) / blur
+                    density = 1.0 if distance > 0.0 else 0.0
+                    if abs(distance) <= SURE_BLURS:
+                        wall = math.exp(-0.5 * distance * distance) / (
+                            blur * math.sqrt(2.0 * math.pi)
+                        )
+                        density = share_inside(distance) + walls * wall
+                    table[len(WALLS_M) * b + m, p, k] = math.log(density + STRAY_SHARE)
     return table
 
 
@@ -98,17 +100,17 @@ def offsets_by(xy, normals, distances, ends, density, table):
     """What `side_offsets` says, by the `log_densities`."""
     offsets = np.empty(len(normals))
     for m in range(len(normals)):
-        low, high = span_of(normals[m], ends[m])
-        if high - low > LONG_M:
-            low, high = low + END_M, high - END_M
-        offsets[m] = offset(
-            depths_across(xy, normals[m], distances[m], low, high), high - low, density, table
+        lower, upper = compute_span(normals[m], ends[m])
+        if upper - lower > LONG_M:
+            lower, upper = lower + END_M, upper - END_M
+        offsets[m] = interpolate_offset(
+            depths_across(xy, normals[m], distances[m], lower, upper), upper - lower, density, table
         )
     return offsets
 
 
 @compiled
-def span_of(normal, ends):
+def compute_span(normal, ends):
     """From where to where a side with `ends` (2, 2) runs, square to its `normal`."""
     first, last = (
         normal[0] * ends[0, 1] - normal[1] * ends[0, 0],
@@ -118,16 +120,16 @@ def span_of(normal, ends):
 
 
 @compiled
-def depths_across(xy, normal, distance, low, high):
+def depths_across(xy, normal, distance, lower, upper):
     """How deep (k,) inside a side those of the points lie that tell where it is: across it from
-    `low` to `high`, near enough.
+    `lower` to `upper`, near enough.
     """
     depths, count = np.empty(len(xy)), 0
     for k in range(len(xy)):
         depth = distance - normal[0] * xy[k, 0] - normal[1] * xy[k, 1]
         if (
             -OUTSIDE_M < depth < DEEP_M
-            and low <= normal[0] * xy[k, 1] - normal[1] * xy[k, 0] <= high
+            and lower <= normal[0] * xy[k, 1] - normal[1] * xy[k, 0] <= upper
         ):
             depths[count] = depth
             count += 1
@@ -135,7 +137,7 @@ def depths_across(xy, normal, distance, low, high):
 
 
 @compiled
-def offset(depth, length, density, table):
+def interpolate_offset(depth, length, density, table):
     """How far (m) outwards a side of `length` lies of where points `depth` (n,) were
     measured from.
     """
@@ -149,7 +151,7 @@ def offset(depth, length, density, table):
     likely = np.exp(logs - logs.max())
     mean = (likely.sum(axis=0) * OFFSETS_M).sum() / likely.sum()
     behind = depth[depth + mean > -ROW_M]
-    return mean + min(max(half_gap(behind) - 1.0 / a_metre, 0.0), FARTHEST_M)
+    return mean + min(max(half_gap(behind) - 1.0 / a_metre, 0.0), FARTHEST_MOVE_M)
 
 
 @compiled
@@ -168,13 +170,13 @@ def log_likelihoods(depth, a_metre, table):
         counted += 1
         place = (d + OUTSIDE_M) / STEP_M
         k = int(place)
-        p = int((place - k) * FINE)
-        beyond = (place - k) * FINE - p
-        then, after = (k, p + 1) if p + 1 < FINE else (k + 1, 0)
+        p = int((place - k) * OFFSET_STEPS)
+        excess = (place - k) * OFFSET_STEPS - p
+        then, remainder = (k, p + 1) if p + 1 < OFFSET_STEPS else (k + 1, 0)
         for row in range(len(logs)):
             for q in range(len(OFFSETS_M)):
-                logs[row, q] += (1.0 - beyond) * table[row, p, k + q] + beyond * table[
-                    row, after, then + q
+                logs[row, q] += (1.0 - excess) * table[row, p, k + q] + excess * table[
+                    row, remainder, then + q
                 ]
     return logs + counted * math.log(a_metre)
 
@@ -190,7 +192,7 @@ def half_gap(depth):
         return 0.0
     depth = np.sort(depth)
     gaps = np.diff(depth)
-    if gaps[gaps > ROW_M].sum() > MOSTLY * gaps.sum():
+    if gaps[gaps > ROW_M].sum() > MOSTLY_ON_POINTS * gaps.sum():
         starts = np.append(np.append(0, np.flatnonzero(gaps > ROW_M) + 1), len(depth))
         rows = np.array([depth[starts[r] : starts[r + 1]].mean() for r in range(len(starts) - 1)])
         gaps = np.diff(rows)

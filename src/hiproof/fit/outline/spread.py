@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 
 CELL_SPACINGS = 2.0  # of square cells: four points in the mean
-FEWEST_CELLS = 9  # fewer tell nothing
+FEWEST_SPREAD_CELLS = 9  # fewer tell nothing
 # what is believed: the most even clouds, roofs with patches that gave no return
-LEAST, MOST = 0.4, 1.2
+LEAST, MOST_SPREAD = 0.4, 1.2
 
 
 def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
@@ -25,19 +25,19 @@ def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
     cell = CELL_SPACINGS * spacing
     west, south, east, north = shape.bounds
     # a stray far away would make cells without end
-    around = shapely.box(west - cell, south - cell, east + cell, north + cell)
-    index = np.floor(xy[shapely.intersects_xy(around, xy)] / cell).astype(int)
-    low = index.min(axis=0)
-    columns, rows = index.max(axis=0) - low + 1
+    surroundings = shapely.box(west - cell, south - cell, east + cell, north + cell)
+    index = np.floor(xy[shapely.intersects_xy(surroundings, xy)] / cell).astype(int)
+    smallest = index.min(axis=0)
+    columns, rows = index.max(axis=0) - smallest + 1
     counts = (
-        np.bincount((index - low) @ (rows, 1), minlength=columns * rows)
+        np.bincount((index - smallest) @ (rows, 1), minlength=columns * rows)
         .reshape(columns, rows)
         .astype(float)
     )
-    centres = shapely.points((np.moveaxis(np.indices(counts.shape), 0, -1) + low + 0.5) * cell)
+    centres = shapely.points((np.moveaxis(np.indices(counts.shape), 0, -1) + smallest + 0.5) * cell)
     ring = shape.exterior
     shapely.prepare([shape, ring])
     inside = counts[shapely.contains(shape, centres) & ~shapely.dwithin(ring, centres, cell)]
-    if len(inside) < FEWEST_CELLS or not inside.any():
+    if len(inside) < FEWEST_SPREAD_CELLS or not inside.any():
         return 1.0
-    return float(np.clip(np.sqrt(inside.var(ddof=1) / inside.mean()), LEAST, MOST))
+    return float(np.clip(np.sqrt(inside.var(ddof=1) / inside.mean()), LEAST, MOST_SPREAD))

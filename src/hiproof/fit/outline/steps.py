@@ -14,32 +14,32 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from .cost import changed, known_cost
-from .lines import quarter_gap, replaced, replaced_by
+from .cost import apply_change, interpolate_cost
+from .lines import quarter_gap, replace_lines, replaced_by
 from .moves import GAIN, TURN_RAD
 from .soft import SURE_BLURS
 
 # m; along the side, across it: lines are moved more finely afterwards
-COLUMN_M, LEVEL_M = 0.25, 0.1
+COLUMN_M, STEP_LEVEL_M = 0.25, 0.1
 # levels inwards and outwards of the side; larger bays are the rough outline's
-DEEPEST_M, FARTHEST_M = 2.0, 1.5
-LEVELS = round((DEEPEST_M + FARTHEST_M) / LEVEL_M) + 1
+DEEPEST_STEP_M, FARTHEST_LEVEL_M = 2.0, 1.5
+LEVELS = round((DEEPEST_STEP_M + FARTHEST_LEVEL_M) / STEP_LEVEL_M) + 1
 RUN = 5  # sides that become one flight, at most
 INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
 
 
 @compiled
-def stepped(drawing, border, longest):
+def add_steps(drawing, border, longest):
     """The drawing with sides, and runs of up to `longest` of them, as flights of steps where that
     is cheaper.
     """
     i = 0
     while i < len(drawing.lines):
-        best = side_as_flight(drawing, i, border)
+        best = step_side(drawing, i, border)
         if not best.cost < drawing.cost - GAIN:
             best = drawing
         for count in range(1, min(longest, len(drawing.lines) - 2) + 1):
-            new = run_as_flight(drawing, i, count, border)
+            new = step_run(drawing, i, count, border)
             if new.cost < best.cost - GAIN:
                 best = new
         i = 0 if best.cost < drawing.cost else i + 1
@@ -48,15 +48,15 @@ def stepped(drawing, border, longest):
 
 
 @compiled
-def side_as_flight(drawing, i, border):
+def step_side(drawing, i, border):
     """The drawing with side `i` as a flight of steps along its own direction."""
-    flight = flight_of(drawing, i, border)
+    flight = make_flight(drawing, i, border)
     lines = replaced_by(drawing.lines, i, 1, flight)
-    return changed(lines, drawing, i, 1, len(flight) + 1, border)
+    return apply_change(lines, drawing, i, 1, len(flight) + 1, border)
 
 
 @compiled
-def run_as_flight(drawing, i, count, border):
+def step_run(drawing, i, count, border):
     """The drawing with `count` sides from `i` on as one flight along the main direction nearest to
     their chord; itself where they make no such side to begin with.
     """
@@ -66,25 +66,25 @@ def run_as_flight(drawing, i, count, border):
     if math.cos(way - chord) < math.cos(TURN_RAD):
         return drawing
     x, y = 0.5 * (start + end)
-    joint = replaced(drawing.lines, i, count, way, x * math.cos(way) + y * math.sin(way))
-    joined = changed(joint, drawing, i, count, 2, border)
-    return drawing if joined.cost == np.inf else side_as_flight(joined, 0, border)
+    joint = replace_lines(drawing.lines, i, count, way, x * math.cos(way) + y * math.sin(way))
+    joined = apply_change(joint, drawing, i, count, 2, border)
+    return drawing if joined.cost == np.inf else step_side(joined, 0, border)
 
 
 @compiled
-def flight_of(drawing, i, border):
+def make_flight(drawing, i, border):
     """Lines (m, 2) in place of side `i`: along it at one level or another, and what joins them at
     right angles.
     """
     azimuth, distance = drawing.lines[i]
-    low, high = (
+    lower, upper = (
         along(azimuth, drawing.corners[i]),
         along(azimuth, drawing.corners[(i + 1) % len(drawing.lines)]),
     )
-    columns = max(int((high - low) / COLUMN_M), 1)
-    width = (high - low) / columns
+    columns = max(int((upper - lower) / COLUMN_M), 1)
+    width = (upper - lower) / columns
     levels = best_levels(
-        column_costs(drawing, border, azimuth, distance, low, width, columns), 2.0 * border.line
+        column_costs(drawing, border, azimuth, distance, lower, width, columns), 2.0 * border.line
     )
     flight, m = np.empty((2 * columns, 2)), 0
     for k in range(columns):
@@ -92,9 +92,9 @@ def flight_of(drawing, i, border):
             continue
         if k > 0:
             turn = -1.0 if levels[k] > levels[k - 1] else 1.0
-            flight[m, 0], flight[m, 1] = azimuth + turn * 0.5 * math.pi, turn * (low + k * width)
+            flight[m, 0], flight[m, 1] = azimuth + turn * 0.5 * math.pi, turn * (lower + k * width)
             m += 1
-        flight[m, 0], flight[m, 1] = azimuth, distance + LEVEL_M * levels[k] - DEEPEST_M
+        flight[m, 0], flight[m, 1] = azimuth, distance + STEP_LEVEL_M * levels[k] - DEEPEST_STEP_M
         m += 1
     return flight[:m]
 
@@ -106,45 +106,52 @@ def along(azimuth, place):
 
 
 @compiled
-def column_costs(drawing, border, azimuth, distance, low, width, columns):
+def column_costs(drawing, border, azimuth, distance, lower, width, columns):
     """What each of the `columns` (columns, LEVELS) along a line costs at each level."""
     costs, far_out = np.empty((columns, LEVELS)), border.costs[0, 0]
     for level in range(LEVELS):
-        costs[:, level] = border.density * width * (LEVEL_M * level - DEEPEST_M)
+        costs[:, level] = border.density * width * (STEP_LEVEL_M * level - DEEPEST_STEP_M)
     c, s, sure = math.cos(azimuth), math.sin(azimuth), SURE_BLURS * border.blur
-    first, last = band_of(border.y, azimuth, distance, low, low + columns * width)
+    first, last = find_band(border.y, azimuth, distance, lower, lower + columns * width)
     for k in range(first, last):
         x, y, wall = border.x[k], border.y[k], border.wall[k]
-        depth, column = distance - (x * c + y * s), math.floor((y * c - x * s - low) / width)
-        if not 0 <= column < columns or not -FARTHEST_M < depth < DEEPEST_M:
+        depth, column = distance - (x * c + y * s), math.floor((y * c - x * s - lower) / width)
+        if not 0 <= column < columns or not -FARTHEST_LEVEL_M < depth < DEEPEST_STEP_M:
             continue
         if depth < 0.0 and not wall and drawing.own[k] < INSIDE:  # beyond another side
             continue
-        inner = 0 if wall else min(max(math.ceil((DEEPEST_M - depth - sure) / LEVEL_M), 0), LEVELS)
+        inner = (
+            0
+            if wall
+            else min(max(math.ceil((DEEPEST_STEP_M - depth - sure) / STEP_LEVEL_M), 0), LEVELS)
+        )
         outer = (
             LEVELS
             if wall
-            else min(max(math.floor((DEEPEST_M - depth + sure) / LEVEL_M) + 1, 0), LEVELS)
+            else min(max(math.floor((DEEPEST_STEP_M - depth + sure) / STEP_LEVEL_M) + 1, 0), LEVELS)
         )
         for level in range(inner):
             costs[column, level] += far_out
         for level in range(inner, outer):
-            deep = (depth + LEVEL_M * level - DEEPEST_M) / border.blur
-            costs[column, level] += known_cost(deep, wall, border.costs)
+            deep = (depth + STEP_LEVEL_M * level - DEEPEST_STEP_M) / border.blur
+            costs[column, level] += interpolate_cost(deep, wall, border.costs)
     return costs
 
 
 @compiled
-def band_of(y, azimuth, distance, low, high):
-    """The first and last of points, ascending in `y` (n,), that may lie beside a line between `low`
-    and `high` along it.
+def find_band(y, azimuth, distance, lower, upper):
+    """The first and last of points, ascending in `y` (n,), that may lie beside a line between
+    `lower` and `upper` along it.
     """
     c, s = math.cos(azimuth), math.sin(azimuth)
-    least, most = np.inf, -np.inf
-    for out in (distance - DEEPEST_M, distance + FARTHEST_M):
-        for at in (low, high):
-            least, most = min(least, out * s + at * c), max(most, out * s + at * c)
-    return np.searchsorted(y, least), np.searchsorted(y, most)
+    minimum, limit = np.inf, -np.inf
+    for out in (distance - DEEPEST_STEP_M, distance + FARTHEST_LEVEL_M):
+        for position in (lower, upper):
+            minimum, limit = (
+                min(minimum, out * s + position * c),
+                max(limit, out * s + position * c),
+            )
+    return np.searchsorted(y, minimum), np.searchsorted(y, limit)
 
 
 @compiled

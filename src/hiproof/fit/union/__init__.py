@@ -72,7 +72,7 @@ from .plan import Plan, lay_out_plan
 from .regions import Site, besides, places_of, polygons_of
 from .scene import Scene
 from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
-from .shown import highest_of, that_show
+from .shown import find_highest, that_show
 from .slivers import without_slivers, without_specks
 from .unite import Ends, ends_of, ends_within, united
 from .weld import weld
@@ -153,7 +153,7 @@ def largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
 def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
     """The share of the plan's points further than `tolerance_m` from the max of the parts."""
     xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
-    z, _ = highest_of(parts, xy)
+    z, _ = find_highest(parts, xy)
     return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 

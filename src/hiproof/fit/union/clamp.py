@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import shapely
 
-from ...geometry.rings import GRID_M, with_area
+from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part, Piece
 from .regions import polygons_of
 
@@ -41,7 +41,7 @@ def clamped_part(part: Part, low: float, high: float, missed: float = 0.0) -> li
         sunken = beyond(piece, low, high)[0] if sunken.area > 0.0 else sunken
         beneath += polygons_of(sunken)
         above += polygons_of(risen)
-        rest = shapely.difference(piece.outline, with_area(shapely.union(sunken, risen)), grid_size=GRID_M)
+        rest = shapely.difference(piece.outline, with_area(shapely.union(sunken, risen)), grid_size=OVERLAY_GRID_M)
         kept += [Piece(polygon, piece.planes) for polygon in polygons_of(rest)]
     if not beneath and not above:
         return [part]
@@ -54,14 +54,14 @@ def beyond(piece: Piece, low: float, high: float) -> tuple[shapely.Geometry, sha
     z, sunken, risen = corner_heights(piece), NOWHERE, NOWHERE
     if z.min() < low:
         rings = [ring_above(box_around(piece.outline), *line) for line in ([0.0, 0.0, low] - piece.planes).tolist()]
-        below = with_area(shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=GRID_M))
-        sunken = with_area(shapely.intersection(piece.outline, below, grid_size=GRID_M))
+        below = with_area(shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=OVERLAY_GRID_M))
+        sunken = with_area(shapely.intersection(piece.outline, below, grid_size=OVERLAY_GRID_M))
     if z.max(axis=0).min() > high:
         ring = box_around(piece.outline)
         for line in (piece.planes - [0.0, 0.0, high]).tolist():
             ring = ring_above(ring, *line)
         if ring:
-            risen = with_area(shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=GRID_M))
+            risen = with_area(shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=OVERLAY_GRID_M))
     return sunken, risen
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.contract import BACK, FRONT
-from ...primitives.family import member_of
+from ...primitives.family import read_member
 from .regions import area_of, besides, polygons_of
 from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, places_around, with_saw_teeth
 
@@ -94,7 +94,7 @@ def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
                 return []
             found.append(Slope(step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"]))
         elif part.type == "truncated_gable" and len(lower) == 1 and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD:
-            member = member_of(part.type, p, part.kappa, part.translation)
+            member = read_member(part.type, p, part.kappa, part.translation)
             for sign, side in ((-1.0, FRONT), (1.0, BACK)):
                 at = step + sign * 0.5 * p["width"]
                 found.append(Slope(at, member.eaves[side], member.slopes[side]))

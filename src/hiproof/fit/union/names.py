@@ -63,8 +63,8 @@ def part_of(
     turns = member.quarter_turns
     modes = np.concatenate([turned(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2)
     told = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # of cants those that show
-    changes = changed(members, modes[told]).turned(turns)
-    member = replace(member.turned(turns), centre=member.centre @ axes + plan.frame.origin[:2])
+    changes = changed(members, modes[told]).turn(turns)
+    member = replace(member.turn(turns), centre=member.centre @ axes + plan.frame.origin[:2])
     return member.part(regions, name_among(member.name, allowed), changes, len(unknown))
 
 

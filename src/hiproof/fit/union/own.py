@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from ...errors import FitError
-from ...geometry.rings import GRID_M
+from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...primitives.catalogue import CATALOGUE
 from ...primitives.contract import Primitive
@@ -67,7 +67,7 @@ def fitted(shape: Primitive, points: np.ndarray, outline: shapely.Polygon, setti
     if len(part.pieces) == 1:
         pieces = [Piece(outline, part.pieces[0].planes)]
     else:
-        cut = [(polygons_of(shapely.intersection(p.outline, outline, grid_size=GRID_M)), p.planes) for p in part.pieces]
+        cut = [(polygons_of(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)), p.planes) for p in part.pieces]
         pieces = [Piece(polygon, planes) for polygons, planes in cut for polygon in polygons]
     return Part(shape.name, tuple(pieces), part.parameters, part.kappa, part.translation, part.sigma)
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from ...geometry.rings import GRID_M, with_area
+from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part
 from .apart import IN_LINE_M
 from .finish import Planes
@@ -55,7 +55,7 @@ class Site(NamedTuple):
         key = volume[PLACE].tobytes(), *sides
         if key not in self.known:
             quad = quad_of(volume, sides, self.plan, self.scene)
-            self.known[key] = quad, shapely.intersection(quad, self.outline, grid_size=GRID_M)
+            self.known[key] = quad, shapely.intersection(quad, self.outline, grid_size=OVERLAY_GRID_M)
         return self.known[key]
 
     def rest(self, quads: list[shapely.Polygon]) -> list[shapely.Polygon]:
@@ -93,7 +93,7 @@ def places_of(
 ) -> Iterator[tuple[int, list[shapely.Polygon]]]:
     """Which volume roofs which polygons, each to be one part: what lies apart of the base are several, such as two wings."""
     places: list[list[shapely.Polygon]] = []
-    for polygon in sorted(polygons_of(shapely.union_all(regions[0], grid_size=GRID_M)), key=lambda p: -p.area):
+    for polygon in sorted(polygons_of(shapely.union_all(regions[0], grid_size=OVERLAY_GRID_M)), key=lambda p: -p.area):
         alike = (
             places if polygon.area < PLACE_M2 else (own for own in places if runs_on(own[0], polygon, outline, plan))
         )
@@ -108,7 +108,7 @@ def places_of(
 
 def runs_on(one: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polygon, plan: Plan) -> bool:
     """Whether a roof may run on from one place to another under what stands between: no yard, nor a house in a row with them."""
-    both = with_area(shapely.union(one, other, grid_size=GRID_M))
+    both = with_area(shapely.union(one, other, grid_size=OVERLAY_GRID_M))
     between = shapely.difference(shapely.convex_hull(both), both)
     if shapely.intersection(between, outline).area <= ROOFED * between.area:
         return False
@@ -182,18 +182,18 @@ def difference(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shapely.
         return [polygon]
     if polygon.area < hole.area and shapely.contains_properly(hole, polygon):
         return []
-    return polygons_of(shapely.difference(polygon, hole, grid_size=GRID_M))
+    return polygons_of(shapely.difference(polygon, hole, grid_size=OVERLAY_GRID_M))
 
 
 def rest_of(outline: shapely.Polygon, *quads: shapely.Polygon) -> list[shapely.Polygon]:
     """What of an outline lies in no quad."""
-    covered = with_area(shapely.union_all(quads, grid_size=GRID_M))
+    covered = with_area(shapely.union_all(quads, grid_size=OVERLAY_GRID_M))
     return difference(outline, covered)
 
 
 def area_of(parts: Iterable[Part]) -> shapely.Geometry:
     """What parts cover together, without the lines to which slivers shrink on the grid."""
-    return with_area(shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M))
+    return with_area(shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=OVERLAY_GRID_M))
 
 
 def besides(parts: Iterable[Part], some: Iterable[Part]) -> list[Part]:
@@ -228,12 +228,12 @@ def merged_inside(
     polygon: shapely.Polygon, near: shapely.Polygon, outline: shapely.Polygon
 ) -> list[shapely.Polygon]:
     """What two polygons cover together of an outline."""
-    wider = with_area(shapely.union_all([polygon, near], grid_size=GRID_M))
-    return polygons_of(shapely.intersection(wider, outline, grid_size=GRID_M))
+    wider = with_area(shapely.union_all([polygon, near], grid_size=OVERLAY_GRID_M))
+    return polygons_of(shapely.intersection(wider, outline, grid_size=OVERLAY_GRID_M))
 
 
 def shared_area(one: shapely.Polygon, other: shapely.Polygon) -> float:
-    return shapely.intersection(one, other, grid_size=GRID_M).area
+    return shapely.intersection(one, other, grid_size=OVERLAY_GRID_M).area
 
 
 def place_beside(
@@ -257,7 +257,7 @@ def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
     """Whether the polygons cover a gap together, but for a millimetre."""
     if any(shapely.covers(polygon, gap) for polygon in polygons):
         return True
-    return bool(shapely.covers(shapely.union_all(polygons, grid_size=GRID_M).buffer(1e-3), gap))
+    return bool(shapely.covers(shapely.union_all(polygons, grid_size=OVERLAY_GRID_M).buffer(1e-3), gap))
 
 
 def is_base(gap: shapely.Polygon, base: np.ndarray, volume: np.ndarray, planes: Planes, site: Site) -> bool:

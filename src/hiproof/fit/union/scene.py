@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 import shapely
 
-from ..direction import quarter_gap, support_of
+from ..direction import measure_support, quarter_gap
 from .plan import Plan, grid_lines, ring_edges, signed_depth
 
 MOST_DIRECTIONS = 2  # of a building that volumes may follow along walls, the main one first
@@ -57,7 +57,7 @@ def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
         new = np.all([np.abs(quarter_gap(angle - other)) > APART_RAD for other in found], axis=0)
         if not new.any():
             break
-        support = support_of(angle[new], angle, length, NEAR_RAD)
+        support = measure_support(angle[new], angle, length, NEAR_RAD)
         best = int(np.argmax(support))
         if support[best] < max(LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE * length.sum()):
             break

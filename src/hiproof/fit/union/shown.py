@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ...geometry.rings import GRID_M
+from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
-from ...model.heights import highest_of
+from ...model.heights import find_highest
 from .plan import Plan
 from .regions import area_of, place_beside, polygons_of, widened
 from .scene import Scene, nodes
@@ -25,7 +25,7 @@ def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = ma
         return parts
     u, v = nodes(scene, BORDER_M)
     xy = plan.frame.xy_local(np.column_stack([u[0], v[0]]))
-    places = np.bincount(highest_of(parts, xy)[1], minlength=len(parts)).tolist()  # at which each part is the highest
+    places = np.bincount(find_highest(parts, xy)[1], minlength=len(parts)).tolist()  # at which each part is the highest
     shown = [part for part, count in zip(parts, places, strict=True) if count]
     hidden = [part for part, count in zip(parts, places, strict=True) if not count]
     for part in hidden:
@@ -38,7 +38,7 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
     """`parts` with what only the `hidden` one covers added to the pieces beside it; None where that cannot be or is too much."""
     covered, own = area_of(parts), area_of([hidden])
     pieces = [list(part.pieces) for part in parts]
-    bare = polygons_of(shapely.difference(own, covered, grid_size=GRID_M))
+    bare = polygons_of(shapely.difference(own, covered, grid_size=OVERLAY_GRID_M))
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
     for sliver in bare:
@@ -47,9 +47,9 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
         if not (pieces and pieces[k]):
             return None  # nothing lies beside the sliver
         outline = pieces[k][q].outline
-        seam = polygons_of(shapely.intersection(near, own, grid_size=GRID_M))
+        seam = polygons_of(shapely.intersection(near, own, grid_size=OVERLAY_GRID_M))
         beside = shapely.snap(sliver, outline, SEAM_M)
-        merged = polygons_of(shapely.union_all([outline, *seam, beside], grid_size=GRID_M))
+        merged = polygons_of(shapely.union_all([outline, *seam, beside], grid_size=OVERLAY_GRID_M))
         if len(merged) != 1:
             return None
         pieces[k][q] = Piece(merged[0], pieces[k][q].planes)

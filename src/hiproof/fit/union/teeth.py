@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from ...geometry.rings import GRID_M, with_area
+from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
@@ -73,7 +73,7 @@ def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Pa
 def next_tooth(row: list[Part], last: Part, step: float) -> Part:
     """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
     across = step * mean_of(row, "width") * np.array([-math.sin(last.kappa), math.cos(last.kappa), 0.0])
-    return replace(last, pieces=(last.pieces[0].moved(across),), translation=last.translation + across)
+    return replace(last, pieces=(last.pieces[0].move(across),), translation=last.translation + across)
 
 
 def as_high_amid(parts: list[Part], tooth: Part) -> Iterator[Part]:
@@ -177,7 +177,7 @@ def ground_of(row: list[Part], others: list[Part]) -> Ground:
     covered, beside = (area_of(own) for own in (row, others))
     uv = (shapely.get_coordinates(covered) - origin) @ axes.T
     (left, first), (right, last) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
-    roof = shapely.MultiPolygon(polygons_of(shapely.union(covered, beside, grid_size=GRID_M)))
+    roof = shapely.MultiPolygon(polygons_of(shapely.union(covered, beside, grid_size=OVERLAY_GRID_M)))
     walls = shapely.buffer(roof, CRACK_M, join_style="mitre").boundary
     return Ground(origin, axes, left, right, first, last, covered, roof, walls)
 
@@ -206,7 +206,7 @@ def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
     shape = get("shed").variant(parameters)
     whole = shape.part(shape.to_theta(parameters, row[0].kappa, translation))
     shed = replace(whole, pieces=cut(whole.pieces, breaks, ground))
-    rest = shapely.difference(ground.covered, ground.strip(breaks[0], breaks[-1]), grid_size=GRID_M)
+    rest = shapely.difference(ground.covered, ground.strip(breaks[0], breaks[-1]), grid_size=OVERLAY_GRID_M)
     left_over = replace(shed, pieces=tuple(Piece(polygon, shed.pieces[0].planes) for polygon in polygons_of(rest)))
     if not left_over.pieces:
         return [*others, shed]
@@ -247,11 +247,11 @@ def laid_out(feet: np.ndarray, ground: Ground) -> np.ndarray:
 def cut(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: Ground) -> tuple[Piece, ...]:
     """The pieces of a saw-tooth, a tooth each, over what its row covers and reaches further."""
     further = [ground.strip(breaks[0], ground.first), ground.strip(ground.last, breaks[-1])]
-    more = with_area(shapely.intersection(ground.roof, with_area(shapely.union_all(further, grid_size=GRID_M))))
-    over = with_area(shapely.union(ground.covered, more, grid_size=GRID_M))
+    more = with_area(shapely.intersection(ground.roof, with_area(shapely.union_all(further, grid_size=OVERLAY_GRID_M))))
+    over = with_area(shapely.union(ground.covered, more, grid_size=OVERLAY_GRID_M))
     strips = [ground.strip(foot, top) for foot, top in pairwise(breaks.tolist())]
     return tuple(
         Piece(polygon, piece.planes)
         for strip, piece in zip(strips, pieces, strict=True)
-        for polygon in polygons_of(shapely.intersection(over, strip, grid_size=GRID_M))
+        for polygon in polygons_of(shapely.intersection(over, strip, grid_size=OVERLAY_GRID_M))
     )

@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 
 from ...model import Part
-from ...model.heights import highest_of
+from ...model.heights import find_highest
 from .agree import Agreement, fitted, null_space
 from .drawn_plan import DrawnPlan, count_parameters, draw_plan, part_over
 from .finish import Planes
@@ -319,7 +319,7 @@ def price_of(
         shown |= {(int(numbers[k]), p) for k, p in drawn.owner[drawn.shown].tolist()}
     rows = np.array([state.planes[k].rows[p] for k, p in sorted(shown)])
     turns = scene.turn[problem.volumes[[k for k, _ in sorted(shown)], DIRECTION].astype(int)]
-    height, _ = highest_of(drawing.parts, window.xy)
+    height, _ = find_highest(drawing.parts, window.xy)
     misfit = window.weight * float(misfits(window.z, height, scene).sum())
     units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * drawing.corners
     return misfit + scene.evidence * units

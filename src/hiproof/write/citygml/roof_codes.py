@@ -24,11 +24,11 @@ def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
     ...     "hip"]), roof_type_code(["hip"], "adv")
     ('1030', '1130', '3200')
     """
-    codes = {own_code(name, code_list) for name in types}
+    codes = {find_code(name, code_list) for name in types}
     return codes.pop() if len(codes) == 1 else MIXED[code_list]
 
 
-def own_code(name: str, code_list: str) -> str:
+def find_code(name: str, code_list: str) -> str:
     """The code of one roof type."""
     if name not in CATALOGUE:
         return MIXED[code_list]

@@ -14,7 +14,7 @@ import numpy as np
 from ...frames import Units
 from ...model import GROUND, ROOF, WALL, Face, Solid
 from ..roof_figures import RoofFigures
-from ..values import rounded
+from ..values import round_value
 from ..xml_text import generic_attribute
 
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
@@ -36,7 +36,7 @@ def lod1_solid(solid: Solid | None, units: Units) -> str:
     """A block; nothing for None."""
     if solid is None:
         return ""
-    members = surface_members(rings_of_faces(solid.faces, units.from_metres(solid.vertices)))
+    members = surface_members(list_face_rings(solid.faces, units.from_metres(solid.vertices)))
     return (
         f"<bldg:lod1Solid><gml:Solid><gml:exterior><gml:CompositeSurface>{members}</gml:CompositeSurface></gml:exterior>"
         "</gml:Solid></bldg:lod1Solid>"
@@ -107,13 +107,13 @@ def angle_attributes(figures: RoofFigures, index: int) -> str:
     """Slope and azimuth of roof face `index`, as far as they are known."""
     angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
     return "".join(
-        generic_attribute(key, rounded(angle, 3))
+        generic_attribute(key, round_value(angle, 3))
         for key, angle in angles.items()
         if math.isfinite(angle)
     )
 
 
-def rings_of_faces(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:
+def list_face_rings(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:
     """The rings of each of the faces over the vertices `xyz` (n, 3)."""
     place = positions(xyz)
     return [polygon_rings(face, place) for face in faces]

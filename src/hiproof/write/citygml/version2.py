@@ -18,24 +18,24 @@ import numpy as np
 
 from ...model import GROUND, Building, Face, Solid
 from ...settings import WriteSettings
-from ..building_attributes import OWN, PREFIX, building_attributes, figures_of
+from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..naming import UniqueNames, gml_name, srs_name
-from ..roof_figures import RoofFigures, ground_height
+from ..roof_figures import RoofFigures, find_ground_height
 from ..shapes import PartShape
 from ..values import WIDEST
 from ..writer import BuildingWriter
-from ..xml_text import attribute_set, generic_attribute, xml_attribute, xml_text
+from ..xml_text import format_attribute_set, generic_attribute, xml_attribute, xml_text
 from .roof_codes import CODE_SPACES, roof_type_code
 from .surfaces import (
     boundary_surfaces,
+    list_face_rings,
     lod1_solid,
     lod2_solid,
     lod2_surfaces,
     multi_surface,
     positions,
-    rings_of_faces,
     surface_ids,
     terrain_element,
 )
@@ -102,7 +102,7 @@ class CityGMLWriter(BuildingWriter):
         self.file.write(b" " * self.envelope_length)
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        figures = figures or figures_of(building)
+        figures = figures or measure_figures(building)
         osm = self.head.write.osm_tags
         attributes = building_attributes(
             building, figures, self.head.prefix, self.head.units.gml, osm
@@ -130,9 +130,9 @@ class CityGMLWriter(BuildingWriter):
             self.file.write(self.envelope(self.low, self.high).ljust(self.envelope_length))
             self.file.seek(end)
 
-    def envelope(self, low: np.ndarray, high: np.ndarray) -> bytes:
+    def envelope(self, low_value: np.ndarray, high_value: np.ndarray) -> bytes:
         srs = "" if self.srs_name is None else f' srsName="{xml_attribute(self.srs_name)}"'
-        lower, upper = positions(np.array([low, high]))
+        lower, upper = positions(np.array([low_value, high_value]))
         return (
             "<gml:boundedBy><gml:Envelope "
             f'srsDimension="3"{srs}><gml:lowerCorner>{lower}</gml:lowerCorner>'
@@ -153,7 +153,7 @@ def fragment(sheet: Sheet) -> Fragment:
     lines = terrain_lines(sheet)
     if sheet.figures is not None:
         lines = [*lines, in_file(sheet, sheet.building.solid)]
-        lines += [unmoved(sheet)] if sheet.shapes.outline is not None else []
+        lines += [undo_shift(sheet)] if sheet.shapes.outline is not None else []
     if not lines:
         return Fragment(text)
     xyz = np.concatenate(lines)
@@ -170,16 +170,18 @@ def building_element(sheet: Sheet) -> str:
         )
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
-        types = types_that_show(building)
-        text.append(roof_and_height(types, figures, ground_height(building, figures), write))
+        types = list_visible_types(building)
+        text.append(
+            format_roof_and_height(types, figures, find_ground_height(building, figures), write)
+        )
         text.append(level_surfaces(sheet))
         text.append(lod1_solid(sheet.shapes.lod13 or sheet.shapes.lod12, sheet.head.units.gml))
-    if figures is None or (solid := own_solid(sheet)) is None:
+    if figures is None or (solid := choose_solid(sheet)) is None:
         text.append(with_terrain(sheet, "", []))
     else:
         ids, rings = (
             surface_ids(solid.faces, name),
-            rings_of_faces(solid.faces, in_file(sheet, solid)),
+            list_face_rings(solid.faces, in_file(sheet, solid)),
         )
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
         text += boundary_surfaces(solid, figures, ids, rings)
@@ -191,7 +193,7 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
     """One bldg:BuildingPart with its solid; its gml:ids have the part's number before the
     building's name.
     """
-    name, ground = f"{number}-{sheet.gml_name}", ground_height(sheet.building, sheet.figures)
+    name, ground = f"{number}-{sheet.gml_name}", find_ground_height(sheet.building, sheet.figures)
     sets = part.attributes.get(f"{OWN}primitives", [])
     text = [f'<bldg:consistsOfBuildingPart><bldg:BuildingPart gml:id="part-{name}">']
     text += [
@@ -199,28 +201,28 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
         for key, value in part.attributes.items()
         if not isinstance(value, list)
     ]
-    text += [attribute_set(f"{OWN}primitive_{k}", values) for k, values in enumerate(sets)]
-    text.append(roof_and_height(part.types, part.figures, ground, sheet.head.write))
+    text += [format_attribute_set(f"{OWN}primitive_{k}", values) for k, values in enumerate(sets)]
+    text.append(format_roof_and_height(part.types, part.figures, ground, sheet.head.write))
     text.append(lod1_solid(part.block, sheet.head.units.gml))
     if "2.2" in sheet.head.write.lods:
         ids = surface_ids(part.solid.faces, sheet.gml_name, f"{number}.")
         text.append(lod2_solid(ids, f"shell-{name}"))
-        rings = rings_of_faces(part.solid.faces, in_file(sheet, part.solid))
+        rings = list_face_rings(part.solid.faces, in_file(sheet, part.solid))
         text += [lod2_surfaces(rings)] if sheet.head.write.gml_surfaces else []
         text += boundary_surfaces(part.solid, part.figures, ids, rings)
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
 
 
-def types_that_show(building: Building) -> list[str]:
+def list_visible_types(building: Building) -> list[str]:
     """Roof types of the parts that are seen from above."""
     return [
         part.type
-        for part, area in zip(building.parts, building.model.shown_m2, strict=True)
+        for part, area in zip(building.parts, building.model.visible_m2, strict=True)
         if area > 0.0
     ]
 
 
-def roof_and_height(
+def format_roof_and_height(
     types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings
 ) -> str:
     """roofType of roof parts of `types`, where there are any, and measuredHeight, over the
@@ -242,17 +244,17 @@ def level_surfaces(sheet: Sheet) -> str:
     if shapes.outline is None:
         return ""
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
-    low = multi_surface(rings_of_faces((upward,), unmoved(sheet)))
+    surface = multi_surface(list_face_rings((upward,), undo_shift(sheet)))
     edge = multi_surface(
-        rings_of_faces((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid)))
+        list_face_rings((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid)))
     )
     return (
-        f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint>"
+        f"<bldg:lod0FootPrint>{surface}</bldg:lod0FootPrint>"
         f"<bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
     )
 
 
-def unmoved(sheet: Sheet) -> np.ndarray:
+def undo_shift(sheet: Sheet) -> np.ndarray:
     """The vertices (n, 3) of the solid in the file's unit as they would be where the footprint lay
     before it was moved.
     """
@@ -296,7 +298,7 @@ def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
     return sheet.head.units.gml.from_metres(solid.vertices)
 
 
-def own_solid(sheet: Sheet) -> Solid | None:
+def choose_solid(sheet: Sheet) -> Solid | None:
     """The solid that is the building's own: none where its parts have solids, or where none is
     asked for.
     """

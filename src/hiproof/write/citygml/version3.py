@@ -23,7 +23,7 @@ from ..head import FileHead
 from . import version2
 from .version2 import CityGMLWriter
 
-NAMESPACES = {
+NAMESPACES_3 = {
     "bldg": "http://www.opengis.net/citygml/building/3.0",
     "con": "http://www.opengis.net/citygml/construction/3.0",
     "core": "http://www.opengis.net/citygml/3.0",
@@ -31,7 +31,7 @@ NAMESPACES = {
     "gml": "http://www.opengis.net/gml/3.2",
     "xlink": "http://www.w3.org/1999/xlink",
 }
-ID, OLD_ID = f"{{{NAMESPACES['gml']}}}id", f"{{{version2.NAMESPACES['gml']}}}id"
+ID, OLD_ID = f"{{{NAMESPACES_3['gml']}}}id", f"{{{version2.NAMESPACES['gml']}}}id"
 ORDER = (
     *(
         "name",
@@ -81,10 +81,10 @@ def write_citygml3(
 class CityGML3Writer(CityGMLWriter):
     """Incremental form of `write_citygml3`."""
 
-    namespaces, root_id = NAMESPACES, ' gml:id="city"'
+    namespaces, root_id = NAMESPACES_3, ' gml:id="city"'
 
     def add_member(self, member: Fragment) -> None:
-        self.put(upgraded(member))
+        self.put(upgrade_member(member))
 
 
 def writer(path: str | os.PathLike, head: FileHead) -> CityGML3Writer:
@@ -94,17 +94,17 @@ def writer(path: str | os.PathLike, head: FileHead) -> CityGML3Writer:
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's part of a run's file."""
-    return upgraded(version2.fragment(sheet))
+    return upgrade_member(version2.fragment(sheet))
 
 
-def upgraded(member: Fragment) -> Fragment:
+def upgrade_member(member: Fragment) -> Fragment:
     """The cityObjectMember of CityGML 2.0 as one of 3.0; the root's namespaces are taken as
     declared in both.
     """
     declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in version2.NAMESPACES.items())
     (old,) = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
-    root = etree.Element("root", nsmap=NAMESPACES)
-    root.append(made("core:cityObjectMember", building_of(old[0])))
+    root = etree.Element("root", nsmap=NAMESPACES_3)
+    root.append(make_element("core:cityObjectMember", upgrade_building(old[0])))
     text = etree.tostring(root, encoding="utf-8")
     return Fragment(text[text.index(b">") + 1 : text.rindex(b"<")], member.extent)
 
@@ -112,101 +112,113 @@ def upgraded(member: Fragment) -> Fragment:
 HUGE = etree.XMLParser(huge_tree=True, resolve_entities=False)
 
 
-def building_of(old: Any) -> Any:
+def upgrade_building(old: Any) -> Any:
     """A Building or BuildingPart with all that is in it, in the order of the schemas."""
-    new = made(f"bldg:{local(old)}", **{ID: old.get(OLD_ID)})
+    new = make_element(f"bldg:{local(old)}", **{ID: old.get(OLD_ID)})
     owner = new.get(ID)
     new.extend(
         sorted(
-            (property_of(child, owner) for child in old),
+            (upgrade_property(child, owner) for child in old),
             key=lambda child: ORDER.index(local(child)),
         )
     )
-    for number, geometry in enumerate(new.iter(*(named(f"gml:{kind}") for kind in WITH_ID)), 1):
+    for number, geometry in enumerate(
+        new.iter(*(qualify_name(f"gml:{kind}") for kind in WITH_ID)), 1
+    ):
         if geometry.get(ID) is None:
             geometry.set(ID, f"geom-{number}-{owner}")
     return new
 
 
-def property_of(old: Any, owner: str) -> Any:
+def upgrade_property(old: Any, owner: str) -> Any:
     """What 3.0 makes of a property of a building or surface in 2.0;
 
     `owner` ends the ids that are new.
     """
     name = local(old)
     if name in (*GENERIC, SET):
-        return made("core:genericAttribute", generic_of(old))
+        return make_element("core:genericAttribute", upgrade_generic(old))
     if name == "boundedBy":
-        return made("core:boundary", surface_of(old[0], owner))
+        return make_element("core:boundary", upgrade_surface(old[0], owner))
     if name in LEVEL_0:
-        surfaces = made("core:lod0MultiSurface", geometry_of(old[0]))
-        return made(
-            "core:boundary", made(f"con:{LEVEL_0[name]}", surfaces, **{ID: f"{name}-{owner}"})
+        surfaces = make_element("core:lod0MultiSurface", upgrade_geometry(old[0]))
+        return make_element(
+            "core:boundary",
+            make_element(f"con:{LEVEL_0[name]}", surfaces, **{ID: f"{name}-{owner}"}),
         )
     if name == "measuredHeight":
-        return made("con:height", height_of(old))
+        return make_element("con:height", upgrade_height(old))
     if name == "consistsOfBuildingPart":
-        return made("bldg:buildingPart", building_of(old[0]))
+        return make_element("bldg:buildingPart", upgrade_building(old[0]))
     if name == "creationDate":
-        return made("core:creationDate", text=f"{old.text}T00:00:00")
+        return make_element("core:creationDate", text=f"{old.text}T00:00:00")
     if name.startswith("lod"):
         renamed = name.replace("TerrainIntersection", "TerrainIntersectionCurve")
-        return made(f"core:{renamed}", *map(geometry_of, old))
-    return made(f"{'gml' if name == 'name' else 'bldg'}:{name}", text=old.text, **old.attrib)
+        return make_element(f"core:{renamed}", *map(upgrade_geometry, old))
+    return make_element(
+        f"{'gml' if name == 'name' else 'bldg'}:{name}", text=old.text, **old.attrib
+    )
 
 
-def generic_of(old: Any) -> Any:
+def upgrade_generic(old: Any) -> Any:
     """A generic attribute, or a named set of them."""
-    name = made("gen:name", text=old.get("name"))
+    name = make_element("gen:name", text=old.get("name"))
     if local(old) == SET:
-        return made(
+        return make_element(
             "gen:GenericAttributeSet",
             name,
-            *(made("gen:genericAttribute", generic_of(one)) for one in old),
+            *(make_element("gen:genericAttribute", upgrade_generic(item)) for item in old),
         )
-    return made(f"gen:{GENERIC[local(old)]}", name, made("gen:value", text=old[0].text))
+    return make_element(
+        f"gen:{GENERIC[local(old)]}", name, make_element("gen:value", text=old[0].text)
+    )
 
 
-def surface_of(old: Any, owner: str) -> Any:
+def upgrade_surface(old: Any, owner: str) -> Any:
     """A RoofSurface, WallSurface or GroundSurface."""
     properties = sorted(
-        (property_of(child, owner) for child in old), key=lambda child: ORDER.index(local(child))
+        (upgrade_property(child, owner) for child in old),
+        key=lambda child: ORDER.index(local(child)),
     )
-    return made(f"con:{local(old)}", *properties, **{ID: old.get(OLD_ID)})
+    return make_element(f"con:{local(old)}", *properties, **{ID: old.get(OLD_ID)})
 
 
-def height_of(old: Any) -> Any:
+def upgrade_height(old: Any) -> Any:
     """A measuredHeight, which says from where to where it was measured."""
-    told = {
+    properties = {
         "highReference": "highestRoofEdge",
         "lowReference": "lowestGroundPoint",
         "status": "measured",
     }
-    how = [made(f"con:{name}", text=value) for name, value in told.items()]
-    return made("con:Height", *how, made("con:value", text=old.text, uom=old.get("uom")))
+    how = [make_element(f"con:{name}", text=value) for name, value in properties.items()]
+    return make_element(
+        "con:Height", *how, make_element("con:value", text=old.text, uom=old.get("uom"))
+    )
 
 
-def geometry_of(old: Any) -> Any:
+def upgrade_geometry(old: Any) -> Any:
     """A geometry of GML 3.1 as one of 3.2, where a solid's boundary is a shell."""
     is_shell = local(old) == "CompositeSurface" and local(old.getparent().getparent()) == "Solid"
-    new = made(f"gml:{'Shell' if is_shell else local(old)}", *map(geometry_of, old), text=old.text)
+    new = make_element(
+        f"gml:{'Shell' if is_shell else local(old)}", *map(upgrade_geometry, old), text=old.text
+    )
     for name, value in old.attrib.items():
         new.set(ID if name == OLD_ID else name, value)
     return new
 
 
-def made(tag: str, *children: Any, text: str | None = None, **attributes: str) -> Any:
+def make_element(tag: str, *children: Any, text: str | None = None, **attributes: str) -> Any:
     """An element `prefix:name`."""
-    element = etree.Element(named(tag), attributes, nsmap=NAMESPACES)
+    element = etree.Element(qualify_name(tag), attributes, nsmap=NAMESPACES_3)
     element.text = text
     element.extend(children)
     return element
 
 
-def named(tag: str) -> str:
+def qualify_name(tag: str) -> str:
     """The name in lxml's form of `prefix:name`."""
     prefix, _, name = tag.partition(":")
-    return f"{{{NAMESPACES[prefix]}}}{name}"
+    return f"{{{NAMESPACES_3[prefix]}}}{name}"
 
 
 def local(element: Any) -> str:

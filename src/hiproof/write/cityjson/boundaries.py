@@ -15,7 +15,7 @@ from ...model import GROUND, ROOF, Building, Face, Solid
 from ..building_attributes import OWN
 from ..roof_figures import RoofFigures
 from ..shapes import PartShape, Shapes
-from ..values import plain, rounded
+from ..values import plain, round_value
 
 LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 
@@ -99,7 +99,7 @@ def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> li
     """LoD0: the footprint where it lay before it was moved, and the roof's edge, with semantics to
     tell them apart by.
     """
-    corners, grounds = building.solid.vertices, building.solid.of_kind(GROUND)
+    corners, grounds = building.solid.vertices, building.solid.select_faces(GROUND)
     unmoved = corners - np.array([*building.shift, 0.0]) if any(building.shift) else corners
     footprint = multi_surface(ground_boundaries(grounds, unmoved, vertices))
     if shapes.outline is None:
@@ -160,21 +160,21 @@ def roof_surfaces(
     """Semantics of the roof faces of its `solid`, or a part's, by index: slope, azimuth (degrees),
     the roof part they belong to.
     """
-    found = {}
+    result = {}
     for index, face in enumerate(solid.faces):
         if face.kind != ROOF:
             continue
-        found[index] = {
+        result[index] = {
             "type": ROOF,
-            f"{prefix}slope": plain(rounded(figures.face_slope_deg[index], 3)),
-            f"{prefix}azimuth": plain(rounded(figures.face_azimuth_deg[index], 3)),
+            f"{prefix}slope": plain(round_value(figures.face_slope_deg[index], 3)),
+            f"{prefix}azimuth": plain(round_value(figures.face_azimuth_deg[index], 3)),
         }
         if 0 <= face.part < len(building.parts):
-            found[index] |= {
+            result[index] |= {
                 f"{OWN}part": int(face.part),
                 f"{OWN}part_type": building.parts[face.part].type,
             }
-    return found
+    return result
 
 
 def level_footprint(building: Building) -> shapely.Polygon | None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...model import Building
 from ...settings import WriteSettings
-from ..building_attributes import PREFIX, building_attributes, figures_of
+from ..building_attributes import PREFIX, building_attributes, measure_figures
 from ..files import scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
@@ -91,9 +91,9 @@ class CityJSONWriter(BuildingWriter):
             self.waiting = stack.enter_context(scratch(self.path))
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        figures = figures or figures_of(building)
+        figures = figures or measure_figures(building)
         name = self.ids.take(plain_text(building.id))
-        vertices = Vertices(self.origin_for(building), self.scale, self.units)
+        vertices = Vertices(self.choose_origin(building), self.scale, self.units)
         attributes = building_attributes(
             building, figures, self.head.prefix, self.units, self.head.write.osm_tags
         )
@@ -115,20 +115,20 @@ class CityJSONWriter(BuildingWriter):
                 np.maximum(self.high, extent[3:]),
             )
 
-    def origin_for(self, building: Building) -> np.ndarray:
+    def choose_origin(self, building: Building) -> np.ndarray:
         """The file's offset (3,), settled by the first building that has coordinates."""
         if self.translate is None:
             corner = first_corner(building)
             if corner is None:
                 return np.zeros(3)
-            self.translate = offset_of(self.units.from_metres(corner[:2]))
+            self.translate = choose_offset(self.units.from_metres(corner[:2]))
         return self.translate
 
     def add_to_document(self, objects: dict[str, dict[str, Any]], vertices: Vertices) -> None:
         self.widen(next(iter(objects.values())).get("geographicalExtent"))
         for name, city_object in objects.items():
             for geometry in city_object.get("geometry", ()):
-                geometry["boundaries"] = shifted(geometry["boundaries"], self.vertex_count)
+                geometry["boundaries"] = shift_indices(geometry["boundaries"], self.vertex_count)
             self.file.write(
                 (b",\n" if self.object_count else b"") + dump(name) + b":" + dump(city_object)
             )
@@ -180,7 +180,7 @@ def fragment(sheet: Sheet) -> Fragment:
     return feature_line(sheet, vertices)
 
 
-def offset_of(corner_xy: np.ndarray) -> np.ndarray:
+def choose_offset(corner_xy: np.ndarray) -> np.ndarray:
     """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole thousands, so
     that it seldom moves.
     """
@@ -201,7 +201,7 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
     if geometry:
         whole = {
             "type": "Building",
-            "geographicalExtent": list(extent_of(vertices)),
+            "geographicalExtent": list(compute_extent(vertices)),
             "attributes": sheet.attributes,
         }
         whole["geometry"] = geometry
@@ -223,13 +223,13 @@ def part_object(sheet: Sheet, part: PartShape, vertices: Vertices) -> dict[str, 
     }
 
 
-def extent_of(vertices: Vertices) -> tuple[float, ...]:
+def compute_extent(vertices: Vertices) -> tuple[float, ...]:
     """Low x y z and high x y z of all vertices."""
     grid = np.array(vertices.grid)
-    low, high = (
+    lower, upper = (
         edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0))
     )
-    return tuple(metres(v) for v in (*low, *high))
+    return tuple(metres(v) for v in (*lower, *upper))
 
 
 def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
@@ -241,13 +241,13 @@ def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
         "CityObjects": objects,
         "vertices": vertices.grid,
     }
-    return Fragment(dump(feature) + b"\n", extent_of(vertices) if vertices.grid else None)
+    return Fragment(dump(feature) + b"\n", compute_extent(vertices) if vertices.grid else None)
 
 
-def shifted(boundaries: Any, count: int) -> Any:
+def shift_indices(boundaries: Any, count: int) -> Any:
     """Nested lists of vertex indices, each index raised by `count`."""
     return (
         boundaries + count
         if isinstance(boundaries, int)
-        else [shifted(inner, count) for inner in boundaries]
+        else [shift_indices(inner, count) for inner in boundaries]
     )

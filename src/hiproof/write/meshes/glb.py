@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 VERTICES, INDICES = 34962, 34963  # ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER of WebGL, which glTF names
-COMPONENTS = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121}
-TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+COMPONENT_TYPES = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121}
+ACCESSOR_TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 ALIGNED = 8  # bytes: what tables of properties ask for, and more than arrays of vertices do
 
 
@@ -40,8 +40,8 @@ class GlbDocument:
         accessors = self.tables.setdefault("accessors", [])
         view = self.view(np.ascontiguousarray(values).tobytes(), target=target)
         kind = {
-            "componentType": COMPONENTS[values.dtype.str[1:]],
-            "type": TYPES[1 if values.ndim == 1 else values.shape[1]],
+            "componentType": COMPONENT_TYPES[values.dtype.str[1:]],
+            "type": ACCESSOR_TYPES[1 if values.ndim == 1 else values.shape[1]],
         }
         accessors.append({"bufferView": view, "count": len(values), **kind, **table})
         return len(accessors) - 1
@@ -64,6 +64,6 @@ class GlbDocument:
         return struct.pack("<III", 0x46546C67, 2, 12 + sum(map(len, parts))) + b"".join(parts)
 
 
-def y_up(vectors: np.ndarray) -> np.ndarray:
+def turn_y_up(vectors: np.ndarray) -> np.ndarray:
     """East, north, up to glTF's x, y, z: east is x, north is -z."""
     return np.column_stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]])

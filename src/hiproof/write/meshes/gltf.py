@@ -15,9 +15,9 @@ import numpy as np
 
 from ...model import Face
 from ..colours import linear_rgb
-from .glb import GlbDocument, y_up
+from .glb import GlbDocument, turn_y_up
 from .triangles import face_normals, faces_triangles
-from .viewed import Look, ViewedModel, told_beside
+from .viewed import Look, ViewedModel, merge_values
 
 
 def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None = None) -> int:
@@ -58,7 +58,7 @@ class GlbContent:
             places = {"POSITION": self.document.positions(corners), "NORMAL": normal}
             material = self.materials.setdefault(look, len(self.materials))
             primitives.append({"attributes": places, "material": material})
-        extras = told_beside({"id": model.id, "roof_type": model.roof_type}, model.attributes)
+        extras = merge_values({"id": model.id, "roof_type": model.roof_type}, model.attributes)
         self.nodes.append({"name": model.id, "mesh": len(self.meshes), "extras": extras})
         self.meshes.append({"name": model.id, "primitives": primitives})
 
@@ -99,4 +99,4 @@ def flat_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> tuple[np.ndar
     ):
         corners.append(vertices[triangles.ravel()])
         normals.append(np.tile(normal / max(np.linalg.norm(normal), 1e-12), (triangles.size, 1)))
-    return y_up(np.concatenate(corners)), y_up(np.concatenate(normals))
+    return turn_y_up(np.concatenate(corners)), turn_y_up(np.concatenate(normals))

@@ -44,9 +44,9 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 
 
 def header(library: str, origin: np.ndarray, crs: str | None) -> str:
-    where = " ".join(f"{value:.0f}" for value in origin)
+    text = " ".join(f"{value:.0f}" for value in origin)
     return (
-        f"# hiproof; in metres; the origin {where} is to be added to every vertex\n"
+        f"# hiproof; in metres; the origin {text} is to be added to every vertex\n"
         f"# crs: {crs}; its coordinates are metres divided by its unit\nmtllib {library}\n"
     )
 

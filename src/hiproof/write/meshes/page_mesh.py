@@ -14,7 +14,7 @@ from .triangles import faces_triangles
 
 
 @dataclass(frozen=True)
-class Mesh:
+class PageMesh:
     """Corners (t, 3, 3) of triangles, the part (t,) that each roofs (-1: a wall), ends (e, 2, 3) of
     the roof's edges.
     """
@@ -24,7 +24,7 @@ class Mesh:
     edges: np.ndarray
 
 
-def solid_mesh(solid: Solid) -> Mesh:
+def solid_mesh(solid: Solid) -> PageMesh:
     """The mesh of a solid, in its own frame; faces on the ground are left out."""
     corners, part, edges = [np.empty((0, 3, 3))], [], [np.empty((0, 2, 3))]
     faces = [face for face in solid.faces if face.kind in (ROOF, WALL)]
@@ -34,9 +34,9 @@ def solid_mesh(solid: Solid) -> Mesh:
         if face.kind == ROOF:
             rings = (solid.vertices[list(ring)] for ring in face.rings)
             edges += [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
-    return Mesh(np.concatenate(corners), np.array(part, int), np.concatenate(edges))
+    return PageMesh(np.concatenate(corners), np.array(part, int), np.concatenate(edges))
 
 
-def packed(values: np.ndarray, kind: str) -> str:
+def pack_values(values: np.ndarray, kind: str) -> str:
     """Base64 of the array's little-endian bytes."""
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")

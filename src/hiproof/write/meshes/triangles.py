@@ -40,10 +40,12 @@ def faces_triangles(
 
     `normals` are those of `face_normals`, where a caller has them.
     """
-    others = [number for number, face in enumerate(faces) if not is_triangle(face)]
+    neighbours = [number for number, face in enumerate(faces) if not is_triangle(face)]
     normals = face_normals(vertices, faces) if normals is None else normals
     tiles = iter(
-        cut(vertices, [faces[number].rings for number in others], normals[others]) if others else []
+        cut_faces(vertices, [faces[number].rings for number in neighbours], normals[neighbours])
+        if neighbours
+        else []
     )
     return [np.array(face.rings[:1], int) if is_triangle(face) else next(tiles) for face in faces]
 
@@ -52,7 +54,7 @@ def is_triangle(face: Face) -> bool:
     return len(face.rings) == 1 and len(face.rings[0]) == 3
 
 
-def cut(
+def cut_faces(
     vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray
 ) -> list[np.ndarray]:
     """Triangles (t, 3) of faces given by their rings of vertex indices and their normals (n, 3), by
@@ -74,7 +76,7 @@ def cut(
     turned = (ax * by - ay * bx) * normals[owner, axes[owner]] < 0
     corners[turned] = corners[turned][:, ::-1]
     return [
-        named(
+        number_corners(
             corners[owner == number],
             np.concatenate(plan),
             [index for ring in rings for index in ring],
@@ -83,7 +85,7 @@ def cut(
     ]
 
 
-def named(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
+def number_corners(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
     """Vertex indices (t, 3) of triangles' corners (t, 3, 2), which are among the vertices `plan`
     (m, 2) with these `indices`.
     """

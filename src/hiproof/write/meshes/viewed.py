@@ -31,35 +31,40 @@ class ViewedModel(NamedTuple):
 
     def faces_by_look(self) -> dict[Look, list[Face]]:
         """Roofs, walls and grounds, those of one look together."""
-        found: dict[Look, list[Face]] = {}
+        result: dict[Look, list[Face]] = {}
         for kind in (ROOF, WALL, GROUND):
-            for face in self.solid.of_kind(kind):
-                found.setdefault(look_of(face, self.part_types), []).append(face)
-        return found
+            for face in self.solid.select_faces(kind):
+                result.setdefault(choose_look(face, self.part_types), []).append(face)
+        return result
 
 
-def told_beside(own: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
-    """`own` values by name, then the `attributes`, of which one that has such a name and says
+def merge_values(members: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
+    """`members` values by name, then the `attributes`, of which one that has such a name and says
     something else is called NAME_input.
 
-    >>> told_beside({"id": "a", "type": "gable"}, {"id": "a", "type": "church", "year": 1905})
+    >>> merge_values({"id": "a", "type": "gable"}, {"id": "a", "type": "church", "year": 1905})
     {'id': 'a', 'type': 'gable', 'type_input': 'church', 'year': 1905}
     """
-    others = {
+    neighbours = {
         name: value
         for name, value in attributes.items()
-        if name not in own or str(value) != str(own[name])
+        if name not in members or str(value) != str(members[name])
     }
-    return own | {f"{name}_input" if name in own else name: value for name, value in others.items()}
+    return members | {
+        f"{name}_input" if name in members else name: value for name, value in neighbours.items()
+    }
 
 
-def look_of(face: Face, part_types: Mapping[int, str]) -> Look:
+def choose_look(face: Face, part_types: Mapping[int, str]) -> Look:
     """The look of a face: a roof's is that of its part's type.
 
-    >>> look_of(Face(((0, 1, 2),), ROOF, part=1), {0: "gable", 1: "hip"})
+    >>> choose_look(Face(((0, 1, 2),), ROOF, part=1), {0: "gable", 1: "hip"})
     Look(name='roof hip', colour='#05429b')
     """
     if face.kind != ROOF:
         return Look(face.kind, WALL_COLOUR if face.kind == WALL else GROUND_COLOUR)
-    known = part_types.get(face.part)
-    return Look(f"roof {known if known in type_colours() else 'unknown'}", type_colour(known))
+    known_values = part_types.get(face.part)
+    return Look(
+        f"roof {known_values if known_values in type_colours() else 'unknown'}",
+        type_colour(known_values),
+    )

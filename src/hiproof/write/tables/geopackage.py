@@ -22,14 +22,14 @@ from ...errors import OutputError
 from ...model import Building
 from ...settings import WriteSettings
 from ..attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
-from ..building_attributes import building_attributes, figures_of
+from ..building_attributes import building_attributes, measure_figures
 from ..files import atomic, scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..naming import plan_wkt
 from ..roof_figures import RoofFigures
 from ..writer import BuildingWriter
-from .rows import Row, lines_of, table_rows
+from .rows import Row, split_lines, table_rows
 from .styles import TABLE, style_rows
 
 BUILDINGS = "buildings"
@@ -80,11 +80,11 @@ class WaitingRows:
         """A building's rows, as a line of `Rows.to_text`."""
         for _, values in json.loads(line):
             for name, value in values.items():
-                self.found.setdefault(name, set()).add(kind_of(value))
+                self.found.setdefault(name, set()).add(classify_value(value))
         self.file.write(line + b"\n")
 
-    def kinds(self, prefix: str, most: int | None = None) -> dict[str, type]:
-        """The one type of every column; of more than `most`, the last of the input's own are left
+    def kinds(self, prefix: str, limit: int | None = None) -> dict[str, type]:
+        """The one type of every column; of more than `limit`, the last of the input's own are left
         out.
         """
         declared = {
@@ -96,13 +96,13 @@ class WaitingRows:
             {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
         )
         kinds = {
-            name: column_kind(found, declared.get(name, "text"))
-            for name, found in self.found.items()
+            name: column_kind(result, declared.get(name, "text"))
+            for name, result in self.found.items()
         }
-        beyond = len(kinds) - (most or len(kinds))
-        if beyond > 0:
-            own = [name for name in kinds if name not in declared and name != "id"]
-            left_out = set(own[-beyond:])
+        excess = len(kinds) - (limit or len(kinds))
+        if excess > 0:
+            selected_kinds = [name for name in kinds if name not in declared and name != "id"]
+            left_out = set(selected_kinds[-excess:])
             kinds = {name: kind for name, kind in kinds.items() if name not in left_out}
         return kinds or {"id": str}
 
@@ -145,14 +145,14 @@ class AttributesWriter(BuildingWriter):
         }
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        figures = figures or figures_of(building)
+        figures = figures or measure_figures(building)
         attributes = building_attributes(
             building, figures, self.prefix, self.units.gml, self.osm_tags
         )
         self.put(Fragment(table_rows(building, figures, attributes, self.units.table).to_text()))
 
     def put(self, fragment: Fragment) -> None:
-        lines = lines_of(fragment.text)
+        lines = split_lines(fragment.text)
         for layer, waiting in self.waiting.items():
             waiting.put(lines[layer])
 
@@ -234,31 +234,31 @@ def fixed_date() -> Iterator[None]:
     """GDAL writes FIXED_DATE as the date of change, and an unknown CRS is no warning."""
     import pyogrio
 
-    before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
+    previous = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": FIXED_DATE})
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "'crs' was not provided")
             yield
     finally:
-        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": previous})
 
 
-def kind_of(value: Any) -> type:
+def classify_value(value: Any) -> type:
     """bool, int, float, str or NoneType; whole numbers beyond 64 bits count as text."""
     return str if type(value) is int and abs(value) >= 2**63 else type(value)
 
 
-def column_kind(found: set[type], declared: str) -> type:
+def column_kind(result: set[type], declared: str) -> type:
     """The one type that holds all values found; a figure that is always unknown stays what it is
     `declared`.
     """
-    known = found - {type(None)}
-    if not known:
+    kinds = result - {type(None)}
+    if not kinds:
         return {"text": str, "count": int}.get(declared, float)
-    if len(known) == 1:
-        return known.pop()
-    return str if str in known else float if float in known else int
+    if len(kinds) == 1:
+        return kinds.pop()
+    return str if str in kinds else float if float in kinds else int
 
 
 def column(values: list[Any], kind: type) -> tuple[np.ndarray, np.ndarray]:
@@ -284,12 +284,12 @@ def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str
     >>> column_names(["id", "Year", "year", "fid"], ["fid"])
     ['id', 'Year', 'year_2', 'fid_2']
     """
-    taken, unique = set(reserved), []
+    accepted, unique = set(reserved), []
     for name in names:
         candidate, number = name, 1
-        while candidate.lower() in taken:
+        while candidate.lower() in accepted:
             number += 1
             candidate = f"{name}_{number}"
-        taken.add(candidate.lower())
+        accepted.add(candidate.lower())
         unique.append(candidate)
     return unique

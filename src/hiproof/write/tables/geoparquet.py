@@ -16,8 +16,8 @@ from .geopackage import BUILDINGS, AttributesWriter, column_names
 from .rows import Row
 
 GEOMETRY = "geometry"
-PLAN = ["Polygon", "MultiPolygon"]
-GEOMETRY_TYPES = {BUILDINGS: PLAN, "parts": PLAN, "roof_surfaces": ["Polygon Z"]}
+PLAN_TYPES = ["Polygon", "MultiPolygon"]
+GEOMETRY_TYPES = {BUILDINGS: PLAN_TYPES, "parts": PLAN_TYPES, "roof_surfaces": ["Polygon Z"]}
 
 
 class GeoParquetWriter(AttributesWriter):

@@ -33,10 +33,10 @@ BATCH = 500  # buildings sent at once
 # extension
 LOCKS = 0x6869
 # Names of indexes add 15 characters, and PostgreSQL cuts at 63.
-PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")
-KINDS = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
-MEASURES = ", ".join(f"{a.name} {KINDS[a.kind]}" for a in PARTS_LAYER[3:])
-SCHEMA = """
+TABLE_PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")
+COLUMN_TYPES = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
+MEASURE_COLUMNS = ", ".join(f"{a.name} {COLUMN_TYPES[a.kind]}" for a in PARTS_LAYER[3:])
+TABLE_SCHEMA = """
 create table if not exists {buildings} (
     id text primary key, status text, quality text, roof_type text, attributes jsonb,
     geom geometry(PolyhedralSurfaceZ, {srid}));
@@ -57,7 +57,7 @@ create index if not exists {prefix}_parts_geom on {parts} using gist (geom);
 
 
 @dataclass(frozen=True)
-class Row:
+class DatabaseRow:
     """A building as the tables hold it: its `solid` in metres, None without a model, the types of
     its parts by number, and the `units` in which the tables hold coordinates."""
 
@@ -73,7 +73,7 @@ class Row:
 
 def load_rows(
     dsn: str,
-    rows: Iterator[Row],
+    rows: Iterator[DatabaseRow],
     parts: Iterable[Sequence[tuple]],
     srid: int = 0,
     prefix: str = "hiproof",
@@ -85,7 +85,7 @@ def load_rows(
     buildings that are not among `rows` are left out. Raises InputError for a prefix that makes no
     names of tables, OutputError for a database that cannot be written.
     """
-    if not PREFIX.fullmatch(prefix):
+    if not TABLE_PREFIX.fullmatch(prefix):
         raise InputError(
             "expected a table prefix of at most 48 letters (a to z), digits and underscores, got "
             f"{prefix!r:.80}; "
@@ -111,12 +111,12 @@ def load_rows(
             insert_parts(cursor, parts, loaded, names["parts"], srid)
             return len(loaded)
     except psycopg.OperationalError as error:
-        raise not_written(error, "; check the address") from error
+        raise explain_not_written(error, "; check the address") from error
     except (psycopg.Error, UnicodeError) as error:
-        raise not_written(error, "") from error
+        raise explain_not_written(error, "") from error
 
 
-def not_written(error: Exception, advice: str) -> OutputError:
+def explain_not_written(error: Exception, advice: str) -> OutputError:
     reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
     return OutputError(f"expected a PostGIS database that can be written, got: {reason}{advice}")
 
@@ -131,7 +131,7 @@ def add_extension(connection: Any, cursor: Any) -> None:
 
 def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
     """Make the tables, or empty those that are there and give them the run's reference system."""
-    cursor.execute(SCHEMA.format(srid=srid, measures=MEASURES, **names))
+    cursor.execute(TABLE_SCHEMA.format(srid=srid, measures=MEASURE_COLUMNS, **names))
     cursor.execute("delete from {buildings}".format(**names))
     for key, kind in (
         ("buildings", "PolyhedralSurfaceZ"),
@@ -144,7 +144,7 @@ def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
             cursor.execute(f"alter table {table} alter column geom type geometry({kind}, {srid})")
 
 
-def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> None:
+def insert(cursor: Any, rows: list[DatabaseRow], names: dict[str, str], srid: int) -> None:
     """Insert buildings together with their roof surfaces."""
     geometry = f"ST_GeomFromEWKT('SRID={srid};' || %s::text)"
     cursor.executemany(
@@ -171,28 +171,30 @@ def insert_parts(
         f"insert into {table} ({', '.join(columns)}, geom) values ({values}, "
         f"ST_SetSRID(%s::geometry, {srid}))"
     )
-    for some in parts:
-        cursor.executemany(sql, [tuple(map(known, row)) for row in some if row[0] in loaded])
+    for part in parts:
+        cursor.executemany(
+            sql, [tuple(map(convert_value, row)) for row in part if row[0] in loaded]
+        )
 
 
-def known(value: Any) -> Any:
+def convert_value(value: Any) -> Any:
     """A value of a table as the database takes it; NaN, which stands for what is not known, as
     null."""
     value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-def roof_rows(row: Row) -> Iterator[tuple]:
+def roof_rows(row: DatabaseRow) -> Iterator[tuple]:
     """A row a roof surface: (building, number, part, type, slope, azimuth, area, WKT)."""
     if row.solid is None:
         return
-    for number, face in enumerate(row.solid.of_kind(ROOF)):
+    for number, face in enumerate(row.solid.select_faces(ROOF)):
         rings = [row.solid.vertices[list(ring)] for ring in face.rings]
         wkt = f"POLYGON Z {rings_wkt([row.units.from_metres(ring) for ring in rings])}"
-        yield (row.id, number, face.part, row.part_types.get(face.part), *lie_of(rings), wkt)
+        yield (row.id, number, face.part, row.part_types.get(face.part), *measure_plane(rings), wkt)
 
 
-def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
+def measure_plane(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
     """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat), true area
     (m2) of rings in metres."""
     normal = np.sum([ring_normal(ring) for ring in rings], axis=0)
@@ -206,7 +208,7 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
     return slope, azimuth, area
 
 
-def polyhedral_wkt(row: Row) -> str | None:
+def polyhedral_wkt(row: DatabaseRow) -> str | None:
     """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None
     without one."""
     if row.solid is None:

@@ -15,12 +15,12 @@ import shapely
 from ...errors import OutputError
 from ...frames import METRES, Units
 from ...model import ROOF, Building, Face, Part
-from ...primitives.cants import CANTED, MEASURES, cants_named
+from ...primitives.cants import CANTED, MEASURES, list_cants
 from ..attribute_list import SHAPE
 from ..roof_figures import RoofFigures
-from ..values import metres, plain_text, rounded
+from ..values import metres, plain_text, round_value
 
-TEXT = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
+ENCODER = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
 
 
@@ -34,15 +34,15 @@ class Rows(NamedTuple):
     def to_text(self) -> bytes:
         """The rows as JSON, a line a table, geometries in hexadecimal digits."""
         tables = ([[wkb and wkb.hex(), values] for wkb, values in table] for table in self)
-        return b"\n".join(TEXT.encode(table).encode() for table in tables)
+        return b"\n".join(ENCODER.encode(table).encode() for table in tables)
 
 
-def lines_of(text: bytes) -> dict[str, bytes]:
+def split_lines(text: bytes) -> dict[str, bytes]:
     """The line of each table in what `Rows.to_text` wrote.
 
     Raises OutputError for what another version did.
 
-    >>> lines_of(Rows(((None, {"id": "a"}),)).to_text())
+    >>> split_lines(Rows(((None, {"id": "a"}),)).to_text())
     {'buildings': b'[[null, {"id": "a"}]]', 'parts': b'[]', 'roof_surfaces': b'[]'}
     """
     lines = text.split(b"\n")
@@ -74,14 +74,14 @@ def building_row(building: Building, attributes: dict[str, Any], units: Units = 
     """The outline of `building` in `units` (None where it is unknown) and its attributes by
     column.
     """
-    named = {
+    names = {
         f"{name}_input" if name.lower() == "id" else name: value
         for name, value in attributes.items()
     }
-    return wkb_of(known_outline(building), units), {"id": plain_text(building.id), **named}
+    return encode_geometry(find_outline(building), units), {"id": plain_text(building.id), **names}
 
 
-def known_outline(building: Building) -> shapely.Geometry | None:
+def find_outline(building: Building) -> shapely.Geometry | None:
     """The building's outline in world coordinates: the modelled one, else the one asked for, else
     None.
     """
@@ -96,14 +96,14 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     deviation.
     """
     rows = []
-    for number, shown in enumerate(building.shown_areas()):
-        values = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
-        rows.append((wkb_of(shown, units), values))
+    for number, visible in enumerate(building.compute_visible_areas()):
+        values = {"building_id": plain_text(building.id), **part_values(building, number, visible)}
+        rows.append((encode_geometry(visible, units), values))
     return tuple(rows)
 
 
-def part_values(building: Building, number: int, shown: shapely.Geometry) -> dict[str, Any]:
-    """What is known of a roof part by column: its type, the area where it is `shown`, place,
+def part_values(building: Building, number: int, visible: shapely.Geometry) -> dict[str, Any]:
+    """What is known of a roof part by column: its type, the area where it is `visible`, place,
     parameters and their standard deviations.
     """
     part, (x, y, z) = (
@@ -113,33 +113,40 @@ def part_values(building: Building, number: int, shown: shapely.Geometry) -> dic
     return {
         "part": number,
         "type": part.type,
-        "area_m2": metres(shown.area),
+        "area_m2": metres(visible.area),
         "x": metres(x),
         "y": metres(y),
         "z_eave": metres(z),
-        "rotation": rounded(math.degrees(part.kappa)),
-        **{name: rounded(value) for name, value in part.parameters.items() if name not in CANTED},
-        **cants_in_one(part),
-        **sigmas_of(part),
+        "rotation": round_value(math.degrees(part.kappa)),
+        **{
+            name: round_value(value)
+            for name, value in part.parameters.items()
+            if name not in CANTED
+        },
+        **join_cants(part),
+        **list_sigmas(part),
     }
 
 
-def cants_in_one(part: Part) -> dict[str, str]:
+def join_cants(part: Part) -> dict[str, str]:
     """The column of a part's cants, where it has any: thirty columns that hardly a part fills would
     hide the others.
     """
-    cants = cants_named(part.parameters)
-    told = [[rounded(part.parameters[f"{what}_{cant}"]) for what in MEASURES] for cant in cants]
-    return {"cants": TEXT.encode(told)} if cants else {}
+    cants = list_cants(part.parameters)
+    rows = [
+        [round_value(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
+        for cant in cants
+    ]
+    return {"cants": ENCODER.encode(rows)} if cants else {}
 
 
-def sigmas_of(part: Part) -> dict[str, float]:
+def list_sigmas(part: Part) -> dict[str, float]:
     """Standard deviations by column, those of the angles in degrees."""
     columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
         name: f"{name}_sigma" for name in SHAPE
     }
     return {
-        columns[name]: rounded(math.degrees(value) if name == "kappa" else value)
+        columns[name]: round_value(math.degrees(value) if name == "kappa" else value)
         for name, value in part.sigma.items()
         if name in columns
     }
@@ -153,25 +160,25 @@ def surface_rows(
         return ()
     vertices = np.round(units.from_metres(building.solid.vertices), 4)
     roofs = [(index, face) for index, face in enumerate(building.solid.faces) if face.kind == ROOF]
-    polygons = shapely.to_wkb(polygons_of(vertices, [face for _, face in roofs]))
+    polygons = shapely.to_wkb(make_polygons(vertices, [face for _, face in roofs]))
     rows: list[Row] = []
     for (index, face), polygon in zip(roofs, polygons, strict=True):
         azimuth = float(figures.face_azimuth_deg[index])
-        known = 0 <= face.part < len(building.parts)
+        mask = 0 <= face.part < len(building.parts)
         values = {
             "building_id": plain_text(building.id),
             "number": len(rows),
-            "part": face.part if known else None,
-            "type": building.parts[face.part].type if known else None,
-            "slope_deg": rounded(figures.face_slope_deg[index], 3),
-            "azimuth_deg": rounded(azimuth, 3) if math.isfinite(azimuth) else None,
+            "part": face.part if mask else None,
+            "type": building.parts[face.part].type if mask else None,
+            "slope_deg": round_value(figures.face_slope_deg[index], 3),
+            "azimuth_deg": round_value(azimuth, 3) if math.isfinite(azimuth) else None,
             "area_m2": metres(figures.face_area_m2[index]),
         }
         rows.append((polygon, values))
     return tuple(rows)
 
 
-def polygons_of(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
+def make_polygons(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
     """The polygons (k,) of faces over `vertices` (n, 3), all made at once."""
     rings = [ring for face in faces for ring in face.rings]
     corners = vertices[[vertex for ring in rings for vertex in ring]]
@@ -187,7 +194,7 @@ def polygons_of(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
     return shapely.polygons(lines, indices=face_of)
 
 
-def wkb_of(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
+def encode_geometry(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
     """A plan geometry (world metres) in `units` as WKB, None of one that holds nothing."""
     if geometry is None or geometry.is_empty:
         return None

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 from ...primitives.catalogue import CATALOGUE
 from ..attribute_list import OWN
-from ..colours import GRADE_COLOURS, ROOF_COLOURS, UNKNOWN_COLOUR, legend_of
+from ..colours import GRADE_COLOURS, ROOF_COLOURS, UNKNOWN_COLOUR, list_legend
 from ..xml_text import xml_attribute
 
 TABLE = "layer_styles"
-LINE = "50,50,50,255"
+LINE_RGBA = "50,50,50,255"
 
 
 class Style(NamedTuple):
@@ -38,7 +38,7 @@ def legend_expression(column: str) -> str:
     """
     kinds: dict[str, list[str]] = {}
     for kind in CATALOGUE:
-        kinds.setdefault(legend_of(kind), []).append(f"'{kind}'")
+        kinds.setdefault(list_legend(kind), []).append(f"'{kind}'")
     cases = (f"WHEN \"{column}\" IN ({','.join(of)}) THEN '{to}'" for to, of in kinds.items())
     return f"CASE {' '.join(cases)} END"
 
@@ -115,15 +115,15 @@ def fill_symbol(number: int, colour: str, alpha: float) -> str:
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     options = {
         "color": f"{red},{green},{blue},{round(255 * alpha)}",
-        "outline_color": LINE,
+        "outline_color": LINE_RGBA,
         "outline_width": "0.1",
     }
     options |= {"outline_width_unit": "MM", "style": "solid", "outline_style": "solid"}
-    told = "".join(
+    text = "".join(
         f'<Option name="{name}" value="{value}" type="QString"/>' for name, value in options.items()
     )
     return (
         f'<symbol type="fill" name="{number}" alpha="1" clip_to_extent="1" force_rhr="0">'
         '<layer class="SimpleFill" enabled="1" locked="0" pass="0"><Option '
-        f'type="Map">{told}</Option></layer></symbol>'
+        f'type="Map">{text}</Option></layer></symbol>'
     )

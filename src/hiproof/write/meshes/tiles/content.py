@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..glb import INDICES, GlbDocument
-from .meshes import Mesh
-from .properties import EXTENSION, Property, add_table, schema_of
+from .meshes import TileMesh
+from .properties import EXTENSION, Property, add_table, make_schema
 
-FEATURES = "EXT_mesh_features"
+FEATURE_EXTENSION = "EXT_mesh_features"
 PAINTED = {
     "name": "building",
     "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.9},
@@ -21,7 +21,7 @@ PAINTED = {
 
 
 def tile_glb(
-    meshes: Sequence[Mesh], rows: Sequence[dict[str, Any]], properties: Sequence[Property]
+    meshes: Sequence[TileMesh], rows: Sequence[dict[str, Any]], properties: Sequence[Property]
 ) -> bytes:
     """The file of the buildings `meshes`, of which `rows` tells by attribute's name.
 
@@ -32,7 +32,7 @@ def tile_glb(
     corners = np.concatenate([mesh.corners for mesh in meshes])
     middle = np.round((corners.min(axis=0) + corners.max(axis=0)) / 2)
     document.tables |= {
-        "extensionsUsed": [FEATURES, EXTENSION],
+        "extensionsUsed": [FEATURE_EXTENSION, EXTENSION],
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "translation": middle.tolist()}],
         "meshes": [{"primitives": [primitive(document, meshes, corners - middle)]}],
@@ -40,28 +40,30 @@ def tile_glb(
     }
     table = add_table(document, properties, rows)
     document.tables["extensions"] = {
-        EXTENSION: {"schema": schema_of(properties), "propertyTables": [table]}
+        EXTENSION: {"schema": make_schema(properties), "propertyTables": [table]}
     }
     return document.to_bytes()
 
 
-def primitive(document: GlbDocument, meshes: Sequence[Mesh], corners: np.ndarray) -> dict[str, Any]:
+def primitive(
+    document: GlbDocument, meshes: Sequence[TileMesh], corners: np.ndarray
+) -> dict[str, Any]:
     """All triangles as one primitive; corners of a face that are one vertex are written once."""
     ids = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
-    told = np.zeros(
+    corner_table = np.zeros(
         len(corners),
         [("place", "<f4", 3), ("normal", "<f4", 3), ("colour", "u1", 4), ("id", "<f4")],
     )
-    told["place"], told["id"] = corners, ids
-    told["normal"] = np.concatenate([mesh.normals for mesh in meshes])
-    told["colour"] = np.concatenate([mesh.colours for mesh in meshes])
+    corner_table["place"], corner_table["id"] = corners, ids
+    corner_table["normal"] = np.concatenate([mesh.normals for mesh in meshes])
+    corner_table["colour"] = np.concatenate([mesh.colours for mesh in meshes])
     _, first, number = np.unique(
-        told.view(f"V{told.itemsize}"), return_index=True, return_inverse=True
+        corner_table.view(f"V{corner_table.itemsize}"), return_index=True, return_inverse=True
     )
     order = np.argsort(first)  # as they come, building by building
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    vertices, indices = told[first[order]], place[number.ravel()]
+    vertices, indices = corner_table[first[order]], place[number.ravel()]
     return {
         "attributes": {
             "POSITION": document.positions(vertices["place"]),
@@ -74,7 +76,7 @@ def primitive(document: GlbDocument, meshes: Sequence[Mesh], corners: np.ndarray
         ),
         "material": 0,
         "extensions": {
-            FEATURES: {
+            FEATURE_EXTENSION: {
                 "featureIds": [
                     {
                         "label": "building",

@@ -15,9 +15,16 @@ import numpy as np
 
 from ....errors import InputError
 from ....frames import Units
-from ....read.crs import best_of, described, horizontal_crs, parse_crs, units_of, vertical_crs
+from ....read.crs import (
+    describe_crs,
+    find_best_transformer,
+    find_units,
+    horizontal_crs,
+    parse_crs,
+    vertical_crs,
+)
 
-GEOGRAPHIC, GEOCENTRIC = "EPSG:4979", "EPSG:4978"
+GEOGRAPHIC_CRS, GEOCENTRIC_CRS = "EPSG:4979", "EPSG:4978"
 # m that a place may move on its way to the globe and back; more is a CRS used outside its area
 SAME_PLACE_M = 0.005
 
@@ -62,20 +69,20 @@ class Globe:
                 "--crs EPSG:..."
             )
         units, to_centre = (
-            units_of(crs, "the models"),
-            Transformer.from_crs(GEOGRAPHIC, GEOCENTRIC, always_xy=True),
+            find_units(crs, "the models"),
+            Transformer.from_crs(GEOGRAPHIC_CRS, GEOCENTRIC_CRS, always_xy=True),
         )
         exact = with_heights(crs) if geoid_height_m is None else None
-        transformer = exact or best_of(horizontal_crs(crs), "EPSG:4326")
+        transformer = exact or find_best_transformer(horizontal_crs(crs), "EPSG:4326")
         if transformer is None:
             raise InputError(
-                f"expected a CRS that pyproj can place on the globe, got {described(crs)}; name "
+                f"expected a CRS that pyproj can place on the globe, got {describe_crs(crs)}; name "
                 "another with --crs"
             )
-        heights, is_known = heights_told(crs, exact, geoid_height_m)
+        heights, is_known = explain_heights(crs, exact, geoid_height_m)
         accuracy = transformer.accuracy if transformer.accuracy >= 0 else None
         return cls(
-            described(crs),
+            describe_crs(crs),
             units,
             transformer,
             exact is not None,
@@ -117,8 +124,10 @@ class Globe:
             *np.asarray(earth).T, direction="INVERSE"
         )
         if self.is_3d:
-            own = self.transformer.transform(longitude, latitude, height, direction="INVERSE")
-            return self.units.to_metres(np.column_stack(own))
+            coordinates = self.transformer.transform(
+                longitude, latitude, height, direction="INVERSE"
+            )
+            return self.units.to_metres(np.column_stack(coordinates))
         xy = np.column_stack(self.transformer.transform(longitude, latitude, direction="INVERSE"))
         return np.column_stack([self.units.to_metres(xy), height - self.geoid_height_m])
 
@@ -129,10 +138,10 @@ def with_heights(crs: Any) -> Any:
     None where heights or a grid are missing.
     """
     has_heights = vertical_crs(crs) is not None or len(crs.axis_info) == 3
-    return best_of(crs, GEOGRAPHIC, allow_ballpark=False) if has_heights else None
+    return find_best_transformer(crs, GEOGRAPHIC_CRS, allow_ballpark=False) if has_heights else None
 
 
-def heights_told(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[str, bool]:
+def explain_heights(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[str, bool]:
     """What was done with heights as a sentence, and whether they are known to be right."""
     if geoid_height_m is not None:
         return (
@@ -142,27 +151,28 @@ def heights_told(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[st
         )
     if exact is not None:
         return f"heights above the ellipsoid by pyproj: {exact.description}", True
-    own = vertical_crs(crs)
+    height_crs = vertical_crs(crs)
     advice = "say the geoid's height there with --geoid-height METRES"
-    if own is None:
+    if height_crs is None:
         return (
-            f"{described(crs)} names no heights, so these are taken to be above the ellipsoid; "
+            f"{describe_crs(crs)} names no heights, so these are taken to be above the ellipsoid; "
             f"{advice}",
             False,
         )
     return (
-        f"pyproj has no grid here for {own.name}, so heights are taken to be above the ellipsoid "
+        f"pyproj has no grid here for {height_crs.name}, so heights are taken to be above the "
+        "ellipsoid "
         "and the buildings may "
         "stand some tens of metres too low or high; install it (`projsync`, or PROJ_NETWORK=ON) "
         f"or {advice}"
     ), False
 
 
-def east_north_up(longitude: float, latitude: float, origin: np.ndarray) -> np.ndarray:
+def make_local_frame(longitude: float, latitude: float, origin: np.ndarray) -> np.ndarray:
     """The transform (4, 4) from east, north, up about `origin` (3,), Earth-centred, to
     Earth-centred coordinates.
 
-    >>> east_north_up(0.0, 0.0, np.array([6378137.0, 0.0, 0.0]))[:3,
+    >>> make_local_frame(0.0, 0.0, np.array([6378137.0, 0.0, 0.0]))[:3,
     ...     2].tolist()  # up is away from the centre
     [1.0, 0.0, 0.0]
     """

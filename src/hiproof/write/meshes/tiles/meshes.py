@@ -15,7 +15,7 @@ from ..viewed import ViewedModel
 
 
 @dataclass(frozen=True)
-class Mesh:
+class TileMesh:
     """Corners (3 t, 3), y up, their face's `normals` (3 t, 3) and `colours` (3 t, 4) as linear
     bytes.
     """
@@ -33,12 +33,12 @@ class Mesh:
             np.save(file, array, allow_pickle=False)
 
     @classmethod
-    def load(cls, file: BinaryIO) -> Mesh:
+    def load(cls, file: BinaryIO) -> TileMesh:
         """The mesh that `save` wrote where `file` stands now."""
         return cls(*(np.load(file, allow_pickle=False) for _ in range(3)))
 
 
-def mesh_of(model: ViewedModel, vertices: np.ndarray) -> Mesh:
+def make_mesh(model: ViewedModel, vertices: np.ndarray) -> TileMesh:
     """The mesh of a model whose solid's `vertices` (n, 3) are east, north, up of the tileset's
     frame.
     """
@@ -50,7 +50,7 @@ def mesh_of(model: ViewedModel, vertices: np.ndarray) -> Mesh:
         colours.append(
             np.tile(np.round(np.multiply([*linear_rgb(look.colour), 1.0], 255)), (len(places), 1))
         )
-    return Mesh(
+    return TileMesh(
         np.concatenate(corners),
         np.concatenate(normals).astype("<f4"),
         np.concatenate(colours).astype(np.uint8),

@@ -21,7 +21,7 @@ EXTENSION = "EXT_structural_metadata"
 CLASS = "building"
 NO_NUMBER = -9999.0  # stands for what is not known, as GDAL's files use it; no attribute has it
 WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is told as text
-TOLD = {
+DESCRIPTIONS = {
     "id": "the building's id",
     "type": "roof type of the part that shows the largest area",
     "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see "
@@ -51,9 +51,9 @@ class Found:
 
     def add(self, values: dict[str, Any]) -> None:
         for name, value in values.items():
-            known = self.are_numbers.setdefault(name, None)
+            was_number = self.are_numbers.setdefault(name, None)
             if value is not None:
-                self.are_numbers[name] = known is not False and is_number(value)
+                self.are_numbers[name] = was_number is not False and is_number(value)
 
     def properties(self) -> list[Property]:
         """The columns that hold them, named as the extension allows: letters, digits,
@@ -76,17 +76,18 @@ def property_id(names: UniqueNames, name: str) -> str:
     return names.take(plain if re.match("[A-Za-z_]", plain) else f"_{plain}").replace("..", "_")
 
 
-def schema_of(properties: Iterable[Property]) -> dict[str, Any]:
+def make_schema(properties: Iterable[Property]) -> dict[str, Any]:
     """The schema: one class, a property a column."""
     kinds: dict[bool, dict[str, Any]] = {
         True: {"type": "SCALAR", "componentType": "FLOAT64", "noData": NO_NUMBER},
         False: {"type": "STRING", "noData": ""},
     }
-    told = {
-        p.id: {"name": p.name, "description": TOLD.get(p.name, "as given")} | kinds[p.is_number]
+    by_id = {
+        p.id: {"name": p.name, "description": DESCRIPTIONS.get(p.name, "as given")}
+        | kinds[p.is_number]
         for p in properties
     }
-    return {"id": "hiproof", "classes": {CLASS: {"properties": told}}}
+    return {"id": "hiproof", "classes": {CLASS: {"properties": by_id}}}
 
 
 def add_table(
@@ -103,7 +104,7 @@ def add_column(document: GlbDocument, column: Property, values: list[Any]) -> di
     if column.is_number:
         numbers = np.array([NO_NUMBER if v is None else v for v in values], "<f8")
         return {"values": document.view(numbers.tobytes())}
-    texts = [text_of(value).encode() for value in values]
+    texts = [format_value(value).encode() for value in values]
     ends = np.cumsum([0, *map(len, texts)]).astype("<u4")
     return {
         # A view may not be empty, so that a column of empty texts holds one byte that none of them
@@ -114,7 +115,7 @@ def add_column(document: GlbDocument, column: Property, values: list[Any]) -> di
     }
 
 
-def text_of(value: Any) -> str:
+def format_value(value: Any) -> str:
     if value is None:
         return ""
     return str(value).lower() if isinstance(value, bool) else str(value)

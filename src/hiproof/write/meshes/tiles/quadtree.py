@@ -25,10 +25,13 @@ class Tile:
     items: np.ndarray
     children: tuple[Tile, ...] = ()
 
-    def below(self) -> np.ndarray:
+    def list_below(self) -> np.ndarray:
         """Indices drawn by the tiles below this one."""
         return np.concatenate(
-            [np.empty(0, int), *(np.append(child.items, child.below()) for child in self.children)]
+            [
+                np.empty(0, int),
+                *(np.append(child.items, child.list_below()) for child in self.children),
+            ]
         )
 
 
@@ -36,50 +39,50 @@ def quadtree(
     centres: np.ndarray,
     sizes: np.ndarray,
     triangles: np.ndarray,
-    most: int = MOST_TRIANGLES,
+    limit: int = MOST_TRIANGLES,
     widest: float = WIDEST_M,
 ) -> Tile:
     """The root of the tree of buildings with `centres` (n, 2), `sizes` (n,) and numbers of
     `triangles` (n,), metres.
 
-    A tile holds the largest buildings of its square, at least one and else at most `most`
+    A tile holds the largest buildings of its square, at least one and else at most `limit`
     triangles, the rest goes to its four quarters; squares wider than `widest` hold none. Indices in
     a tile are in the order given.
 
     >>> tree = quadtree(np.array([[0.0, 0], [1, 1], [9, 9]]), np.array([3.0, 2, 1]), np.array([10,
-    ...     10, 10]), most=10)
+    ...     10, 10]), limit=10)
     >>> tree.items.tolist(), [(child.name, child.items.tolist()) for child in tree.children]
     ([0], [('r0', [1]), ('r3', [2])])
     """
-    low, high = centres.min(axis=0), centres.max(axis=0)
-    return grown(
+    smallest, largest = centres.min(axis=0), centres.max(axis=0)
+    return grow_tile(
         "r",
         np.arange(len(centres)),
-        low,
-        float((high - low).max()),
-        (centres, sizes, triangles, most, widest),
+        smallest,
+        float((largest - smallest).max()),
+        (centres, sizes, triangles, limit, widest),
     )
 
 
-def grown(name: str, items: np.ndarray, low: np.ndarray, side: float, told: tuple) -> Tile:
-    """The tile of the square from `low` (2,) over `side` metres, in which `items` stand."""
-    centres, sizes, triangles, most, widest = told
+def grow_tile(name: str, items: np.ndarray, lower: np.ndarray, side: float, tables: tuple) -> Tile:
+    """The tile of the square from `lower` (2,) over `side` metres, in which `items` stand."""
+    centres, sizes, triangles, limit, widest = tables
     largest = items[np.argsort(-sizes[items], kind="stable")]
-    fits = np.cumsum(triangles[largest]) <= most
+    fits = np.cumsum(triangles[largest]) <= limit
     fits[0] = True
-    kept = largest[fits] if side <= widest else largest[:0]
-    left = np.setdiff1d(items, kept)
-    middle = low + side / 2
-    quarter = (centres[left] >= middle) @ [1, 2]
+    selection = largest[fits] if side <= widest else largest[:0]
+    remainder = np.setdiff1d(items, selection)
+    middle = lower + side / 2
+    quarter = (centres[remainder] >= middle) @ [1, 2]
     children = [
-        grown(
+        grow_tile(
             f"{name}{q}",
-            left[quarter == q],
-            low + side / 2 * np.array([q % 2, q // 2]),
+            remainder[quarter == q],
+            lower + side / 2 * np.array([q % 2, q // 2]),
             side / 2,
-            told,
+            tables,
         )
         for q in range(4)
         if (quarter == q).any()
     ]
-    return Tile(name, np.sort(kept), tuple(children))
+    return Tile(name, np.sort(selection), tuple(children))

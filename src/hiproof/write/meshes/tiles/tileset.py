@@ -20,10 +20,10 @@ import numpy as np
 from .... import __version__
 from ....errors import InputError, InputWarning, OutputError
 from ...files import hidden_name, output_error, scratch
-from ..viewed import ViewedModel, told_beside
+from ..viewed import ViewedModel, merge_values
 from .content import tile_glb
-from .globe import Globe, east_north_up
-from .meshes import Mesh, mesh_of
+from .globe import Globe, make_local_frame
+from .meshes import TileMesh, make_mesh
 from .properties import Found
 from .quadtree import MOST_TRIANGLES, Tile, quadtree
 
@@ -53,7 +53,7 @@ def write_models(
     folder, globe = Path(folder), None if crs is None else Globe.of(crs, geoid_height_m)
     make_room(folder)
     with scratch(folder) as file:
-        warn_of(globe)
+        warn_guesses(globe)
         city = WaitingCity(file, globe)
         for model in buildings:
             city.add(model)
@@ -62,17 +62,17 @@ def write_models(
                 "expected buildings with solids, got none; their `hiproof_status` says what became "
                 "of them"
             )
-        with whole_folder(folder) as beside:
-            tiles = TileFiles(city, beside)
+        with whole_folder(folder) as temporary:
+            tiles = TileFiles(city, temporary)
             tree = quadtree(
                 tiles.boxes.mean(axis=1)[:, :2], tiles.sizes, np.array(city.triangles), most
             )
             text = json.dumps(tiles.tileset(tree), separators=(",", ":"), allow_nan=False)
-            (beside / TILESET).write_text(text)
+            (temporary / TILESET).write_text(text)
     return len(city.offsets)
 
 
-def warn_of(globe: Globe | None) -> None:
+def warn_guesses(globe: Globe | None) -> None:
     """Say in a sentence what is guessed of the place."""
     if globe is None:
         warnings.warn(
@@ -100,8 +100,8 @@ class WaitingCity:
     def add(self, model: ViewedModel) -> None:
         """Keep a building: its mesh, and a row of the table that tells of it."""
         local = self.local(model.solid.vertices)
-        row = told_beside({"id": model.id, "type": model.roof_type}, model.attributes)
-        mesh = mesh_of(model, local)
+        row = merge_values({"id": model.id, "type": model.roof_type}, model.attributes)
+        mesh = make_mesh(model, local)
         self.found.add(row)
         self.offsets.append(self.file.tell())
         self.triangles.append(mesh.triangles)
@@ -116,10 +116,10 @@ class WaitingCity:
         places = world if self.globe is None else self.globe.to_earth(world)
         return (places - self.transform[:3, 3]) @ self.transform[:3, :3]
 
-    def at(self, index: int) -> tuple[dict[str, Any], Mesh]:
+    def at(self, index: int) -> tuple[dict[str, Any], TileMesh]:
         """The row and the mesh of a building that was added."""
         self.file.seek(self.offsets[index])
-        return json.loads(self.file.readline()), Mesh.load(self.file)
+        return json.loads(self.file.readline()), TileMesh.load(self.file)
 
 
 class TileFiles:
@@ -134,7 +134,7 @@ class TileFiles:
 
     def tileset(self, tree: Tile) -> dict[str, Any]:
         """The content of tileset.json; the files of all tiles are written."""
-        globe, transform, root = self.city.globe, self.city.transform, self.written(tree)
+        globe, transform, root = self.city.globe, self.city.transform, self.write_tile(tree)
         if globe is None:
             extras = {
                 "crs": None,
@@ -151,24 +151,24 @@ class TileFiles:
             "root": root,
         }
 
-    def written(self, tile: Tile) -> dict[str, Any]:
+    def write_tile(self, tile: Tile) -> dict[str, Any]:
         """`tile` as the tileset tells it, with all below; their files are written."""
-        below = tile.below()
-        told: dict[str, Any] = {
-            "boundingVolume": box_of(self.boxes[np.append(tile.items, below)]),
+        below = tile.list_below()
+        description: dict[str, Any] = {
+            "boundingVolume": bound_boxes(self.boxes[np.append(tile.items, below)]),
             "geometricError": MISSED * float(self.sizes[below].max(initial=0.0)),
             "refine": "ADD",
         }
         if len(tile.items):
-            told["content"] = {
-                "uri": self.file_of(tile),
-                "boundingVolume": box_of(self.boxes[tile.items]),
+            description["content"] = {
+                "uri": self.name_file(tile),
+                "boundingVolume": bound_boxes(self.boxes[tile.items]),
             }
         if tile.children:
-            told["children"] = [self.written(child) for child in tile.children]
-        return told
+            description["children"] = [self.write_tile(child) for child in tile.children]
+        return description
 
-    def file_of(self, tile: Tile) -> str:
+    def name_file(self, tile: Tile) -> str:
         rows, meshes = zip(*map(self.city.at, tile.items), strict=True)
         uri = f"tiles/{tile.name}.glb"
         (self.folder / uri).write_bytes(tile_glb(meshes, rows, self.properties))
@@ -184,13 +184,18 @@ def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
         frame[:3, 3] = origin
         return frame
     longitude, latitude, _ = globe.geographic(origin[None])[0]
-    return east_north_up(longitude, latitude, globe.to_earth(origin[None])[0])
+    return make_local_frame(longitude, latitude, globe.to_earth(origin[None])[0])
 
 
-def box_of(boxes: np.ndarray) -> dict[str, list[float]]:
+def bound_boxes(boxes: np.ndarray) -> dict[str, list[float]]:
     """The bounding volume around `boxes` (n, 2, 3): middle, then half of each axis."""
-    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
-    return {"box": [*((low + high) / 2).tolist(), *np.diag((high - low) / 2).ravel().tolist()]}
+    smallest, largest = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    return {
+        "box": [
+            *((smallest + largest) / 2).tolist(),
+            *np.diag((largest - smallest) / 2).ravel().tolist(),
+        ]
+    }
 
 
 def make_room(folder: Path) -> None:
@@ -216,16 +221,16 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     """Yield a hidden folder that takes the place of `folder` when the block ends well, and is
     removed when not.
     """
-    beside = hidden_name(folder)
-    older = beside.with_name(beside.name + "-older")
+    name = hidden_name(folder)
+    older = name.with_name(name.name + "-older")
     try:
-        beside.mkdir()
-        yield beside
+        name.mkdir()
+        yield name
         if folder.exists():
             folder.rename(older)
-        beside.rename(folder)
+        name.rename(folder)
     except OSError as error:
         raise output_error(folder, error) from error
     finally:
-        for left in (beside, older):
-            shutil.rmtree(left, ignore_errors=True)
+        for remainder in (name, older):
+            shutil.rmtree(remainder, ignore_errors=True)

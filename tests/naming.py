@@ -1,0 +1,209 @@
+"""Measure the names of the package: what functions, locals, classes and constants are called.
+
+usage: python tests/naming.py
+
+Prints one row a figure, for the package without `fit/union` and for `fit/union` alone.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src/hiproof"
+COLUMNS = 100  # of a line of code
+LATER = ("fit/union/",)  # being rewritten: its names are not held to the standard yet
+
+FUNCTION_WORDS = frozenset(
+    re.findall(
+        r"\w+",
+        """own told asked held known left low high found others here there where what which
+        that who whom when why how kept seen shown said says given taken made done gone put
+        beside besides before after near far away apart aside alone around about above below
+        beyond behind over under between into within without through towards off up down on
+        at for from like likely unlike one two three both either neither each every all any
+        some several few fewer fewest many more most much less least enough better same such
+        else otherwise again anew yet still now then once ever never always often already
+        also too very so as is are was were be been has have had may might must can could
+        will would shall should not no nor and or but if while until since because than
+        whether wanted needed used chosen tried drawn named called fresh rest mine ours its
+        their of""",
+    )
+)
+"""Words that name no thing. Names of sides (`left` beside `right`) do not count."""
+
+IRREGULAR = frozenset(
+    re.findall(
+        r"\w+",
+        """told held known kept seen shown said given taken made done gone found left drawn
+        grown chosen written sought brought bent bound built dealt felt lost meant met sent
+        spent stood taught thrown worn wound broken fallen frozen hidden ridden risen shaken
+        spoken stolen woken""",
+    )
+)
+VERBS_IN_ED = frozenset({"embed", "exceed", "feed", "need", "proceed", "seed", "shed", "speed"})
+VERBS = frozenset(
+    re.findall(
+        r"\w+",
+        """are begin build check choose compose compute count end estimate explain find fit
+        fits format has have import is iterate knows lies list log make measure minimise names
+        open plan put raise read refuse remark remove round run score search select serve
+        solve sort split step take turn vote warn work write""",
+    )
+)
+"""First words of names that may end in any word: `warn_if_moved`, `is_registered`."""
+
+ALLOWED_FUNCTIONS = frozenset({"of", "around", "at", "near", "compiled", "joined"})
+"""Constructors and look-ups (`Scores.of`, `LocalFrame.around`), the decorator of compiled code."""
+
+ALLOWED_CONSTANTS = frozenset({"PRIMITIVE"})  # each shape's file defines its own
+
+
+def list_files(is_later: bool = False) -> list[Path]:
+    """Return the package's source files, with or without those that are renamed later."""
+    files = sorted(PACKAGE.rglob("*.py"))
+    return [file for file in files if is_later_file(file) == is_later]
+
+
+def is_later_file(file: Path) -> bool:
+    return file.relative_to(PACKAGE).as_posix().startswith(LATER)
+
+
+def parse(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+def iterate_functions(files: list[Path]) -> Iterator[tuple[Path, ast.FunctionDef]]:
+    """Yield all functions and methods, without properties, which are nouns."""
+    for file in files:
+        for node in ast.walk(parse(file)):
+            if isinstance(node, ast.FunctionDef) and not is_property(node):
+                yield file, node
+
+
+def is_property(function: ast.FunctionDef) -> bool:
+    return any("property" in ast.unparse(item) for item in function.decorator_list)
+
+
+def is_participle(word: str) -> bool:
+    """Whether a word is a past participle and no verb's base form.
+
+    >>> [is_participle(word) for word in ("united", "drawn", "embed", "merge")]
+    [True, True, False, False]
+    """
+    return word in IRREGULAR or (word.endswith("ed") and word not in VERBS_IN_ED)
+
+
+def find_misnamed_functions(files: list[Path]) -> list[str]:
+    """Return functions whose names end in a participle or a function word."""
+    found = []
+    for file, function in iterate_functions(files):
+        words = function.name.strip("_").split("_")
+        first, last = words[0], words[-1]
+        if function.name in ALLOWED_FUNCTIONS or first in VERBS:
+            continue
+        if is_participle(last) or last in FUNCTION_WORDS - {"at"}:  # `height_at` is a height
+            found.append(f"{file.relative_to(PACKAGE)}: {function.name}")
+    return sorted(set(found))
+
+
+def list_locals(function: ast.FunctionDef) -> set[str]:
+    """Return the names of a function's parameters and variables."""
+    arguments = function.args
+    names = {item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
+    stores = (node for node in ast.walk(function) if isinstance(node, ast.Name))
+    names |= {node.id for node in stores if isinstance(node.ctx, ast.Store)}
+    return names - ({"left"} if "right" in names else set())
+
+
+def count_locals(files: list[Path]) -> tuple[int, Counter[str]]:
+    """Return the number of local names, and how often each function word is one of them."""
+    names = [name for _, function in iterate_functions(files) for name in list_locals(function)]
+    return len(names), Counter(name for name in names if name in FUNCTION_WORDS)
+
+
+def find_duplicate_classes(files: list[Path]) -> dict[str, list[str]]:
+    """Return the names that several classes have, with their files."""
+    places = defaultdict(list)
+    for file in files:
+        for node in ast.walk(parse(file)):
+            if isinstance(node, ast.ClassDef):
+                places[node.name].append(file.relative_to(PACKAGE).as_posix())
+    return {name: files for name, files in places.items() if len(files) > 1}
+
+
+def iterate_constants(file: Path) -> Iterator[tuple[str, str]]:
+    """Yield the constants at the top of a file with their values as text."""
+    for node in parse(file).body:
+        if isinstance(node, ast.AnnAssign):
+            targets: list[ast.expr] = [node.target] if node.value else []
+        else:
+            targets = node.targets if isinstance(node, ast.Assign) else []
+        for target in targets:
+            pairs = [(target, node.value)]  # type: ignore[attr-defined]
+            if isinstance(target, ast.Tuple):
+                values = getattr(node.value, "elts", ())  # type: ignore[attr-defined]
+                pairs = list(zip(target.elts, values, strict=False))
+            for name, value in pairs:
+                if isinstance(name, ast.Name) and re.fullmatch(r"[A-Z][A-Z0-9_]+", name.id):
+                    yield name.id, ast.unparse(value)
+
+
+def find_ambiguous_constants(files: list[Path]) -> list[str]:
+    """Return the names that constants with different values share."""
+    values = defaultdict(set)
+    for file in files:
+        for name, value in iterate_constants(file):
+            values[name].add(value)
+    return sorted(
+        name for name in values if len(values[name]) > 1 and name not in ALLOWED_CONSTANTS
+    )
+
+
+def find_long_lines(files: list[Path]) -> list[str]:
+    """Return the lines of code over 100 columns, as file:line."""
+    found = []
+    for file in files:
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+            if len(line) > COLUMNS and len(line.split()) > 1 and "noqa" not in line:
+                found.append(f"{file.relative_to(ROOT)}:{number}")
+    return found
+
+
+def count_deep_imports() -> Counter[str]:
+    """Return how many lines of each test import from modules within a package of hiproof."""
+    pattern = re.compile(r"^\s*from hiproof\.\w+\.[\w.]+ import|^\s*import hiproof\.\w+\.\w+")
+    counts: Counter[str] = Counter()
+    for file in sorted((ROOT / "tests").rglob("*.py")):
+        lines = file.read_text(encoding="utf-8").splitlines()
+        counts[file.name] = sum(bool(pattern.match(line)) for line in lines)
+    return counts
+
+
+def main() -> None:
+    parts = {"package without fit/union": list_files(), "fit/union": list_files(is_later=True)}
+    for title, files in parts.items():
+        total, words = count_locals(files)
+        print(title)
+        print(
+            f"  functions ending in a participle or function word: "
+            f"{len(find_misnamed_functions(files))}"
+        )
+        print(
+            f"  locals that are function words: {sum(words.values())} of {total} "
+            f"({100 * sum(words.values()) / total:.1f} %)"
+        )
+        print(f"  duplicate class names: {len(find_duplicate_classes(files))}")
+        print(
+            f"  constants of one name with several values: {len(find_ambiguous_constants(files))}"
+        )
+        print(f"  lines over {COLUMNS} columns: {len(find_long_lines(files))}")
+    print(f"lines of tests that import within packages: {count_deep_imports().total()}")
+
+
+if __name__ == "__main__":
+    main()
