@@ -10,10 +10,13 @@ from hiproof.fit.union import fit_building
 from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, cheapest_cut
 from hiproof.fit.union.box import NOWHERE
+from hiproof.fit.union.groups import draw_in_groups
 from hiproof.fit.union.nearby import look_around, put_back
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.regions import Site
 from hiproof.fit.union.scene import directions_of, scene_of
+from hiproof.fit.union.unite import drawn, ends_of
 from hiproof.fit.union.volumes import LEVEL, OFFSET, PLANES, U0, U1, V0, V1, base_only
 from hiproof.fit.union.whole import Whole
 from hiproof.status import Status
@@ -128,3 +131,30 @@ def test_a_change_is_worth_as_much_among_what_is_around_it_as_on_the_whole(seed)
         whole = objective(changed, scene, np.inf) - objective(volumes, scene, np.inf)
         assert around == pytest.approx(whole, abs=1e-6)
     assert smaller >= 4
+
+
+def test_a_roof_drawn_in_groups_is_drawn_as_all_at_once():
+    """Also where a group lies inside and sees no edge of the outline."""
+    rng, outline = np.random.default_rng(4), shapely.box(0, 0, 48, 48)
+    volumes = np.vstack([base_only(2.0), np.zeros((144, base_only(2.0).shape[1]))])
+    volumes[1:, OFFSET : OFFSET + PLANES] = np.inf
+    i, j = np.divmod(np.arange(144), 12)
+    volumes[1:, U0], volumes[1:, U1] = 4.0 * i, 4.0 * i + 4.0
+    volumes[1:, V0], volumes[1:, V1] = 4.0 * j, 4.0 * j + 4.0
+    levels = volumes[1:, OFFSET + LEVEL] = rng.uniform(4.0, 12.0, 144)
+
+    def height(x, y):
+        column, row = np.clip(np.array([x, y]) // 4.0, 0, 11).astype(int)
+        return levels[12 * column + row]
+
+    plan = lay_out_plan(sampled(height, outline, 3.0, 0.02), outline)
+    volumes[1:, [U0, U1]] -= plan.frame.origin[0]
+    volumes[1:, [V0, V1]] -= plan.frame.origin[1]
+    volumes[:, OFFSET + LEVEL] -= plan.frame.origin[2]
+    scene = scene_of(plan, outline, [0.0], 2.0, 0.2, allowed_shapes(()))
+    ends = ends_of(outline, plan, scene)
+    at_once = drawn(volumes, ends, scene, {})
+    in_groups, _ = draw_in_groups(volumes, ends, Site(outline, plan, scene, {}), {})
+    for mine, theirs in zip(in_groups.sides[1:], at_once.sides[1:], strict=True):
+        assert [side.at for side in mine] == pytest.approx([side.at for side in theirs], abs=1e-6)
+        assert [side.anchored for side in mine] == [side.anchored for side in theirs]

@@ -39,7 +39,8 @@ LEAST_KNOWN = 0.05  # a place so likely at the end of the way is not known
 class Lines(NamedTuple):
     """Lines x = start + lean * y through the outline's edges and chords that may be sides, from one to the other of y (2, m).
 
-    The ends of all edges, across and along, are `x_edges`, `y_edges` (2, n).
+    The ends of all edges, across and along, are `x_edges`, `y_edges` (2, n). The whole outline reaches
+    over `x_extent` and `y_extent` (2,), lowest and highest, also where only some of its edges are near.
     """
 
     start: np.ndarray
@@ -48,6 +49,8 @@ class Lines(NamedTuple):
     is_edge: np.ndarray
     x_edges: np.ndarray
     y_edges: np.ndarray
+    x_extent: np.ndarray
+    y_extent: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -64,10 +67,23 @@ class Side:
     sigma: float = 0.0
 
 
-def lines_among(edges: np.ndarray, chords: np.ndarray, turns: np.ndarray) -> list[list[Lines]]:
-    """The lines that sides across u and across v may take, by direction, of an outline's edges and chords (2, m, 2)."""
+def list_lines(
+    edges: np.ndarray, chords: np.ndarray, turns: np.ndarray, outline: np.ndarray
+) -> list[list[Lines]]:
+    """The lines that sides across u and across v may take, by direction: along edges and chords (2, m, 2).
+
+    `outline` (2, n, 2) are all edges of the outline, of which `edges` may be only some.
+    """
     ends = np.concatenate([edges, chords], axis=1)
-    return [lines_along(ends, edges.shape[1], turn) for turn in turns]
+    found = []
+    for c, s in turns:
+        axes = np.array([[c, -s], [s, c]])
+        x, y = np.moveaxis(ends @ axes, 2, 0)
+        x_all, y_all = (np.array([ends.min(), ends.max()]) for ends in np.moveaxis(outline @ axes, 2, 0))
+        long = np.hypot(x[1] - x[0], y[1] - y[0]) > SHORTEST_M
+        across_u = lines_across(x, y, long, edges.shape[1], x_all, y_all)
+        found.append([across_u, lines_across(y, x, long, edges.shape[1], y_all, x_all)])
+    return found
 
 
 def sides_of(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> list[list[Side]]:
@@ -103,22 +119,16 @@ def plan_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     return (ends[:, within] - plan.frame.origin[:2]) @ plan.frame.rotation.T
 
 
-def lines_along(ends: np.ndarray, edges: int, turn: np.ndarray) -> list[Lines]:
-    """Lines across u and across v of the direction `turn`, of the `ends` (2, m, 2) of edges, so many of them, and of chords after these."""
-    c, s = turn
-    u, v = np.moveaxis(ends @ np.array([[c, -s], [s, c]]), 2, 0)
-    long = np.hypot(u[1] - u[0], v[1] - v[0]) > SHORTEST_M
-    return [lines_across(x, y, long, edges) for x, y in ((u, v), (v, u))]
-
-
-def lines_across(x: np.ndarray, y: np.ndarray, long: np.ndarray, edges: int) -> Lines:
+def lines_across(
+    x: np.ndarray, y: np.ndarray, long: np.ndarray, edges: int, x_extent: np.ndarray, y_extent: np.ndarray
+) -> Lines:
     """Those `long` (m,) of the lines from one to the other of x, y (2, m) that are nearly square to the axis x."""
     across, along = x[1] - x[0], y[1] - y[0]
     kept = np.nonzero(long & (np.abs(across) < LEAN * np.abs(along)))[0]
     lean = across[kept] / along[kept]
     start = x[0, kept] - lean * y[0, kept]
     x_edges, y_edges = np.ascontiguousarray(x[:, :edges]), np.ascontiguousarray(y[:, :edges])
-    return Lines(start, lean, np.ascontiguousarray(y[:, kept]), kept < edges, x_edges, y_edges)
+    return Lines(start, lean, np.ascontiguousarray(y[:, kept]), kept < edges, x_edges, y_edges, x_extent, y_extent)
 
 
 @compiled
@@ -141,19 +151,13 @@ def sides_of_volume(volumes, k, across_u, across_v, scene):
 @compiled
 def near_places(volume, across_u, u, v):
     """The numbers of the places u, v that a volume's sides, or walls beside these, depend on."""
-    least_u, most_u, least_v, most_v = outline_box(across_u)
+    least_u, most_u = across_u.x_extent[0], across_u.x_extent[1]
+    least_v, most_v = across_u.y_extent[0], across_u.y_extent[1]
     wide, deep = volume[U0 + 1] - volume[U0], volume[V1] - volume[V0]
     reach_u, reach_v = REACH_M + 0.5 * LEAN * deep, REACH_M + 0.5 * LEAN * wide
     u0, u1 = min(volume[U0], most_u) - reach_u, max(volume[U0 + 1], least_u) + reach_u
     v0, v1 = min(volume[V0], most_v) - reach_v, max(volume[V1], least_v) + reach_v
     return np.nonzero((u >= u0) & (u <= u1) & (v >= v0) & (v <= v1))[0]
-
-
-@compiled
-def outline_box(across_u):
-    """Lowest and highest u, lowest and highest v of an outline, by the ends of its edges."""
-    u, v = across_u.x_edges, across_u.y_edges
-    return u.min(), u.max(), v.min(), v.max()
 
 
 @compiled
@@ -179,8 +183,8 @@ def cost_at(i, z, scene):
 def cheapest_line(volume, edge, lines, uv, gain, evidence):
     """Which of the lines is cheapest for a side of a volume; -1 where the side as it is is cheaper than all."""
     axis, at = edge // 2, volume[U0 + edge]
-    low = max(volume[V0 - 2 * axis], lines.y_edges.min())
-    high = min(volume[V1 - 2 * axis], lines.y_edges.max())
+    low = max(volume[V0 - 2 * axis], lines.y_extent[0])
+    high = min(volume[V1 - 2 * axis], lines.y_extent[1])
     sign = -1.0 if edge % 2 == 0 else 1.0
     x, y = uv[axis], uv[1 - axis]
     strip = np.nonzero((y >= low) & (y <= high) & (sign * (x - volume[U0 + (edge ^ 1)]) >= 0.0))[0]
@@ -213,7 +217,7 @@ def sigma_of_side(volume, edge, lines, uv, gain, anchored):
 def shows_at(volume, edge, lines, uv, gain):
     """Whether points next to an edge of the volume, or to the outline where it lies beyond that, need the volume."""
     axis, sign = edge // 2, -1.0 if edge % 2 == 0 else 1.0
-    at = min(max(volume[U0 + edge], lines.x_edges.min()), lines.x_edges.max())
+    at = min(max(volume[U0 + edge], lines.x_extent[0]), lines.x_extent[1])
     x, y = uv[axis], uv[1 - axis]
     count = 0
     for i in range(len(x)):

@@ -22,7 +22,7 @@ from .objective import base_shows, costs, edges_cost, objective
 from .plan import Plan
 from .scene import Scene
 from .sides import BESIDE_M as REACH_M
-from .sides import Lines, Side, lines_among, plan_chords, plan_edges, sides_of
+from .sides import Lines, Side, list_lines, plan_chords, plan_edges, sides_of
 from .volumes import (
     DIRECTION,
     LEAN,
@@ -50,12 +50,13 @@ MOST_CUT = 2  # volumes drawn out over walls that cut corners off: a house has o
 
 class Ends(NamedTuple):
     """What an outline ends volumes with: its edges and chords (2, m, 2) in the first direction's axes, the lines that sides
-    may take of these, by direction, and its walls (m, 2, 2)."""
+    may take of these, by direction, and its walls (m, 2, 2). `outline` (2, n, 2) are all edges, near or not."""
 
     edges: np.ndarray
     chords: np.ndarray
     lines: list[list[Lines]]
     walls: np.ndarray
+    outline: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ def united(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known, own: Col
 
 def ends_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> Ends:
     edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
-    return Ends(edges, chords, lines_among(edges, chords, scene.turn), walls_of(outline, plan))
+    return Ends(edges, chords, list_lines(edges, chords, scene.turn, edges), walls_of(outline, plan), edges)
 
 
 def ends_within(ends: Ends, scene: Scene) -> Ends:
@@ -104,7 +105,8 @@ def ends_within(ends: Ends, scene: Scene) -> Ends:
     edges, chords, walls = (
         lines[:, reaches(lines, low, high)] for lines in (ends.edges, ends.chords, ends.walls.swapaxes(0, 1))
     )
-    return Ends(edges, chords, lines_among(edges, chords, scene.turn), walls.swapaxes(0, 1))
+    lines = list_lines(edges, chords, scene.turn, ends.outline)
+    return Ends(edges, chords, lines, walls.swapaxes(0, 1), ends.outline)
 
 
 def reaches(lines: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
