@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
-from benchmarks.matching import hidden_end, right_types
+from benchmarks.matching import hidden_end, right_types, told_apart
 
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
@@ -16,7 +16,7 @@ from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import COMPONENTS, GENERAL_SHAPES, compute_planes
 from hiproof.settings import Settings
-from hiproof.simulate import ScanSettings, random_building, random_compound, scan
+from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_building, random_compound, scan
 from hiproof.simulate.scene import Defects
 from roof_zoo import FRAME
 from union_scenes import lowest_of, member_of_shape, rectangle_of
@@ -310,3 +310,20 @@ def test_a_tooth_with_something_more_is_a_tooth():
     xy = strewn(outline.buffer(-0.3), np.random.default_rng(0))
     before = np.max([part.height_at(xy) for part in row], axis=0)
     assert np.mean(np.abs(found.height_at(xy) - before) < 0.05) > 0.95
+
+
+@pytest.mark.parametrize("kind, seed", [("row", 3), ("row", 11), ("row", 19), ("L_of_hips", 1)])
+def test_what_shows_along_the_outline_alone_makes_no_part_and_keeps_houses_in_a_row_apart(kind, seed):
+    """Rows whose ends are equal around a lower house, and hips that hide a volume but for a micrometre."""
+    found, wanted = count_parts(kind, 5.0, seed)
+    assert found == wanted
+
+
+def count_parts(kind, density, seed):
+    """Count the parts that a compound scanned without defects gets, and those that it has."""
+    rng = np.random.default_rng([seed, COMPOUND_KINDS.index(kind)])
+    building = random_compound(rng, kind)
+    cloud = scan(building, rng, ScanSettings(density=density, defects=Defects.none()))
+    points = building.roof.frame.to_local(cloud.points[cloud.source != 2])
+    fit = fit_building(points, building.outline)
+    return len(fit.roof_parts), len(told_apart(building.roof.parts))

@@ -10,7 +10,7 @@ import numpy as np
 
 from .moves import without
 from .objective import objective
-from .scene import Scene, nodes
+from .scene import BORDER_M, Scene, nodes
 from .trim import COVER_M, runs_of
 from .volumes import DIRECTION, LEVEL, OFFSET, U0, U1, V0, V1, roof_heights
 
@@ -23,7 +23,7 @@ NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
 
 def told_apart(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """The volumes with each that shows in several places of a row, or of a roof that it stands out of, as several."""
-    U, V = nodes(scene)
+    U, V = nodes(scene, BORDER_M)
     heights, top = roof_heights(volumes, U, V)
     for k in range(len(volumes) - 1, 0, -1):
         for axis in (0, 1):

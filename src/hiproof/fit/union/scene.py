@@ -16,6 +16,8 @@ from .plan import Plan, grid_lines, ring_edges, signed_depth
 MOST_DIRECTIONS = 2  # of a building that volumes may follow along walls, the main one first
 APART_RAD, NEAR_RAD = math.radians(7.0), math.radians(3.0)  # directions differ by more; edges support one within
 LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for a further direction
+# m inside the outline from which on a roof shows: nearer, an edge that ends a hair early shows what lies below
+BORDER_M = 0.1
 RASTER_M, RASTER_CELLS = 0.2, 400  # m of a cell of the outline's depth, and cells a side at most
 MOST_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
     0.6,

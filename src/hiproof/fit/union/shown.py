@@ -13,10 +13,9 @@ from ...model import Part, Piece
 from ...model.heights import find_highest
 from .plan import Plan
 from .regions import area_of, place_beside, polygons_of, widened
-from .scene import Scene, nodes
+from .scene import BORDER_M, Scene, nodes
 
 SEAM_M = 1e-5  # between corners that are the same but for the grid they lie on
-BORDER_M = 0.1  # a part shows that is the highest somewhere so far inside the outline
 
 
 def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = math.inf) -> list[Part]:
@@ -39,6 +38,7 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
     covered, own = area_of(parts), area_of([hidden])
     pieces = [list(part.pieces) for part in parts]
     bare = polygons_of(shapely.difference(own, covered, grid_size=OVERLAY_GRID_M))
+    bare = [polygon for polygon in bare if not shapely.buffer(polygon, -SEAM_M).is_empty]
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
     for sliver in bare:
