@@ -19,20 +19,20 @@ import shapely.affinity
 
 from hiproof.fit.align import find_shift
 
-from .outlines import KINDS, simulated
+from .outlines import KINDS, simulate_house
 
 DISTANCES_M = (0.0, 0.5, 1.0, 2.0)
 WITHIN_M = 0.1
 
 
-def outcomes(density: float, seeds: range) -> dict[float, list[tuple[float, bool]]]:
+def find_shifts(density: float, seeds: range) -> dict[float, list[tuple[float, bool]]]:
     """By distance (m): how far the shift found is from the true one (m), and whether it is clear
     enough to move the footprint.
     """
     found: dict[float, list[tuple[float, bool]]] = {distance: [] for distance in DISTANCES_M}
     for kind in KINDS:
         for seed in seeds:
-            points, truth = simulated(kind, density, seed)
+            points, truth = simulate_house(kind, density, seed)
             azimuth = np.random.default_rng([seed, KINDS.index(kind), 7]).uniform(-math.pi, math.pi)
             for distance, rows in found.items():
                 off = distance * np.array([math.cos(azimuth), math.sin(azimuth)])
@@ -47,7 +47,9 @@ def main() -> None:
     parser.add_argument("--density", type=float, default=5.0, help="points a square metre")
     parser.add_argument("--first-seed", type=int, default=0)
     a = parser.parse_args()
-    for distance, rows in outcomes(a.density, range(a.first_seed, a.first_seed + a.each)).items():
+    for distance, rows in find_shifts(
+        a.density, range(a.first_seed, a.first_seed + a.each)
+    ).items():
         error, moved = np.array(rows).T
         print(
             f"{a.density:g}/m2, {distance:g} m off: {len(rows)} houses, "

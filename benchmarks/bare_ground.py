@@ -61,7 +61,7 @@ class Site:
     defects: Defects = field(default_factory=Defects.none)
 
 
-def rectangle_body(
+def make_house_body(
     rect: tuple[float, float, float, float], eave: float, rise: float, ground: Plane
 ) -> Body:
     """A house of that plan (xmin, ymin, xmax, ymax): flat, or a gable along its longer side."""
@@ -72,11 +72,11 @@ def rectangle_body(
     return Body(box(centre, (max(size), min(size)), z + rise, kappa, rise))
 
 
-def random_slope(rng: np.random.Generator, steepest: float = 0.06) -> Plane:
+def draw_slope(rng: np.random.Generator, steepest: float = 0.06) -> Plane:
     return Plane(*rng.uniform(-steepest, steepest, 2))
 
 
-def house(
+def draw_house(
     rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0)
 ) -> tuple[np.ndarray, float, float]:
     """Size (2,), eave and rise of a house."""
@@ -84,9 +84,9 @@ def house(
     return size, rng.uniform(*eave), rng.choice([0.0, rng.uniform(1.0, 3.5)])
 
 
-def with_yard(rng: np.random.Generator, place: str) -> Site:
+def make_yard_site(rng: np.random.Generator, place: str) -> Site:
     """A house around a yard of 10 to 60 m2: `place` is court, side or corner."""
-    size, eave, rise = house(rng, (2.8, 7.0))
+    size, eave, rise = draw_house(rng, (2.8, 7.0))
     area, ratio = rng.uniform(10.0, 60.0), rng.uniform(0.6, 1.7)
     yard = np.minimum(
         [math.sqrt(area * ratio), math.sqrt(area / ratio)],
@@ -96,9 +96,9 @@ def with_yard(rng: np.random.Generator, place: str) -> Site:
     low = inner * {"court": (1.0, 1.0), "side": (1.0, 0.0), "corner": (0.0, 0.0)}[place]
     (a, b), (c, d), (w, h) = low, low + yard, size
     blocks = [(0, d, w, h), (0, 0, a, d), (c, 0, w, d), (a, 0, c, b)]
-    ground = random_slope(rng)
+    ground = draw_slope(rng)
     bodies = [
-        rectangle_body(
+        make_house_body(
             r,
             eave + rng.uniform(-0.5, 0.5),
             rise if min(r[2] - r[0], r[3] - r[1]) > 4 else 0.0,
@@ -111,22 +111,22 @@ def with_yard(rng: np.random.Generator, place: str) -> Site:
     return Site(footprint, footprint - shapely.box(a, b, c, d), bodies, slope=ground)
 
 
-def plain(
+def make_plain_site(
     rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0), steep: float = 0.06, **more
 ) -> Site:
-    size, eave_m, rise = house(rng, eave)
-    footprint, ground = shapely.box(0, 0, *size), random_slope(rng, steep)
+    size, eave_m, rise = draw_house(rng, eave)
+    footprint, ground = shapely.box(0, 0, *size), draw_slope(rng, steep)
     return Site(
         footprint,
         footprint,
-        [rectangle_body((0, 0, *size), eave_m, rise, ground)],
+        [make_house_body((0, 0, *size), eave_m, rise, ground)],
         slope=ground,
         **more,
     )
 
 
-def lost_points(rng: np.random.Generator) -> Site:
-    return plain(
+def make_thinned_site(rng: np.random.Generator) -> Site:
+    return make_plain_site(
         rng,
         defects=Defects(
             0, 0, 0, 0, 0, missing_strip=0.7, partial=0.7, swath_edge=0.3, outliers=0.01
@@ -134,9 +134,9 @@ def lost_points(rng: np.random.Generator) -> Site:
     )
 
 
-def dormers(rng: np.random.Generator) -> Site:
+def make_dormer_site(rng: np.random.Generator) -> Site:
     """Boxes on a roof."""
-    site = plain(rng)
+    site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     for _ in range(rng.integers(1, 4)):
         at = rng.uniform((x0 + 2, y0 + 2), (x1 - 2, y1 - 2))
@@ -145,7 +145,7 @@ def dormers(rng: np.random.Generator) -> Site:
     return site
 
 
-def sunk(site: Site, area: shapely.Geometry, share: float) -> Site:
+def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
     """The site where of the roof points over `area` a `share` goes through it and meets the
     ground.
     """
@@ -164,42 +164,42 @@ def sunk(site: Site, area: shapely.Geometry, share: float) -> Site:
     return site
 
 
-def glass(rng: np.random.Generator) -> Site:
+def make_glass_site(rng: np.random.Generator) -> Site:
     """A glass roof over a court: most of the light goes through, and frames and some panes
     return.
     """
-    site = plain(rng)
+    site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     size = rng.uniform(3.0, 7.0, 2)
     low = rng.uniform((x0 + 1, y0 + 1), np.maximum((x1, y1) - size - 1, (x0 + 1.1, y0 + 1.1)))
-    return sunk(site, shapely.box(*low, *(low + size)), rng.uniform(0.3, 0.85))
+    return sink_points(site, shapely.box(*low, *(low + size)), rng.uniform(0.3, 0.85))
 
 
-def passage(rng: np.random.Generator) -> Site:
+def make_passage_site(rng: np.random.Generator) -> Site:
     """A way through a house, whose ground is seen from aslant for some metres at either end, under
     the roof.
     """
-    site = plain(rng)
+    site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     at, width, deep = rng.uniform(x0 + 2, x1 - 5), rng.uniform(2.5, 4.0), rng.uniform(1.0, 2.5)
     ends = shapely.union(
         shapely.box(at, y0, at + width, y0 + deep), shapely.box(at, y1 - deep, at + width, y1)
     )
-    return with_ground_under(site, ends, rng.uniform(0.3, 0.8))
+    return add_ground(site, ends, rng.uniform(0.3, 0.8))
 
 
-def canopy(rng: np.random.Generator) -> Site:
+def make_canopy_site(rng: np.random.Generator) -> Site:
     """A roof that reaches over a yard without walls: ground is seen below it along the open
     side.
     """
-    site = plain(rng, (2.3, 4.0))
+    site = make_plain_site(rng, (2.3, 4.0))
     x0, y0, x1, _ = site.footprint.bounds
-    return with_ground_under(
+    return add_ground(
         site, shapely.box(x0, y0, x1, y0 + rng.uniform(1.0, 3.0)), rng.uniform(0.2, 0.7)
     )
 
 
-def with_ground_under(site: Site, area: shapely.Geometry, share: float) -> Site:
+def add_ground(site: Site, area: shapely.Geometry, share: float) -> Site:
     """The site with ground points under its roof over `area`, a `share` of the roof's density."""
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
@@ -216,7 +216,7 @@ def with_ground_under(site: Site, area: shapely.Geometry, share: float) -> Site:
     return site
 
 
-def crowns_around(
+def draw_crowns(
     rng: np.random.Generator, footprint: shapely.Polygon, count: int, inside: bool
 ) -> np.ndarray:
     x0, y0, x1, y1 = footprint.bounds
@@ -232,51 +232,53 @@ def crowns_around(
     return np.array(rows).reshape(-1, 5)
 
 
-def under_trees(rng: np.random.Generator) -> Site:
+def make_tree_site(rng: np.random.Generator) -> Site:
     """A house whose footprint is too large by up to 1.2 m at a side, with trees over its
     corners.
     """
-    site = plain(rng)
+    site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     wide = shapely.box(x0, y0, x1 + rng.uniform(0.3, 1.2), y1)
-    return Site(wide, site.footprint, site.bodies, crowns_around(rng, wide, 3, False), site.slope)
+    return Site(wide, site.footprint, site.bodies, draw_crowns(rng, wide, 3, False), site.slope)
 
 
-def beside(rng: np.random.Generator) -> Site:
+def shift_footprint(rng: np.random.Generator) -> Site:
     """A footprint that lies 0.3 to 0.9 m beside its house."""
-    site = plain(rng)
+    site = make_plain_site(rng)
     shift = rng.choice([-1, 1], 2) * rng.uniform(0.2, 0.65, 2)
     moved = shapely.transform(site.footprint, lambda xy: xy + shift)
     return Site(moved, moved & site.footprint, site.bodies, slope=site.slope)
 
 
-def gone(rng: np.random.Generator, steep: float = 0.06) -> Site:
+def remove_house(rng: np.random.Generator, steep: float = 0.06) -> Site:
     """Ground where a house stood, with heaps and bushes on up to half of it, and up to two
     trees.
     """
-    site = plain(rng, steep=steep)
+    site = make_plain_site(rng, steep=steep)
     x0, y0, x1, y1 = site.footprint.bounds
     bodies = []
     for _ in range(rng.integers(0, 6)):
         at, size = rng.uniform((x0, y0), (x1, y1)), rng.uniform(1.0, 4.0, 2)
         z = float(site.slope.height_at(at)) + rng.uniform(0.3, 2.5)
         bodies.append(Body(box(at, tuple(size), z, rng.uniform(0, 3)), SOURCE_WALL, SOURCE_WALL))
-    trees = crowns_around(rng, site.footprint, int(rng.integers(0, 3)), True)
+    trees = draw_crowns(rng, site.footprint, int(rng.integers(0, 3)), True)
     return Site(site.footprint, shapely.Polygon(), bodies, trees, site.slope)
 
 
-def small(rng: np.random.Generator, height: tuple[float, float], share_below: float = 0.0) -> Site:
+def make_shed_site(
+    rng: np.random.Generator, height: tuple[float, float], share_below: float = 0.0
+) -> Site:
     """A shed or, with ground seen below it, a carport of 10 to 40 m2."""
-    size, ground = rng.uniform((3.0, 3.3), (5.5, 7.0)), random_slope(rng)
+    size, ground = rng.uniform((3.0, 3.3), (5.5, 7.0)), draw_slope(rng)
     footprint = shapely.box(0, 0, *size)
-    body = rectangle_body((0, 0, *size), rng.uniform(*height), rng.choice([0.0, 0.4]), ground)
+    body = make_house_body((0, 0, *size), rng.uniform(*height), rng.choice([0.0, 0.4]), ground)
     site = Site(footprint, footprint, [body], slope=ground)
-    return with_ground_under(site, footprint, share_below * rng.random()) if share_below else site
+    return add_ground(site, footprint, share_below * rng.random()) if share_below else site
 
 
-def green(rng: np.random.Generator) -> Site:
+def make_green_roof_site(rng: np.random.Generator) -> Site:
     """A low flat roof with plants on it: heights scatter by up to 0.3 m."""
-    site = plain(rng, (2.2, 4.0))
+    site = make_plain_site(rng, (2.2, 4.0))
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         roof = scan.source == SOURCE_ROOF
@@ -290,24 +292,24 @@ def green(rng: np.random.Generator) -> Site:
     return site
 
 
-def dug_in(rng: np.random.Generator) -> Site:
+def make_slope_site(rng: np.random.Generator) -> Site:
     """A house on a slope of up to 35 %, its eaves level: uphill they are 2 m lower above the
     ground.
     """
-    return plain(rng, (3.5, 6.0), 0.35)
+    return make_plain_site(rng, (3.5, 6.0), 0.35)
 
 
-def garage_deck(rng: np.random.Generator) -> Site:
+def make_garage_site(rng: np.random.Generator) -> Site:
     """The roof of a garage below ground, 0 to 1.2 m above it."""
-    return plain(rng, (0.0, 1.2))
+    return make_plain_site(rng, (0.0, 1.2))
 
 
-def block(rng: np.random.Generator) -> Site:
+def make_block_site(rng: np.random.Generator) -> Site:
     """A closed block of houses around a yard of a third to two thirds of its plan."""
     (w, h), deep, ground, eave = (
         rng.uniform(24.0, 40.0, 2),
         rng.uniform(4.0, 9.0),
-        random_slope(rng),
+        draw_slope(rng),
         rng.uniform(4.0, 9.0),
     )
     rows = [
@@ -317,46 +319,46 @@ def block(rng: np.random.Generator) -> Site:
         (w - deep, deep, w, h - deep),
     ]
     footprint = shapely.box(0, 0, w, h)
-    bodies = [rectangle_body(one, eave, rng.choice([0.0, 2.0]), ground) for one in rows]
+    bodies = [make_house_body(one, eave, rng.choice([0.0, 2.0]), ground) for one in rows]
     return Site(
         footprint, footprint - shapely.box(deep, deep, w - deep, h - deep), bodies, slope=ground
     )
 
 
 YARDS = {
-    f"yard: {place}": (lambda rng, p=place: with_yard(rng, p))
+    f"yard: {place}": (lambda rng, p=place: make_yard_site(rng, p))
     for place in ("court", "side", "corner")
 }
-YARDS["yard of a block"] = block
+YARDS["yard of a block"] = make_block_site
 SOUND = {
-    "plain": plain,
-    "lost points": lost_points,
-    "dormers": dormers,
-    "glass roof": glass,
-    "passage": passage,
-    "canopy": canopy,
-    "under trees": under_trees,
-    "footprint beside": beside,
-    "green roof": green,
-    "slope": dug_in,
-    "shed 1.8-2.5 m": lambda rng: small(rng, (1.8, 2.5)),
-    "carport": lambda rng: small(rng, (2.0, 2.5), 0.5),
+    "plain": make_plain_site,
+    "lost points": make_thinned_site,
+    "dormers": make_dormer_site,
+    "glass roof": make_glass_site,
+    "passage": make_passage_site,
+    "canopy": make_canopy_site,
+    "under trees": make_tree_site,
+    "footprint beside": shift_footprint,
+    "green roof": make_green_roof_site,
+    "slope": make_slope_site,
+    "shed 1.8-2.5 m": lambda rng: make_shed_site(rng, (1.8, 2.5)),
+    "carport": lambda rng: make_shed_site(rng, (2.0, 2.5), 0.5),
 }
 GONE = {
-    "gone": gone,
-    "gone, slope to 25 %": lambda rng: gone(rng, 0.25),
-    "garage deck": garage_deck,
+    "gone": remove_house,
+    "gone, slope to 25 %": lambda rng: remove_house(rng, 0.25),
+    "garage deck": make_garage_site,
 }
 
 
-def scanned(site: Site, density: float, rng: np.random.Generator) -> Scan:
+def scan_site(site: Site, density: float, rng: np.random.Generator) -> Scan:
     settings = ScanSettings(density=density, margin_m=0.0, defects=site.defects)
     scene = make_scene(site.bodies, site.crowns, site.slope)
     scan = scan_scene(scene, site.footprint.buffer(AROUND_M, quad_segs=2), 3.0, rng, settings)
     return site.change(rng, scan) if site.change else scan
 
 
-def with_classes(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
+def judge_classified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
     """As of a cloud whose roofs, ground and trees have classes, few of them wrong."""
     right = rng.random(len(scan)) >= WRONG_CLASS
     roof, ground = (
@@ -365,24 +367,24 @@ def with_classes(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.S
     leaves = np.unique(np.floor(scan.points[scan.source == SOURCE_TREE, :2]), axis=0)
     ground = thin_to_grid(ground, 1.0)
     bare = ~(np.floor(ground[:, None, :2]) == leaves[None]).all(axis=2).any(axis=1)
-    return looked_at(site, roof, ground[bare])
+    return judge_roof(site, roof, ground[bare])
 
 
-def without_classes(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
+def judge_unclassified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
     """As of a cloud without classes, whose roofs are found by shape."""
     height = scan.points[:, 2] - site.slope.height_at(scan.points[:, :2])
     found = found_roof(scan.points, site.footprint, height, True)
     if not found.is_seen:
         return fit_site.Site(found.points, site.footprint, found.remark, found.is_ground)
-    return looked_at(site, found.points, found.ground)
+    return judge_roof(site, found.points, found.ground)
 
 
-def of_one_class(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
+def judge_one_class(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
     """As of a cloud whose only class is said to be the building class."""
-    return looked_at(site, scan.points, np.zeros((0, 3)))
+    return judge_roof(site, scan.points, np.zeros((0, 3)))
 
 
-def looked_at(site: Site, roof: np.ndarray, ground: np.ndarray) -> fit_site.Site:
+def judge_roof(site: Site, roof: np.ndarray, ground: np.ndarray) -> fit_site.Site:
     inside = shapely.intersects_xy(site.footprint, roof[:, 0], roof[:, 1])
     if not inside.any():
         return fit_site.Site(roof[inside], site.footprint, "no points")
@@ -402,10 +404,14 @@ class Known:
         return self.slope.height_at(xy[:, :2])
 
 
-WAYS = {"with classes": with_classes, "without classes": without_classes, "one class": of_one_class}
+WAYS = {
+    "with classes": judge_classified,
+    "without classes": judge_unclassified,
+    "one class": judge_one_class,
+}
 
 
-def row(make: Callable, key: int, density: float, seeds: range) -> str:
+def make_row(make: Callable, key: int, density: float, seeds: range) -> str:
     """Of a kind of site by each way: share without a building, share with bare ground cut, error of
     the area left.
     """
@@ -413,7 +419,7 @@ def row(make: Callable, key: int, density: float, seeds: range) -> str:
     for seed in seeds:
         rng = np.random.default_rng([seed, key, round(10 * density)])
         site = make(rng)
-        scan = scanned(site, density, rng)
+        scan = scan_site(site, density, rng)
         for way, look in WAYS.items():
             seen = look(site, scan, rng)
             is_cut = not seen.is_empty and seen.outline.area < 0.999 * site.footprint.area
@@ -446,7 +452,7 @@ def main() -> None:
     print(f"{'kind':20s}  density | {' | '.join(f'{way:21s}' for way in WAYS)}")
     for key, (name, make) in enumerate((YARDS | SOUND | GONE).items()):
         for density in a.densities if a.kinds in name else ():
-            print(f"{name:20s} {density:5g}/m2 | {row(make, key, density, seeds)}", flush=True)
+            print(f"{name:20s} {density:5g}/m2 | {make_row(make, key, density, seeds)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -124,11 +124,11 @@ def collect_tracebacks() -> Iterator[dict[str, str]]:
     """Collect the tracebacks of internal errors inside the block, by building."""
     record, errors = solve.record_failure, {}
 
-    def failed(plan, job, detail):
+    def record_failure(plan, job, detail):
         errors[job.id] = job.error.trace if job.error else traceback.format_exc()
         return record(plan, job, detail)
 
-    with patch.object(solve, "record_failure", failed):
+    with patch.object(solve, "record_failure", record_failure):
         yield errors
 
 
@@ -230,12 +230,12 @@ def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
                 yield (
                     name,
                     partial(
-                        thinned_request, data / folder, share, outlines, settings, work / folder
+                        request_thinned_run, data / folder, share, outlines, settings, work / folder
                     ),
                 )
 
 
-def thinned_request(
+def request_thinned_run(
     folder: Path, share: float, footprints: str | None, settings: Settings, work: Path
 ) -> Request:
     """The run over a share of the points of all files in `folder`."""
@@ -263,21 +263,24 @@ def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
     called.
     """
     if (data / "roofn3d").exists() or (data / "hand_drawn").exists():
-        yield "real roofs", partial(roofs_request, data, work / "real-roofs")
+        yield "real roofs", partial(request_roofs_run, data, work / "real-roofs")
     for town, path in (TOWNS | OTHER_TOWNS).items():
         for density in TOWN_DENSITIES if path.exists() else ():
             folder = work / f"{town}-{density:g}"
-            yield f"{town} at {density:g} points/m2", partial(town_request, path, density, folder)
+            yield (
+                f"{town} at {density:g} points/m2",
+                partial(request_town_run, path, density, folder),
+            )
 
 
-def roofs_request(data: Path, folder: Path) -> Request:
+def request_roofs_run(data: Path, folder: Path) -> Request:
     """The run over all real roofs."""
     return lay_out(read_roofs(data), folder)
 
 
-def town_request(path: Path, density: float, folder: Path) -> Request:
+def request_town_run(path: Path, density: float, folder: Path) -> Request:
     """The run over all buildings of a town, scanned at `density` (points/m2)."""
-    return lay_out([building.scanned(density) for building in read_town(path)], folder)
+    return lay_out([building.scan_points(density) for building in read_town(path)], folder)
 
 
 def read_roofs(data: Path) -> list[np.ndarray]:

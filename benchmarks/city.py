@@ -64,7 +64,7 @@ class Cost:
     def cpu_s(self) -> float:
         return self.main_s + self.workers_s
 
-    def line(self) -> str:
+    def format_cost(self) -> str:
         return (
             f"{self.buildings / self.cpu_s:.1f} buildings/CPU s, "
             f"{1000 * self.cpu_s / self.buildings:.1f} ms a building "
@@ -73,7 +73,7 @@ class Cost:
         )
 
 
-def city_files(work: Path, buildings: int) -> tuple[list[str], str]:
+def make_city(work: Path, buildings: int) -> tuple[list[str], str]:
     """Clouds and footprints of a simulated city, made where they are not there yet."""
     folder = work / f"city{buildings}"
     if not (folder / "complete").exists():
@@ -89,15 +89,15 @@ def city_files(work: Path, buildings: int) -> tuple[list[str], str]:
     )
 
 
-def measured(
+def measure_run(
     clouds: list[str], footprints: str, out: Path, jobs: int = 1, settings: Settings = DEFAULTS
 ) -> Cost:
     """Cost of a run in a fresh process that has done the demo's neighbourhood before."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(warm_run, clouds, footprints, out, jobs, settings).result()
+        return pool.submit(run_warm, clouds, footprints, out, jobs, settings).result()
 
 
-def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int, settings: Settings) -> Cost:
+def run_warm(clouds: list[str], footprints: str, out: Path, jobs: int, settings: Settings) -> Cost:
     demo = demo_files()
     warm_up = out.with_name("warm-up")
     reconstruct_area(
@@ -105,11 +105,11 @@ def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int, settings:
             (str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True
         )
     )
-    before, started = used(), time.perf_counter()
+    before, started = measure_cpu(), time.perf_counter()
     summary = reconstruct_area(
         Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True)
     )
-    wall, after = time.perf_counter() - started, used()
+    wall, after = time.perf_counter() - started, measure_cpu()
     peak = (
         max(
             resource.getrusage(who).ru_maxrss
@@ -120,13 +120,13 @@ def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int, settings:
     return Cost(summary.buildings, after[0] - before[0], after[1] - before[1], wall, peak)
 
 
-def used() -> tuple[float, float]:
+def measure_cpu() -> tuple[float, float]:
     """CPU seconds of this process and of its ended children."""
     usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return tuple(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
-def outcomes(out: Path, asked: int) -> str:
+def describe_outcomes(out: Path, asked: int) -> str:
     """How many solids are valid, and how many buildings have no outcome."""
     rows = read_parameters(out / "parameters.jsonl")
     solids = [solid for _, solid in read_solids(out / "buildings.city.jsonl")]
@@ -137,7 +137,7 @@ def outcomes(out: Path, asked: int) -> str:
     return f"{valid} of {len(solids)} solids valid; {asked - len(rows)} without outcome; {statuses}"
 
 
-def killed_run(
+def run_with_kills(
     clouds: list[str], footprints: str, out: Path, whole: Path, kills: int, seed: int = 1
 ) -> str:
     """Runs with two workers, killed at random moments and started again until they end; each is
@@ -164,7 +164,7 @@ def killed_run(
             )
             while done < kills and main.poll() is None:
                 time.sleep(draw.uniform(0.3, 5.0))
-                victim = draw.choice([main.pid, *children(main.pid)])
+                victim = draw.choice([main.pid, *list_children(main.pid)])
                 if main.poll() is None:
                     os.kill(victim, signal.SIGKILL)
                     done, of_main = done + 1, of_main + (victim == main.pid)
@@ -179,7 +179,7 @@ def killed_run(
     )
 
 
-def children(pid: int) -> list[int]:
+def list_children(pid: int) -> list[int]:
     """Processes started by `pid` that run Python code of ours, from the process table."""
     try:
         text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8")
@@ -190,7 +190,7 @@ def children(pid: int) -> list[int]:
         return []
 
 
-def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> str:
+def run_on_damage(clouds: list[str], footprints: str, work: Path, whole: Path) -> str:
     """One tile cut off, 1 % of the polygons self-crossing, 1 % more away from all points; the rest
     is compared.
     """
@@ -204,7 +204,7 @@ def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> 
     lost = shapely.box(xmin - 15, ymin - 15, xmax + 15, ymax + 15)
     asked = read_footprints(footprints)
     broken = set(range(0, len(asked), 100))
-    shapes = [crossed(f.polygon) if i in broken else f.polygon for i, f in enumerate(asked)]
+    shapes = [cross_corners(f.polygon) if i in broken else f.polygon for i, f in enumerate(asked)]
     empty = [
         shapely.box(xmax + 1e4 + 20 * i, ymax, xmax + 1e4 + 20 * i + 10, ymax + 10)
         for i in range(len(broken))
@@ -231,7 +231,7 @@ def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> 
     )
 
 
-def crossed(polygon: shapely.Polygon) -> shapely.Polygon:
+def cross_corners(polygon: shapely.Polygon) -> shapely.Polygon:
     """The polygon with two neighbouring corners exchanged: its border crosses itself."""
     xy = shapely.get_coordinates(polygon.exterior)[:-1]
     xy[[1, 2]] = xy[[2, 1]]
@@ -266,14 +266,14 @@ def main() -> None:
     print("| measure | got |\n| --- | --- |", flush=True)
     if args.delft.is_dir():
         delft = sorted(map(str, args.delft.glob("*.laz"))), str(args.delft / "footprints.gpkg")
-        show("Delft, one process", measured(*delft, args.work / "out-delft").line())
-    clouds, footprints = city_files(args.work, args.buildings)
+        show("Delft, one process", measure_run(*delft, args.work / "out-delft").format_cost())
+    clouds, footprints = make_city(args.work, args.buildings)
     out = args.work / "out-one"
-    one = measured(clouds, footprints, out)
-    show("simulated city, one process", one.line())
-    show("outcomes", outcomes(out, len(read_footprints(footprints))))
-    two = measured(clouds, footprints, args.work / "out-two", jobs=2)
-    show("the same, two workers", two.line())
+    one = measure_run(clouds, footprints, out)
+    show("simulated city, one process", one.format_cost())
+    show("outcomes", describe_outcomes(out, len(read_footprints(footprints))))
+    two = measure_run(clouds, footprints, args.work / "out-two", jobs=2)
+    show("the same, two workers", two.format_cost())
     same = all(
         (out / name).read_bytes() == (args.work / "out-two" / name).read_bytes() for name in RECORDS
     )
@@ -282,22 +282,22 @@ def main() -> None:
         "two workers against one",
         f"wall {one.wall_s / two.wall_s:.2f}, by CPU time {bound:.2f}; same bytes: {same}",
     )
-    show("damaged input", damaged_run(clouds, footprints, args.work, out))
+    show("damaged input", run_on_damage(clouds, footprints, args.work, out))
     if args.large:
-        large = measured(*city_files(args.work, args.large), args.work / "out-large")
+        large = measure_run(*make_city(args.work, args.large), args.work / "out-large")
         ratio = large.cpu_s / large.buildings / (one.cpu_s / one.buildings)
         show(
             f"{args.large} buildings",
-            f"{large.line()}; cost a building against {args.buildings}: {ratio:.2f}",
+            f"{large.format_cost()}; cost a building against {args.buildings}: {ratio:.2f}",
         )
     for buildings in filter(None, (args.buildings, args.large_flat)):
-        flat = measured(*city_files(args.work, buildings), args.work / "out-flat", settings=FLAT)
-        show(f"{buildings} buildings, all but fitting and recognising", flat.line())
+        flat = measure_run(*make_city(args.work, buildings), args.work / "out-flat", settings=FLAT)
+        show(f"{buildings} buildings, all but fitting and recognising", flat.format_cost())
     if args.kills:
-        files = city_files(args.work, args.kill_buildings)
+        files = make_city(args.work, args.kill_buildings)
         whole = args.work / "out-whole"
         reconstruct_area(Request(tuple(files[0]), whole, files[1], restart=True))
-        show("random kills", killed_run(*files, args.work / "out-killed", whole, args.kills))
+        show("random kills", run_with_kills(*files, args.work / "out-killed", whole, args.kills))
 
 
 if __name__ == "__main__":

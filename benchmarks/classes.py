@@ -32,7 +32,7 @@ from hiproof.classify.ground import GroundGrid, fill_gaps, ground_grid
 from hiproof.model import PointCloud
 from hiproof.read import read_points
 
-from .judging import SHARED, tool
+from .judging import SHARED, load_tool
 
 SETS = ("delft", "amsterdam_west", "ctview", "stbarth")
 APART = ("amsterdam_west",)
@@ -44,20 +44,20 @@ WITH_FOOTPRINTS, SHARES = (
 )
 
 
-def clouds_of(name: str) -> list[PointCloud]:
+def read_clouds(name: str) -> list[PointCloud]:
     """The set's clouds, without its noise."""
     files = sorted((SHARED / "data" / name).glob("*.laz"))
     clouds = [read_points(file) for file in files] if name in APART else [read_points(*files)]
-    return [chosen(cloud, cloud.classification != NOISE) for cloud in clouds]
+    return [select_points(cloud, cloud.classification != NOISE) for cloud in clouds]
 
 
-def chosen(cloud: PointCloud, keep: np.ndarray) -> PointCloud:
+def select_points(cloud: PointCloud, keep: np.ndarray) -> PointCloud:
     return PointCloud(
         cloud.xyz[keep], cloud.classification[keep], cloud.crs, cloud.sources, cloud.units
     )
 
 
-def agreement(found: np.ndarray, truth: np.ndarray) -> str:
+def describe_agreement(found: np.ndarray, truth: np.ndarray) -> str:
     """Precision, recall and F1 of points (n,) `found` against the `truth`."""
     hits = (found & truth).sum()
     precision, recall = hits / max(found.sum(), 1), hits / max(truth.sum(), 1)
@@ -67,7 +67,7 @@ def agreement(found: np.ndarray, truth: np.ndarray) -> str:
     )
 
 
-def ground_differences(cloud: PointCloud) -> np.ndarray:
+def compare_ground(cloud: PointCloud) -> np.ndarray:
     """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold
     points of class 6.
     """
@@ -85,19 +85,19 @@ def ground_differences(cloud: PointCloud) -> np.ndarray:
 
 
 def report(name: str, pictures: Path | None) -> None:
-    clouds, found, seconds = clouds_of(name), [], time.process_time()
+    clouds, found, seconds = read_clouds(name), [], time.process_time()
     found = [classify(cloud.xyz) == BUILDING for cloud in clouds]
     seconds = time.process_time() - seconds
     truth = [cloud.classification == BUILDING for cloud in clouds]
-    ground = np.concatenate([ground_differences(cloud) for cloud in clouds])
+    ground = np.concatenate([compare_ground(cloud) for cloud in clouds])
     print(
-        f"{name}: {agreement(np.concatenate(found), np.concatenate(truth))}; {seconds:.1f} s of "
-        f"{sum(map(len, clouds)):,} points"
+        f"{name}: {describe_agreement(np.concatenate(found), np.concatenate(truth))}; "
+        f"{seconds:.1f} s of {sum(map(len, clouds)):,} points"
     )
     if name == "delft":
         west = clouds[0].xyz[:, 0] < HALVES_X
         for half, here in (("west (chosen on)", west), ("east", ~west)):
-            print(f"  {half}: {agreement(found[0][here], truth[0][here])}")
+            print(f"  {half}: {describe_agreement(found[0][here], truth[0][here])}")
     print(
         f"  terrain under buildings: mean |dz| {np.abs(ground).mean():.3f} m, mean "
         f"{ground.mean():+.3f} m",
@@ -130,17 +130,19 @@ def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) ->
     image.imsave(path, np.kron(np.clip(picture, 0, 1).transpose(1, 0, 2)[::-1], np.ones((3, 3, 1))))
 
 
-def models_without_classes(name: str, share: float) -> str:
+def model_without_classes(name: str, share: float) -> str:
     """A town reconstructed from footprints and a `share` of its points, of class 1 alone, by
     default options.
     """
     data = SHARED / "data" / name
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        clouds = [unclassified(file, Path(folder), share) for file in sorted(data.glob("*.laz"))]
+        clouds = [
+            write_unclassified(file, Path(folder), share) for file in sorted(data.glob("*.laz"))
+        ]
         footprints, out = data / WITH_FOOTPRINTS[name], Path(folder) / "out"
         summary = reconstruct_area(Request(tuple(map(str, clouds)), out, str(footprints)))
-        figures = tool("roof_residuals").measure(
+        figures = load_tool("roof_residuals").measure(
             out / "buildings.city.jsonl", footprints, sorted(data.glob("*.laz"))
         )
     return (
@@ -149,7 +151,7 @@ def models_without_classes(name: str, share: float) -> str:
     )
 
 
-def unclassified(file: Path, folder: Path, share: float) -> Path:
+def write_unclassified(file: Path, folder: Path, share: float) -> Path:
     """A copy in `folder` of a `share` of a LAZ file's points, all of class 1."""
     las = laspy.read(file)
     las.points = las.points[np.random.default_rng(0).random(len(las.points)) < share]
@@ -168,7 +170,7 @@ def main() -> None:
         report(name, arguments.pictures)
     if not arguments.quick:
         for name, share in product(WITH_FOOTPRINTS, SHARES):
-            print(models_without_classes(name, share), flush=True)
+            print(model_without_classes(name, share), flush=True)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 import shapely
-from tests.roof_zoo import KINDS, gable_planes, generated, random_planes, roof
+from tests.roof_zoo import KINDS, gable_planes, generate_roof, random_planes, roof
 
 from hiproof.compose import check_solid, compose
 from hiproof.model import Piece
@@ -20,7 +20,7 @@ from hiproof.model import Piece
 ROOFS_A_KIND = 200
 
 
-def compound(seed: int):
+def make_compound(seed: int):
     """A house with wings, a lower extension and a dormer: five pieces over twelve vertices."""
     rng = np.random.default_rng(seed)
     boxes = [(0, 0, 14, 8), (14, 1, 19, 7), (4, 8, 9, 13), (-3, 2, 0, 6), (6, 2, 8, 4)]
@@ -32,23 +32,23 @@ def compound(seed: int):
     return roof(pieces, shapely.union_all([piece.outline for piece in pieces]))
 
 
-def timed(run, argument) -> tuple[float, object]:
+def time_call(run, argument) -> tuple[float, object]:
     start = time.process_time()
     result = run(argument)
     return 1e3 * (time.process_time() - start), result
 
 
 def main() -> None:
-    compose(compound(0), 0.0)
-    cases = {kind: [generated(kind, seed) for seed in range(ROOFS_A_KIND)] for kind in KINDS}
-    cases["compound, 5 pieces"] = [compound(seed) for seed in range(ROOFS_A_KIND)]
+    compose(make_compound(0), 0.0)
+    cases = {kind: [generate_roof(kind, seed) for seed in range(ROOFS_A_KIND)] for kind in KINDS}
+    cases["compound, 5 pieces"] = [make_compound(seed) for seed in range(ROOFS_A_KIND)]
     print(
         f"{'kind':20} {'faces':>6} {'compose ms, median':>19} {'largest':>8} "
         f"{'check ms, median':>17}"
     )
     for kind, roofs in cases.items():
-        composed = [timed(lambda made: compose(made, 0.0), made) for made in roofs]
-        checked = [timed(check_solid, solid)[0] for _, solid in composed]
+        composed = [time_call(lambda made: compose(made, 0.0), made) for made in roofs]
+        checked = [time_call(check_solid, solid)[0] for _, solid in composed]
         times, faces = [ms for ms, _ in composed], [len(solid.faces) for _, solid in composed]
         print(
             f"{kind:20} {np.median(faces):6.0f} {np.median(times):19.2f} {max(times):8.2f} "

@@ -34,8 +34,14 @@ from hiproof.model import Part, Roof
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, SimBuilding, random_compound, scan
 from hiproof.simulate.scene import Defects
 
-from .judging import RASTER_M, BuildingFit, fitted, raster
-from .matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
+from .judging import RASTER_M, BuildingFit, fit_roof_parts, make_raster
+from .matching import (
+    compute_sigma_errors,
+    has_hidden_end,
+    list_right_types,
+    match_parts,
+    merge_alike,
+)
 
 STEP_M, NEAR_STEP_CELLS, NEAR_M = 0.4, 3, 0.1
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6745
@@ -55,7 +61,7 @@ class Outcome:
     ratios: tuple[tuple[str, float], ...]
 
 
-def errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
+def measure_errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
     """RMSE (m) over the roof's raster, and over it without the surroundings of the true roof's
     steps.
     """
@@ -75,7 +81,7 @@ def errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
     return float(np.sqrt(np.mean(gap[known] ** 2))), float(np.sqrt(np.mean(gap[known & away] ** 2)))
 
 
-def drawn(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray]:
+def draw_compound(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray]:
     """A compound of `kind`, always the same for a seed, and its points (n, 3) in its frame."""
     rng = np.random.default_rng([seed, COMPOUND_KINDS.index(kind)])
     building = random_compound(rng, kind)
@@ -83,26 +89,30 @@ def drawn(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray
     return building, building.roof.frame.to_local(cloud.points[cloud.source != 2])
 
 
-def compared(truth: Roof, parts: tuple[Part, ...]) -> tuple[int, bool, list[tuple[str, float]]]:
+def compare_parts(
+    truth: Roof, parts: tuple[Part, ...]
+) -> tuple[int, bool, list[tuple[str, float]]]:
     """The true number of parts, whether `parts` are as many, each found with its type, and their
     errors in sigmas.
     """
     as_built = len(parts) == len(truth.parts)
-    true_parts = list(truth.parts) if as_built else told_apart(truth.parts)
+    true_parts = list(truth.parts) if as_built else merge_alike(truth.parts)
     right, ratios = len(parts) == len(true_parts), []
-    for k, index in enumerate(matched(true_parts, parts, raster(truth.outline))):
-        hidden = hidden_end(true_parts[k], true_parts[:k] + true_parts[k + 1 :])
-        right &= index >= 0 and parts[index].type in right_types(true_parts[k], hidden)
+    for k, index in enumerate(match_parts(true_parts, parts, make_raster(truth.outline))):
+        hidden = has_hidden_end(true_parts[k], true_parts[:k] + true_parts[k + 1 :])
+        right &= index >= 0 and parts[index].type in list_right_types(true_parts[k], hidden)
         if index >= 0:
-            ratios += errors_in_sigmas(true_parts[k], parts[index], hidden).items()
+            ratios += compute_sigma_errors(true_parts[k], parts[index], hidden).items()
     return len(true_parts), right, ratios
 
 
-def outcome(kind: str, density: float, seed: int) -> Outcome:
-    building, points = drawn(kind, density, seed)
-    fit = fitted(points, building.outline)
-    wanted, right, ratios = compared(building.roof, fit.roof_parts)
-    return Outcome(*errors(building.roof, fit), len(fit.roof_parts), wanted, right, tuple(ratios))
+def judge_compound(kind: str, density: float, seed: int) -> Outcome:
+    building, points = draw_compound(kind, density, seed)
+    fit = fit_roof_parts(points, building.outline)
+    wanted, right, ratios = compare_parts(building.roof, fit.roof_parts)
+    return Outcome(
+        *measure_errors(building.roof, fit), len(fit.roof_parts), wanted, right, tuple(ratios)
+    )
 
 
 def report(name: str, found: list[Outcome]) -> str:
@@ -117,7 +127,7 @@ def report(name: str, found: list[Outcome]) -> str:
     )
 
 
-def sigma_report(found: Iterable[Outcome]) -> str:
+def report_sigmas(found: Iterable[Outcome]) -> str:
     ratios = defaultdict(list)
     for name, ratio in (pair for outcome in found for pair in outcome.ratios):
         ratios[name].append(ratio)
@@ -145,11 +155,11 @@ def main() -> None:
     for density in arguments.densities:
         every = []
         for kind in arguments.kinds:
-            found = [outcome(kind, density, seed) for seed in seeds]
+            found = [judge_compound(kind, density, seed) for seed in seeds]
             every += found
             print(report(f"{density:g}/m2 {kind}", found), flush=True)
         print(report(f"{density:g}/m2 all", every))
-        print(f"{density:g}/m2 {sigma_report(every)}", flush=True)
+        print(f"{density:g}/m2 {report_sigmas(every)}", flush=True)
 
 
 if __name__ == "__main__":

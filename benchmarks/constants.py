@@ -26,7 +26,7 @@ PACKAGE, ROOT = Path(hiproof.__file__).parent, Path(__file__).parents[1]
 PARITY = "even"  # of footprints' ids: on these constants are chosen, on the odd ones reported
 
 
-def value_of(text: str, name: str) -> ast.Constant:
+def find_value(text: str, name: str) -> ast.Constant:
     """Where the number `name` stands in a module's text. Exits with a sentence where it is none."""
     for statement in ast.parse(text).body:
         if isinstance(statement, ast.Assign):
@@ -46,13 +46,13 @@ def value_of(text: str, name: str) -> ast.Constant:
     )
 
 
-def changed(text: str, name: str, factor: float) -> str:
+def change_value(text: str, name: str, factor: float) -> str:
     """A module's text with the number `name` times `factor`, whole where it is whole.
 
     >>> changed("A, MOST = 1.5, 7  # of all\\n", "MOST", 0.5)
     'A, MOST = 1.5, 4  # of all\\n'
     """
-    number = value_of(text, name)
+    number = find_value(text, name)
     new = type(number.value)(
         round(number.value * factor) if isinstance(number.value, int) else number.value * factor
     )
@@ -64,7 +64,7 @@ def changed(text: str, name: str, factor: float) -> str:
     return "".join(lines)
 
 
-def rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
+def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
     """What `benchmarks.delft` says of a copy of the package in which the number is `factor` times
     as large.
     """
@@ -73,7 +73,9 @@ def rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
         # what is compiled goes along, and is used where it still holds
         shutil.copytree(PACKAGE, copy)
         file = copy / module
-        file.write_text(changed(file.read_text(encoding="utf-8"), name, factor), encoding="utf-8")
+        file.write_text(
+            change_value(file.read_text(encoding="utf-8"), name, factor), encoding="utf-8"
+        )
         command = [
             sys.executable,
             "-m",
@@ -111,10 +113,11 @@ def tell() -> None:
             f"expected a module of hiproof and a name in it, got {arguments.name}; the page of "
             "constants lists them"
         )
-    value = value_of((PACKAGE / module).read_text(encoding="utf-8"), name).value
+    value = find_value((PACKAGE / module).read_text(encoding="utf-8"), name).value
     for factor in arguments.factors:
         print(
-            f"{name} = {value!r} times {factor:g}:\n{rows(module, name, factor, arguments.shares)}",
+            f"{name} = {value!r} times {factor:g}:\n"
+            f"{measure_rows(module, name, factor, arguments.shares)}",
             flush=True,
         )
 

@@ -25,8 +25,8 @@ import matplotlib.pyplot as plt
 
 from hiproof.settings import Settings
 
-from .delft import SETS, Asked, asked_of, measure, models_of
-from .judging import named_share
+from .delft import SETS, Asked, measure, model_buildings, read_set
+from .judging import measure_named_share
 
 PRICE = ("evidence_points", "evidence_area_m2")
 TITLES = {"delft": "Delft", "amsterdam_west": "Amsterdam West"}
@@ -45,7 +45,7 @@ class Stop:
     named: float
 
 
-def priced(price: float) -> Settings:
+def set_price(price: float) -> Settings:
     """The default settings with structure at `price` times its cost."""
     compound = Settings().compound
     return Settings.from_dict(
@@ -54,10 +54,14 @@ def priced(price: float) -> Settings:
 
 
 def stop_at(price: float, asked: Asked) -> Stop:
-    buildings, columns = models_of(asked, priced(price))
+    buildings, columns = model_buildings(asked, set_price(price))
     share = measure(buildings, asked)["share_within_20cm"]
     return Stop(
-        price, share, columns["parts"].mean(), columns["faces"].mean(), named_share(buildings)
+        price,
+        share,
+        columns["parts"].mean(),
+        columns["faces"].mean(),
+        measure_named_share(buildings),
     )
 
 
@@ -108,7 +112,7 @@ def main() -> None:
     arguments = parser.parse_args()
     curves = {}
     for name in arguments.set:
-        asked, curves[name] = asked_of(name, parity=arguments.parity), []
+        asked, curves[name] = read_set(name, parity=arguments.parity), []
         for price in arguments.prices:
             stop = stop_at(price, asked)
             curves[name].append(stop)

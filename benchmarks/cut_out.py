@@ -50,7 +50,7 @@ def cut_clouds(building: TrueBuilding, density: float) -> dict[str, np.ndarray]:
     }
 
 
-def told(clouds: list[np.ndarray]) -> str:
+def count_cut_out(clouds: list[np.ndarray]) -> str:
     """How many of the clouds that may be one building are taken for roofs cut out."""
     found = [
         is_cut_out(xyz) is not False
@@ -70,7 +70,7 @@ def main() -> None:
             clouds = [cut_clouds(building, density) for building in buildings]
             print(
                 f"{town}, {density:g} points/m2:",
-                *(f"{kind} {told([c[kind] for c in clouds])}" for kind in clouds[0]),
+                *(f"{kind} {count_cut_out([c[kind] for c in clouds])}" for kind in clouds[0]),
                 sep="  ",
             )
     folder = SHARED / "data/delft"
@@ -87,7 +87,7 @@ def main() -> None:
             areas = [around(footprint) for footprint in footprints[::every]]
             print(
                 f"delft, {kept:g} of the points, {kind}: "
-                f"{told([some[grid.inside(area)] for area in areas])}"
+                f"{count_cut_out([some[grid.inside(area)] for area in areas])}"
             )
 
 

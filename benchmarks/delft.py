@@ -40,7 +40,14 @@ from hiproof.settings import Settings
 from hiproof.status import Status
 from hiproof.write import write_cityjson
 
-from .judging import SHARED, area_by_type, count_narrow_parts, fitted, named_share, tool
+from .judging import (
+    SHARED,
+    count_narrow_parts,
+    fit_roof_parts,
+    load_tool,
+    measure_named_share,
+    sum_area_by_type,
+)
 
 SETS = {"delft": "footprints.gpkg", "amsterdam_west": "footprints_bag.gpkg"}
 EPOCHS = {"two_epochs": "footprints.gpkg"}  # sets whose clouds lie in folders by year
@@ -49,7 +56,7 @@ BUILDING_CLASS = 6
 WALL_M = 3.0
 
 
-def thinned(paths: list[Path], share: float) -> np.ndarray:
+def thin_points(paths: list[Path], share: float) -> np.ndarray:
     """Building points (n, 3) of the files after the draw that `thin_cloud.py` makes."""
     rng = np.random.default_rng(0)
     kept = []
@@ -69,7 +76,7 @@ def model(
     frame = LocalFrame.around(points)
     local, outline = frame.to_local(points), shapely.transform(footprint.polygon, frame.to_local)
     started = time.process_time()
-    fit = fitted(local, outline, settings)
+    fit = fit_roof_parts(local, outline, settings)
     done = time.process_time()
     roof = Roof(fit.roof_parts, fit.outline, frame)
     figures = {"fit": done - started, "parts": len(fit.roof_parts)}
@@ -98,7 +105,7 @@ def model(
     ), figures
 
 
-def asked_footprints(path: Path, parity: str | None) -> list[Footprint]:
+def select_footprints(path: Path, parity: str | None) -> list[Footprint]:
     """Footprints of the file, all or those with an even or an odd number at the end of their id."""
     footprints = list(read_footprints(path))
     if parity is None:
@@ -117,14 +124,14 @@ class Asked:
     own_points: list[tuple[np.ndarray, Footprint]]
 
 
-def asked_of(
+def read_set(
     name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None
 ) -> Asked:
     """The set `name`, its cloud thinned to `share`; `data` is its folder where that is another."""
     data = data or SHARED / "data" / name
-    footprints = asked_footprints(data / (SETS | EPOCHS)[name], parity)
+    footprints = select_footprints(data / (SETS | EPOCHS)[name], parity)
     clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
-    cloud = thinned(clouds, share)
+    cloud = thin_points(clouds, share)
     indices = assign_points(cloud, footprints)
     return Asked(
         footprints,
@@ -133,7 +140,9 @@ def asked_of(
     )
 
 
-def models_of(asked: Asked, settings: Settings) -> tuple[list[Building], dict[str, np.ndarray]]:
+def model_buildings(
+    asked: Asked, settings: Settings
+) -> tuple[list[Building], dict[str, np.ndarray]]:
     """All buildings that could be composed, and the figures of `model` for every building asked
     for.
     """
@@ -154,21 +163,21 @@ def measure(buildings: list[Building], asked: Asked, tools: Path = SHARED / "too
         write_cityjson(models, buildings)
         outlines = shapely.to_wkb([footprint.polygon for footprint in asked.footprints])
         pyogrio.raw.write(footprints, outlines, [], [], geometry_type="Polygon", crs="EPSG:28992")
-        return tool("roof_residuals", tools).measure(models, footprints, asked.clouds)
+        return load_tool("roof_residuals", tools).measure(models, footprints, asked.clouds)
 
 
-def row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
-    buildings, columns = models_of(asked, settings)
+def make_row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
+    buildings, columns = model_buildings(asked, settings)
     figures = measure(buildings, asked, tools)
     narrow, standing = np.sum([count_narrow_parts(building.roof) for building in buildings], axis=0)
-    both, areas = 1e3 * (columns["fit"] + columns["compose"]), area_by_type(buildings)
+    both, areas = 1e3 * (columns["fit"] + columns["compose"]), sum_area_by_type(buildings)
     return (
         f"{share:<6g} {len(asked.footprints)} footprints  share {figures['share_within_20cm']:.4f} "
         f" modelled {figures['modelled']}"
         f"  faces median {figures['median_roof_faces']:.0f} ({np.median(columns['faces']):.0f}) "
         f"mean {columns['faces'].mean():.2f}"
         f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named "
-        f"{named_share(buildings):.3f}"
+        f"{measure_named_share(buildings):.3f}"
         f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(both):.1f} mean "
         f"{both.mean():.1f} max {both.max():.0f}"
         f" (fit {1e3 * np.median(columns['fit']):.1f})  beyond {columns['beyond'].max():.2f}  bad "
@@ -190,8 +199,8 @@ def main() -> None:
     )
     arguments = parser.parse_args()
     for share in arguments.shares:
-        asked = asked_of(arguments.set, share, arguments.parity, arguments.data)
-        print(row(share, asked, arguments.tools, Settings()), flush=True)
+        asked = read_set(arguments.set, share, arguments.parity, arguments.data)
+        print(make_row(share, asked, arguments.tools, Settings()), flush=True)
 
 
 if __name__ == "__main__":

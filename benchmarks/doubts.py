@@ -24,7 +24,7 @@ from hiproof.evaluate.layers import FEWEST_LAYER_POINTS, find_second_surface, un
 from hiproof.evaluate.verdict import MOST_UNSEEN
 from hiproof.settings import Settings
 
-from .delft import asked_of
+from .delft import read_set
 from .towns import TOWNS, read_town
 
 # no footprint is off, and half a roof moves none
@@ -34,18 +34,18 @@ EACH = {"denhaag": 12}  # of that town's 1,990 buildings one in so many
 Case = tuple[str, np.ndarray, shapely.Polygon]
 
 
-def raised(by_m: float) -> Callable[[Case], np.ndarray]:
+def make_raise(by_m: float) -> Callable[[Case], np.ndarray]:
     """Points (n, 3) of a case, half of them drawn by chance and put higher."""
 
-    def points_of(case: Case) -> np.ndarray:
+    def raise_points(case: Case) -> np.ndarray:
         id, points, _ = case
         drawn = np.random.default_rng(zlib.crc32(id.encode())).random(len(points)) < 0.5
         return points + np.outer(drawn, (0.0, 0.0, by_m))
 
-    return points_of
+    return raise_points
 
 
-def western(case: Case) -> np.ndarray:
+def keep_western_points(case: Case) -> np.ndarray:
     """Points (n, 3) of a case west of the middle of its outline."""
     _, points, outline = case
     return points[points[:, 0] < outline.centroid.x]
@@ -53,12 +53,12 @@ def western(case: Case) -> np.ndarray:
 
 CHANGES: dict[str, Callable[[Case], np.ndarray]] = {
     "as they are": lambda case: case[1],
-    **{f"half {by_m:g} m higher": raised(by_m) for by_m in (0.25, 0.4, 1.0)},
-    "western half alone": western,
+    **{f"half {by_m:g} m higher": make_raise(by_m) for by_m in (0.25, 0.4, 1.0)},
+    "western half alone": keep_western_points,
 }
 
 
-def told(cases: Iterable[Case], change: Callable[[Case], np.ndarray]) -> str:
+def describe_doubts(cases: Iterable[Case], change: Callable[[Case], np.ndarray]) -> str:
     """What is said of all cases once changed."""
     surfaces, apart, unseen, count = 0, [], 0, 0
     for case in cases:
@@ -85,10 +85,10 @@ def main() -> None:
     )
     a = parser.parse_args()
     delft = [
-        (f.id, points, f.polygon) for points, f in asked_of("delft", a.share, a.parity).own_points
+        (f.id, points, f.polygon) for points, f in read_set("delft", a.share, a.parity).own_points
     ]
     towns = [
-        (building.id, building.scanned(a.density), building.footprint)
+        (building.id, building.scan_points(a.density), building.footprint)
         for name, path in TOWNS.items()
         for building in read_town(path)[:: EACH.get(name, 1)]
     ]
@@ -97,7 +97,7 @@ def main() -> None:
         (f"towns, {a.density:g}/m2", towns),
     ):
         for words, change in CHANGES.items():
-            print(f"{name}, {words}: {told(cases, change)}", flush=True)
+            print(f"{name}, {words}: {describe_doubts(cases, change)}", flush=True)
 
 
 if __name__ == "__main__":

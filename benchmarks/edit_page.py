@@ -82,7 +82,7 @@ class Window:
         return found if code == 200 else None
 
 
-def times(window: Window, ids: list[str]) -> None:
+def measure_times(window: Window, ids: list[str]) -> None:
     """Milliseconds of an edit and of a refit, both composed, checked and measured."""
     wall, cpu = {"ridge raised": [], "refit": []}, {"ridge raised": [], "refit": []}
     for id in ids:
@@ -108,7 +108,7 @@ def times(window: Window, ids: list[str]) -> None:
         )
 
 
-def in_browser(window: Window, ids: list[str]) -> None:
+def measure_in_browser(window: Window, ids: list[str]) -> None:
     """Milliseconds from the key r to the model shown, in Chromium."""
     from playwright.sync_api import sync_playwright
 
@@ -140,7 +140,7 @@ def in_browser(window: Window, ids: list[str]) -> None:
     )
 
 
-def tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def list_tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Edits that a person might try on the largest parts."""
     areas = [h.get("width", 0.0) * h.get("length", 0.0) for h in model["handles"]]
     for part in sorted(range(len(areas)), key=lambda k: -areas[k])[:PARTS]:
@@ -152,10 +152,10 @@ def tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
             )
         if len(areas) > 1:
             yield {"action": "remove", "part": part}
-            yield from drags(model, part)
+            yield from list_drags(model, part)
 
 
-def drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
+def list_drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
     """Each edge of a part moved out and in, as a hand drags its handle."""
     h, z = model["handles"][part], model["parts"][part]["position"][2]
     for side, turn in (("length", 0.0), ("width", 0.5 * np.pi)) if h else ():
@@ -170,16 +170,16 @@ def drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
                 }
 
 
-def tried(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def try_models(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The models that the tries make, refitted where that can be."""
     for action, heights in (("dormer", ABOVE_M), ("recess", BELOW_M)):
-        for crowd in crowds(window, id, model, heights):
-            yield from drawn_around(window, id, model, crowd, action)
-    for asked in tries(model):
-        yield from refitted(window, id, window.change(id, model["parts"], **asked))
+        for crowd in find_crowds(window, id, model, heights):
+            yield from draw_parts(window, id, model, crowd, action)
+    for asked in list_tries(model):
+        yield from refit(window, id, window.change(id, model["parts"], **asked))
 
 
-def refitted(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dict[str, Any]]:
+def refit(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dict[str, Any]]:
     """The model with its heights fitted to the points, itself where they cannot be; nothing of
     none.
     """
@@ -187,7 +187,7 @@ def refitted(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[
         yield window.change(id, model["parts"], action="refit") or model
 
 
-def crowds(
+def find_crowds(
     window: Window, id: str, model: dict[str, Any], heights: tuple[float, float]
 ) -> list[np.ndarray]:
     """The largest crowds of points (n, 3) whose heights over the roof lie within two: what a person
@@ -211,28 +211,28 @@ def crowds(
     return list(found.values())
 
 
-def drawn_around(
+def draw_parts(
     window: Window, id: str, model: dict[str, Any], crowd: np.ndarray, action: str
 ) -> Iterator[dict[str, Any]]:
     """The models with a dormer, a block or a recess drawn around a crowd, refitted, its edges
     dragged while that helps.
     """
     middle = crowd.mean(axis=0)
-    for part in owners_of(model, middle)[:PARTS]:
+    for part in list_owners(model, middle)[:PARTS]:
         made = window.change(id, model["parts"], action=action, part=part, place=middle.tolist())
         if made is None:
             continue
         last = len(made["parts"]) - 1
         for kind in dict.fromkeys((made["parts"][last]["type"], "flat")):
-            change = {"type": kind} | box_around(
+            change = {"type": kind} | fit_box(
                 crowd, made["handles"][last]["turn"], made["parts"][last]["position"][2]
             )
             best = window.change(id, made["parts"], action="change", part=last, change=change)
-            best = next(refitted(window, id, best), None)
-            yield from () if best is None else dragged(window, id, best, last)
+            best = next(refit(window, id, best), None)
+            yield from () if best is None else drag_edges(window, id, best, last)
 
 
-def box_around(crowd: np.ndarray, turn: float, z: float) -> dict[str, Any]:
+def fit_box(crowd: np.ndarray, turn: float, z: float) -> dict[str, Any]:
     """Width, length and position of the rectangle around a crowd, its length turned so."""
     axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     uv = crowd[:, :2] @ axes.T
@@ -241,17 +241,19 @@ def box_around(crowd: np.ndarray, turn: float, z: float) -> dict[str, Any]:
     return {"width": width, "length": length, "position": [x, y, z]}
 
 
-def dragged(window: Window, id: str, model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
+def drag_edges(
+    window: Window, id: str, model: dict[str, Any], part: int
+) -> Iterator[dict[str, Any]]:
     """The model, and whatever dragging edges of a part makes better."""
     yield model
-    for asked in drags(model, part):
-        for found in refitted(window, id, window.change(id, model["parts"], **asked)):
-            if share_of(found) > share_of(model):
-                yield from dragged(window, id, found, part)
+    for asked in list_drags(model, part):
+        for found in refit(window, id, window.change(id, model["parts"], **asked)):
+            if read_share(found) > read_share(model):
+                yield from drag_edges(window, id, found, part)
                 return
 
 
-def owners_of(model: dict[str, Any], place: np.ndarray) -> list[int]:
+def list_owners(model: dict[str, Any], place: np.ndarray) -> list[int]:
     """The parts in whose reach a place lies."""
     return [
         index
@@ -262,39 +264,39 @@ def owners_of(model: dict[str, Any], place: np.ndarray) -> list[int]:
     ]
 
 
-def share_of(model: dict[str, Any] | None) -> float:
+def read_share(model: dict[str, Any] | None) -> float:
     return -1.0 if model is None else model["figures"]["share_within_20cm"] or 0.0
 
 
-def enough_better(models: Iterator[dict[str, Any]], best: dict[str, Any]) -> dict[str, Any]:
+def choose_better(models: Iterator[dict[str, Any]], best: dict[str, Any]) -> dict[str, Any]:
     """The first model whose share is higher by ENOUGH, else the best of all, `best` among them."""
     found = best
     for model in models:
-        found = max(found, model, key=share_of)
-        if share_of(found) >= share_of(best) + ENOUGH:
+        found = max(found, model, key=read_share)
+        if read_share(found) >= read_share(best) + ENOUGH:
             break
     return found
 
 
-def mended(window: Window, id: str, rounds: int) -> tuple[float, float, int, int]:
+def mend_building(window: Window, id: str, rounds: int) -> tuple[float, float, int, int]:
     """Share before and after, parts before and after, of a building mended and accepted."""
     start = window.ask("GET", f"building?id={id}")[1]
     first = best = window.change(id, start["parts"], action="show")
     refitted = window.change(id, start["parts"], action="refit")
-    best = max(best, refitted or best, key=share_of)
+    best = max(best, refitted or best, key=read_share)
     for _ in range(rounds):
-        better = enough_better(tried(window, id, best), best)
+        better = choose_better(try_models(window, id, best), best)
         if better is best:
             break
         best = better
-    note = f"share {share_of(first):.3f} to {share_of(best):.3f}"
+    note = f"share {read_share(first):.3f} to {read_share(best):.3f}"
     code, answer = window.ask(
         "POST",
         "accept",
         {"id": id, "parts": best["parts"], "version": start["version"], "note": note},
     )
     assert code == 200, answer
-    return share_of(first), share_of(best), len(start["parts"]), len(best["parts"])
+    return read_share(first), read_share(best), len(start["parts"]), len(best["parts"])
 
 
 def run_again(folder: Path) -> None:
@@ -312,7 +314,7 @@ def run_again(folder: Path) -> None:
     reconstruct_area(again)
 
 
-def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
+def mend_doubtful(window: Window, folder: Path, count: int, rounds: int) -> None:
     """The most doubtful buildings, mended one after the other; then the run done again."""
     ids = [
         row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
@@ -320,12 +322,12 @@ def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
     before = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
     for id in ids:
         start = time.perf_counter()
-        was, now, parts_was, parts_now = mended(window, id, rounds)
+        was, now, parts_was, parts_now = mend_building(window, id, rounds)
         told = f"{id}: share {was:.3f} -> {now:.3f}, parts {parts_was} -> {parts_now}"
         print(f"{told} ({time.perf_counter() - start:.0f} s)", flush=True)
     run_again(folder)
     after = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
-    up = sum(share_in(after[id]) > share_in(before[id]) for id in ids)
+    up = sum(read_record_share(after[id]) > read_record_share(before[id]) for id in ids)
     solids = dict(read_solids(folder / "buildings.city.jsonl"))
     valid = sum(not check_solid(solids[id], planarity_m=0.01) for id in ids)
     others = [id for id in before if id not in ids]
@@ -336,7 +338,7 @@ def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
     )
 
 
-def share_in(record: dict[str, Any]) -> float:
+def read_record_share(record: dict[str, Any]) -> float:
     return record["residuals"]["share_within_20cm"] or 0.0
 
 
@@ -356,11 +358,11 @@ def main() -> None:
         row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
     ]
     ids = rows[:: max(1, len(rows) // asked.buildings)][: asked.buildings]
-    times(window, ids)
+    measure_times(window, ids)
     if asked.browser:
-        in_browser(window, ids)
+        measure_in_browser(window, ids)
     if asked.mend:
-        mend(window, asked.run, asked.mend, asked.rounds)
+        mend_doubtful(window, asked.run, asked.mend, asked.rounds)
 
 
 if __name__ == "__main__":

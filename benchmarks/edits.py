@@ -30,7 +30,7 @@ PRESSES = ("split", "merge", "dormer", "recess")
 PRESSED = 0.3  # of the edits
 
 
-def generated(count: int, seed: int = 0) -> list[Building]:
+def generate_buildings(count: int, seed: int = 0) -> list[Building]:
     """Buildings of one primitive and compounds in turn, their solids composed."""
     rng = np.random.default_rng(seed)
     roofs = [(random_building if k % 2 else random_compound)(rng).roof for k in range(count)]
@@ -40,7 +40,7 @@ def generated(count: int, seed: int = 0) -> list[Building]:
     ]
 
 
-def random_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
+def draw_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
     """What one of the page's buttons asks for, at any part and any place about the roof."""
     part, other = (int(k) for k in rng.integers(len(building.parts), size=2))
     x0, y0, x1, y1 = building.roof.outline.bounds
@@ -58,10 +58,10 @@ def random_press(rng: np.random.Generator, building: Building) -> dict[str, Any]
     return {"part": part, **asked[rng.integers(len(asked))]}
 
 
-def one_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[], Building]]:
+def draw_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[], Building]]:
     """A random edit's kind, and what does it."""
     if rng.random() < PRESSED:
-        asked = random_press(rng, house)
+        asked = draw_press(rng, house)
         return asked["action"], lambda: apply_edit(
             building_record(house), asked, np.zeros((0, 3)), Settings(), False
         )
@@ -76,13 +76,13 @@ def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, 
     """Each building is edited again and again, an edit standing on those before it that made a
     building.
     """
-    rng, houses = np.random.default_rng(seed), generated(buildings)
+    rng, houses = np.random.default_rng(seed), generate_buildings(buildings)
     outcomes = {kind: Counter() for kind in (*EDIT_KINDS, *PRESSES)}
     sentences: Counter = Counter()
     seconds = []
     for number in range(edits):
         place = number % buildings
-        kind, edit = one_edit(rng, houses[place])
+        kind, edit = draw_edit(rng, houses[place])
         start = time.perf_counter()
         try:
             found = edit()

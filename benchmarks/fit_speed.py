@@ -18,7 +18,7 @@ from hiproof.fit.single import fit_roof
 from hiproof.primitives import CATALOGUE
 from hiproof.settings import Settings
 
-from .roofs import DENSITY, random_roof, scan
+from .roofs import DENSITY, draw_roof, scan
 
 POINTS = 310
 
@@ -34,7 +34,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     rng = np.random.default_rng(22)
     clouds = [
-        scan(random_roof(name, rng), DENSITY, rng, outlier_share=0.03)
+        scan(draw_roof(name, rng), DENSITY, rng, outlier_share=0.03)
         for name in CATALOGUE
         for _ in range(2)
     ]
@@ -42,7 +42,8 @@ def main() -> None:
     fit_roof(clouds[0])
     repetitions = 1 if quick else 7
     ours = np.median(
-        [[cpu_ms(cloud, "likelihood") for cloud in clouds] for _ in range(repetitions)], axis=0
+        [[measure_cpu_ms(cloud, "likelihood") for cloud in clouds] for _ in range(repetitions)],
+        axis=0,
     )
     print(
         f"likelihood: median {np.median(ours):.2f}, mean {ours.mean():.2f} ms a roof of {POINTS} "
@@ -52,7 +53,7 @@ def main() -> None:
     fit_roof(
         clouds[0], settings=Settings.from_dict({"fit": {"types": ["flat"], "objective": "paper"}})
     )
-    papers = np.array([cpu_ms(cloud, "paper") for cloud in clouds[asked]])
+    papers = np.array([measure_cpu_ms(cloud, "paper") for cloud in clouds[asked]])
     print(
         f"paper:      median {np.median(papers):.0f}, mean {papers.mean():.0f} ms on {len(papers)} "
         "of these roofs"
@@ -60,7 +61,7 @@ def main() -> None:
     print(f"ratio of the means on the same roofs: {papers.mean() / ours[asked].mean():.0f}")
 
 
-def cpu_ms(cloud: np.ndarray, objective: str) -> float:
+def measure_cpu_ms(cloud: np.ndarray, objective: str) -> float:
     """CPU time (ms) of one fit."""
     settings = Settings.from_dict({"fit": {"objective": objective}})
     start = time.process_time()

@@ -21,14 +21,14 @@ import numpy as np
 from hiproof import reconstruct
 from hiproof.model import Building
 
-from .judging import tool
-from .wireframes import Score, WireframeCounts, figures_of, table_by_size, worst_of
+from .judging import load_tool
+from .wireframes import Score, WireframeCounts, list_worst, make_size_table, summarise
 
 MODES = {"points": "points only", "footprints": "with footprints"}
 SHORT_M = 1.0
 
 
-def scores_of(
+def score_roofs(
     judge: ModuleType, with_footprint: bool, parity: str | None
 ) -> tuple[list[Score], list[int]]:
     """Return the score of every roof, and the numbers of short edges and of right ones among them.
@@ -44,14 +44,14 @@ def scores_of(
             started = time.process_time()
             building = reconstruct(points, outline, id=name)
             seconds = time.process_time() - started
-            counts, short_edges = compared(judge, building, points, corners, edges)
+            counts, short_edges = compare_building(judge, building, points, corners, edges)
             share = building.quality.share_within_20cm if building.solid is not None else 0.0
             scores.append(Score(name, counts, footprint.area, seconds, len(building.parts), share))
             short += short_edges
     return scores, short.tolist()
 
 
-def compared(
+def compare_building(
     judge: ModuleType,
     building: Building,
     points: np.ndarray,
@@ -79,13 +79,13 @@ def main() -> None:
     )
     parser.add_argument("--worst", type=int, default=0, help="name the roofs with the worst edges")
     arguments = parser.parse_args()
-    judge = tool("hand_drawn")
+    judge = load_tool("hand_drawn")
     for mode in MODES if arguments.mode == "both" else (arguments.mode,):
-        scores, (short, right) = scores_of(judge, mode == "footprints", arguments.parity)
+        scores, (short, right) = score_roofs(judge, mode == "footprints", arguments.parity)
         print(f"{len(scores)} roofs drawn by hand, {MODES[mode]}")
-        rows = [*figures_of(scores), f"edges under {SHORT_M:g} m: {short}, of which right {right}"]
-        worst = [f"worst    {line}" for line in worst_of(scores, arguments.worst)]
-        rows += [*table_by_size(scores), *worst]
+        rows = [*summarise(scores), f"edges under {SHORT_M:g} m: {short}, of which right {right}"]
+        worst = [f"worst    {line}" for line in list_worst(scores, arguments.worst)]
+        rows += [*make_size_table(scores), *worst]
         print("\n".join("  " + row for row in rows), flush=True)
 
 

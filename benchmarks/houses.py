@@ -42,20 +42,20 @@ SHOWS_M, NEAR_M, GAP_M = 0.25, 2.0, 1.0
 LEAST_M2, LEAST_SHARED_M, APART, CUT = 30.0, 2.0, 0.8, 0.1
 
 
-def scanned(house: SimBuilding, rng: np.random.Generator, density: float) -> np.ndarray:
+def scan_house(house: SimBuilding, rng: np.random.Generator, density: float) -> np.ndarray:
     """Points (n, 3) of a building in its own frame, those of the ground left out."""
     cloud = scan(house, rng, ScanSettings(density=density, defects=Defects.none()))
     return house.roof.frame.to_local(cloud.points[cloud.source != 2])
 
 
-def areas_of(points: np.ndarray) -> list[shapely.Geometry]:
+def find_areas(points: np.ndarray) -> list[shapely.Geometry]:
     """The areas of the houses told apart among points (n, 3)."""
     box = shapely.box(*points[:, :2].min(axis=0) - 0.5, *points[:, :2].max(axis=0) + 0.5)
     around = shapely.MultiPoint(points[:, :2]).buffer(GAP_M).buffer(0.5 - GAP_M)
     return separate_houses(points, shapely.intersection(around, box), GAP_M)
 
 
-def shows(one: shapely.Polygon, other: shapely.Polygon, row: SimBuilding) -> bool:
+def differs_from_neighbour(one: shapely.Polygon, other: shapely.Polygon, row: SimBuilding) -> bool:
     """Whether the roofs of neighbours in a `row` differ along most of the wall between them."""
     parts = [next(p for p in row.roof.parts if p.pieces[0].outline.equals(o)) for o in (one, other)]
     wall = shapely.intersection(shapely.buffer(one, 0.01), shapely.buffer(other, 0.01))
@@ -83,15 +83,15 @@ def is_apart(
     return bool(best[0] != best[1] and shares.max(axis=1).min() > APART)
 
 
-def report_simulated(density: float, seeds: range) -> None:
+def report_simulation(density: float, seeds: range) -> None:
     counts = {True: [0, 0], False: [0, 0]}
     for seed in seeds:
         rng = np.random.default_rng([seed, 1000])
         row = random_compound(rng, "row")
-        points = scanned(row, rng, density)
-        areas, outlines = areas_of(points), [part.pieces[0].outline for part in row.roof.parts]
+        points = scan_house(row, rng, density)
+        areas, outlines = find_areas(points), [part.pieces[0].outline for part in row.roof.parts]
         for one, other in pairwise(outlines):
-            count = counts[shows(one, other, row)]
+            count = counts[differs_from_neighbour(one, other, row)]
             count[0] += is_apart(one, other, areas, points)
             count[1] += 1
     print(
@@ -106,7 +106,8 @@ def report_simulated(density: float, seeds: range) -> None:
             random_building(rng) if kind == "plain" else random_compound(rng, kind) for rng in rngs
         ]
         cut[kind] = sum(
-            len(areas_of(scanned(h, rng, density))) > 1 for h, rng in zip(houses, rngs, strict=True)
+            len(find_areas(scan_house(h, rng, density))) > 1
+            for h, rng in zip(houses, rngs, strict=True)
         )
     of = len(seeds) * len(FAMILIES)
     print(f"{density:g}/m2 single houses cut: {sum(cut.values())} of {of}  {cut}", flush=True)
@@ -160,7 +161,7 @@ def main() -> None:
         default=("delft", "amsterdam_west", "stbarth"),
     )
     a = parser.parse_args()
-    report_simulated(a.density, range(a.first_seed, a.first_seed + a.each))
+    report_simulation(a.density, range(a.first_seed, a.first_seed + a.each))
     for name in a.real:
         report_real(name)
 

@@ -25,14 +25,14 @@ RASTER_M = 0.2
 NARROW_M, STANDING_M = 1.0, 2.0
 
 
-def fitted(
+def fit_roof_parts(
     points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None
 ) -> BuildingFit:
     """The roof of one building: the only place where benchmarks name the search they measure."""
     return fit_building(points_local, outline, settings or Settings())
 
 
-def tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
+def load_tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
     """Load the judge `name` (roof_residuals, wireframe, hand_drawn) as a module."""
     if str(tools) not in sys.path:
         sys.path.append(str(tools))  # judges import each other
@@ -42,7 +42,7 @@ def tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
     return module
 
 
-def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
+def make_raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
     """Plan points (n, 2) inside `outline` on a square grid; one point within it where the grid has
     none.
     """
@@ -53,11 +53,11 @@ def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
     return xy if len(xy) else shapely.get_coordinates(outline.representative_point())
 
 
-def visible_areas(roof: Roof) -> np.ndarray:
+def measure_visible_areas(roof: Roof) -> np.ndarray:
     """Plan area (m2) where each part is the highest: what is hidden under another does not
     count.
     """
-    xy = raster(roof.outline)
+    xy = make_raster(roof.outline)
     top = np.argmax([part.height_at(xy) for part in roof.parts], axis=0)
     return roof.outline.area * np.bincount(top, minlength=len(roof.parts)) / len(top)
 
@@ -68,7 +68,7 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
 
     A part's width is that of the smallest rectangle around its outlines within the roof's.
     """
-    xy = raster(roof.outline)
+    xy = make_raster(roof.outline)
     heights = np.array([np.nan_to_num(part.height_at(xy), nan=-np.inf) for part in roof.parts])
     top, z = heights.argmax(axis=0), heights.max(axis=0)
     beside = cKDTree(xy)
@@ -94,16 +94,16 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
     return narrow, standing
 
 
-def area_by_type(buildings: Iterable[Building]) -> Counter[str]:
+def sum_area_by_type(buildings: Iterable[Building]) -> Counter[str]:
     """Roof area in plan (m2) that each type of part has in all `buildings`, the largest first."""
     areas: Counter[str] = Counter()
     for roof in (building.roof for building in buildings if building.built is not None):
-        for part, area in zip(roof.parts, visible_areas(roof), strict=True):
+        for part, area in zip(roof.parts, measure_visible_areas(roof), strict=True):
             areas[part.type] += float(area)
     return Counter(dict(areas.most_common()))
 
 
-def named_share(buildings: Iterable[Building]) -> float:
+def measure_named_share(buildings: Iterable[Building]) -> float:
     """Share of the roof area in plan whose part has a type with parameters, "free" being none."""
-    areas = area_by_type(buildings)
+    areas = sum_area_by_type(buildings)
     return 1.0 - areas["free"] / max(areas.total(), 1e-9)

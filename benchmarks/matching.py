@@ -24,7 +24,7 @@ ALONG = ("length", "ridge_length", "t_x", "t_y")
 """What cannot be known of a part whose end runs on under another."""
 
 
-def told_apart(parts: Sequence[Part]) -> list[Part]:
+def merge_alike(parts: Sequence[Part]) -> list[Part]:
     """`parts` where neighbours that nothing tells apart, such as a row's houses under one ridge,
     are one.
 
@@ -32,13 +32,13 @@ def told_apart(parts: Sequence[Part]) -> list[Part]:
     """
     parts = list(parts)
     for k in range(len(parts) - 1, 0, -1):
-        united = one_of(parts[k - 1], parts[k])
+        united = merge_parts(parts[k - 1], parts[k])
         if united is not None:
             parts[k - 1 : k + 1] = [united]
     return parts
 
 
-def one_of(a: Part, b: Part) -> Part | None:
+def merge_parts(a: Part, b: Part) -> Part | None:
     """Two parts of the same planes side by side as one; None where they differ or lie otherwise."""
     if (
         a.type != b.type
@@ -67,7 +67,7 @@ def one_of(a: Part, b: Part) -> Part | None:
     )
 
 
-def matched(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
+def match_parts(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
     """For each true part the index of the fitted one that stands for it at plan points (n, 2), -1
     where none does.
     """
@@ -82,7 +82,7 @@ def matched(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[
     return found
 
 
-def hidden_end(part: Part, others: Sequence[Part]) -> bool:
+def has_hidden_end(part: Part, others: Sequence[Part]) -> bool:
     """Whether one of the two ends of `part`'s length lies under or in the roofs of `others`."""
     if "length" not in part.parameters or len(part.pieces) > 1 or not others:
         return False
@@ -97,7 +97,7 @@ def hidden_end(part: Part, others: Sequence[Part]) -> bool:
     return False
 
 
-def right_types(part: Part, hidden: bool) -> set[str]:
+def list_right_types(part: Part, hidden: bool) -> set[str]:
     """The types a true part may be called by: of a hidden end nothing can be known, and an
     asymmetric gable of equal slopes is a gable whose eaves differ.
     """
@@ -110,7 +110,7 @@ def right_types(part: Part, hidden: bool) -> set[str]:
     )
 
 
-def errors_in_sigmas(truth: Part, fit: Part, hidden: bool) -> dict[str, float]:
+def compute_sigma_errors(truth: Part, fit: Part, hidden: bool) -> dict[str, float]:
     """Error over standard deviation of every parameter that both parts of one type have; none where
     they are turned against each other, none along a part whose end is hidden, none of what the
     footprint gives (a sigma of 0).

@@ -25,14 +25,14 @@ from hiproof.model import Building, Footprint, Part, Roof
 from hiproof.read.assign import assign_points
 from hiproof.simulate import SimBuilding, demo_files, read_truth
 
-from .compounds import compared
+from .compounds import compare_parts
 from .judging import SHARED
-from .matching import right_types
+from .matching import list_right_types
 
 BUILDING_CLASS = 6
 
 
-def demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
+def read_demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
     """True building, points (n, 3) and footprint of each of the demo's buildings, in world
     metres.
     """
@@ -48,7 +48,7 @@ def demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
     return [(truth[f.id], points[index], f) for index, f in zip(own, footprints, strict=True)]
 
 
-def parts_in(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
+def move_parts(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
     """The parts of `roof` in the frame whose origin (world) is `origin` (3,)."""
     shift = roof.frame.origin - origin
     return tuple(
@@ -61,33 +61,33 @@ def parts_in(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
     )
 
 
-def named(parts: tuple[Part, ...]) -> str:
+def name_parts(parts: tuple[Part, ...]) -> str:
     return ", ".join(part.type for part in parts)
 
 
-def judged(truth: SimBuilding, model: Building) -> tuple[bool, bool]:
+def judge_types(truth: SimBuilding, model: Building) -> tuple[bool, bool]:
     """Whether the largest part has its true type, and whether all parts are there with theirs."""
     largest = max(truth.roof.parts, key=lambda part: part.area)
-    main = model.type in right_types(largest, hidden=False)
-    _, every, _ = compared(truth.roof, parts_in(model.roof, truth.roof.frame.origin))
+    main = model.type in list_right_types(largest, hidden=False)
+    _, every, _ = compare_parts(truth.roof, move_parts(model.roof, truth.roof.frame.origin))
     return main, every
 
 
-def demo_report() -> str:
+def report_demo() -> str:
     lines, right = [], []
-    for truth, points, footprint in demo():
+    for truth, points, footprint in read_demo():
         model = reconstruct(points, footprint)
-        right.append(judged(truth, model))
+        right.append(judge_types(truth, model))
         if not all(right[-1]):
             lines.append(
-                f"  {footprint.id} ({truth.kind}): {named(truth.roof.parts)} taken for "
-                f"{named(model.parts)}"
+                f"  {footprint.id} ({truth.kind}): {name_parts(truth.roof.parts)} taken for "
+                f"{name_parts(model.parts)}"
             )
     main, every = np.sum(right, axis=0)
     return "\n".join([f"demo: main type {main}, all parts {every} of {len(right)}", *lines])
 
 
-def labelled_report(folder: Path) -> str:
+def report_labelled(folder: Path) -> str:
     lines, right, parts = [], 0, []
     files = sorted(folder.glob("*/*.pts"))
     for path in files:
@@ -96,7 +96,7 @@ def labelled_report(folder: Path) -> str:
         right += name == path.parent.name
         parts.append(len(model.parts))
         if name != path.parent.name:
-            lines.append(f"  {path.parent.name} {path.stem} taken for {named(model.parts)}")
+            lines.append(f"  {path.parent.name} {path.stem} taken for {name_parts(model.parts)}")
     return "\n".join(
         [
             f"labelled roofs: {right} of {len(files)} right, {np.mean(parts):.2f} parts a roof",
@@ -109,8 +109,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, default=SHARED / "data/roofn3d/labelled")
     arguments = parser.parse_args()
-    print(demo_report(), flush=True)
-    print(labelled_report(arguments.data))
+    print(report_demo(), flush=True)
+    print(report_labelled(arguments.data))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from hiproof.reconstruct import reconstruct
 DATA = Path("../shared/data/roofn3d/nyc_roofs.npz")
 
 
-def fitted(points: np.ndarray, compounds: bool) -> tuple[Fit | Solid, str, int]:
+def fit_points(points: np.ndarray, compounds: bool) -> tuple[Fit | Solid, str, int]:
     """The roof of `points` (n, 3), the type of its largest part, and how many parts it has."""
     if not compounds:
         fit = fit_roof(points)
@@ -51,7 +51,7 @@ def main() -> None:
     types = Counter()
     for k, i in enumerate(chosen):
         roof = slice(offset[i], offset[i + 1])
-        fit, type, parts[k] = fitted(points[roof], arguments.compounds)
+        fit, type, parts[k] = fit_points(points[roof], arguments.compounds)
         judged = points[roof][face[roof] > 0]
         distance[k] = psd(fit, judged).mean()
         overlap[k] = iou(plan_outline(fit), alpha_shape(judged[:, :2]))

@@ -43,7 +43,7 @@ CELL_M = 0.5
 APART = ("amsterdam_west",)  # sets whose files lie apart
 
 
-def simulated(kind: str, density: float, seed: int) -> tuple[np.ndarray, shapely.Polygon]:
+def simulate_house(kind: str, density: float, seed: int) -> tuple[np.ndarray, shapely.Polygon]:
     """Points (n, 3) of a house without the ground's, and its true outline, in its frame; always the
     same for a seed.
     """
@@ -55,28 +55,28 @@ def simulated(kind: str, density: float, seed: int) -> tuple[np.ndarray, shapely
     )
 
 
-def corner_count(outline: shapely.Polygon) -> int:
+def count_corners(outline: shapely.Polygon) -> int:
     return len(shapely.simplify(outline, STRAIGHT_M).exterior.coords) - 1
 
 
-def row(name: str, outcomes: list[tuple[float, bool]]) -> str:
+def make_row(name: str, outcomes: list[tuple[float, bool]]) -> str:
     overlap, right = np.mean(outcomes, axis=0)
     return f"{name:12s} IoU {overlap:.4f}  right number of corners {right:6.1%}"
 
 
-def report_simulated(density: float, seeds: range) -> None:
+def report_simulation(density: float, seeds: range) -> None:
     every = []
     for kind in KINDS:
         outcomes = []
-        for points, truth in (simulated(kind, density, seed) for seed in seeds):
+        for points, truth in (simulate_house(kind, density, seed) for seed in seeds):
             outline = outline_of_points(points)
-            outcomes.append((iou(outline, truth), corner_count(outline) == corner_count(truth)))
-        print(row(f"{density:g}/m2 {kind}", outcomes), flush=True)
+            outcomes.append((iou(outline, truth), count_corners(outline) == count_corners(truth)))
+        print(make_row(f"{density:g}/m2 {kind}", outcomes), flush=True)
         every += outcomes
-    print(row(f"{density:g}/m2 all", every), flush=True)
+    print(make_row(f"{density:g}/m2 all", every), flush=True)
 
 
-def outlined(points: np.ndarray) -> shapely.Polygon:
+def outline_points(points: np.ndarray) -> shapely.Polygon:
     """The outline of points (n, 3), in their own coordinates; empty where they span no area."""
     frame = LocalFrame.around(points)
     try:
@@ -93,7 +93,7 @@ def report_real(name: str) -> None:
     overlaps = [
         row
         for part in ([[f] for f in files] if name in APART else [files])
-        for row in overlaps_of(part, footprints)
+        for row in measure_overlaps(part, footprints)
     ]
     overlap, of_cells, area, outside = np.array(overlaps).T
     print(
@@ -106,7 +106,7 @@ def report_real(name: str) -> None:
     )
 
 
-def overlaps_of(
+def measure_overlaps(
     files: list[Path], footprints: list[shapely.Polygon]
 ) -> list[tuple[float, float, float, float]]:
     """IoU of the outlines and of the points' cells, area (m2) and share of the points outside of
@@ -117,7 +117,7 @@ def overlaps_of(
     joined = shapely.union_all([polygon.buffer(TOUCH_M) for polygon in footprints]).buffer(-TOUCH_M)
     found = split_buildings(cloud)
     outlines = np.array(
-        [shapely.intersection(outlined(cloud.xyz[building.index]), box) for building in found]
+        [shapely.intersection(outline_points(cloud.xyz[building.index]), box) for building in found]
     )
     cells = np.array([cell_area(cloud.xyz[building.index, :2], CELL_M) for building in found])
     touching = shapely.get_parts(shapely.intersection(joined, box))
@@ -149,7 +149,7 @@ def main() -> None:
     parser.add_argument("--real", nargs="*", choices=list(SETS), default=list(SETS))
     a = parser.parse_args()
     for density in a.densities:
-        report_simulated(density, range(a.first_seed, a.first_seed + a.each))
+        report_simulation(density, range(a.first_seed, a.first_seed + a.each))
     for name in a.real:
         report_real(name)
 

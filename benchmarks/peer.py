@@ -58,7 +58,7 @@ ONCE = WHOLE + "tell(start)"
 STEADY = WHOLE + "start = used(); run(); tell(start)"
 
 
-def measured(script: str, inputs: tuple[list[str], str, str]) -> list[float]:
+def measure_process(script: str, inputs: tuple[list[str], str, str]) -> list[float]:
     """CPU seconds, wall seconds and peak memory (MB) that a fresh process tells of itself."""
     environment = {
         **os.environ,
@@ -86,9 +86,9 @@ def main() -> None:
     clouds = sorted(map(str, args.data.glob("*.laz")))
     with tempfile.TemporaryDirectory() as out:
         inputs = (clouds, str(args.data / "footprints.gpkg"), out)
-        measured(ONCE, inputs)  # compiles, where nobody did
+        measure_process(ONCE, inputs)  # compiles, where nobody did
         runs = [
-            [measured(script, inputs) for script in (DECODE, ONCE, STEADY)]
+            [measure_process(script, inputs) for script in (DECODE, ONCE, STEADY)]
             for _ in range(1 if args.quick else args.runs)
         ]
     decode = statistics.median(run[0][0] for run in runs)

@@ -34,7 +34,7 @@ from hiproof.settings import Settings
 from hiproof.simulate import demo_files
 
 from .campaign import find_refused, list_real_runs, list_roof_runs
-from .city import city_files
+from .city import make_city
 
 FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
 OVERRIDES = 50
@@ -43,7 +43,7 @@ FLAT = Settings.from_dict(
 )
 
 
-def requests(
+def list_requests(
     work: Path, data: Path, buildings: int, settings: Settings
 ) -> Iterator[tuple[str, Callable[[], Request]]]:
     """Yield what is run, by name, its input made when called; real data only where they are."""
@@ -56,13 +56,13 @@ def requests(
     yield from list_roof_runs(data, work)
 
     def city() -> Request:
-        clouds, footprints = city_files(work, buildings)
+        clouds, footprints = make_city(work, buildings)
         return Request(tuple(clouds), work / "city", footprints, settings=settings)
 
     yield f"city of {buildings}", city
 
 
-def rebuilt(name: str, request: Request) -> str:
+def rebuild_run(name: str, request: Request) -> str:
     """Run, build again, compare byte by byte."""
     reconstruct_area(request)
     again = request.out.with_name(f"{request.out.name}-again")
@@ -75,7 +75,7 @@ def rebuilt(name: str, request: Request) -> str:
     return f"{name}: {built.buildings} buildings, {refused} refused, {told}"
 
 
-def overridden(request: Request, work: Path) -> str:
+def run_with_overrides(request: Request, work: Path) -> str:
     """The city done again with overrides of every so-many-th building."""
     before = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
     chosen = list(before)[:: max(1, len(before) // OVERRIDES)][:OVERRIDES]
@@ -101,7 +101,7 @@ def overridden(request: Request, work: Path) -> str:
     )
 
 
-def many_lines(work: Path, lines: int) -> str:
+def read_many_lines(work: Path, lines: int) -> str:
     """A file of as many overrides, read and checked."""
     path = work / "many.jsonl"
     with path.open("w") as file:
@@ -136,20 +136,20 @@ def main() -> None:
     work.mkdir(parents=True, exist_ok=True)
     wanted = tuple(asked.only or [""])
     settings = FLAT if asked.flat else Settings()
-    for name, make in requests(work, asked.data, asked.buildings, settings):
+    for name, make in list_requests(work, asked.data, asked.buildings, settings):
         if name.startswith(wanted):
             request = make()
             start, cpu = time.perf_counter(), time.process_time()
-            told = rebuilt(name, request)
+            told = rebuild_run(name, request)
             print(
                 f"{told} ({time.perf_counter() - start:.0f} s, {time.process_time() - cpu:.0f} s "
                 "of CPU)",
                 flush=True,
             )
             if name.startswith("city"):
-                print(overridden(request, work), flush=True)
+                print(run_with_overrides(request, work), flush=True)
     if "lines".startswith(wanted):
-        print(many_lines(work, asked.lines), flush=True)
+        print(read_many_lines(work, asked.lines), flush=True)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,7 @@ Polygons = list[shapely.Polygon]
 Trial = tuple[Polygons, np.ndarray]  # outlines where the shift puts them, and the shift (2,)
 
 
-def set_of(name: str) -> tuple[Polygons, np.ndarray]:
+def read_set(name: str) -> tuple[Polygons, np.ndarray]:
     """Footprints of a set that lie within its cloud, and the cloud's roof points (n, 3)."""
     if name in TOWNS:
         return scan_town(name)
@@ -67,21 +67,23 @@ def set_of(name: str) -> tuple[Polygons, np.ndarray]:
 def scan_town(name: str) -> tuple[Polygons, np.ndarray]:
     """Surveyed footprints of a simulated town and its points (n, 3), walls included."""
     town, rng = read_town(TOWNS[name]), np.random.default_rng(7)
-    polygons = [shifted([building.footprint], rng.normal(0.0, SURVEY_M, 2))[0] for building in town]
-    return polygons, np.concatenate([building.scanned(TOWN_DENSITY) for building in town])
+    polygons = [
+        shift_polygons([building.footprint], rng.normal(0.0, SURVEY_M, 2))[0] for building in town
+    ]
+    return polygons, np.concatenate([building.scan_points(TOWN_DENSITY) for building in town])
 
 
-def vector(distance: float, number: int) -> np.ndarray:
+def draw_vector(distance: float, number: int) -> np.ndarray:
     """A shift (2,) of a length, its direction drawn by chance for each number."""
     azimuth = np.random.default_rng([number, 7]).uniform(-math.pi, math.pi)
     return distance * np.array([math.cos(azimuth), math.sin(azimuth)])
 
 
-def shifted(polygons: Polygons, off: np.ndarray) -> Polygons:
+def shift_polygons(polygons: Polygons, off: np.ndarray) -> Polygons:
     return list(shapely.transform(np.array(polygons), lambda xy: xy + off))
 
 
-def found_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarray:
+def find_row_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarray:
     """What a run moves a row by (2,): nothing where the evidence is not clear."""
     outline = row_outline(row)
     origin = np.floor(outline.bounds[:2])
@@ -90,7 +92,7 @@ def found_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarra
     return shift.xy if shift.is_clear else np.zeros(2)
 
 
-def trials_of(
+def iterate_trials(
     kind: str, polygons: Polygons, distance: float, parity: str | None
 ) -> Iterator[Trial]:
     """Rows as a run sees them, and the vector that the one asked of was shifted by."""
@@ -99,18 +101,20 @@ def trials_of(
     for number, members in enumerate(rows):
         if parity is not None and number % 2 != (parity == "odd"):
             continue
-        off = vector(distance, number)
+        off = draw_vector(distance, number)
         if kind == "row":
-            yield shifted([polygons[i] for i in members], off), off
+            yield shift_polygons([polygons[i] for i in members], off), off
         elif kind == "each":
-            yield from ((shifted([polygons[i]], off), off) for i in members)
+            yield from ((shift_polygons([polygons[i]], off), off) for i in members)
         elif kind in ("one alone", "one of a row") and (len(members) == 1) == (kind == "one alone"):
             house = members[len(members) // 2]
-            beside = [shifted([p], off)[0] if i == house else p for i, p in enumerate(polygons)]
+            beside = [
+                shift_polygons([p], off)[0] if i == house else p for i, p in enumerate(polygons)
+            ]
             yield Outlines(beside).row(house), off
 
 
-def row_line(kind: str, outcomes: list[tuple[np.ndarray, np.ndarray]], distance: float) -> str:
+def make_row(kind: str, outcomes: list[tuple[np.ndarray, np.ndarray]], distance: float) -> str:
     """The figures of some trials: what was found (2,) and the vector (2,)."""
     apart = np.array([np.hypot(*(found + off)) for found, off in outcomes])
     moved = np.array([bool(found.any()) for found, _ in outcomes])
@@ -127,12 +131,12 @@ def main() -> None:
     parser.add_argument("--parity", choices=("even", "odd"), help="every second row")
     arguments = parser.parse_args()
     for name in arguments.sets:
-        polygons, points = set_of(name)
+        polygons, points = read_set(name)
         grid = PointGrid(points)
         print(f"{name}: {len(polygons)} footprints, {len(Outlines(polygons).members)} rows")
         for number, distance in enumerate(DISTANCES_M):
-            off = vector(distance, 100 + number)
-            found = register([(points[:, :2], shifted(polygons, off))])
+            off = draw_vector(distance, 100 + number)
+            found = register([(points[:, :2], shift_polygons(polygons, off))])
             print(
                 f"{'all':13} {distance:3g} m: {np.hypot(*(found.xy + off)):.3f} m from the vector, "
                 f"sigma {max(found.sigma):.3f} m, {'moved' if found.is_clear else 'left'}",
@@ -140,13 +144,13 @@ def main() -> None:
             )
         for kind in ("row", "one alone", "one of a row", "each"):
             for distance in DISTANCES_M:
-                trials = list(trials_of(kind, polygons, distance, arguments.parity))
+                trials = list(iterate_trials(kind, polygons, distance, arguments.parity))
                 if trials:
                     outcomes = [
-                        (found_shift(row, grid, points) if row else np.zeros(2), off)
+                        (find_row_shift(row, grid, points) if row else np.zeros(2), off)
                         for row, off in trials
                     ]
-                    print(row_line(kind, outcomes, distance), flush=True)
+                    print(make_row(kind, outcomes, distance), flush=True)
 
 
 if __name__ == "__main__":

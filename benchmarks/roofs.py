@@ -32,21 +32,21 @@ class TrueRoof:
         return self.primitive.to_theta(self.theta_p, self.kappa, self.translation)
 
 
-def random_roof(name: str, rng: np.random.Generator) -> TrueRoof:
+def draw_roof(name: str, rng: np.random.Generator) -> TrueRoof:
     """An ordinary house of type `name`: 6 to 12 m wide, up to 2.2 times as long, slopes of 20 to 50
     degrees.
     """
     width = rng.uniform(6, 12)
     length = width * (rng.uniform(1.05, 1.3) if name == "pyramid" else rng.uniform(1.3, 2.2))
     height = width / 2 * rng.uniform(0.36, 1.2)
-    theta_p = CATALOGUE[name].typical(width, length, height) | shape_of(
+    theta_p = CATALOGUE[name].typical(width, length, height) | draw_shape(
         name, width, length, height, rng
     )
     kappa, translation = rng.uniform(-np.pi / 2, np.pi / 2), np.array([*rng.uniform(-1, 1, 2), 6.0])
     return TrueRoof(CATALOGUE[name].variant(theta_p), theta_p, kappa, translation)
 
 
-def shape_of(
+def draw_shape(
     name: str, width: float, length: float, height: float, rng: np.random.Generator
 ) -> dict[str, float]:
     """The lengths that make a type what it is, drawn where they can be seen."""
@@ -71,7 +71,7 @@ def shape_of(
         slope = rng.uniform(0.3, 0.9)
         return {"height": slope * width, "end_height": slope * length * rng.uniform(0.8, 1.25)}
     if name == "asymmetric_gable":
-        return asymmetry(width, height, rng)
+        return draw_asymmetry(width, height, rng)
     if name == "gambrel":
         return {
             "break_width": width * rng.uniform(0.5, 0.7),
@@ -85,7 +85,7 @@ def shape_of(
     return {}
 
 
-def asymmetry(width: float, height: float, rng: np.random.Generator) -> dict[str, float]:
+def draw_asymmetry(width: float, height: float, rng: np.random.Generator) -> dict[str, float]:
     """A ridge off the middle and a step between the eaves with which one slope is at least a
     seventh steeper.
     """
@@ -96,9 +96,9 @@ def asymmetry(width: float, height: float, rng: np.random.Generator) -> dict[str
             return {"ridge_offset": offset, "eave_step": step}
 
 
-def catslide(rng: np.random.Generator) -> TrueRoof:
+def draw_catslide(rng: np.random.Generator) -> TrueRoof:
     """A gable whose ridge lies off the middle."""
-    gable = random_roof("gable", rng)
+    gable = draw_roof("gable", rng)
     theta_p = gable.theta_p | {"ridge_offset": gable.theta_p["width"] * rng.uniform(0.08, 0.25)}
     return TrueRoof(gable.primitive.variant(theta_p), theta_p, gable.kappa, gable.translation)
 
@@ -119,7 +119,7 @@ def scan(
     uv = rng.uniform(-half, half, (count, 2))
     c, s = np.cos(roof.kappa), np.sin(roof.kappa)
     xy = uv @ np.array([[c, s], [-s, c]]) + roof.translation[:2]
-    z = roof.primitive.height_at(theta, xy) + paper_noise(count, rng) * noise_rmse_m
+    z = roof.primitive.height_at(theta, xy) + draw_paper_noise(count, rng) * noise_rmse_m
     points = np.column_stack([xy, z])
     outliers = rng.random(count) < outlier_share
     low, high = points.min(axis=0) - (1, 1, 2), points.max(axis=0) + (1, 1, 1)
@@ -127,7 +127,7 @@ def scan(
     return points
 
 
-def paper_noise(count: int, rng: np.random.Generator) -> np.ndarray:
+def draw_paper_noise(count: int, rng: np.random.Generator) -> np.ndarray:
     """Errors in RMSE as the paper draws them: 90 % within 1, 9 % between 1 and 2, 1 % between 2 and
     3, either sign.
     """

@@ -30,10 +30,10 @@ NOISE_M = 0.02
 NEAR_M = 0.2
 
 
-def outline_of(area_m2: float) -> shapely.Polygon:
+def make_outline(area_m2: float) -> shapely.Polygon:
     """Return a rectangle of whole squares of about `area_m2`, twice as long as wide.
 
-    >>> outline_of(800.0).area
+    >>> make_outline(800.0).area
     800.0
     """
     wide = max(1, round(math.sqrt(area_m2 / 2.0) / SQUARE_M))
@@ -41,7 +41,7 @@ def outline_of(area_m2: float) -> shapely.Polygon:
     return shapely.box(0.0, 0.0, long * SQUARE_M, wide * SQUARE_M)
 
 
-def heights(xy: np.ndarray) -> np.ndarray:
+def compute_heights(xy: np.ndarray) -> np.ndarray:
     """Return the heights (n,) of the roof at places `xy` (n, 2)."""
     i, j = (xy // SQUARE_M).astype(int).T
     x, y = (xy % SQUARE_M).T - 0.5 * SQUARE_M
@@ -55,18 +55,18 @@ def heights(xy: np.ndarray) -> np.ndarray:
     return eaves + np.choose((i + 2 * j) % 4, shapes)
 
 
-def points_of(outline: shapely.Polygon, density: float) -> np.ndarray:
+def sample_points(outline: shapely.Polygon, density: float) -> np.ndarray:
     """Return points (n, 3) of the roof over `outline`, `density` a square metre."""
     rng = np.random.default_rng(0)
     low, high = np.reshape(outline.bounds, (2, 2))
     xy = rng.uniform(low, high, (int(density * outline.area), 2))
-    return np.column_stack([xy, heights(xy) + rng.normal(0.0, NOISE_M, len(xy))])
+    return np.column_stack([xy, compute_heights(xy) + rng.normal(0.0, NOISE_M, len(xy))])
 
 
 def measure(area_m2: float, density: float) -> str:
     """Fit and compose one roof; return a row of its figures."""
-    outline = outline_of(area_m2)
-    points = points_of(outline, density)
+    outline = make_outline(area_m2)
+    points = sample_points(outline, density)
     started = time.process_time()
     fit = fit_building(points, outline)
     fitted = time.process_time()

@@ -78,17 +78,17 @@ class Opinion:
         return max(self.network, key=self.network.get)
 
 
-def opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
+def collect_opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
     """Network alone, fit alone on all points, and the evidence of the fit to the network's roof
     points.
     """
     found = segment(points, Settings().replace({"fit": {"types": types}}))
-    alone, informed = fitted(points, types), fitted(points, types, found.weights)
+    alone, informed = fit_or_none(points, types), fit_or_none(points, types, found.weights)
     bics, used = (informed.bics, informed.points_used) if informed else ({}, 0)
     return Opinion(found.types, bics, used, alone.type if alone else None)
 
 
-def fitted(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
+def fit_or_none(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
     try:
         return fit_roof(
             points, settings=Settings.from_dict({"fit": {"types": types}}), weights=weights
@@ -97,7 +97,7 @@ def fitted(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | Non
         return None
 
 
-def three_types(count: int) -> tuple[str, Scores, Scores]:
+def judge_three_types(count: int) -> tuple[str, Scores, Scores]:
     """The paper's configuration: pyramid, gable, hip on simulated clouds with all defects, with
     labels of every point.
     """
@@ -114,38 +114,38 @@ def three_types(count: int) -> tuple[str, Scores, Scores]:
     of_points = Scores.of(
         np.concatenate(true_points), np.concatenate(told_points), (*THREE, "not_roof")
     )
-    text = table(
+    text = make_table(
         ("measure", "reached", "to reach"),
         [
-            ("accuracy", percent(types.accuracy), "98"),
-            ("balanced accuracy", percent(types.balanced_accuracy), "97"),
-            ("lowest recall", percent(types.lowest_recall), "95"),
-            ("mean IoU of point labels", percent(of_points.mean_iou), "85"),
+            ("accuracy", format_percent(types.accuracy), "98"),
+            ("balanced accuracy", format_percent(types.balanced_accuracy), "97"),
+            ("lowest recall", format_percent(types.lowest_recall), "95"),
+            ("mean IoU of point labels", format_percent(of_points.mean_iou), "85"),
         ],
     )
     return text, types, of_points
 
 
-def all_types(
+def judge_all_types(
     count: int, densities: tuple[float, ...] = (2.0, 5.0, 10.0)
 ) -> tuple[str, dict[float, Tally]]:
     """Network, fit and combination on all types with all defects, `count` buildings a density."""
     rows, tallies = [], {}
     for density in densities:
         tally = Tally()
-        for truth, points in simulated(count, density):
-            said = opinion(points)
+        for truth, points in simulate_samples(count, density):
+            said = collect_opinion(points)
             tally.add(truth, network=said.network_alone, fit=said.fit_alone, combined=said.combined)
         tallies[density] = tally
         figures = [
-            percent(tally.scores(method).balanced_accuracy)
+            format_percent(tally.scores(method).balanced_accuracy)
             for method in ("network", "fit", "combined")
         ]
         rows.append((f"{density:g}", *figures))
-    return table(("points/m2", "network alone", "fit alone", "combined"), rows), tallies
+    return make_table(("points/m2", "network alone", "fit alone", "combined"), rows), tallies
 
 
-def simulated(
+def simulate_samples(
     count: int, density: float, seed: int = TEST_SEED
 ) -> Iterator[tuple[str, np.ndarray]]:
     """(type, points) of `count` buildings at one density, all of the scanner's defects in them."""
@@ -161,7 +161,7 @@ DIRECTIONS = {"flat": 0, "monopitch": 1, "gable": 2, "hip": 4, "pyramid": 4}
 """In how many directions a roof of each type slopes."""
 
 
-def the_hague(scans: int) -> tuple[str, Tally] | None:
+def judge_the_hague(scans: int) -> tuple[str, Tally] | None:
     """Held-out shapes of The Hague at 5 points/m2, `scans` scans a type; all of them, and those
     true to their code.
     """
@@ -178,7 +178,7 @@ def the_hague(scans: int) -> tuple[str, Tally] | None:
             cloud = scan_solids([shape.solid], rng, ScanSettings(density=5.0), [shape.type])
             if len(cloud) < POINTS[0] // 2:
                 continue
-            said = opinion(as_sample(cloud, TYPES, TYPES.index(type), rng).xyz)
+            said = collect_opinion(as_sample(cloud, TYPES, TYPES.index(type), rng).xyz)
             answers = {
                 "network": said.network_alone,
                 "fit": said.fit_alone,
@@ -193,7 +193,7 @@ def the_hague(scans: int) -> tuple[str, Tally] | None:
         (
             method,
             *(
-                percent(tally.scores(method).balanced_accuracy)
+                format_percent(tally.scores(method).balanced_accuracy)
                 for tally in (everything, true_to_code)
             ),
         )
@@ -203,9 +203,9 @@ def the_hague(scans: int) -> tuple[str, Tally] | None:
     header = (
         "method",
         "balanced accuracy (combined: 93 to reach)",
-        f"on the {percent(kept)} % true to their code",
+        f"on the {format_percent(kept)} % true to their code",
     )
-    return table(header, rows), everything
+    return make_table(header, rows), everything
 
 
 def is_true_to_code(shape: Shape) -> bool:
@@ -228,23 +228,23 @@ def is_true_to_code(shape: Shape) -> bool:
     return directions == DIRECTIONS[shape.type] and share[~sloped].sum() < 0.1
 
 
-def labelled_roofs() -> str | None:
+def judge_labelled_roofs() -> str | None:
     """The twelve labelled real roofs, never trained on."""
     folder = DATA / "roofn3d" / "labelled"
     if not folder.is_dir():
         return None
     rows, right = [], np.zeros(3, int)
     for path in sorted(folder.glob("*/*.pts")):
-        said, truth = opinion(np.loadtxt(path)[:, :3]), path.parent.name
+        said, truth = collect_opinion(np.loadtxt(path)[:, :3]), path.parent.name
         answers = (said.network_alone, said.fit_alone, said.combined)
         right += [SAME_CODE.get(answer, answer) == truth for answer in answers]
         rows.append((f"{truth}/{path.stem}", *answers))
-    return table(
+    return make_table(
         ("roof", "network alone", "fit alone", "combined"), [*rows, ("right", *map(str, right))]
     )
 
 
-def new_york() -> str | None:
+def judge_new_york() -> str | None:
     """392 real roofs through the whole pipeline with and without the network: distance of their
     roof points.
     """
@@ -261,7 +261,7 @@ def new_york() -> str | None:
                 {"fit": {"parts": parts}, "segment": {"enabled": enabled}}
             )
             distances = [
-                roof_distance(cloud, face > 0, settings)
+                measure_roof_distance(cloud, face > 0, settings)
                 for cloud, face in zip(clouds, faces, strict=True)
             ]
             figures = (np.mean(distances), np.median(distances), np.percentile(distances, 90))
@@ -272,10 +272,10 @@ def new_york() -> str | None:
                     *(f"{figure:.4f} m" for figure in figures),
                 )
             )
-    return table(("parts", "network", "mean", "median", "90th percentile"), rows)
+    return make_table(("parts", "network", "mean", "median", "90th percentile"), rows)
 
 
-def roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) -> float:
+def measure_roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) -> float:
     """Mean distance of a roof's points to the nearest roof surface of its reconstruction, NaN
     counted as 1 m.
     """
@@ -288,7 +288,7 @@ def roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) ->
     return float(point_surface_distances(cloud[is_roof], rings).mean())
 
 
-def speed() -> str:
+def measure_speed() -> str:
     """Time of recognising on one core, types alone as a compound fit needs them and with the
     points' labels, and the size of the weights.
     """
@@ -298,7 +298,7 @@ def speed() -> str:
             np.random.default_rng(0), n_points=(count, count), density=(5.0, 5.0)
         )[0]
         types, labels = (
-            1000 * processor_time(road, points)
+            1000 * measure_processor_time(road, points)
             for road in (segment, lambda points: segment(points).labels)
         )
         rows.append((f"types, {count} points, one core", f"{types:.1f} ms", ""))
@@ -311,10 +311,10 @@ def speed() -> str:
         )
     megabytes = SHIPPED_WEIGHTS.stat().st_size / 1e6
     rows.append(("shipped weights", f"{megabytes:.2f} MB", "8 MB"))
-    return table(("measure", "reached", "to reach"), rows)
+    return make_table(("measure", "reached", "to reach"), rows)
 
 
-def processor_time(
+def measure_processor_time(
     road: Callable[[np.ndarray], object], points: np.ndarray, repeats: int = 100
 ) -> float:
     """Median seconds of processor time of one call, after a first one."""
@@ -332,18 +332,19 @@ def calibrate(count: int) -> None:
     """
     for density in (1.0, 2.0, 5.0, 10.0):
         said = [
-            (truth, opinion(points)) for truth, points in simulated(count, density, TEST_SEED + 1)
+            (truth, collect_opinion(points))
+            for truth, points in simulate_samples(count, density, TEST_SEED + 1)
         ]
         truth = np.array([TYPES.index(name) for name, _ in said])
         line = []
         for exponent in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 1.0):
             told = [next(iter(combine(o.network, o.bics, o.points, exponent))) for _, o in said]
             scores = Scores.of(truth, np.array([TYPES.index(name) for name in told]), TYPES)
-            line.append(f"{exponent:g}: {percent(scores.balanced_accuracy)}")
+            line.append(f"{exponent:g}: {format_percent(scores.balanced_accuracy)}")
         print(f"{density:g} points/m2  " + "  ".join(line), flush=True)
 
 
-def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def make_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     """A Markdown table."""
     lines = [
         "| " + " | ".join(map(str, row)) + " |" for row in (header, ["---"] * len(header), *rows)
@@ -351,11 +352,11 @@ def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join(lines)
 
 
-def percent(share: float) -> str:
+def format_percent(share: float) -> str:
     return f"{100 * share:.1f}"
 
 
-def picture(scores: Scores, title: str, name: str) -> None:
+def draw_confusion(scores: Scores, title: str, name: str) -> None:
     """A confusion matrix as PNG: rows are the truth, in percent of the truth."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -402,13 +403,17 @@ def main() -> None:
         "# Recognising roofs",
         "Written by `python -m benchmarks.segment`. Figures in percent unless they have a unit.",
     ]
-    text, types, points = three_types(1500 // scale)
-    picture(types, "three types, simulated: buildings", "segment_three_types")
-    picture(points, "three types, simulated: points", "segment_three_types_points")
-    parts += ["## Three types, simulated with all defects, network alone", text, recalls(types)]
-    text, tallies = all_types(600 // scale)
+    text, types, points = judge_three_types(1500 // scale)
+    draw_confusion(types, "three types, simulated: buildings", "segment_three_types")
+    draw_confusion(points, "three types, simulated: points", "segment_three_types_points")
+    parts += [
+        "## Three types, simulated with all defects, network alone",
+        text,
+        describe_recalls(types),
+    ]
+    text, tallies = judge_all_types(600 // scale)
     for method in ("network", "fit", "combined"):
-        picture(
+        draw_confusion(
             tallies[5.0].scores(method),
             f"all types, 5 points/m2: {method}",
             f"segment_all_types_{method}",
@@ -417,24 +422,27 @@ def main() -> None:
         "## All types, simulated with all defects: balanced accuracy (combined, 96 to reach at 5)",
         text,
     ]
-    parts += [recalls(tallies[5.0].scores("combined"))]
-    found = the_hague(150 // scale)
+    parts += [describe_recalls(tallies[5.0].scores("combined"))]
+    found = judge_the_hague(150 // scale)
     if found:
-        picture(
+        draw_confusion(
             found[1].scores("combined"), "The Hague, 5 points/m2: combined", "segment_the_hague"
         )
         parts += [
             "## The Hague's held-out shapes, 5 points/m2",
             found[0],
-            recalls(found[1].scores("combined")),
+            describe_recalls(found[1].scores("combined")),
         ]
     for title, text in (
-        ("Twelve labelled real roofs (an asymmetric gable counts as gable)", labelled_roofs()),
+        (
+            "Twelve labelled real roofs (an asymmetric gable counts as gable)",
+            judge_labelled_roofs(),
+        ),
         (
             "392 New York roofs through the pipeline: distance of roof points",
-            None if arguments.quick else new_york(),
+            None if arguments.quick else judge_new_york(),
         ),
-        ("Speed and size", speed()),
+        ("Speed and size", measure_speed()),
     ):
         parts += [f"## {title}", text] if text else []
     report = "\n\n".join(parts) + "\n"
@@ -443,11 +451,11 @@ def main() -> None:
         (HERE / "segment.md").write_text(report)
 
 
-def recalls(scores: Scores) -> str:
+def describe_recalls(scores: Scores) -> str:
     """Recall of every type that occurs, as one sentence."""
     return (
         "Recall: "
-        + ", ".join(f"{name} {percent(recall)}" for name, recall in scores.recalls.items())
+        + ", ".join(f"{name} {format_percent(recall)}" for name, recall in scores.recalls.items())
         + "."
     )
 

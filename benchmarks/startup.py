@@ -27,7 +27,7 @@ DELFT = ROOT.parent / "shared" / "data" / "delft"
 REFERENCE = ["-c", "import numpy"]
 
 
-def cost(arguments: list[str]) -> tuple[float, float]:
+def measure_cost(arguments: list[str]) -> tuple[float, float]:
     """CPU and wall seconds of a process and of those that it starts."""
     environment = {
         **os.environ,
@@ -48,8 +48,8 @@ def cost(arguments: list[str]) -> tuple[float, float]:
 
 def compare(name: str, arguments: list[str], runs: int) -> None:
     """Print the median of `runs` fresh processes after one warm-up, in turn with the reference."""
-    cost(arguments)
-    pairs = [(cost(arguments), cost(REFERENCE)) for _ in range(runs)]
+    measure_cost(arguments)
+    pairs = [(measure_cost(arguments), measure_cost(REFERENCE)) for _ in range(runs)]
     cpu, wall = (statistics.median(mine[k] for mine, _ in pairs) for k in (0, 1))
     ratio = statistics.median(mine[1] / reference[1] for mine, reference in pairs)
     print(

@@ -48,8 +48,8 @@ from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
 from hiproof.write import write_all
 
-from .judging import SHARED, area_by_type, named_share
-from .wireframes import Score, count_wireframes, figures_of, table_by_size, worst_of
+from .judging import SHARED, measure_named_share, sum_area_by_type
+from .wireframes import Score, count_wireframes, list_worst, make_size_table, summarise
 
 TOWNS = {
     "essen": SHARED / "data/towns/essen.city.json",
@@ -75,7 +75,7 @@ class TrueBuilding:
     solids: dict[str, Solid]
     footprint: shapely.Polygon
 
-    def scanned(self, density: float) -> np.ndarray:
+    def scan_points(self, density: float) -> np.ndarray:
         """Points (n, 3) of the building by itself, ground left out, always the same for one id."""
         rng = np.random.default_rng(zlib.crc32(self.id.encode()))
         cloud = scan_solids(
@@ -92,13 +92,13 @@ def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding
     solids = defaultdict(dict)
     for name, solid in read_solids(path):
         solids[objects[name].get("parents", [name])[0]][name] = solid
-    found = [building for id in sorted(solids) for building in touching(id, solids[id])]
+    found = [building for id in sorted(solids) for building in group_touching(id, solids[id])]
     return [building for building in found if building.footprint.area >= smallest_m2]
 
 
-def touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
+def group_touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
     """The solids of one building as one or, where their grounds lie apart, as several."""
-    grounds = {name: ground_of(solid) for name, solid in solids.items()}
+    grounds = {name: find_ground(solid) for name, solid in solids.items()}
     joined = shapely.union_all(
         [ground.buffer(TOUCH_M, join_style="mitre") for ground in grounds.values()]
     )
@@ -107,7 +107,9 @@ def touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
     found = []
     for k, outline in enumerate(outlines):
         own = {
-            name: solids[name] for name, ground in grounds.items() if nearest(ground, outlines) == k
+            name: solids[name]
+            for name, ground in grounds.items()
+            if find_nearest(ground, outlines) == k
         }
         found.append(
             TrueBuilding(id if k == 0 else f"{id}~{k + 1}", own, outline.simplify(TOUCH_M))
@@ -115,12 +117,12 @@ def touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
     return found
 
 
-def nearest(ground: shapely.Geometry, outlines: list[shapely.Polygon]) -> int:
+def find_nearest(ground: shapely.Geometry, outlines: list[shapely.Polygon]) -> int:
     """Index of the outline that covers most of `ground`."""
     return int(np.argmax(shapely.area(shapely.intersection(ground, outlines))))
 
 
-def ground_of(solid: Solid) -> shapely.Geometry:
+def find_ground(solid: Solid) -> shapely.Geometry:
     rings = [
         [solid.vertices[list(ring), :2] for ring in face.rings]
         for face in solid.select_faces(GROUND)
@@ -130,7 +132,7 @@ def ground_of(solid: Solid) -> shapely.Geometry:
     )
 
 
-def chosen(
+def choose_buildings(
     buildings: list, every: int = 1, parity: str | None = None, most: int | None = None
 ) -> list:
     """Every k-th of `buildings`, those at even or odd places, at most so many drawn by a fixed
@@ -177,7 +179,7 @@ def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) ->
     (folder / "run.json").write_text(json.dumps({"inputs": {"clouds": [str(cloud)]}}))
 
 
-def modelled(
+def model_building(
     building: TrueBuilding, points: np.ndarray, with_footprint: bool
 ) -> tuple[Building, float]:
     """One building reconstructed from its scan, and the seconds it took; a bug costs one building,
@@ -197,16 +199,18 @@ def modelled(
     return model, time.process_time() - started
 
 
-def all_modelled(
+def model_all(
     buildings: list[TrueBuilding], points: list[np.ndarray], with_footprint: bool
 ) -> tuple[list[Building], list[float]]:
     """Every building reconstructed, and the seconds that each took."""
-    modelled(buildings[0], points[0], with_footprint)  # loads what is compiled
-    outcomes = [modelled(b, p, with_footprint) for b, p in zip(buildings, points, strict=True)]
+    model_building(buildings[0], points[0], with_footprint)  # loads what is compiled
+    outcomes = [
+        model_building(b, p, with_footprint) for b, p in zip(buildings, points, strict=True)
+    ]
     return [model for model, _ in outcomes], [seconds for _, seconds in outcomes]
 
 
-def times_told(seconds: list[float]) -> str:
+def describe_times(seconds: list[float]) -> str:
     """How long the buildings took, in words."""
     ms = 1e3 * np.array(seconds)
     mean, most = ms.mean(), ms.max()
@@ -216,19 +220,19 @@ def times_told(seconds: list[float]) -> str:
     )
 
 
-def composed(building: TrueBuilding) -> Building:
+def compose_truth(building: TrueBuilding) -> Building:
     """The true roof faces themselves as one shell: what a perfect reconstruction would score."""
     frame = LocalFrame(
         np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0)
     )
     solids = [solid.move(-frame.origin) for solid in building.solids.values()]
-    parts = tuple(Part("free", (piece,)) for solid in solids for piece in roof_pieces(solid))
+    parts = tuple(Part("free", (piece,)) for solid in solids for piece in make_roof_pieces(solid))
     roof = Roof(parts, shapely.transform(building.footprint, frame.to_local), frame)
     solid = compose(roof, min(float(solid.vertices[:, 2].min()) for solid in solids))
     return Building(building.id, Status.MODELLED, built=Model(roof, solid.move(frame.origin)))
 
 
-def roof_pieces(solid: Solid) -> Iterator[Piece]:
+def make_roof_pieces(solid: Solid) -> Iterator[Piece]:
     """A piece for each polygon of the roof's faces; those that stand upright are none."""
     for face in solid.select_faces(ROOF):
         ring = solid.vertices[list(face.rings[0])]
@@ -243,7 +247,7 @@ def roof_pieces(solid: Solid) -> Iterator[Piece]:
                 yield Piece(polygon, np.array([[a, b, centre[2] - a * centre[0] - b * centre[1]]]))
 
 
-def judged(
+def judge_models(
     town: str,
     buildings: list[TrueBuilding],
     models: list[Building],
@@ -255,29 +259,29 @@ def judged(
     write_truth(truth, TOWNS[town], buildings)
     counts = count_wireframes(folder / "buildings.city.jsonl", truth)
     return [
-        Score(b.id, counts[b.id], b.footprint.area, spent, len(m.parts), known_share(m))
+        Score(b.id, counts[b.id], b.footprint.area, spent, len(m.parts), read_share(m))
         for b, m, spent in zip(buildings, models, seconds, strict=True)
         if b.id in counts
     ]
 
 
-def known_share(model: Building) -> float:
+def read_share(model: Building) -> float:
     """Share of the points within 0.2 m of the roof; 0 where there is no model or no measurement."""
     return float(np.nan_to_num(model.quality.share_within_20cm)) if model.solid is not None else 0.0
 
 
-def report_on(scores: list[Score], models: list[Building], worst: int) -> str:
+def report_scores(scores: list[Score], models: list[Building], worst: int) -> str:
     """What there is to say of the scores and the models of a town."""
-    areas = area_by_type(models)
+    areas = sum_area_by_type(models)
     types = ", ".join(f"{name} {area / areas.total():.0%}" for name, area in areas.items())
     without_reserve = sum(model.status is Status.MODELLED for model in models)
     rows = [
-        *figures_of(scores),
+        *summarise(scores),
         f"parts    {np.mean([len(model.parts) for model in models]):.2f} a building; named share"
-        f" {named_share(models):.3f}: {types}",
+        f" {measure_named_share(models):.3f}: {types}",
         f"status   {without_reserve} of {len(models)} modelled without reserve",
-        *table_by_size(scores),
-        *(f"worst    {line}" for line in worst_of(scores, worst)),
+        *make_size_table(scores),
+        *(f"worst    {line}" for line in list_worst(scores, worst)),
     ]
     return "\n".join("  " + row for row in rows)
 
@@ -307,19 +311,19 @@ def main() -> None:
     )
     a = parser.parse_args()
     for town in a.town:
-        buildings = chosen(read_town(TOWNS[town]), a.every, a.parity, a.most)
-        points = [building.scanned(a.density) for building in buildings]
+        buildings = choose_buildings(read_town(TOWNS[town]), a.every, a.parity, a.most)
+        points = [building.scan_points(a.density) for building in buildings]
         if a.composed_truth:
-            models, seconds = list(map(composed, buildings)), [float("nan")] * len(buildings)
+            models, seconds = list(map(compose_truth, buildings)), [float("nan")] * len(buildings)
         else:
-            models, seconds = all_modelled(buildings, points, not a.without_footprints)
-        done = "their true roofs composed" if a.composed_truth else times_told(seconds)
+            models, seconds = model_all(buildings, points, not a.without_footprints)
+        done = "their true roofs composed" if a.composed_truth else describe_times(seconds)
         print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {done}")
         with tempfile.TemporaryDirectory() as temporary:
             folder = (a.save or Path(temporary)) / town
             write_run(folder, models, points)
-            scores = judged(town, buildings, models, seconds, folder)
-            print(report_on(scores, models, a.worst), flush=True)
+            scores = judge_models(town, buildings, models, seconds, folder)
+            print(report_scores(scores, models, a.worst), flush=True)
 
 
 if __name__ == "__main__":

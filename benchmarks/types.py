@@ -18,7 +18,7 @@ import numpy as np
 from hiproof.fit.single import fit_roof
 from hiproof.primitives import CATALOGUE
 
-from .roofs import TrueRoof, catslide, random_roof, scan
+from .roofs import TrueRoof, draw_catslide, draw_roof, scan
 
 DENSITIES = (2.0, 5.0, 10.0)
 
@@ -30,7 +30,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=21, help="of the roofs drawn")
     given = parser.parse_args()
     for density in DENSITIES:
-        taken = Counter(types_of(density, 10 if given.quick else 100, given.seed))
+        taken = Counter(choose_types(density, 10 if given.quick else 100, given.seed))
         right = sum(count for (truth, found), count in taken.items() if truth == found)
         print(
             f"{density:4.0f} points/m2: {100 * right / taken.total():.1f} % of {taken.total()}",
@@ -41,18 +41,18 @@ def main() -> None:
                 print(f"       {truth} taken for {found}: {count}")
 
 
-def types_of(density: float, roofs: int, seed: int) -> Iterator[tuple[str, str]]:
+def choose_types(density: float, roofs: int, seed: int) -> Iterator[tuple[str, str]]:
     """(true type, chosen type) of `roofs` roofs a type."""
-    for roof, points in clouds(density, roofs, seed):
+    for roof, points in draw_clouds(density, roofs, seed):
         yield roof.primitive.name, fit_roof(points).type
 
 
-def clouds(density: float, roofs: int, seed: int) -> Iterator[tuple[TrueRoof, np.ndarray]]:
+def draw_clouds(density: float, roofs: int, seed: int) -> Iterator[tuple[TrueRoof, np.ndarray]]:
     """`roofs` true roofs a type with their points (n, 3)."""
     rng = np.random.default_rng(seed)
     for name in CATALOGUE:
         for number in range(roofs):
-            roof = catslide(rng) if name == "gable" and number % 2 else random_roof(name, rng)
+            roof = draw_catslide(rng) if name == "gable" and number % 2 else draw_roof(name, rng)
             yield roof, scan(roof, density, rng, outlier_share=0.05)
 
 

@@ -47,7 +47,7 @@ from hiproof.model import ROOF, WALL, Building, Model, Solid
 from hiproof.status import Grade
 
 from .towns import STEEPEST
-from .verdict_cases import PLACES, Case, cases
+from .verdict_cases import PLACES, Case, iterate_cases
 
 SOUND_RMSE_M = 0.2
 LEVEL_M, LEVEL_M2, LEVEL_SHARE, LEVEL_WIDTH_M = 0.5, 2.0, 0.02, 1.0
@@ -96,7 +96,7 @@ class Outcome:
         return self.rmse < SOUND_RMSE_M and self.wrong_levels == 0
 
 
-def polygons_of(solids: Iterable[Solid], kinds: tuple[str, ...]) -> Polygons:
+def list_polygons(solids: Iterable[Solid], kinds: tuple[str, ...]) -> Polygons:
     """Faces of `kinds` as lists of rings (m, 3)."""
     return [
         [solid.vertices[list(r)] for r in f.rings]
@@ -111,7 +111,7 @@ def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
     return shapely.make_valid(shapely.Polygon(outer, holes))
 
 
-def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
+def compute_heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
     """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none.
 
     Upright polygons do not count.
@@ -129,12 +129,12 @@ def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(z), z, np.nan)
 
 
-def compared(case: Case, building: Building) -> tuple[float, int]:
+def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
     """RMSE (m) between the true and the model's surface; how many levels are missing or wrong."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.move(-origin) for solid in case.solids], [building.solid.move(-origin)]
     area, seen = shapely.transform([case.truth_area, case.seen_area], lambda xy: xy - origin[:2])
-    everywhere = shapely.union_all([area, *map(plan_of, polygons_of(model, (ROOF,)))])
+    everywhere = shapely.union_all([area, *map(plan_of, list_polygons(model, (ROOF,)))])
     step = max(RASTER_M, float(np.sqrt(everywhere.area / MOST_PLACES)))
     west, south, east, north = everywhere.bounds
     x, y = np.meshgrid(
@@ -144,25 +144,25 @@ def compared(case: Case, building: Building) -> tuple[float, int]:
     )
     xy = np.column_stack([x.ravel(), y.ravel()])
     z_true, z_model = (
-        heights(polygons_of(true, (ROOF,)), xy),
-        heights(polygons_of(model, (ROOF,)), xy),
+        compute_heights(list_polygons(true, (ROOF,)), xy),
+        compute_heights(list_polygons(model, (ROOF,)), xy),
     )
     may_end = np.isnan(z_model) & ~shapely.contains_xy(seen, xy[:, 0], xy[:, 1])
     z_true[may_end | ~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
     gaps = [
         point_surface_distances(
-            np.column_stack([xy, z])[np.isfinite(z)], polygons_of(other, (ROOF, WALL))
+            np.column_stack([xy, z])[np.isfinite(z)], list_polygons(other, (ROOF, WALL))
         )
         for z, other in ((z_true, model), (z_model, true))
     ]
     is_off = (np.isfinite(z_true) != np.isfinite(z_model)) | (np.abs(z_true - z_model) >= LEVEL_M)
-    wrong = patches(
+    wrong = find_patches(
         is_off.reshape(x.shape), step, max(LEVEL_M2, LEVEL_SHARE * case.truth_area.area)
     )
     return float(np.sqrt(np.mean(np.concatenate(gaps) ** 2))), wrong
 
 
-def patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
+def find_patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
     """Patches of a raster (rows, columns) that are LEVEL_WIDTH_M wide and `least_m2` large."""
     width = max(2, round(LEVEL_WIDTH_M / step))
     wide = ndimage.binary_opening(np.pad(is_off, width), np.ones((width, width)))
@@ -184,7 +184,7 @@ def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
         yield asked
 
 
-def outcomes(block: Block, folder: Path | None = None) -> list[Outcome]:
+def judge_block(block: Block, folder: Path | None = None) -> list[Outcome]:
     """Reconstruct and compare the cases of a block, or read them from `folder`.
 
     A building without a model is left out.
@@ -193,18 +193,18 @@ def outcomes(block: Block, folder: Path | None = None) -> list[Outcome]:
     if path and path.exists():
         return pickle.loads(path.read_bytes())
     found = []
-    for case in cases(*block):
+    for case in iterate_cases(*block):
         with collect_evidence() as evidence:
             building = reconstruct(case.points, case.footprint, id=case.id)
         if building.built is not None:
-            wrong = compared(case, building)
+            wrong = compare_surfaces(case, building)
             found.append(Outcome(block, case.id, case.defect, case.area_m2, evidence[-1], *wrong))
     if path:
         path.write_bytes(pickle.dumps(found))
     return found
 
 
-def line(name: str, found: list[Outcome]) -> str:
+def make_line(name: str, found: list[Outcome]) -> str:
     """A row of a table about some outcomes."""
     sound = [outcome for outcome in found if outcome.is_sound]
     cells = [f"{name:24}", f"{len(found):5d}", f"{len(sound) / len(found):6.3f}"]
@@ -218,7 +218,7 @@ def line(name: str, found: list[Outcome]) -> str:
     return " | ".join([*cells, kept])
 
 
-def table(found: list[Outcome]) -> str:
+def make_table(found: list[Outcome]) -> str:
     """Rows for all outcomes, and by density, area, source and defect."""
     groups: dict[str, Callable[[Outcome], bool]] = {"all": lambda outcome: True}
     groups |= {
@@ -237,13 +237,16 @@ def table(found: list[Outcome]) -> str:
         f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
     )
     rows = ((name, [o for o in found if belongs(o)]) for name, belongs in groups.items())
-    return "\n".join([head, *(line(name, own) for name, own in rows if own)])
+    return "\n".join([head, *(make_line(name, own) for name, own in rows if own)])
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--sources", nargs="+", default=["compounds", *sources()], choices=["compounds", *sources()]
+        "--sources",
+        nargs="+",
+        default=["compounds", *list_sources()],
+        choices=["compounds", *list_sources()],
     )
     parser.add_argument("--most", type=int, default=40, help="buildings of each source")
     parser.add_argument(
@@ -277,13 +280,13 @@ def main() -> None:
     with ProcessPoolExecutor(a.processes, mp_context=get_context("spawn")) as pool:
         found = [
             outcome
-            for block in pool.map(outcomes, blocks, [a.keep] * len(blocks))
+            for block in pool.map(judge_block, blocks, [a.keep] * len(blocks))
             for outcome in block
         ]
     for with_footprints in footprints:
         own = [outcome for outcome in found if outcome.block.with_footprints == with_footprints]
         known = "with" if with_footprints else "without"
-        print(f"{a.parity} buildings, {known} footprints\n{table(own)}\n", flush=True)
+        print(f"{a.parity} buildings, {known} footprints\n{make_table(own)}\n", flush=True)
     wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
     for o in wrong[: a.wrong]:
         known = "with" if o.block.with_footprints else "without"
@@ -291,7 +294,7 @@ def main() -> None:
         print(f"{case}: RMSE {o.rmse:.2f} m, wrong levels {o.wrong_levels}")
 
 
-def sources() -> list[str]:
+def list_sources() -> list[str]:
     """The towns whose buildings are scanned, where their truth is here."""
     return [name for name, path in PLACES.items() if path.is_file()]
 

@@ -74,19 +74,19 @@ class Scene:
 Defect = Callable[[Scene, np.random.Generator], Scene]
 
 
-def direction(rng: np.random.Generator) -> np.ndarray:
+def draw_direction(rng: np.random.Generator) -> np.ndarray:
     """A level unit vector (2,) drawn by chance."""
     angle = rng.uniform(-np.pi, np.pi)
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def with_hole(scene: Scene, rng: np.random.Generator) -> Scene:
+def cut_hole(scene: Scene, rng: np.random.Generator) -> Scene:
     """No points on one side of a line: 15 to 60 % of them are missing."""
-    along = scene.points[:, :2] @ direction(rng)
+    along = scene.points[:, :2] @ draw_direction(rng)
     return replace(scene, points=scene.points[along < np.quantile(along, rng.uniform(0.4, 0.85))])
 
 
-def under_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
+def cover_with_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
     """A crown over a tenth to a half of the roof: seven points in ten lie in its leaves."""
     middle = shapely.get_coordinates(scene.footprint)[rng.integers(4)]
     away = np.hypot(*(scene.points[:, :2] - middle).T)
@@ -96,9 +96,9 @@ def under_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
     return replace(scene, points=points)
 
 
-def facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np.ndarray:
+def draw_facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np.ndarray:
     """So many points (count, 3) on the two sides of the outline that face the scanner."""
-    seen_from = direction(rng)
+    seen_from = draw_direction(rng)
     corners = shapely.get_coordinates(shapely.orient_polygons(scene.footprint).exterior)
     edges = np.diff(corners, axis=0)
     outwards = np.column_stack([edges[:, 1], -edges[:, 0]])
@@ -116,34 +116,36 @@ def facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np.ndar
     )
 
 
-def with_facades(scene: Scene, rng: np.random.Generator) -> Scene:
+def add_facades(scene: Scene, rng: np.random.Generator) -> Scene:
     """A fifth to twice as many points on walls as on the roof."""
     count = int(len(scene.points) * rng.uniform(0.2, 2.0)) + 1
-    return replace(scene, points=np.concatenate([scene.points, facade_points(scene, rng, count)]))
+    return replace(
+        scene, points=np.concatenate([scene.points, draw_facade_points(scene, rng, count)])
+    )
 
 
-def walls_alone(scene: Scene, rng: np.random.Generator) -> Scene:
+def keep_walls(scene: Scene, rng: np.random.Generator) -> Scene:
     """Points on two walls and none on the roof."""
-    return replace(scene, points=facade_points(scene, rng, len(scene.points)))
+    return replace(scene, points=draw_facade_points(scene, rng, len(scene.points)))
 
 
-def shifted(scene: Scene, rng: np.random.Generator) -> Scene:
+def shift_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
     """A footprint 0.4 to 1.5 m beside its building."""
-    shift = direction(rng) * rng.uniform(0.4, 1.5)
+    shift = draw_direction(rng) * rng.uniform(0.4, 1.5)
     return replace(scene, footprint=shapely.transform(scene.footprint, lambda xy: xy + shift))
 
 
-def too_wide(scene: Scene, rng: np.random.Generator) -> Scene:
+def widen_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
     """A footprint that takes in a yard beside its building."""
     west, south, east, north = scene.footprint.bounds
-    shift = direction(rng) * rng.uniform(0.1, 0.5) * np.array([east - west, north - south])
+    shift = draw_direction(rng) * rng.uniform(0.1, 0.5) * np.array([east - west, north - south])
     wider = shapely.union_all(
         [scene.footprint, shapely.transform(scene.footprint, lambda xy: xy + shift)]
     )
     return replace(scene, footprint=max(shapely.get_parts(wider), key=shapely.area))
 
 
-def part_alone(scene: Scene, rng: np.random.Generator) -> Scene:
+def halve_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
     """A footprint of one half of the building, as cadastres cut them; the other half is not asked
     for.
     """
@@ -155,34 +157,34 @@ def part_alone(scene: Scene, rng: np.random.Generator) -> Scene:
     return replace(scene, footprint=half, asked=half)
 
 
-def noisy(scene: Scene, rng: np.random.Generator) -> Scene:
+def add_noise(scene: Scene, rng: np.random.Generator) -> Scene:
     """Heights with a further noise of 0.05 to 0.3 m."""
     noise = rng.normal(0.0, rng.uniform(0.05, 0.3), len(scene.points))
     return replace(scene, points=scene.points + np.outer(noise, (0.0, 0.0, 1.0)))
 
 
 OF_POINTS: dict[str, Defect] = {
-    "hole": with_hole,
-    "leaves": under_leaves,
-    "facades": with_facades,
-    "walls alone": walls_alone,
-    "noise": noisy,
+    "hole": cut_hole,
+    "leaves": cover_with_leaves,
+    "facades": add_facades,
+    "walls alone": keep_walls,
+    "noise": add_noise,
 }
 OF_FOOTPRINTS: dict[str, Defect] = {
-    "shifted": shifted,
-    "too wide": too_wide,
-    "part alone": part_alone,
+    "shifted": shift_footprint,
+    "too wide": widen_footprint,
+    "part alone": halve_footprint,
 }
 DEFECTS = OF_POINTS | OF_FOOTPRINTS
 SOUND = ("none", "scanner")
 
 
-def seeded(*words: object) -> np.random.Generator:
+def make_generator(*words: object) -> np.random.Generator:
     """A generator drawn by `words`."""
     return np.random.default_rng(zlib.crc32(" ".join(map(str, words)).encode()))
 
 
-def compound(
+def simulate_compound(
     seed: int,
 ) -> tuple[TrueBuilding, Callable[[np.random.Generator, ScanSettings], np.ndarray]]:
     """A simulated compound as a true building, and what scans it."""
@@ -190,38 +192,42 @@ def compound(
     building = random_compound(rng, COMPOUND_KINDS[seed // 2 % len(COMPOUND_KINDS)])
     solid = compose(building.roof, 0.0)
 
-    def scanned(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
+    def scan_house(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
         cloud = scan(building, rng, settings)
         return cloud.points[cloud.source != SOURCES.index("ground")]
 
     origin = building.roof.frame.origin
-    return TrueBuilding(f"compound-{seed}", {"a": solid.move(origin)}, building.footprint), scanned
+    return TrueBuilding(
+        f"compound-{seed}", {"a": solid.move(origin)}, building.footprint
+    ), scan_house
 
 
-def of_town(building: TrueBuilding) -> Callable[[np.random.Generator, ScanSettings], np.ndarray]:
+def take_from_town(
+    building: TrueBuilding,
+) -> Callable[[np.random.Generator, ScanSettings], np.ndarray]:
     """What scans a building of a town."""
 
-    def scanned(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
+    def scan_house(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
         cloud = scan_solids(list(building.solids.values()), rng, settings)
         return cloud.points[cloud.source != SOURCES.index("ground")]
 
-    return scanned
+    return scan_house
 
 
-def buildings(source: str, most: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
+def iterate_buildings(source: str, most: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
     """Number, truth and scanner of at most so many buildings of a source, evenly chosen, as many
     even as odd ones.
     """
     if source == "compounds":
-        yield from ((seed, *compound(seed)) for seed in range(most))
+        yield from ((seed, *simulate_compound(seed)) for seed in range(most))
         return
     town = read_town(Path(PLACES[source]))
     step = max(1, len(town) // most)
     for number, building in enumerate(town[::step][:most]):
-        yield number, building, of_town(building)
+        yield number, building, take_from_town(building)
 
 
-def where_seen(scene: Scene, density: float) -> shapely.Geometry:
+def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
     """The true area as far as it has points: half a distance between points around them, gaps
     between them closed.
     """
@@ -236,7 +242,7 @@ def where_seen(scene: Scene, density: float) -> shapely.Geometry:
     return scene.asked if found.is_empty else found
 
 
-def cases(
+def iterate_cases(
     source: str, most: int, density: float, with_footprints: bool, parity: str
 ) -> Iterator[Case]:
     """The cases of even or odd buildings of a source at one density.
@@ -244,10 +250,10 @@ def cases(
     Of four buildings one has no defect, one those of the scanner, two have others.
     """
     others = list(DEFECTS if with_footprints else OF_POINTS)
-    for number, building, scanned in buildings(source, most):
+    for number, building, scanned in iterate_buildings(source, most):
         if number % 2 != ("even", "odd").index(parity):
             continue
-        rng = seeded(building.id, density, with_footprints)
+        rng = make_generator(building.id, density, with_footprints)
         kind = number // 2 % 4
         defect = SOUND[kind] if kind < 2 else others[int(rng.integers(len(others)))]
         own = (
@@ -265,7 +271,7 @@ def cases(
             defect,
             tuple(building.solids.values()),
             scene.asked,
-            scene.asked if with_footprints else where_seen(scene, density),
+            scene.asked if with_footprints else find_seen_area(scene, density),
             scene.footprint if with_footprints else None,
             scene.points,
         )

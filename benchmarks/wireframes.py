@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .judging import tool
+from .judging import load_tool
 
 SIZES_M2 = (0.0, 200.0, 400.0, 800.0, np.inf)
 COLUMNS = (
@@ -52,12 +52,12 @@ class WireframeCounts:
     @property
     def edge_f1(self) -> float:
         """F1 (%) of the edges."""
-        return f1(self.right_edges, self.edges, self.true_edges)
+        return compute_f1(self.right_edges, self.edges, self.true_edges)
 
     @property
     def corner_f1(self) -> float:
         """F1 (%) of the corners."""
-        return f1(self.right_corners, self.corners, self.true_corners, self.found_corners)
+        return compute_f1(self.right_corners, self.corners, self.true_corners, self.found_corners)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Score:
     share: float = 0.0
 
 
-def f1(right: int, drawn: int, true: int, found: int | None = None) -> float:
+def compute_f1(right: int, drawn: int, true: int, found: int | None = None) -> float:
     """Return F1 (%) of `right` among `drawn` and of `found` (by default `right`) among `true`."""
     precision, recall = right / max(drawn, 1), (right if found is None else found) / max(true, 1)
     return 200.0 * precision * recall / (precision + recall) if precision + recall else 0.0
@@ -80,7 +80,7 @@ def f1(right: int, drawn: int, true: int, found: int | None = None) -> float:
 
 def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
     """Compare each building of `truth` with its model; a missing one counts as all missed."""
-    judge = tool("wireframe")
+    judge = load_tool("wireframe")
     drawn, counts = judge.solids(models), {}
     for name, parts in judge.solids(truth).items():
         reference, model = judge.wireframe(parts), drawn.get(name, [])
@@ -92,26 +92,26 @@ def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
     return counts
 
 
-def summed(counts: Iterable[WireframeCounts]) -> WireframeCounts:
+def sum_counts(counts: Iterable[WireframeCounts]) -> WireframeCounts:
     """Return the counts of all buildings together, with the mean of the known height errors."""
     rows = np.array([list(vars(one).values()) for one in counts], float)
     *numbers, offset, _ = rows.sum(axis=0)
-    rmse = known(np.mean, rows[:, -1])
+    rmse = measure_finite(np.mean, rows[:, -1])
     return WireframeCounts(*(int(number) for number in numbers), offset, rmse)
 
 
-def known(figure, values: np.ndarray) -> float:
+def measure_finite(figure, values: np.ndarray) -> float:
     """Return `figure` of the values that are no NaN, or NaN where all are."""
     values = values[np.isfinite(values)]
     return float(figure(values)) if len(values) else NAN
 
 
-def figures_of(scores: list[Score]) -> list[str]:
+def summarise(scores: list[Score]) -> list[str]:
     """Return the sentences on all `scores` together: edges, corners, faces and heights."""
-    total, each = summed(score.counts for score in scores), [score.counts for score in scores]
-    rmse = known(np.median, np.array([one.height_rmse_m for one in each]))
+    total, each = sum_counts(score.counts for score in scores), [score.counts for score in scores]
+    rmse = measure_finite(np.median, np.array([one.height_rmse_m for one in each]))
     same = np.mean([one.faces == one.true_faces for one in each])
-    precision, recall = shares_of(total)
+    precision, recall = compute_shares(total)
     offset = total.offset_m / max(total.right_corners, 1)
     times = total.corners / total.true_corners
     rows = [
@@ -129,37 +129,37 @@ def figures_of(scores: list[Score]) -> list[str]:
     return rows
 
 
-def table_by_size(scores: list[Score]) -> list[str]:
+def make_size_table(scores: list[Score]) -> list[str]:
     """Return a head, a row for all `scores` and one for each class of footprint area that has any.
 
     Pairs are the pooled figure and the mean over buildings. Corners and faces are multiples of
     the true number.
     """
-    rows = [aligned(COLUMNS), row_of("all", scores)]
+    rows = [align_cells(COLUMNS), make_row("all", scores)]
     for low, high in pairwise(SIZES_M2):
         found = [score for score in scores if low <= score.area_m2 < high]
-        rows += [row_of(name_of(low, high), found)] if found else []
+        rows += [make_row(name_class(low, high), found)] if found else []
     return rows
 
 
-def shares_of(counts: WireframeCounts) -> tuple[float, float]:
+def compute_shares(counts: WireframeCounts) -> tuple[float, float]:
     """Return precision and recall of the edges."""
     right = counts.right_edges
     return right / max(counts.edges, 1), right / max(counts.true_edges, 1)
 
 
-def name_of(low_m2: float, high_m2: float) -> str:
+def name_class(low_m2: float, high_m2: float) -> str:
     if low_m2 == 0.0:
         return f"< {high_m2:.0f} m2"
     return f"> {low_m2:.0f} m2" if np.isinf(high_m2) else f"{low_m2:.0f}-{high_m2:.0f} m2"
 
 
-def row_of(name: str, scores: list[Score]) -> str:
+def make_row(name: str, scores: list[Score]) -> str:
     """Return the row of one class of footprint area."""
-    total = summed(score.counts for score in scores)
+    total = sum_counts(score.counts for score in scores)
     edges = np.mean([score.counts.edge_f1 for score in scores])
     corners = np.mean([score.counts.corner_f1 for score in scores])
-    precision, recall = shares_of(total)
+    precision, recall = compute_shares(total)
     areas, ms = np.array([s.area_m2 for s in scores]), 1e3 * np.array([s.seconds for s in scores])
     cells = [
         name,
@@ -174,16 +174,16 @@ def row_of(name: str, scores: list[Score]) -> str:
         f"{np.mean([s.parts for s in scores]):.2f}",
         f"{100 * ms.sum() / areas.sum():.1f}, {np.mean(100 * ms / areas):.1f}",
     ]
-    return aligned(cells)
+    return align_cells(cells)
 
 
-def aligned(cells: Iterable[str]) -> str:
+def align_cells(cells: Iterable[str]) -> str:
     """Return the cells of a row in columns, the first one to the left."""
     first, *rest = zip(cells, COLUMNS, strict=True)
     return first[0].ljust(12) + "".join(cell.rjust(max(len(head), 5) + 2) for cell, head in rest)
 
 
-def worst_of(scores: list[Score], most: int) -> list[str]:
+def list_worst(scores: list[Score], most: int) -> list[str]:
     """Return a line for each of the `most` buildings with the worst edges."""
     worst = sorted(scores, key=lambda score: score.counts.edge_f1)[:most]
     return [

@@ -23,12 +23,12 @@ from hiproof import read_points, reconstruct
 from hiproof.classify.split import split_buildings
 from hiproof.model import ROOF, Building
 
-from .judging import SHARED, area_by_type, named_share
+from .judging import SHARED, measure_named_share, sum_area_by_type
 
 SETS = ("stbarth", "ctview")
 
 
-def models_of(name: str) -> tuple[list[tuple[Building, float]], float]:
+def model_found(name: str) -> tuple[list[tuple[Building, float]], float]:
     """Every building found in the set's cloud, reconstructed, and the seconds it took; the seconds
     in which they were found.
     """
@@ -44,7 +44,7 @@ def models_of(name: str) -> tuple[list[tuple[Building, float]], float]:
     return outcomes, splitting
 
 
-def row(building: Building) -> str:
+def make_row(building: Building) -> str:
     types = ", ".join(
         f"{count} {name}" for name, count in Counter(p.type for p in building.parts).most_common()
     )
@@ -57,7 +57,7 @@ def row(building: Building) -> str:
 
 def report(name: str, outcomes: list[tuple[Building, float]], splitting: float) -> str:
     buildings = [building for building, _ in outcomes if building.built is not None]
-    ms, areas = 1e3 * np.array([seconds for _, seconds in outcomes]), area_by_type(buildings)
+    ms, areas = 1e3 * np.array([seconds for _, seconds in outcomes]), sum_area_by_type(buildings)
     return (
         f"{name}: {len(buildings)} of {len(outcomes)} buildings modelled"
         f"  share {np.nanmean([b.quality.share_within_20cm for b in buildings]):.4f}"
@@ -65,8 +65,9 @@ def report(name: str, outcomes: list[tuple[Building, float]], splitting: float) 
         f"  parts {np.mean([len(b.parts) for b in buildings]):.2f} "
         f"({sum(len(b.parts) for b in buildings)})"
         f"  faces {np.mean([len(b.solid.select_faces(ROOF)) for b in buildings]):.2f}"
-        f"  named {named_share(buildings):.3f}  ms median {np.median(ms):.1f} mean {ms.mean():.1f} "
-        f"max {ms.max():.0f}, splitting {splitting:.1f} s\n"
+        f"  named {measure_named_share(buildings):.3f}"
+        f"  ms median {np.median(ms):.1f} mean {ms.mean():.1f} max {ms.max():.0f}, "
+        f"splitting {splitting:.1f} s\n"
         "  " + ", ".join(f"{type} {area / areas.total():.1%}" for type, area in areas.items())
     )
 
@@ -77,13 +78,13 @@ def main() -> None:
     parser.add_argument("--each", action="store_true", help="a line a building")
     arguments = parser.parse_args()
     for name in arguments.set:
-        outcomes, splitting = models_of(name)
+        outcomes, splitting = model_found(name)
         print(report(name, outcomes, splitting), flush=True)
         if arguments.each:
             largest_first = sorted(
                 (b for b, _ in outcomes), key=lambda building: -building.quality.points
             )
-            print("\n".join(row(building) for building in largest_first))
+            print("\n".join(make_row(building) for building in largest_first))
 
 
 if __name__ == "__main__":

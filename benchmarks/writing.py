@@ -39,7 +39,7 @@ WRITERS = {
 }
 
 
-def generated(seed=0):
+def generate_buildings(seed=0):
     """One building of each roof type, in world coordinates."""
     rng = np.random.default_rng(seed)
     for type in ROOF_TYPES:
@@ -58,14 +58,14 @@ def generated(seed=0):
         )
 
 
-def street(buildings, count):
+def iterate_street(buildings, count):
     """`count` buildings with ids of their own."""
     return (
         replace(building, id=f"b{n}") for n, building in enumerate(islice(cycle(buildings), count))
     )
 
 
-def cpu_ms(work, count, runs=5):
+def measure_cpu_ms(work, count, runs=5):
     times = []
     for _ in range(runs):
         start = time.process_time()
@@ -80,23 +80,25 @@ def write_with(writer, path, pairs):
             out.add(building, figures)
 
 
-def peak_mb():
+def measure_peak_mb():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def main(count):
-    buildings = list(generated())
+    buildings = list(generate_buildings())
     with tempfile.TemporaryDirectory() as folder:
         for size in (count // 10, count):
-            write_all(folder, street(buildings, size), "EPSG:7415")
-            print(f"peak memory after {size} buildings: {peak_mb():.0f} MB")
-        some = list(street(buildings, 500))
+            write_all(folder, iterate_street(buildings, size), "EPSG:7415")
+            print(f"peak memory after {size} buildings: {measure_peak_mb():.0f} MB")
+        some = list(iterate_street(buildings, 500))
         figures = [roof_figures(building.solid) for building in some]
-        total = cpu_ms(lambda: [roof_figures(building.solid) for building in some], len(some))
+        total = measure_cpu_ms(
+            lambda: [roof_figures(building.solid) for building in some], len(some)
+        )
         print(f"{'figures of the solid':22} {total:.3f} ms")
         for name, writer in WRITERS.items():
             pairs = list(zip(some, figures, strict=True))
-            spent = cpu_ms(
+            spent = measure_cpu_ms(
                 lambda w=writer, n=name, p=pairs: write_with(w, Path(folder, n), p), len(some)
             )
             total += spent if name != "buildings.gpkg" else 0.0

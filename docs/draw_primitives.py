@@ -27,7 +27,7 @@ HEAD = """# Roof types and their parameters
 """
 
 
-def document() -> str:
+def make_page() -> str:
     """docs/primitives.md."""
     sections = [
         f"## {name}\n\n{', '.join(f'`{p}`' for p in list_parameters(name))}\n\n"
@@ -41,7 +41,7 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     for name in CATALOGUE:
         (FOLDER / f"{name}.svg").write_text(primitive_svg(name))
-    (FOLDER.parent / "primitives.md").write_text(document())
+    (FOLDER.parent / "primitives.md").write_text(make_page())
 
 
 if __name__ == "__main__":

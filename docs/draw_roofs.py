@@ -100,7 +100,7 @@ class Drawn:
         return float(np.mean(np.abs(self.gap) < NEAR_M)) if len(self.gap) else 0.0
 
 
-def modelled(name: str, out: Path) -> Path:
+def run_set(name: str, out: Path) -> Path:
     """Folder of a run over the set `name`, made now.
 
     Raises InputError where the set is not there.
@@ -136,8 +136,8 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
         if model.solid is not None and len(points):
             roof = roofs[model.id]
-            parts = tuple(drawn_part(part, roof.frame.origin) for part in roof.parts)
-            gap = gaps(model.solid, points)
+            parts = tuple(make_part(part, roof.frame.origin) for part in roof.parts)
+            gap = measure_gaps(model.solid, points)
             true_solid = true_solids.get(model.id)
             found.append(
                 Drawn(
@@ -147,7 +147,7 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
     return found
 
 
-def drawn_part(part: Part, shift: np.ndarray) -> DrawnPart:
+def make_part(part: Part, shift: np.ndarray) -> DrawnPart:
     """A part in world coordinates, its polygons made valid."""
     pieces = (piece.move(shift) for piece in part.pieces)
     return DrawnPart(
@@ -155,14 +155,16 @@ def drawn_part(part: Part, shift: np.ndarray) -> DrawnPart:
     )
 
 
-def gaps(solid: Solid, points: np.ndarray) -> np.ndarray:
+def measure_gaps(solid: Solid, points: np.ndarray) -> np.ndarray:
     """Height (n,) of points (n, 3) over the nearest roof face above or below them, NaN where there
     is none.
     """
     nearest = np.full(len(points), np.nan)
     for face in solid.select_faces(ROOF):
-        a, b, c = plane_of(solid.vertices, face)
-        inside = shapely.intersects_xy(outline_of(solid.vertices, face), points[:, 0], points[:, 1])
+        a, b, c = compute_plane(solid.vertices, face)
+        inside = shapely.intersects_xy(
+            make_outline(solid.vertices, face), points[:, 0], points[:, 1]
+        )
         gap = points[inside, 2] - (points[inside, :2] @ (a, b) + c)
         nearest[inside] = np.where(
             np.abs(gap) < np.nan_to_num(np.abs(nearest[inside]), nan=np.inf), gap, nearest[inside]
@@ -170,12 +172,12 @@ def gaps(solid: Solid, points: np.ndarray) -> np.ndarray:
     return nearest
 
 
-def outline_of(vertices: np.ndarray, face: Face) -> shapely.Polygon:
+def make_outline(vertices: np.ndarray, face: Face) -> shapely.Polygon:
     outer, *holes = (vertices[list(ring), :2] for ring in face.rings)
     return shapely.make_valid(shapely.Polygon(outer, holes))
 
 
-def normal_of(vertices: np.ndarray, face: Face) -> np.ndarray:
+def compute_normal(vertices: np.ndarray, face: Face) -> np.ndarray:
     """Unit normal (3,) of a face, outwards."""
     ring = vertices[list(face.rings[0])]
     ring = ring - ring.mean(axis=0)
@@ -183,22 +185,22 @@ def normal_of(vertices: np.ndarray, face: Face) -> np.ndarray:
     return normal / max(np.linalg.norm(normal), 1e-12)
 
 
-def plane_of(vertices: np.ndarray, face: Face) -> tuple[float, float, float]:
+def compute_plane(vertices: np.ndarray, face: Face) -> tuple[float, float, float]:
     """(a, b, c) of z = a x + b y + c through a roof face."""
-    normal, centre = normal_of(vertices, face), vertices[list(face.rings[0])].mean(axis=0)
+    normal, centre = compute_normal(vertices, face), vertices[list(face.rings[0])].mean(axis=0)
     a, b = -normal[:2] / normal[2]
     return a, b, centre[2] - a * centre[0] - b * centre[1]
 
 
-def edges(face: Face) -> list[tuple[int, int]]:
+def list_edges(face: Face) -> list[tuple[int, int]]:
     return [(a, b) for ring in face.rings for a, b in zip(ring, ring[1:] + ring[:1], strict=True)]
 
 
-def roof_lines(solid: Solid) -> list[tuple[str, np.ndarray]]:
+def list_roof_lines(solid: Solid) -> list[tuple[str, np.ndarray]]:
     """(kind, ends (2, 2) in plan) of every edge of a roof face; kinds are those of LINES."""
     faces = solid.select_faces(ROOF)
-    owner = {edge: face for face in faces for edge in edges(face)}
-    border = shapely.union_all([outline_of(solid.vertices, face) for face in faces]).boundary
+    owner = {edge: face for face in faces for edge in list_edges(face)}
+    border = shapely.union_all([make_outline(solid.vertices, face) for face in faces]).boundary
     lines = []
     for (a, b), face in owner.items():
         other, ends = owner.get((b, a)), solid.vertices[[a, b]]
@@ -208,8 +210,8 @@ def roof_lines(solid: Solid) -> list[tuple[str, np.ndarray]]:
         elif a < b:
             along, n, m = (
                 ends[1] - ends[0],
-                normal_of(solid.vertices, face),
-                normal_of(solid.vertices, other),
+                compute_normal(solid.vertices, face),
+                compute_normal(solid.vertices, other),
             )
             bend = np.cross(n, m) @ along / max(np.linalg.norm(along), 1e-9)
             lines.append(
@@ -248,7 +250,7 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
         for ring in face.rings:
             corners = building.truth.vertices[[*ring, ring[0]], :2] - origin
             axes.plot(*corners.T, color="#00a651", linewidth=1.3, linestyle=(0, (4, 2)), zorder=4)
-    for kind, ends in roof_lines(building.solid):
+    for kind, ends in list_roof_lines(building.solid):
         axes.plot(*(ends - origin).T, **LINES[kind], solid_capstyle="round", zorder=3)
     draw_parts(axes, building, origin)
     low, high = shapely.bounds(shapely.MultiPoint(building.solid.vertices[:, :2] - origin)).reshape(
@@ -296,7 +298,7 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
     """The solid from the south-south-west, hidden surfaces removed, roofs in the colours of their
     parts' types.
     """
-    solid, (right, up, back) = with_low_walls(building.solid), view_axes()
+    solid, (right, up, back) = lower_walls(building.solid), compute_view_axes()
     seen = solid.vertices @ np.column_stack([right, up])
     low, high = seen.min(axis=0), seen.max(axis=0)
     step = (high - low).max() / VIEW_PIXELS
@@ -308,8 +310,8 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
     depth, owner = np.full(len(pixels), -np.inf), np.full(len(pixels), -1)
     colours = [(1.0, 1.0, 1.0)]
     for k, face in enumerate(solid.faces):
-        normal = normal_of(solid.vertices, face)
-        colours.append(shaded(colour_of(building, face, normal), normal))
+        normal = compute_normal(solid.vertices, face)
+        colours.append(apply_light(choose_colour(building, face, normal), normal))
         if normal @ back < 1e-6:
             continue
         outer, *holes = (seen[list(ring)] for ring in face.rings)
@@ -323,12 +325,12 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
         nearer = near > depth[inside] + 1e-6
         depth[inside[nearer]], owner[inside[nearer]] = near[nearer], k
     image = np.array(colours)[owner + 1].reshape(len(y), len(x), 3)
-    image[contours(owner.reshape(len(y), len(x)))] = 0.15
+    image[find_contours(owner.reshape(len(y), len(x)))] = 0.15
     axes.imshow(image, origin="lower", interpolation="antialiased")
     axes.set_axis_off()
 
 
-def with_low_walls(solid: Solid) -> Solid:
+def lower_walls(solid: Solid) -> Solid:
     """The solid cut off a little below its lowest eave, so that the view shows roofs."""
     vertices = solid.vertices.copy()
     roof = np.unique(
@@ -338,7 +340,7 @@ def with_low_walls(solid: Solid) -> Solid:
     return Solid(vertices, solid.faces)
 
 
-def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def compute_view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit vectors to the right and up on the picture, and towards the eye."""
     right = np.array([math.cos(VIEW_TURN), math.sin(VIEW_TURN), 0.0])
     back = np.array(
@@ -351,24 +353,24 @@ def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return right, np.cross(back, right), back
 
 
-def colour_of(building: Drawn, face: Face, normal: np.ndarray) -> tuple[float, float, float]:
+def choose_colour(building: Drawn, face: Face, normal: np.ndarray) -> tuple[float, float, float]:
     """The colour of the type that is on top at a roof face's middle; light for walls."""
     if face.kind != ROOF:
         return (0.93, 0.91, 0.87)
     inside = shapely.get_coordinates(
-        outline_of(building.solid.vertices, face).representative_point()
+        make_outline(building.solid.vertices, face).representative_point()
     )
     top = int(np.argmax([part.height_at(inside)[0] for part in building.parts]))
     return matplotlib.colors.to_rgb(building.parts[top].colour)
 
 
-def shaded(colour: tuple[float, float, float], normal: np.ndarray) -> tuple[float, ...]:
+def apply_light(colour: tuple[float, float, float], normal: np.ndarray) -> tuple[float, ...]:
     """A colour under light from the south-west."""
     light = 0.6 + 0.4 * max(float(normal @ (-0.5, -0.4, 0.77)), 0.0)
     return tuple(light * channel for channel in colour)
 
 
-def contours(owner: np.ndarray) -> np.ndarray:
+def find_contours(owner: np.ndarray) -> np.ndarray:
     """Pixels (h, w) whose neighbour above or to the right shows another face."""
     differs = np.zeros(owner.shape, bool)
     differs[:, :-1] |= owner[:, :-1] != owner[:, 1:]
@@ -376,7 +378,7 @@ def contours(owner: np.ndarray) -> np.ndarray:
     return differs
 
 
-def sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
+def draw_sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
     """One page of up to twelve buildings."""
     rows = -(-len(buildings) // COLUMNS)
     figure, axes = plt.subplots(
@@ -405,10 +407,10 @@ def sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
     print(path)
 
 
-def sheets(out: Path, name: str, buildings: list[Drawn], colour: str) -> None:
+def draw_sheets(out: Path, name: str, buildings: list[Drawn], colour: str) -> None:
     size = COLUMNS * ROWS
     for k in range(0, len(buildings), size):
-        sheet(out / f"{name}-{k // size + 1}.png", buildings[k : k + size], colour)
+        draw_sheet(out / f"{name}-{k // size + 1}.png", buildings[k : k + size], colour)
 
 
 def main(words: list[str]) -> None:
@@ -438,16 +440,16 @@ def main(words: list[str]) -> None:
     a.out.mkdir(parents=True, exist_ok=True)
     try:
         buildings = read_run(
-            Path(a.run) if Path(a.run).is_dir() else modelled(a.run, a.out), a.truth
+            Path(a.run) if Path(a.run).is_dir() else run_set(a.run, a.out), a.truth
         )
     except HiproofError as error:
         sys.exit(str(error))
     drawn = np.random.default_rng(a.seed).permutation(len(buildings))[: a.chance]
-    sheets(
+    draw_sheets(
         a.out, "worst", sorted(buildings, key=lambda building: building.share)[: a.worst], a.colour
     )
-    sheets(a.out, "chance", [buildings[k] for k in drawn], a.colour)
-    sheets(
+    draw_sheets(a.out, "chance", [buildings[k] for k in drawn], a.colour)
+    draw_sheets(
         a.out, "asked", [b for b in buildings if any(b.id.endswith(id) for id in a.ids)], a.colour
     )
 

@@ -31,15 +31,15 @@ def on_files(files: Any, config: Any) -> Any:
     return files
 
 
-def commands_text() -> str:
+def describe_commands() -> str:
     """Every command: what it does, its arguments, its options."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     return "# Commands\n\nAs `hiproof COMMAND --help` tells them.\n" + "".join(
-        command_text(name, command) for name, command in sorted(commands.items())
+        describe_command(name, command) for name, command in sorted(commands.items())
     )
 
 
-def command_text(name: str, command: Any) -> str:
+def describe_command(name: str, command: Any) -> str:
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     rows = [(f"`{(p.name or '').upper()}`", p.help or "") for p in arguments]
     rows += [
@@ -47,12 +47,12 @@ def command_text(name: str, command: Any) -> str:
         for p in command.params
         if p not in arguments
     ]
-    table = "".join(f"| {what} | {cell(help)} |\n" for what, help in rows)
+    table = "".join(f"| {what} | {make_cell(help)} |\n" for what, help in rows)
     head = "| argument or option | meaning |\n| --- | --- |\n"
     return f"\n## hiproof {name}\n\n{command.help}\n\n{head if rows else ''}{table}"
 
 
-def settings_text() -> str:
+def describe_settings() -> str:
     """Every setting by section: its default, unit, bounds or choices, meaning, and option where it
     has one.
     """
@@ -69,18 +69,18 @@ def settings_text() -> str:
             "| setting | default | unit | values | meaning | option |\n| --- | --- | --- | --- | "
             "--- | --- |\n"
         )
-        text += "".join(map(setting_row, dataclasses.fields(values)))
+        text += "".join(map(make_setting_row, dataclasses.fields(values)))
     return text
 
 
-def setting_row(field: dataclasses.Field) -> str:
+def make_setting_row(field: dataclasses.Field) -> str:
     told = field.metadata
     bounds = f"{told['low']} to {told['high']}" if told["low"] is not None else ""
     values = ", ".join(f"`{choice}`" for choice in told["choices"]) or bounds
     option = f"`{told['option']}`" if told["option"] else ""
     return (
         f"| `{field.name}` | `{toml_value(field.default)}` | {told['unit']} | {values} | "
-        f"{cell(told['help'])} | {option} |\n"
+        f"{make_cell(told['help'])} | {option} |\n"
     )
 
 
@@ -99,18 +99,20 @@ class Constant(NamedTuple):
         return self.file.partition("/")[0]
 
 
-def constants() -> list[Constant]:
+def list_constants() -> list[Constant]:
     """All numbers that have a name at the top of a module, in the order of files.
 
     The reason is what is written behind the value, on the lines above it, or in the text below it.
     """
-    return [constant for file in sorted(PACKAGE.rglob("*.py")) for constant in constants_of(file)]
+    return [
+        constant for file in sorted(PACKAGE.rglob("*.py")) for constant in list_constants_in(file)
+    ]
 
 
-def constants_of(file: Path) -> Iterator[Constant]:
+def list_constants_in(file: Path) -> Iterator[Constant]:
     text = file.read_text(encoding="utf-8")
     statements = ast.parse(text).body
-    numbers = [s for s in statements if names_of(s) and is_number(s.value)]  # type: ignore[attr-defined]
+    numbers = [s for s in statements if list_names(s) and is_number(s.value)]  # type: ignore[attr-defined]
     # finding comments in all of a file takes long
     last = max((s.end_lineno or 0 for s in numbers), default=0)
     tokens = takewhile(
@@ -142,10 +144,10 @@ def constants_of(file: Path) -> Iterator[Constant]:
         )
         place = file.relative_to(PACKAGE).as_posix()
         why = " ".join(map(str, [*above, *behind, *below]))
-        yield Constant(place, names_of(statement), ast.unparse(statement.value), why)
+        yield Constant(place, list_names(statement), ast.unparse(statement.value), why)
 
 
-def names_of(statement: ast.stmt) -> tuple[str, ...]:
+def list_names(statement: ast.stmt) -> tuple[str, ...]:
     """The names in capitals that a statement gives values to."""
     if not isinstance(statement, (ast.Assign, ast.AnnAssign)) or statement.value is None:
         return ()
@@ -169,7 +171,7 @@ def is_number(value: ast.expr | None) -> bool:
     return isinstance(value, ast.UnaryOp) and is_number(value.operand)
 
 
-def constants_text() -> str:
+def describe_constants() -> str:
     """A table a room: every named number, its value, its file, and what it does or why it is so."""
     text = (
         "# Constants\n\nEvery number that has a name in the code, with its unit and its reason. "
@@ -177,20 +179,24 @@ def constants_text() -> str:
         "[setting](settings.md) instead. `python -m benchmarks.constants NAME` tells what half and "
         "double of one do to Delft.\n"
     )
-    for room, own in groupby(constants(), lambda constant: constant.room):
+    for room, own in groupby(list_constants(), lambda constant: constant.room):
         text += f"\n## {room}\n\n"
         text += "| names | value | file | unit, what it does, why |\n| --- | --- | --- | --- |\n"
         text += "".join(
-            f"| {', '.join(f'`{name}`' for name in c.names)} | `{cell(c.value)}` | {c.file} | "
-            f"{cell(c.why)} |\n"
+            f"| {', '.join(f'`{name}`' for name in c.names)} | `{make_cell(c.value)}` | {c.file} | "
+            f"{make_cell(c.why)} |\n"
             for c in own
         )
     return text
 
 
-def cell(text: str) -> str:
+def make_cell(text: str) -> str:
     """A text as a table's cell holds it."""
     return text.replace("|", "\\|").replace("\n", " ")
 
 
-PAGES = {"commands.md": commands_text, "settings.md": settings_text, "constants.md": constants_text}
+PAGES = {
+    "commands.md": describe_commands,
+    "settings.md": describe_settings,
+    "constants.md": describe_constants,
+}

@@ -10,7 +10,7 @@ COLOURS = {"paper": "#d1495b", "likelihood": "#2e86ab", "ransac": "#e0a100", "pu
 MORE_COLOURS = ("#2a9d5c", "#7b3fa0", "#f08a4b", "#5fc3e4")
 
 
-def new_figure(columns: int = 1, rows: int = 1, width: float = 5.0, height: float = 3.4):
+def make_figure(columns: int = 1, rows: int = 1, width: float = 5.0, height: float = 3.4):
     """A figure without a window, and its axes as a flat list."""
     from matplotlib.figure import Figure
 
@@ -22,15 +22,15 @@ def new_figure(columns: int = 1, rows: int = 1, width: float = 5.0, height: floa
     return figure, list(axes)
 
 
-def colour_of(name: str, index: int) -> str:
+def choose_colour(name: str, index: int) -> str:
     return COLOURS.get(name, MORE_COLOURS[index % len(MORE_COLOURS)])
 
 
-def grouped_bars(
+def draw_grouped_bars(
     groups: Sequence[str], series: dict[str, Sequence[float]], label: str, log: bool = False
 ):
     """A bar a series within each group; NaN and None leave a gap."""
-    figure, (axis,) = new_figure(width=max(5.0, 0.9 * len(groups)))
+    figure, (axis,) = make_figure(width=max(5.0, 0.9 * len(groups)))
     width = 0.8 / len(series)
     for i, (name, values) in enumerate(series.items()):
         heights = np.array([np.nan if value is None else value for value in values], float)
@@ -39,7 +39,7 @@ def grouped_bars(
             heights,
             width,
             label=name,
-            color=colour_of(name, i),
+            color=choose_colour(name, i),
         )
     axis.set_xticks(np.arange(len(groups)), groups, rotation=30, ha="right")
     axis.set_ylabel(label)
@@ -49,20 +49,20 @@ def grouped_bars(
     return figure
 
 
-def curves(
+def draw_curves(
     panels: dict[str, tuple[Sequence[float], dict[str, Sequence[float]]]],
     label: str,
     log: bool = False,
 ):
     """A panel a name: x values and a line a series."""
     columns = min(3, len(panels))
-    figure, axes = new_figure(columns, -(-len(panels) // columns), 4.2, 3.2)
+    figure, axes = make_figure(columns, -(-len(panels) // columns), 4.2, 3.2)
     for axis in axes[len(panels) :]:
         axis.set_visible(False)
     for axis, (title, (x, series)) in zip(axes, panels.items(), strict=False):
         for i, (name, values) in enumerate(series.items()):
             y = np.array([np.nan if value is None else value for value in values], float)
-            axis.plot(range(len(x)), y, "o-", label=name, color=colour_of(name, i))
+            axis.plot(range(len(x)), y, "o-", label=name, color=choose_colour(name, i))
         axis.set_xticks(
             range(len(x)), [f"{value:g}" if isinstance(value, float) else str(value) for value in x]
         )
@@ -74,14 +74,14 @@ def curves(
     return figure
 
 
-def distributions(values: dict[str, np.ndarray], label: str, top: float):
+def draw_distributions(values: dict[str, np.ndarray], label: str, top: float):
     """Histograms over each other and their cumulated shares, both up to `top`."""
-    figure, (left, right) = new_figure(2)
+    figure, (left, right) = make_figure(2)
     bins = np.linspace(0, top, 41)
     for i, (name, numbers) in enumerate(values.items()):
         numbers = np.asarray(numbers, float)
         numbers = numbers[np.isfinite(numbers)]
-        colour = colour_of(name, i)
+        colour = choose_colour(name, i)
         shares = np.full(len(numbers), 1 / max(len(numbers), 1))
         left.hist(
             np.clip(numbers, 0, top),

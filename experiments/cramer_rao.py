@@ -35,7 +35,7 @@ STEP = 1e-6
 THETA_NAMES = ("x", "y", "kappa", "half_width", "half_length", "q0", "q1", "q2", "q3")
 
 
-def best_covariance(
+def compute_best_covariance(
     primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
 ) -> np.ndarray:
     """Covariance (k, k) of the used entries of theta (metres, radians, slopes) that no estimator
@@ -45,9 +45,9 @@ def best_covariance(
     heights nor edges tell (the rotation of a level roof) has an infinite variance.
     """
     theta = np.asarray(theta, float)
-    information = height_information(primitive, theta, density, sigma_m) + edge_information(
-        primitive, theta, density
-    )
+    information = compute_height_information(
+        primitive, theta, density, sigma_m
+    ) + compute_edge_information(primitive, theta, density)
     known = np.diag(information) > 1e-9
     covariance = np.full_like(information, 0.0)
     covariance[np.ix_(known, known)] = np.linalg.inv(information[np.ix_(known, known)])
@@ -55,7 +55,7 @@ def best_covariance(
     return covariance
 
 
-def height_information(
+def compute_height_information(
     primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
 ) -> np.ndarray:
     """I_z (k, k), the integral taken as a midpoint sum over the plan rectangle."""
@@ -64,12 +64,12 @@ def height_information(
     u, v = (axis.ravel() for axis in np.meshgrid(middle * half_length, middle * half_width))
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     xy = np.column_stack([theta[CX] + u * c - v * s, theta[CY] + u * s + v * c])
-    gradient = height_gradient(primitive, theta, xy)
+    gradient = compute_height_gradient(primitive, theta, xy)
     cell_area = 4 * half_width * half_length / GRID**2
     return gradient.T @ gradient * density * cell_area / sigma_m**2
 
 
-def height_gradient(primitive: Primitive, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
+def compute_height_gradient(primitive: Primitive, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
     """Central differences (n, k) of the height at `xy` (n, 2) by the used entries of theta."""
     columns = []
     for i in range(primitive.theta_size):
@@ -80,7 +80,7 @@ def height_gradient(primitive: Primitive, theta: np.ndarray, xy: np.ndarray) -> 
     return np.stack(columns, axis=1)
 
 
-def edge_information(primitive: Primitive, theta: np.ndarray, density: float) -> np.ndarray:
+def compute_edge_information(primitive: Primitive, theta: np.ndarray, density: float) -> np.ndarray:
     """I_xy (k, k): each edge's position is the centre's, plus or minus a half extent."""
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     information = np.zeros((primitive.theta_size,) * 2)
@@ -97,7 +97,7 @@ def edge_information(primitive: Primitive, theta: np.ndarray, density: float) ->
     return information
 
 
-def bounds_by_name(
+def compute_bounds(
     primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
 ) -> dict[str, float]:
     """Least standard deviations: entries of theta (`q0` is the top or eave height), place along and
@@ -105,7 +105,7 @@ def bounds_by_name(
     """
     theta = np.asarray(theta, float)
     size = primitive.theta_size
-    covariance = best_covariance(primitive, theta, density, sigma_m)
+    covariance = compute_best_covariance(primitive, theta, density, sigma_m)
     bounds = {name: math.sqrt(covariance[i, i]) for i, name in enumerate(THETA_NAMES[:size])}
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
@@ -113,12 +113,12 @@ def bounds_by_name(
     bounds["along"] = math.sqrt(np.array([c, s]) @ place @ np.array([c, s]))
     bounds["across"] = math.sqrt(np.array([-s, c]) @ place @ np.array([-s, c]))
     for name in primitive.parameters:
-        gradient = parameter_gradient(primitive, theta, name)
+        gradient = compute_parameter_gradient(primitive, theta, name)
         bounds[name] = math.sqrt(max(gradient @ covariance @ gradient, 0.0))
     return bounds
 
 
-def parameter_gradient(primitive: Primitive, theta: np.ndarray, name: str) -> np.ndarray:
+def compute_parameter_gradient(primitive: Primitive, theta: np.ndarray, name: str) -> np.ndarray:
     """Derivative (k,) of one of theta_p by the used entries of theta."""
     gradient = np.zeros(primitive.theta_size)
     for i in range(HALF_WIDTH, primitive.theta_size):

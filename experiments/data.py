@@ -41,15 +41,15 @@ class RoofSample:
     type: str | None = None
 
 
-def named_samples(options: Options) -> dict[str, list[RoofSample]]:
+def collect_samples(options: Options) -> dict[str, list[RoofSample]]:
     """Every data set at hand by name: New York or the csv given, and simulated roofs."""
     found = {}
     path = options.data or SHARED
     if path.is_file():
-        found["RoofN3D csv"] = list(roofn3d_roofs(path, 3 if options.quick else MOST_ROWS))
+        found["RoofN3D csv"] = list(read_roofn3d_roofs(path, 3 if options.quick else MOST_ROWS))
     elif (path / "roofn3d" / "nyc_roofs.npz").is_file():
         found["New York roofs"] = list(
-            new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 1 if options.quick else None)
+            read_new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 1 if options.quick else None)
         )
     elif options.data is not None:
         raise InputError(
@@ -57,12 +57,12 @@ def named_samples(options: Options) -> dict[str, list[RoofSample]]:
             "--data"
         )
     found["simulated"] = list(
-        simulated_roofs(options.seed, 1 if options.quick else 20, options.quick)
+        simulate_roofs(options.seed, 1 if options.quick else 20, options.quick)
     )
     return found
 
 
-def new_york_roofs(path: Path, most: int | None = None) -> Iterator[RoofSample]:
+def read_new_york_roofs(path: Path, most: int | None = None) -> Iterator[RoofSample]:
     """The roofs of `nyc_roofs.npz`; what a published network took for roof (face > 0) is what
     counts.
     """
@@ -72,7 +72,7 @@ def new_york_roofs(path: Path, most: int | None = None) -> Iterator[RoofSample]:
         yield RoofSample(points, is_roof, alpha_shape(points[is_roof, :2]))
 
 
-def roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
+def read_roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
     """The first buildings of a RoofN3D csv of a class we know, in its order, with at least ten
     points.
     """
@@ -91,7 +91,7 @@ def roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
         yield RoofSample(record.points, np.ones(len(record.points), bool), outline, record.type)
 
 
-def simulated_roofs(seed: int, roofs: int, quick: bool) -> Iterator[RoofSample]:
+def simulate_roofs(seed: int, roofs: int, quick: bool) -> Iterator[RoofSample]:
     """`roofs` of every type as an airborne scanner sees them: chimneys, dormers, trees, missing
     strips, no neighbours.
     """

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .charts import distributions
-from .judge import METHODS, NO_RANSAC, judged_samples
+from .charts import draw_distributions
+from .judge import METHODS, NO_RANSAC, judge_samples
 from .output import Options, Result, Table
 
 SHARES = (5, 25, 50, 75, 95)
@@ -14,7 +14,7 @@ SHARES = (5, 25, 50, 75, 95)
 def run(options: Options) -> Result:
     """Percentiles as tables, curves as pictures, a pair for each data set."""
     tables, pictures = [], {}
-    samples, verdicts = judged_samples(options)
+    samples, verdicts = judge_samples(options)
     for name in samples:
         psd = {
             m: np.array([verdict.psd_mean for verdict in verdicts[name][m].values()])
@@ -23,16 +23,18 @@ def run(options: Options) -> Result:
         iou = {
             m: np.array([verdict.iou for verdict in verdicts[name][m].values()]) for m in METHODS
         }
-        tables.append(percentiles(f"{name}: mean PSD of a roof, m", psd))
-        tables.append(percentiles(f"{name}: outline IoU", iou))
+        tables.append(compute_percentiles(f"{name}: mean PSD of a roof, m", psd))
+        tables.append(compute_percentiles(f"{name}: outline IoU", iou))
         stem = "fig6_" + name.split()[0].lower()
-        pictures[f"{stem}_psd"] = distributions(psd, "mean distance of a roof's points, m", 0.4)
-        pictures[f"{stem}_iou"] = distributions(iou, "outline IoU", 1.0)
+        pictures[f"{stem}_psd"] = draw_distributions(
+            psd, "mean distance of a roof's points, m", 0.4
+        )
+        pictures[f"{stem}_iou"] = draw_distributions(iou, "outline IoU", 1.0)
     data = ", ".join(f"{len(roofs)} {name}" for name, roofs in samples.items())
     return Result("distributions of residuals and IoU", data, tuple(tables), pictures, NO_RANSAC)
 
 
-def percentiles(title: str, values: dict[str, np.ndarray]) -> Table:
+def compute_percentiles(title: str, values: dict[str, np.ndarray]) -> Table:
     known = {method: numbers[np.isfinite(numbers)] for method, numbers in values.items()}
     rows = [
         (method, *map(float, np.percentile(numbers, SHARES)))

@@ -7,7 +7,7 @@ import numpy as np
 from hiproof.model import Fit
 from hiproof.simulate import random_building, uniform_points
 
-from .methods import OBJECTIVES, fit_model, in_parallel
+from .methods import OBJECTIVES, fit_model, run_in_parallel
 from .output import Options, Result, Table
 
 PRIMITIVES = ("gable", "asymmetric_gable")
@@ -32,7 +32,7 @@ def run(options: Options) -> Result:
             if not chosen:
                 continue
             work = [(method, primitive, options.seed, roof) for roof in chosen]
-            found = np.array(in_parallel(errors_of_roof, work, options.jobs))
+            found = np.array(run_in_parallel(measure_errors, work, options.jobs))
             psd, height = found.T
             row = (
                 method,
@@ -52,44 +52,44 @@ def run(options: Options) -> Result:
         f"{roofs} simulated asymmetric gables (unequal slopes or eaves), {DENSITY} points/m2, "
         f"noise {NOISE_M} m"
     )
-    return Result("the asymmetric gable", data, (table,), {"fig7": section(options.seed)})
+    return Result("the asymmetric gable", data, (table,), {"fig7": draw_section(options.seed)})
 
 
-def roof_and_points(seed: int, roof: int):
+def draw_roof_and_points(seed: int, roof: int):
     rng = np.random.default_rng([seed, roof, 77])
     building = random_building(rng, "asymmetric_gable")
     return building, uniform_points(building, rng, DENSITY, NOISE_M)
 
 
-def errors_of_roof(method: str, primitive: str, seed: int, roof: int) -> tuple[float, float]:
+def measure_errors(method: str, primitive: str, seed: int, roof: int) -> tuple[float, float]:
     """Mean PSD, and the RMSE of the fitted surface's heights."""
-    building, points = roof_and_points(seed, roof)
+    building, points = draw_roof_and_points(seed, roof)
     model = fit_model(method, points, (primitive,))
     xy = uniform_points(building, np.random.default_rng(roof), 5.0, 0.0)
     away = model.fit.height_at(xy[:, :2]) - xy[:, 2]
     return float(model.psd(points).mean()), float(np.sqrt(np.nanmean(away**2)))
 
 
-def unequal_slopes(building) -> bool:
+def has_unequal_slopes(building) -> bool:
     """Whether the eaves are level with each other, so that the slopes differ (of equal slopes the
     gable gets the planes).
     """
     return abs(building.parameters["eave_step"]) < 0.2
 
 
-def section(seed: int):
+def draw_section(seed: int):
     """Points and both fits of a roof with unequal slopes, seen along the ridge."""
-    from .charts import new_figure
+    from .charts import make_figure
 
     building, points = next(
         drawn
-        for drawn in (roof_and_points(seed, roof) for roof in range(100))
-        if unequal_slopes(drawn[0])
+        for drawn in (draw_roof_and_points(seed, roof) for roof in range(100))
+        if has_unequal_slopes(drawn[0])
     )
     part = building.roof.parts[0]
     across = np.array([-np.sin(part.kappa), np.cos(part.kappa)])
     centre = part.translation[:2] + building.roof.frame.origin[:2]
-    figure, (axis,) = new_figure(width=7, height=3)
+    figure, (axis,) = make_figure(width=7, height=3)
     axis.plot(
         (points[:, :2] - centre) @ across,
         points[:, 2],

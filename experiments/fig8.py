@@ -17,9 +17,9 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.contract import place_vertices
 from hiproof.simulate import SimBuilding, random_building, uniform_points
 
-from .methods import fit_model, in_parallel
+from .methods import fit_model, run_in_parallel
 from .output import Options, Result, Table
-from .ransac import DetectedPlane, available, detect_planes, least_squares_plane, match_faces
+from .ransac import DetectedPlane, detect_planes, fit_least_squares_plane, is_available, match_faces
 
 LEVELS = {
     "density, points/m2": (10.0, 5.0, 2.0, 1.0, 0.5),
@@ -39,7 +39,7 @@ COLUMNS = (
 
 def run(options: Options) -> Result:
     """One axis of trouble at a time, both methods on the same points."""
-    if not available():
+    if not is_available():
         remark = (
             "Not run: it needs pyransac3d, the extra `experiments` (pip install "
             "'hiproof[experiments]')."
@@ -52,7 +52,7 @@ def run(options: Options) -> Result:
             for method in ("ransac", "likelihood"):
                 work = [(method, what, level, options.seed, roof) for roof in range(roofs)]
                 found, wrong, closed = np.array(
-                    in_parallel(planes_of_roof, work, options.jobs), float
+                    run_in_parallel(match_planes, work, options.jobs), float
                 ).T
                 rows.append(
                     (
@@ -74,7 +74,7 @@ def run(options: Options) -> Result:
         f"{BASE_NOISE_M} m"
     )
     table = Table("Planes found on hip roofs", COLUMNS, rows, note)
-    return Result("against RANSAC plane detection", data, (table,), {"fig8": picture(rows)})
+    return Result("against RANSAC plane detection", data, (table,), {"fig8": draw_picture(rows)})
 
 
 @dataclass(frozen=True)
@@ -91,12 +91,12 @@ class Trouble:
         return cls(**{name: level})
 
     def points(self, building: SimBuilding, rng: np.random.Generator) -> np.ndarray:
-        return without_corner(
+        return remove_corner(
             uniform_points(building, rng, self.density, self.noise_m), building, self.missing_share
         )
 
 
-def without_corner(points: np.ndarray, building: SimBuilding, share: float) -> np.ndarray:
+def remove_corner(points: np.ndarray, building: SimBuilding, share: float) -> np.ndarray:
     """Points (n, 3) less the given share of them nearest to one corner, as a tree's crown hides
     them.
 
@@ -104,7 +104,7 @@ def without_corner(points: np.ndarray, building: SimBuilding, share: float) -> n
     roof's proportions.
     """
     part = building.roof.parts[0]
-    uv = placed_back(
+    uv = turn_back(
         points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa
     )
     uv = uv / [part.parameters["length"], part.parameters["width"]]
@@ -112,12 +112,12 @@ def without_corner(points: np.ndarray, building: SimBuilding, share: float) -> n
     return points[np.sort(order[int(share * len(points)) :])]
 
 
-def placed_back(xy: np.ndarray, kappa: float) -> np.ndarray:
+def turn_back(xy: np.ndarray, kappa: float) -> np.ndarray:
     """Plan vectors (n, 2) turned into the roof's own axes, along and across."""
     return xy @ np.array([[np.cos(kappa), -np.sin(kappa)], [np.sin(kappa), np.cos(kappa)]])
 
 
-def planes_of_roof(
+def match_planes(
     method: str, what: str, level: float, seed: int, roof: int
 ) -> tuple[int, int, bool]:
     """(true faces found, wrong planes, whether exactly the true faces came out)."""
@@ -126,18 +126,20 @@ def planes_of_roof(
     points = Trouble.of(what, level).points(building, rng)
     if len(points) < 4:
         return 0, 0, False
-    planes = detect_planes(points) if method == "ransac" else planes_of_fit(points)
-    found, wrong = match_faces(planes, true_faces(building))
+    planes = detect_planes(points) if method == "ransac" else fit_planes(points)
+    found, wrong = match_faces(planes, list_true_faces(building))
     return found, wrong, found == 4 and wrong == 0
 
 
-def planes_of_fit(points: np.ndarray) -> list[DetectedPlane]:
+def fit_planes(points: np.ndarray) -> list[DetectedPlane]:
     """The faces of the fitted hip as planes."""
     model = fit_model("likelihood", points, ("hip",))
-    return [DetectedPlane(*least_squares_plane(face), np.empty(0, int)) for face in model.polygons]
+    return [
+        DetectedPlane(*fit_least_squares_plane(face), np.empty(0, int)) for face in model.polygons
+    ]
 
 
-def true_faces(building: SimBuilding) -> list[np.ndarray]:
+def list_true_faces(building: SimBuilding) -> list[np.ndarray]:
     """The roof surfaces (m, 3) in world metres."""
     part = building.roof.parts[0]
     primitive = CATALOGUE[part.type]
@@ -149,9 +151,9 @@ def true_faces(building: SimBuilding) -> list[np.ndarray]:
     return [vertices[list(face)] for face in primitive.faces]
 
 
-def picture(rows: list[tuple]):
+def draw_picture(rows: list[tuple]):
     """Share of roofs with a closed and right model, a panel an axis."""
-    from .charts import curves
+    from .charts import draw_curves
 
     panels = {}
     for what in dict.fromkeys(row[0] for row in rows):
@@ -159,4 +161,4 @@ def picture(rows: list[tuple]):
         levels = list(dict.fromkeys(row[1] for row in mine))
         series = {m: [row[5] for row in mine if row[2] == m] for m in ("ransac", "likelihood")}
         panels[what] = (levels, series)
-    return curves(panels, "closed and right")
+    return draw_curves(panels, "closed and right")

@@ -7,12 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from .data import ROOFN3D_TYPES, RoofSample, named_samples
-from .methods import fit_model, in_parallel
+from .data import ROOFN3D_TYPES, RoofSample, collect_samples
+from .methods import fit_model, run_in_parallel
 from .output import Options
-from .ransac import available
+from .ransac import is_available
 
-METHODS = ("paper", "likelihood", *(("ransac",) if available() else ()))
+METHODS = ("paper", "likelihood", *(("ransac",) if is_available() else ()))
 
 
 @dataclass(frozen=True)
@@ -53,24 +53,24 @@ def judge(method: str, sample: RoofSample) -> Verdict:
 
 
 @lru_cache(maxsize=1)
-def judged_samples(
+def judge_samples(
     options: Options,
 ) -> tuple[dict[str, list[RoofSample]], dict[str, dict[str, dict[int, Verdict]]]]:
     """All data sets at hand, and for each the verdicts by method and sample index; kept for the
     next to ask.
     """
-    samples = named_samples(options)
+    samples = collect_samples(options)
     verdicts: dict = {name: {} for name in samples}
     for name, roofs in samples.items():
         for method in METHODS:
             chosen = [i for i in range(len(roofs)) if options.covers(method, i)]
-            found = in_parallel(judge, [(method, roofs[i]) for i in chosen], options.jobs)
+            found = run_in_parallel(judge, [(method, roofs[i]) for i in chosen], options.jobs)
             verdicts[name][method] = dict(zip(chosen, found, strict=True))
     return samples, verdicts
 
 
 NO_RANSAC = (
     ""
-    if available()
+    if is_available()
     else "The RANSAC baseline is left out: pyransac3d (extra `experiments`) is not installed."
 )

@@ -63,7 +63,7 @@ def fit_model(
     return Model([fit.vertices[list(face)] for face in fit.faces], fit)
 
 
-def in_parallel(function: Callable[..., Any], work: Iterable[tuple], jobs: int) -> list[Any]:
+def run_in_parallel(function: Callable[..., Any], work: Iterable[tuple], jobs: int) -> list[Any]:
     """`function(*item)` for every item, in order; with several processes the work is shared out in
     small chunks.
     """

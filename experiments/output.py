@@ -54,7 +54,7 @@ class Table:
             "| " + " | ".join(self.columns) + " |",
             "|" + " --- |" * len(self.columns),
         ]
-        lines += ["| " + " | ".join(map(shown, row)) + " |" for row in self.rows]
+        lines += ["| " + " | ".join(map(format_value, row)) + " |" for row in self.rows]
         return "\n".join([*lines, *(("", self.note) if self.note else ())]) + "\n"
 
     def to_csv(self) -> str:
@@ -79,7 +79,7 @@ class Result:
     remarks: str = ""
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     if value is None or value != value:
         return "–"
     return f"{value:.3f}" if isinstance(value, float) else str(value)

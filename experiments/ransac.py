@@ -46,7 +46,7 @@ class DetectedPlane:
         return np.column_stack([xy, z])
 
 
-def available() -> bool:
+def is_available() -> bool:
     import importlib.util
 
     return importlib.util.find_spec("pyransac3d") is not None
@@ -60,7 +60,7 @@ def detect_planes(
 
     Each plane is refitted to its inliers by least squares. Raises HiproofError without pyransac3d.
     """
-    if not available():
+    if not is_available():
         raise HiproofError(
             "expected the package pyransac3d for the RANSAC baseline; pip install "
             "'hiproof[experiments]'"
@@ -79,14 +79,14 @@ def detect_planes(
         inliers = left[chosen]
         if len(inliers) < least:
             break
-        normal, offset = least_squares_plane(points[inliers])
+        normal, offset = fit_least_squares_plane(points[inliers])
         left = np.setdiff1d(left, inliers)
         if normal[2] > STEEPEST:
             planes.append(DetectedPlane(normal, offset, inliers))
     return planes
 
 
-def least_squares_plane(points: np.ndarray) -> tuple[np.ndarray, float]:
+def fit_least_squares_plane(points: np.ndarray) -> tuple[np.ndarray, float]:
     """Unit normal pointing up and offset of the plane nearest to `points` (n, 3)."""
     centre = points.mean(axis=0)
     normal = np.linalg.eigh((points - centre).T @ (points - centre))[1][:, 0]
@@ -110,7 +110,7 @@ def match_faces(
     for plane in planes:
         best = None
         for i, face in enumerate(faces):
-            normal, _ = least_squares_plane(face)
+            normal, _ = fit_least_squares_plane(face)
             angle = np.degrees(np.arccos(np.clip(normal @ plane.normal, -1, 1)))
             away = abs(face.mean(axis=0) @ plane.normal + plane.offset)
             if angle < angle_deg and away < distance_m and (best is None or angle < best[0]):

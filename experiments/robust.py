@@ -11,11 +11,11 @@ import shapely
 
 from hiproof.simulate import SimBuilding, random_building, uniform_points
 
-from .charts import curves
-from .fig8 import placed_back, true_faces, without_corner
-from .methods import fit_model, in_parallel
+from .charts import draw_curves
+from .fig8 import list_true_faces, remove_corner, turn_back
+from .methods import fit_model, run_in_parallel
 from .output import Options, Result, Table
-from .ransac import available, detect_planes, match_faces
+from .ransac import detect_planes, is_available, match_faces
 
 BASE_DENSITY, BASE_NOISE_M = 4.72, 0.12
 AXES = {
@@ -54,12 +54,12 @@ def run(options: Options) -> Result:
                 for kind in kinds
                 for roof in range(roofs)
             ]
-            outcomes = in_parallel(errors_of_roof, work, options.jobs)
-            rows.append((what, level, *figures(outcomes)))
+            outcomes = run_in_parallel(measure_errors, work, options.jobs)
+            rows.append((what, level, *compute_figures(outcomes)))
     table = Table("Errors of width, length, height (and ridge length)", COLUMNS, rows, NOTE)
     roofs_a_level = " and ".join(f"{roofs} {kind}s" for kind in kinds)
     data = f"{roofs_a_level} a level, otherwise {BASE_DENSITY} points/m2, noise {BASE_NOISE_M} m"
-    return Result("robustness", data, (table,), {"robust": picture(rows)})
+    return Result("robustness", data, (table,), {"robust": draw_picture(rows)})
 
 
 NOTE = (
@@ -75,7 +75,7 @@ NOTE = (
 )
 
 
-def figures(outcomes: list[dict]) -> tuple:
+def compute_figures(outcomes: list[dict]) -> tuple:
     """RMSE and median of the absolute dimension errors of each method, and RANSAC's missed
     share.
     """
@@ -92,13 +92,13 @@ def figures(outcomes: list[dict]) -> tuple:
     return (*cells, float(np.mean(missed)) if missed else None)
 
 
-def errors_of_roof(
+def measure_errors(
     what: str, level: float, kind: str, seed: int, roof: int, methods: tuple[str, ...] = METHODS
 ) -> dict:
     """Dimension errors (k,) by method (NaN without a fit), and the share of faces RANSAC misses."""
     rng = np.random.default_rng([seed, roof, KINDS.index(kind), 99])
     building = random_building(rng, kind)
-    points, outline = troubled(building, what, level, rng)
+    points, outline = add_trouble(building, what, level, rng)
     truth = building.roof.parts[0].parameters
     outcome: dict = {}
     for method in methods:
@@ -106,17 +106,17 @@ def errors_of_roof(
         outcome[method] = np.array(
             [fit.parameters[name] - v if fit else math.nan for name, v in truth.items()]
         )
-    outcome["missed"] = missed_share(points, building) if available() else None
+    outcome["missed"] = measure_missed_share(points, building) if is_available() else None
     return outcome
 
 
-def missed_share(points: np.ndarray, building: SimBuilding) -> float:
-    faces = true_faces(building)
+def measure_missed_share(points: np.ndarray, building: SimBuilding) -> float:
+    faces = list_true_faces(building)
     found, _ = match_faces(detect_planes(points), faces) if len(points) > 3 else (0, 0)
     return 1 - found / len(faces)
 
 
-def troubled(
+def add_trouble(
     building: SimBuilding, what: str, level: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, shapely.Polygon | None]:
     """Points of the building with one kind of trouble, and the footprint the fit is given,
@@ -126,11 +126,11 @@ def troubled(
     noise_m = level if what.startswith("noise") else BASE_NOISE_M
     points = uniform_points(building, rng, density, noise_m)
     if what == "missing at a corner":
-        return without_corner(points, building, level), None
+        return remove_corner(points, building, level), None
     if what == "missing strip":
-        return without_strip(points, building, level, rng), None
+        return remove_strip(points, building, level, rng), None
     if what == "outliers":
-        return with_outliers(points, level, rng), None
+        return add_outliers(points, level, rng), None
     if what.startswith("footprint"):
         angle = rng.uniform(0, 2 * math.pi)
         shift = level * np.array([math.cos(angle), math.sin(angle)])
@@ -138,14 +138,14 @@ def troubled(
     return points, None
 
 
-def without_strip(
+def remove_strip(
     points: np.ndarray, building: SimBuilding, share: float, rng: np.random.Generator
 ) -> np.ndarray:
     """Points less those in a band across the ridge that takes the given share of the length, a
     tenth left at each end (a band at the end would only make a shorter roof).
     """
     part = building.roof.parts[0]
-    along = placed_back(
+    along = turn_back(
         points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa
     )[:, 0]
     length = part.parameters["length"]
@@ -153,7 +153,7 @@ def without_strip(
     return points[(along < start) | (along > start + share * length)]
 
 
-def with_outliers(points: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+def add_outliers(points: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
     """Points of which the given share is replaced by draws from their box, 2 m higher and lower."""
     points = points.copy()
     chosen = rng.random(len(points)) < share
@@ -162,11 +162,11 @@ def with_outliers(points: np.ndarray, share: float, rng: np.random.Generator) ->
     return points
 
 
-def picture(rows: list[tuple]):
+def draw_picture(rows: list[tuple]):
     """Dimension RMSE of both objectives, a panel an axis."""
     panels = {}
     for what in AXES:
         mine = [row for row in rows if row[0] == what]
         series = {"paper": [row[2] for row in mine], "likelihood": [row[4] for row in mine]}
         panels[what] = ([row[1] for row in mine], series)
-    return curves(panels, "dimension RMSE, m", log=True)
+    return draw_curves(panels, "dimension RMSE, m", log=True)

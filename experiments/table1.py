@@ -12,7 +12,7 @@ from hiproof.segment import NOT_ROOF, Segmentation, segment
 from hiproof.segment.scores import Scores
 from hiproof.simulate import ROOF_TYPES, training_sample
 
-from .data import MOST_ROWS, ROOFN3D_TYPES, SHARED, roofn3d_roofs
+from .data import MOST_ROWS, ROOFN3D_TYPES, SHARED, read_roofn3d_roofs
 from .output import Options, Result, Table
 
 TYPES = ROOF_TYPES
@@ -39,30 +39,32 @@ def run(options: Options) -> Result:
     answers = [segment(points) for points, _, _ in samples]
     true_labels = np.concatenate([labels for _, labels, _ in samples])
     labels = Scores.of(
-        true_labels, np.concatenate([labels_of(answer) for answer in answers]), LABELS
+        true_labels, np.concatenate([list_labels(answer) for answer in answers]), LABELS
     )
     types = Scores.of(
-        np.array([kind for _, _, kind in samples]), np.array([type_of(a) for a in answers]), TYPES
+        np.array([kind for _, _, kind in samples]),
+        np.array([get_type_index(a) for a in answers]),
+        TYPES,
     )
-    tables = [label_table(labels), *type_tables("simulated", types)]
+    tables = [make_label_table(labels), *make_type_tables("simulated", types)]
     data = f"{count} simulated roofs of ten types, not trained on, with clutter, trees and gaps"
-    labelled = list(labelled_roofs(options))
+    labelled = list(read_labelled_roofs(options))
     if labelled:
         truth = np.array([TYPES.index(kind) for kind, _ in labelled])
-        told = np.array([type_of(segment(points)) for _, points in labelled])
-        tables += type_tables("labelled RoofN3D roofs", Scores.of(truth, told, TYPES))
+        told = np.array([get_type_index(segment(points)) for _, points in labelled])
+        tables += make_type_tables("labelled RoofN3D roofs", Scores.of(truth, told, TYPES))
         data += f"; {len(labelled)} labelled RoofN3D roofs"
     return Result("segmentation and roof types", data, tuple(tables), remarks=REMARKS)
 
 
-def labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
+def read_labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
     """(type, points (n, 3)) of the RoofN3D csv given, else of the few labelled roofs in the shared
     data.
     """
     if options.data is not None and options.data.is_file():
         yield from (
             (roof.type, roof.points)
-            for roof in roofn3d_roofs(options.data, 20 if options.quick else MOST_ROWS)
+            for roof in read_roofn3d_roofs(options.data, 20 if options.quick else MOST_ROWS)
         )
         return
     for kind in ROOFN3D_TYPES:
@@ -71,16 +73,16 @@ def labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
             yield kind, np.loadtxt(path)[:, :3]
 
 
-def labels_of(answer: Segmentation) -> np.ndarray:
+def list_labels(answer: Segmentation) -> np.ndarray:
     """Labels (n,) as indices into LABELS."""
     return np.where(answer.labels == NOT_ROOF, len(TYPES), answer.labels)
 
 
-def type_of(answer: Segmentation) -> int:
+def get_type_index(answer: Segmentation) -> int:
     return TYPES.index(answer.type)
 
 
-def label_table(scores: Scores) -> Table:
+def make_label_table(scores: Scores) -> Table:
     """IoU of each label over all points, and the mean."""
     truth, told, both = (
         scores.confusion.sum(axis=1),
@@ -94,7 +96,7 @@ def label_table(scores: Scores) -> Table:
     return Table("simulated: labels of points", ("label", "points", "IoU"), rows)
 
 
-def type_tables(name: str, scores: Scores) -> list[Table]:
+def make_type_tables(name: str, scores: Scores) -> list[Table]:
     """Accuracy, balanced accuracy and recalls, and the confusion matrix."""
     rows = [("accuracy", scores.accuracy), ("balanced accuracy", scores.balanced_accuracy)]
     rows += [(f"recall of {kind}", value) for kind, value in scores.recalls.items()]

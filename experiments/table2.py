@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .data import RoofSample
-from .judge import METHODS, NO_RANSAC, Verdict, judged_samples
+from .judge import METHODS, NO_RANSAC, Verdict, judge_samples
 from .output import Options, Result, Table
 
 COLUMNS = (
@@ -38,18 +38,20 @@ UNEXPLAINED_M = 0.2
 def run(options: Options) -> Result:
     """All data sets at hand, all methods."""
     tables, remarks = [], [NO_RANSAC]
-    samples, verdicts = judged_samples(options)
+    samples, verdicts = judge_samples(options)
     for name, roofs in samples.items():
-        rows = [row for method in METHODS for row in rows_of(method, roofs, verdicts[name][method])]
+        rows = [
+            row for method in METHODS for row in make_rows(method, roofs, verdicts[name][method])
+        ]
         tables.append(Table(name, COLUMNS, rows, NOTE))
-        remarks.append(unexplained(name, verdicts[name]["likelihood"]))
+        remarks.append(describe_unexplained(name, verdicts[name]["likelihood"]))
     data = ", ".join(f"{len(roofs)} {name}" for name, roofs in samples.items())
     return Result(
         "residuals and outlines", data, tuple(tables), remarks="\n\n".join(filter(None, remarks))
     )
 
 
-def rows_of(
+def make_rows(
     method: str, samples: Sequence[RoofSample], verdicts: dict[int, Verdict]
 ) -> list[tuple]:
     """Overall, then by true type where it is known, else by the type the method chose."""
@@ -57,11 +59,12 @@ def rows_of(
     for index, verdict in verdicts.items():
         groups.setdefault(samples[index].type or verdict.type, []).append(verdict)
     return [
-        (method, kind, *figures(groups[kind])) for kind in ("all", *sorted(groups.keys() - {"all"}))
+        (method, kind, *compute_figures(groups[kind]))
+        for kind in ("all", *sorted(groups.keys() - {"all"}))
     ]
 
 
-def figures(verdicts: Sequence[Verdict]) -> tuple:
+def compute_figures(verdicts: Sequence[Verdict]) -> tuple:
     means = np.array([verdict.psd_mean for verdict in verdicts])
     stds = np.array([verdict.psd_std for verdict in verdicts])
     ious = np.array([verdict.iou for verdict in verdicts])
@@ -78,7 +81,7 @@ def figures(verdicts: Sequence[Verdict]) -> tuple:
     )
 
 
-def unexplained(name: str, verdicts: dict[int, Verdict]) -> str:
+def describe_unexplained(name: str, verdicts: dict[int, Verdict]) -> str:
     """Which roofs no single primitive fits."""
     far = [i for i, verdict in verdicts.items() if not verdict.psd_mean <= UNEXPLAINED_M]
     if not far:

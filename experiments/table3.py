@@ -16,8 +16,8 @@ from hiproof.primitives import CATALOGUE, Primitive
 from hiproof.primitives.contract import KAPPA, Q1, Q2, Q3
 from hiproof.simulate import ROOF_TYPES, random_building, uniform_points
 
-from .cramer_rao import HEIGHTS_AND_SLOPES, THETA_NAMES, bounds_by_name
-from .methods import OBJECTIVES, fit_model, in_parallel
+from .cramer_rao import HEIGHTS_AND_SLOPES, THETA_NAMES, compute_bounds
+from .methods import OBJECTIVES, fit_model, run_in_parallel
 from .output import Options, Result, Table
 
 DENSITY, NOISE_M = 4.72, 0.12
@@ -42,14 +42,17 @@ def run(options: Options) -> Result:
     tables, errors = [], {}
     for method in OBJECTIVES:
         for kind in ("gable", "hip") if options.quick else ROOF_TYPES:
-            errors[method, kind] = errors_of_type(method, kind, options)
+            errors[method, kind] = measure_type_errors(method, kind, options)
     kinds = list(dict.fromkeys(kind for _, kind in errors))
     tables.append(
         Table(
-            "Errors by type", ERROR_COLUMNS, [error_row(kind, errors) for kind in kinds], ERROR_NOTE
+            "Errors by type",
+            ERROR_COLUMNS,
+            [make_error_row(kind, errors) for kind in kinds],
+            ERROR_NOTE,
         )
     )
-    rows = [row for kind in kinds for row in bound_rows(kind, errors)]
+    rows = [row for kind in kinds for row in make_bound_rows(kind, errors)]
     tables.append(Table("Against the Cramer-Rao bound", BOUND_COLUMNS, rows, BOUND_NOTE))
     roofs = "2 roofs x 1 trial" if options.quick else f"{ROOFS} roofs x {TRIALS} trials a type"
     data = (
@@ -57,11 +60,14 @@ def run(options: Options) -> Result:
         f"{SIGMA_M:.4f} m"
     )
     return Result(
-        "stability under simulated points", data, tuple(tables), {"table3": picture(kinds, errors)}
+        "stability under simulated points",
+        data,
+        tuple(tables),
+        {"table3": draw_picture(kinds, errors)},
     )
 
 
-def errors_of_type(method: str, kind: str, options: Options) -> list[dict[str, float]]:
+def measure_type_errors(method: str, kind: str, options: Options) -> list[dict[str, float]]:
     """One record a fit: errors of theta, theta_p and place, and their bounds."""
     trials = TRIALS if method == "likelihood" or kind in PUBLISHED else TRIALS_OF_SLOW
     if method == "paper":
@@ -69,11 +75,13 @@ def errors_of_type(method: str, kind: str, options: Options) -> list[dict[str, f
     roofs, trials = (2, 1) if options.quick else (ROOFS, trials)
     work = [(method, kind, options.seed, roof, trials) for roof in range(roofs)]
     return [
-        record for records in in_parallel(errors_of_roof, work, options.jobs) for record in records
+        record
+        for records in run_in_parallel(measure_roof_errors, work, options.jobs)
+        for record in records
     ]
 
 
-def errors_of_roof(
+def measure_roof_errors(
     method: str, kind: str, seed: int, roof: int, trials: int
 ) -> list[dict[str, float]]:
     """Fits of one roof; both methods see the same points."""
@@ -84,7 +92,7 @@ def errors_of_roof(
     truth = primitive.canonical_theta(
         primitive.to_theta(part.parameters, part.kappa, part.translation)
     )
-    bounds = bounds_by_name(primitive, truth, DENSITY, SIGMA_M)
+    bounds = compute_bounds(primitive, truth, DENSITY, SIGMA_M)
     records = []
     for _ in range(trials):
         fit = fit_model(method, uniform_points(building, rng, DENSITY, NOISE_M), (kind,)).fit
@@ -93,15 +101,15 @@ def errors_of_roof(
             found = (
                 CATALOGUE[kind].variant(fit.parameters).to_theta(fit.parameters, fit.kappa, place)
             )
-            records.append(record_of(primitive, truth, found, bounds))
+            records.append(record_errors(primitive, truth, found, bounds))
     return records
 
 
-def record_of(
+def record_errors(
     primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds: dict[str, float]
 ) -> dict[str, float]:
     """Errors of `found` against `truth` (theta (9,)), each name with its `bound:` beside it."""
-    twin = same_way_round(primitive, truth, found)
+    twin = orient_truth(primitive, truth, found)
     if twin is not truth:
         truth, bounds = twin, bounds | {"q1": bounds["q2"], "q2": bounds["q1"]}
     names = THETA_NAMES[: primitive.theta_size]
@@ -124,7 +132,7 @@ def record_of(
     return errors | {f"bound:{name}": value for name, value in bounds.items()}
 
 
-def same_way_round(primitive: Primitive, truth: np.ndarray, found: np.ndarray) -> np.ndarray:
+def orient_truth(primitive: Primitive, truth: np.ndarray, found: np.ndarray) -> np.ndarray:
     """`truth`, or its twin turned by half a turn: which eave of an asymmetric gable is the lower
     one may be chance.
     """
@@ -138,7 +146,7 @@ def same_way_round(primitive: Primitive, truth: np.ndarray, found: np.ndarray) -
     return twin
 
 
-def rmse(records: Sequence[dict[str, float]], prefix: str) -> float | None:
+def compute_rmse(records: Sequence[dict[str, float]], prefix: str) -> float | None:
     """Root mean square of all errors whose name starts with `prefix`."""
     values = [
         value for record in records for name, value in record.items() if name.startswith(prefix)
@@ -161,17 +169,17 @@ ERROR_NOTE = (
 )
 
 
-def error_row(kind: str, errors: dict) -> tuple:
+def make_error_row(kind: str, errors: dict) -> tuple:
     published = PUBLISHED.get(kind, (None,) * 3)
     row = [kind, *published]
     for method in OBJECTIVES:
         records = errors[method, kind]
-        relative = rmse(records, "relative:")
+        relative = compute_rmse(records, "relative:")
         row += [
             len(records),
-            rmse(records, "dimension:"),
+            compute_rmse(records, "dimension:"),
             relative and 100 * relative,
-            rmse(records, "place:"),
+            compute_rmse(records, "place:"),
         ]
     return tuple(row)
 
@@ -194,7 +202,7 @@ BOUND_NOTE = (
 )
 
 
-def bound_rows(kind: str, errors: dict) -> list[tuple]:
+def make_bound_rows(kind: str, errors: dict) -> list[tuple]:
     """One row a parameter: the root mean square bound over the roofs, and each method's errors in
     units of their bounds.
     """
@@ -205,13 +213,13 @@ def bound_rows(kind: str, errors: dict) -> list[tuple]:
         bound = float(np.sqrt(np.mean(np.square(bounds)))) if bounds else math.nan
         if not 0 < bound < math.inf:
             continue
-        ratios = [ratio(errors[method, kind], name) for method in OBJECTIVES]
+        ratios = [compute_ratio(errors[method, kind], name) for method in OBJECTIVES]
         what = "Cramer-Rao" if name in HEIGHTS_AND_SLOPES or name == "kappa" else "sampling"
         rows.append((kind, name, what, bound, *ratios))
     return rows
 
 
-def ratio(records: Sequence[dict[str, float]], name: str) -> float | None:
+def compute_ratio(records: Sequence[dict[str, float]], name: str) -> float | None:
     """Root mean square over the fits of error / bound: 1 at the bound, each roof counting
     the same.
     """
@@ -223,13 +231,13 @@ def ratio(records: Sequence[dict[str, float]], name: str) -> float | None:
     return float(np.sqrt(np.mean((errors / bounds) ** 2)))
 
 
-def picture(kinds: Sequence[str], errors: dict):
+def draw_picture(kinds: Sequence[str], errors: dict):
     """Bars: dimension errors of both objectives and of the paper."""
-    from .charts import grouped_bars
+    from .charts import draw_grouped_bars
 
     series = {
-        method: [rmse(errors[method, kind], "dimension:") for kind in kinds]
+        method: [compute_rmse(errors[method, kind], "dimension:") for kind in kinds]
         for method in OBJECTIVES
     }
     series["published"] = [PUBLISHED.get(kind, (math.nan,))[0] for kind in kinds]
-    return grouped_bars(kinds, series, "RMSE of the dimensions, m", log=True)
+    return draw_grouped_bars(kinds, series, "RMSE of the dimensions, m", log=True)

@@ -30,12 +30,12 @@ def compiled_wheel(wheel: Path, out: Path, command: Sequence[str] = WARM) -> Pat
     where it lies.
     """
     with tempfile.TemporaryDirectory() as folder:
-        python("-m", "wheel", "unpack", str(wheel), "--dest", folder)
+        find_python("-m", "wheel", "unpack", str(wheel), "--dest", folder)
         (root,) = Path(folder).iterdir()
         compile_in(root, command)
         describe(root)
         before = set(out.glob("*.whl"))
-        python("-m", "wheel", "pack", str(root), "--dest-dir", str(out))
+        find_python("-m", "wheel", "pack", str(root), "--dest-dir", str(out))
     (made,) = set(out.glob("*.whl")) - before
     return made
 
@@ -77,7 +77,7 @@ def describe(root: Path) -> None:
     )
 
 
-def python(*arguments: str) -> None:
+def find_python(*arguments: str) -> None:
     subprocess.run([sys.executable, *arguments], check=True)
 
 

@@ -31,7 +31,7 @@ def log_as_it_was():
 
 
 @pytest.fixture(autouse=True)
-def secrets_as_they_were(monkeypatch):
+def restore_secrets(monkeypatch):
     """Secrets that a test uses are hidden in its own messages alone."""
     monkeypatch.setattr(masking, "SECRETS", masking.Secrets())
 
@@ -43,7 +43,7 @@ def town_files(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def undisturbed(town_files, tmp_path_factory):
+def reference_run(town_files, tmp_path_factory):
     """The output folder of a run over the tiny town that nothing disturbs: what every other run has
     to give.
     """

@@ -10,7 +10,7 @@ import hiproof
 WRONG = hiproof.Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["flat"]}})
 
 
-def request_over(
+def make_request(
     town_files: list[str], out: Path, overrides: Path | None = None
 ) -> hiproof.Request:
     """The run's request, and with `overrides` that of the next one."""

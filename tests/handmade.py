@@ -82,7 +82,7 @@ def gable_house(
     return Solid(np.array(vertices, float), faces)
 
 
-def modelled(
+def make_building(
     solid: Solid,
     id: str = "a",
     kinds: tuple[str, ...] = ("gable",),
@@ -119,6 +119,6 @@ def modelled(
     return Building(id, Status.MODELLED, "", Model(roof, solid.move(origin)), **(values | changes))
 
 
-def unmodelled(id: str = "lost", **changes) -> Building:
+def make_lost_building(id: str = "lost", **changes) -> Building:
     """A building asked for that got no model."""
     return Building(id, Status.NO_POINTS, **({"attributes": {"bouwjaar": None}} | changes))

@@ -33,7 +33,7 @@ def town(density: float = 8.0, seed: int = 5) -> tuple[Scan, list]:
     return cloud, own
 
 
-def crowns_over(rng: np.random.Generator, side_m: float, apart_m: float = 5.0) -> np.ndarray:
+def draw_crowns(rng: np.random.Generator, side_m: float, apart_m: float = 5.0) -> np.ndarray:
     """Crowns (t, 5) that cover a square about the origin."""
     steps = np.arange(-side_m / 2, side_m / 2, apart_m)
     x, y = (axis.ravel() + rng.normal(0, 1, axis.size) for axis in np.meshgrid(steps, steps))
@@ -45,18 +45,18 @@ def crowns_over(rng: np.random.Generator, side_m: float, apart_m: float = 5.0) -
 
 def forest(rng: np.random.Generator, side_m: float = 60.0, density: float = 8.0) -> Scan:
     """Trees on a gentle slope and nothing else."""
-    scene = make_scene([], crowns_over(rng, side_m), Plane(0.05, 0.02, 0.0))
+    scene = make_scene([], draw_crowns(rng, side_m), Plane(0.05, 0.02, 0.0))
     area = shapely.box(*[-side_m / 2] * 2, *[side_m / 2] * 2)
     return scan_scene(scene, area, 8.0, rng, ScanSettings(density=density, defects=Defects.none()))
 
 
-def house_under_a_tree(rng: np.random.Generator, share: float, density: float = 10.0):
+def make_house_under_tree(rng: np.random.Generator, share: float, density: float = 10.0):
     """A gable house in the middle of a lawn, `share` of it under crowns; the scan and the
     building.
     """
     building = random_building(rng, "gable", kappa=0.0)
     x0, y0, x1, y1 = building.outline.bounds
-    crowns = crowns_over(rng, 60.0, 3.0)
+    crowns = draw_crowns(rng, 60.0, 3.0)
     crowns[:, 2] += 6.0
     covered = x0 + share * (x1 - x0) - 1.0
     near = (

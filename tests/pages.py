@@ -40,7 +40,7 @@ PLACED = """(viewer, corners) => {
 
 
 @contextmanager
-def opened(browser, address, size):
+def open_page(browser, address, size):
     """A page of a size, whose scripts must not fail while it is open."""
     context = browser.new_context(viewport={"width": size[0], "height": size[1]})
     page = context.new_page()
@@ -53,7 +53,7 @@ def opened(browser, address, size):
     assert faults == []
 
 
-def complaints(page):
+def list_complaints(page):
     """What axe-core finds wrong with the page, by rule and element."""
     axe = pytest.importorskip(
         "axe_playwright_python.sync_playwright",
@@ -63,7 +63,7 @@ def complaints(page):
     return [(rule["id"], node["html"]) for rule in violations for node in rule["nodes"]]
 
 
-def tab_stops(page, count):
+def list_tab_stops(page, count):
     """The names of what the Tab key reaches from the top, each of which shows its focus."""
     names = []
     for _ in range(count):
@@ -79,6 +79,6 @@ def is_too_wide(page):
     return page.evaluate("() => document.documentElement.scrollWidth > innerWidth")
 
 
-def places_on_canvas(page, viewer, corners):
+def project_on_canvas(page, viewer, corners):
     """Where corners of a scene fall, as shares (n, 2) of the canvas; both are expressions."""
     return page.evaluate(f"() => ({PLACED})({viewer}, {corners})")

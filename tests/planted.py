@@ -18,7 +18,7 @@ from hiproof.status import Status
 DEADLY = "house-2"
 
 
-def counted(points, footprint, terrain, settings, id, ground=None, unused=None):
+def count_points(points, footprint, terrain, settings, id, ground=None, unused=None):
     """No roof, but everything that a building's neighbours, tile or files could change: its points
     and its ground.
     """
@@ -40,7 +40,7 @@ def solve_with(reconstruct, folder, tile, terrain, avoid):
 
 
 def solve_quickly(folder, tile, terrain=None, avoid=()):
-    return solve_with(counted, folder, tile, terrain, avoid)
+    return solve_with(count_points, folder, tile, terrain, avoid)
 
 
 def solve_killed_once(folder, tile, terrain=None, avoid=()):
@@ -51,7 +51,7 @@ def solve_killed_once(folder, tile, terrain=None, avoid=()):
         if id == DEADLY and not mark.exists():
             mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
-        return counted(points, footprint, terrain, settings, id)
+        return count_points(points, footprint, terrain, settings, id)
 
     return solve_with(reconstruct, folder, tile, terrain, avoid)
 
@@ -62,7 +62,7 @@ def solve_deadly(folder, tile, terrain=None, avoid=()):
     def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None):
         if id == DEADLY:
             os.kill(os.getpid(), signal.SIGKILL)
-        return counted(points, footprint, terrain, settings, id)
+        return count_points(points, footprint, terrain, settings, id)
 
     return solve_with(reconstruct, folder, tile, terrain, avoid)
 
@@ -80,12 +80,12 @@ def solve_hungry(folder, tile, terrain=None, avoid=()):
                 np.ones(1 << 30)
             finally:
                 resource.setrlimit(resource.RLIMIT_AS, limits)
-        return counted(points, footprint, terrain, settings, id)
+        return count_points(points, footprint, terrain, settings, id)
 
     return solve_with(reconstruct, folder, tile, terrain, avoid)
 
 
-def jobs_of(path):
+def read_jobs_from(path):
     """A stand-in for reading footprints that takes those of `path`, whatever address is
     asked for.
     """

@@ -18,7 +18,7 @@ def typical_theta(
     return primitive.to_theta(theta_p, kappa, np.array(translation))
 
 
-def points_on(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=0, teeth=2):
+def sample_roof(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=0, teeth=2):
     """Points (n, 3) uniform over the plan of `theta`, with normal noise of the heights and outliers
     around.
     """
@@ -37,7 +37,7 @@ def points_on(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=0,
     return points
 
 
-def sampled(height, outline, density=8.0, noise=0.03, seed=0):
+def sample_heights(height, outline, density=8.0, noise=0.03, seed=0):
     """Points (n, 3) at random over `outline` on the surface `height(x, y)`."""
     rng = np.random.default_rng(seed)
     x0, y0, x1, y1 = outline.bounds

@@ -24,7 +24,7 @@ def programs() -> Path | None:
     )
 
 
-def why_not() -> str | None:
+def explain_absence() -> str | None:
     """The reason why no server can be started here, None where it can."""
     if programs() is None:
         return (

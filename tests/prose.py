@@ -19,7 +19,7 @@ PAGES = [
 COLUMNS = 100  # of a line, tables and links that cannot be broken apart
 
 
-def prose(text: str) -> str:
+def extract_prose(text: str) -> str:
     """The running text of a page, without code, tables, headings and the targets of links."""
     text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     lines = [
@@ -30,20 +30,20 @@ def prose(text: str) -> str:
     return re.sub(r"\]\([^)]*\)", "]", "\n".join(lines))
 
 
-def sentences(text: str) -> list[str]:
+def split_sentences(text: str) -> list[str]:
     """The sentences of a page. A list item ends one, with or without a full stop."""
-    blocks = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", prose(text))
+    blocks = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", extract_prose(text))
     joined = [" ".join(block.split()) for block in blocks]
     found = [part for block in joined for part in re.split(r"(?<=[.!?:])\s+(?=[A-Z`*\[(])", block)]
     return [part for part in found if len(part.split()) > 1]
 
 
-def lengths(text: str) -> np.ndarray:
+def count_words(text: str) -> np.ndarray:
     """Words of each sentence of a page (n,)."""
-    return np.array([len(part.split()) for part in sentences(text)] or [0])
+    return np.array([len(part.split()) for part in split_sentences(text)] or [0])
 
 
-def long_lines(text: str) -> list[str]:
+def find_long_lines(text: str) -> list[str]:
     """Lines over COLUMNS outside of tables, but for those that are one unbreakable link."""
     outside = (line for line in text.splitlines() if not line.startswith("|"))
     return [line for line in outside if len(line) > COLUMNS and " " in line.strip()]
@@ -52,11 +52,11 @@ def long_lines(text: str) -> list[str]:
 def main(pages: list[Path]) -> None:
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        words = lengths(text)
+        words = count_words(text)
         print(
             f"{page.relative_to(ROOT)}: {len(text.split())} words; a sentence {words.mean():.1f} in"
             f" the mean, {np.percentile(words, 90):.0f} at p90, {words.max()} at most;"
-            f" {len(long_lines(text))} long lines"
+            f" {len(find_long_lines(text))} long lines"
         )
 
 

@@ -45,7 +45,7 @@ class RangeHandler(SimpleHTTPRequestHandler):
 
 
 @contextmanager
-def serving(folder, log):
+def serve(folder, log):
     """The address at which `folder` is served until the block ends."""
     process = subprocess.Popen(
         [sys.executable, __file__, str(folder), str(log)], stdout=subprocess.PIPE, text=True

@@ -196,7 +196,7 @@ def off_by_little(rng, value):
     ) * rng.choice([-1, 1])
 
 
-def planes_over(rng, x, y, length, width, degrees, z):
+def draw_planes(rng, x, y, length, width, degrees, z):
     """A flat, monopitch, gable, hip, mansard or cut gable with eaves at `z` over a rectangle."""
     slope = rng.choice([0.2, 0.5, 0.84, 1.2, 2.75, rng.uniform(0.1, 2.5)])
     sides = gable_planes(x, y, z + slope * width / 2, slope, degrees)
@@ -235,7 +235,7 @@ def unions(rng):
         pieces.append(
             Piece(
                 rectangle(x, y, length, width, degrees),
-                planes_over(rng, x, y, length, width, degrees, z),
+                draw_planes(rng, x, y, length, width, degrees, z),
             )
         )
         placed.append((np.array([x, y]), length, width, degrees))
@@ -248,14 +248,14 @@ KINDS = {
 }
 
 
-def generated(kind, seed):
+def generate_roof(kind, seed):
     """The roof of that kind and seed, turned and shifted by the seed as well."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind)])
     made = KINDS[kind](rng)
-    return moved(made, rng.choice([0, rng.uniform(0, 90)]), rng.uniform(-5, 5, 2))
+    return move_roof(made, rng.choice([0, rng.uniform(0, 90)]), rng.uniform(-5, 5, 2))
 
 
-def moved(made, degrees, shift):
+def move_roof(made, degrees, shift):
     """The roof turned about the origin, then shifted in the plan."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     turn = np.array([[c, -s], [s, c]])

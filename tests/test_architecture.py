@@ -34,28 +34,28 @@ def list_packages():
     return packages | {path.stem for path in SOURCES.glob("*.py")} - NOT_DRAWN
 
 
-def module_name(file):
+def name_module(file):
     """Return a file's module as a tuple, such as ("fit", "single")."""
     parts = file.relative_to(SOURCES).with_suffix("").parts
     return parts[:-1] if parts[-1] == "__init__" else parts
 
 
-MODULES = {module_name(file): file for file in sorted(SOURCES.rglob("*.py"))}
+MODULES = {name_module(file): file for file in sorted(SOURCES.rglob("*.py"))}
 
 
 @cache
-def import_statements(module):
+def list_import_statements(module):
     """Return all import statements of a module, those inside functions too."""
     tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
     return [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
 
 
 @cache
-def imported_modules(module):
+def list_imported_modules(module):
     """Return the modules of hiproof that a module imports, inside functions too."""
     folder = MODULES[module].parent.relative_to(SOURCES).parts
     found = set()
-    for node in import_statements(module):
+    for node in list_import_statements(module):
         if isinstance(node, ast.ImportFrom) and node.level:
             names = node.module.split(".") if node.module else []
             base = (*folder[: len(folder) - node.level + 1], *names)
@@ -65,9 +65,9 @@ def imported_modules(module):
     return found - {module}
 
 
-def other_packages(module):
+def list_other_packages(module):
     """Return the packages other than hiproof that a module imports."""
-    nodes = import_statements(module)
+    nodes = list_import_statements(module)
     names = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
     names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     return {name.split(".")[0] for name in names}
@@ -89,14 +89,14 @@ def test_a_package_imports_only_from_lines_below(package):
         f"{'.'.join(module)} imports {'.'.join(target)}"
         for module in MODULES
         if module[:1] == (package,)
-        for target in imported_modules(module)
+        for target in list_imported_modules(module)
         if target and target[0] != package and level[target[0]] >= level[package]
     }
     assert wrong == set()
 
 
 def test_no_imports_run_in_a_circle():
-    graph = {module: imported_modules(module) - {()} for module in MODULES if module}
+    graph = {module: list_imported_modules(module) - {()} for module in MODULES if module}
     assert len(list(TopologicalSorter(graph).static_order())) >= len(graph)
 
 
@@ -104,7 +104,7 @@ def test_no_imports_run_in_a_circle():
 def test_one_package_alone_imports(library):
     phrase = f"the only package that imports {library}"
     (package,) = (name for name, description in read_table().items() if phrase in description)
-    assert {module[0] for module in MODULES if library in other_packages(module)} == {package}
+    assert {module[0] for module in MODULES if library in list_other_packages(module)} == {package}
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def row_of_houses(houses: int = 4) -> Town:
     )
 
 
-def moved(town: Town, shift) -> Town:
+def move_town(town: Town, shift) -> Town:
     polygons = {
         id: shapely.transform(polygon, lambda xy: xy + shift)
         for id, polygon in town.footprints.items()
@@ -60,7 +60,7 @@ def moved(town: Town, shift) -> Town:
     return replace(town, footprints=polygons)
 
 
-def request_of(folder, town: Town, pieces: int = 1, **options) -> Request:
+def make_request(folder, town: Town, pieces: int = 1, **options) -> Request:
     """A run on the town, whose cloud is cut into so many files."""
     folder.mkdir(exist_ok=True)
     parts = np.array_split(np.random.default_rng(0).permutation(len(town.xyz)), pieces)
@@ -73,8 +73,8 @@ def request_of(folder, town: Town, pieces: int = 1, **options) -> Request:
 
 
 @pytest.fixture(scope="module")
-def shifted(tmp_path_factory):
-    return request_of(tmp_path_factory.mktemp("shifted"), moved(scattered_houses(), -SHIFT))
+def shifted_request(tmp_path_factory):
+    return make_request(tmp_path_factory.mktemp("shifted"), move_town(scattered_houses(), -SHIFT))
 
 
 def plan_of(request: Request) -> WorkPlan:
@@ -82,8 +82,8 @@ def plan_of(request: Request) -> WorkPlan:
         return make_plan(request)
 
 
-def test_the_common_shift_is_found_and_areas_are_moved(shifted):
-    plan = plan_of(shifted)
+def test_the_common_shift_is_found_and_areas_are_moved(shifted_request):
+    plan = plan_of(shifted_request)
     assert plan.registration.is_clear
     assert np.abs(plan.registration.xy - SHIFT).max() < 0.1
     assert plan.registration.footprints == 25 and max(plan.registration.sigma) < 0.1
@@ -92,23 +92,23 @@ def test_the_common_shift_is_found_and_areas_are_moved(shifted):
         assert np.allclose(apart, np.tile(plan.registration.xy, 2), atol=1e-6)
 
 
-def test_the_common_shift_depends_on_the_files_alone(shifted, tmp_path):
-    known = plan_of(shifted).registration
+def test_the_common_shift_depends_on_the_files_alone(shifted_request, tmp_path):
+    known = plan_of(shifted_request).registration
     box = (*(ORIGIN[:2] + 40), *(ORIGIN[:2] + 120))
     for other in (
-        replace(shifted, bbox=box),
-        replace(shifted, where="id = 'house-7'"),
-        request_of(tmp_path / "cut", moved(scattered_houses(), -SHIFT), pieces=3),
+        replace(shifted_request, bbox=box),
+        replace(shifted_request, where="id = 'house-7'"),
+        make_request(tmp_path / "cut", move_town(scattered_houses(), -SHIFT), pieces=3),
     ):
         plan = plan_of(other)
         assert plan.registration == known
-    reordered = dict(reversed(list(moved(scattered_houses(), -SHIFT).footprints.items())))
+    reordered = dict(reversed(list(move_town(scattered_houses(), -SHIFT).footprints.items())))
     town = replace(scattered_houses(), footprints=reordered)
-    assert plan_of(request_of(tmp_path / "reordered", town)).registration == known
+    assert plan_of(make_request(tmp_path / "reordered", town)).registration == known
 
 
-def test_the_plan_keeps_what_was_moved(shifted, tmp_path):
-    plan = plan_of(replace(shifted, where="id in ('house-7', 'house-8')"))
+def test_the_plan_keeps_what_was_moved(shifted_request, tmp_path):
+    plan = plan_of(replace(shifted_request, where="id in ('house-7', 'house-8')"))
     plan.save(tmp_path / "plan.jsonl")
     again = WorkPlan.load(tmp_path / "plan.jsonl")
     assert again.registration == plan.registration and len(again.others) == len(plan.others) > 0
@@ -120,25 +120,25 @@ def test_the_plan_keeps_what_was_moved(shifted, tmp_path):
         assert job.footprint.shift == other.footprint.shift == plan.registration.shift
 
 
-def test_footprints_in_place_stay_and_align_off_looks_for_nothing(tmp_path, shifted):
-    plan = make_plan(request_of(tmp_path, scattered_houses()))
+def test_footprints_in_place_stay_and_align_off_looks_for_nothing(tmp_path, shifted_request):
+    plan = make_plan(make_request(tmp_path, scattered_houses()))
     assert not plan.registration.is_clear and plan.registration.length < 0.1
     assert all(job.area.equals(job.footprint.polygon) for job in plan.jobs)
-    assert make_plan(replace(shifted, settings=OFF)).registration is None
+    assert make_plan(replace(shifted_request, settings=OFF)).registration is None
 
 
-def records_of(out) -> dict[str, dict]:
+def read_records(out) -> dict[str, dict]:
     lines = map(json.loads, (out / "parameters.jsonl").read_text().splitlines())
     return {line["id"]: line for line in lines if "id" in line}
 
 
-def test_a_run_builds_on_the_roofs_and_says_so(shifted, tmp_path):
-    asked = replace(shifted, out=tmp_path / "out", where="id in ('house-7', 'house-8')")
+def test_a_run_builds_on_the_roofs_and_says_so(shifted_request, tmp_path):
+    asked = replace(shifted_request, out=tmp_path / "out", where="id in ('house-7', 'house-8')")
     with pytest.warns(InputWarning, match="all footprints lie beside their roofs"):
         reconstruct_area(asked)
     record = json.loads((asked.out / "run.json").read_text())
     assert record["registration"]["applied"] and record["registration"]["squares"] >= 15
-    for id, building in records_of(asked.out).items():
+    for id, building in read_records(asked.out).items():
         assert building["shift"] == record["registration"]["shift_m"]
         truth = scattered_houses().footprints[id]
         outline = shapely.Polygon(np.array(building["outline"][0]) + building["origin"][:2])
@@ -146,9 +146,9 @@ def test_a_run_builds_on_the_roofs_and_says_so(shifted, tmp_path):
 
 
 def test_a_row_moves_as_one_whichever_of_its_houses_are_asked_for(tmp_path):
-    request = request_of(tmp_path, moved(row_of_houses(), (-0.7, 0.4)))
+    request = make_request(tmp_path, move_town(row_of_houses(), (-0.7, 0.4)))
     reconstruct_area(request)
-    whole = records_of(request.out)
+    whole = read_records(request.out)
     shifts = {tuple(building["shift"]) for building in whole.values()}
     assert len(shifts) == 1 and np.abs(np.subtract(shifts.pop(), (0.7, -0.4))).max() < 0.1
     assert all(
@@ -157,14 +157,14 @@ def test_a_row_moves_as_one_whichever_of_its_houses_are_asked_for(tmp_path):
     )
     one = replace(request, out=tmp_path / "one", where="id = 'house-2'")
     reconstruct_area(one)
-    assert records_of(one.out)["house-2"] == whole["house-2"]
+    assert read_records(one.out)["house-2"] == whole["house-2"]
 
 
 def test_one_house_of_a_row_is_not_moved_away_from_the_others(tmp_path):
     town = row_of_houses()
-    alone = {**town.footprints, "house-1": moved(town, (0.0, 1.0)).footprints["house-1"]}
-    request = request_of(tmp_path, replace(town, footprints=alone))
+    alone = {**town.footprints, "house-1": move_town(town, (0.0, 1.0)).footprints["house-1"]}
+    request = make_request(tmp_path, replace(town, footprints=alone))
     reconstruct_area(request)
-    assert {tuple(building["shift"]) for building in records_of(request.out).values()} == {
+    assert {tuple(building["shift"]) for building in read_records(request.out).values()} == {
         (0.0, 0.0)
     }

@@ -106,7 +106,7 @@ def test_where_a_cloud_without_classes_holds_ground_alone_there_is_no_building(t
     )
 
 
-def with_heaps(xyz, classes, class_of_heaps):
+def add_heaps(xyz, classes, class_of_heaps):
     """The cloud with three heaps of rubble and bushes, up to 2 m high, on a quarter of the
     footprint.
     """
@@ -121,7 +121,7 @@ def with_heaps(xyz, classes, class_of_heaps):
 
 
 def test_heaps_of_the_building_class_on_bare_ground_are_no_building(tmp_path):
-    xyz, classes = with_heaps(*scan(has_house=False), 6)
+    xyz, classes = add_heaps(*scan(has_house=False), 6)
     record, _ = run(tmp_path, xyz, classes)
     assert (
         record["status"] == "no_building"
@@ -159,7 +159,7 @@ def test_a_low_shed_stands(height):
 
 def test_an_override_says_that_a_building_stands(tmp_path):
     (tmp_path / "o.jsonl").write_text('{"id": "a", "type": "flat"}')
-    xyz, classes = with_heaps(*scan(has_house=False), 6)
+    xyz, classes = add_heaps(*scan(has_house=False), 6)
     cloud = write_cloud(tmp_path / "cloud.laz", xyz, classes)
     footprints = write_footprints(tmp_path / "footprints.geojson", {"a": HOUSE})
     reconstruct_area(

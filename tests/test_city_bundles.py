@@ -29,7 +29,7 @@ SECRET = "J. Smith, 5 Mill Lane"
 
 
 @pytest.fixture
-def fail_for(monkeypatch):
+def set_failing_ids(monkeypatch):
     """A function that lets the fit of some buildings fail, with the sum of their points in the
     message.
     """
@@ -48,7 +48,7 @@ def fail_for(monkeypatch):
     return set_failing
 
 
-def solved(out):
+def read_solved_rows(out):
     """The rows of a run by building, without the attributes of the input."""
     return {id: row | {"attributes": {}} for id, row in by_id(out).items()}
 
@@ -60,7 +60,7 @@ def repeat(bundle, out):
 @pytest.mark.parametrize("with_footprints", [True, False])
 @pytest.mark.parametrize("has_classes", [True, False])
 def test_a_bundle_repeats_the_failure_to_the_last_digit(
-    with_footprints, has_classes, tmp_path, fail_for
+    with_footprints, has_classes, tmp_path, set_failing_ids
 ):
     """All that the building saw is in it: roof, ground and low points.
 
@@ -74,9 +74,9 @@ def test_a_bundle_repeats_the_failure_to_the_last_digit(
     )
     request = Request((cloud,), tmp_path / "out", footprints, restart=True)
     reconstruct_area(request)
-    expected = solved(request.out)
+    expected = read_solved_rows(request.out)
     (victim,) = list(expected)[1:2]
-    fail_for(victim)
+    set_failing_ids(victim)
     summary = reconstruct_area(request)
     assert summary.bundles == tmp_path / "out" / "failures"
     (bundle,) = bundles.bundles_in(request.out)
@@ -84,15 +84,15 @@ def test_a_bundle_repeats_the_failure_to_the_last_digit(
     again = repeat(bundle, tmp_path / "again")
     assert again.exit_code == 1
     assert failure in again.output
-    assert solved(tmp_path / "again") == {victim: solved(request.out)[victim]}
+    assert read_solved_rows(tmp_path / "again") == {victim: read_solved_rows(request.out)[victim]}
     assert failure.removesuffix(")").split(" (")[0] in (bundle / "traceback.txt").read_text()
-    fail_for()
+    set_failing_ids()
     mended = repeat(bundle, tmp_path / "mended")
     assert mended.exit_code == 0
-    assert solved(tmp_path / "mended") == {victim: expected[victim]}
+    assert read_solved_rows(tmp_path / "mended") == {victim: expected[victim]}
 
 
-def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, fail_for):
+def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, set_failing_ids):
     rasterio = pytest.importorskip(
         "rasterio", reason="terrain models need rasterio (extra `terrain`)"
     )
@@ -108,7 +108,7 @@ def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, fail_for):
         file.write(heights, 1)
     request = Request((cloud,), tmp_path / "out", footprints, terrain, restart=True)
     reconstruct_area(request)
-    expected = solved(request.out)["house-1"]
+    expected = read_solved_rows(request.out)["house-1"]
     assert expected["ground_source"] == "terrain model dtm.tif"
     fail = stages.judge
 
@@ -125,10 +125,10 @@ def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, fail_for):
         assert repeat(bundle, tmp_path / "again").exit_code == 1
         broken.clear()
         assert repeat(bundle, tmp_path / "mended").exit_code == 0
-    assert solved(tmp_path / "mended")["house-1"] == expected
+    assert read_solved_rows(tmp_path / "mended")["house-1"] == expected
 
 
-def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, fail_for):
+def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, set_failing_ids):
     town = make_town(1)
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification)
     footprints = tmp_path / "footprints.gpkg"
@@ -142,7 +142,7 @@ def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, fail_f
         geometry_type="Polygon",
         crs="EPSG:28992",
     )
-    fail_for("a")
+    set_failing_ids("a")
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     (bundle,) = bundles.bundles_in(tmp_path / "out")
     files = {path.name: path.read_bytes() for path in bundle.iterdir()}
@@ -164,13 +164,13 @@ def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, fail_f
     assert Settings.from_toml(bundle / "settings.toml") == Settings()
 
 
-def test_ids_may_be_anything(tmp_path, fail_for):
+def test_ids_may_be_anything(tmp_path, set_failing_ids):
     ids = ["../../etc", "CON", "a/b\\c:d*?", "Straße 5 'x'", "x" * 300, "nul", "…", "A", "a"]
     town = make_town(len(ids), density=2.0)
     renamed = dict(zip(ids, town.footprints.values(), strict=True))
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification)
     footprints = write_footprints(tmp_path / "footprints.geojson", renamed)
-    fail_for(*ids)
+    set_failing_ids(*ids)
     summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert summary.by_status == {"internal_error": len(ids)}
     kept = {
@@ -185,11 +185,11 @@ def test_ids_may_be_anything(tmp_path, fail_for):
     assert {path.name for path in tmp_path.iterdir()} == {"cloud.laz", "footprints.geojson", "out"}
 
 
-def test_a_run_keeps_few_bundles_or_none(tmp_path, fail_for, monkeypatch):
+def test_a_run_keeps_few_bundles_or_none(tmp_path, set_failing_ids, monkeypatch):
     monkeypatch.setattr(bundles, "MOST_BUNDLES", 2)
     town = make_town(4, density=2.0)
     cloud, footprints = map(str, write_town(tmp_path, town))
-    fail_for(*town.footprints)
+    set_failing_ids(*town.footprints)
     request = Request((cloud,), tmp_path / "out", footprints)
     assert reconstruct_area(request).by_status == {"internal_error": 4}
     assert len(bundles.bundles_in(request.out)) == 2
@@ -200,23 +200,23 @@ def test_a_run_keeps_few_bundles_or_none(tmp_path, fail_for, monkeypatch):
     assert not (tmp_path / "off" / "failures").exists()
 
 
-def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, fail_for):
+def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, set_failing_ids):
     town = make_town(2, density=2.0)
     cloud, footprints = map(str, write_town(tmp_path, town))
     out = tmp_path / "out"
-    fail_for("house-0", "house-1")
+    set_failing_ids("house-0", "house-1")
     reconstruct_area(Request((cloud,), out, footprints))
     mine = out / "failures" / "mine"
     mine.mkdir()
     (mine / "notes.txt").touch()
-    fail_for("house-1")
+    set_failing_ids("house-1")
     # it is finished: nothing is solved, and nothing goes
     reconstruct_area(Request((cloud,), out, footprints))
     assert len(bundles.bundles_in(out)) == 2
     (tmp_path / "known.jsonl").write_text(json.dumps({"id": "house-0", "block_height": 5.0}) + "\n")
     reconstruct_area(Request((cloud,), out, footprints, overrides=str(tmp_path / "known.jsonl")))
     assert [bundle.name for bundle in bundles.bundles_in(out)] == ["house-1"]
-    fail_for()
+    set_failing_ids()
     assert reconstruct_area(Request((cloud,), out, footprints, restart=True)).exit_code == 0
     assert bundles.bundles_in(out) == []
     assert (mine / "notes.txt").exists()
@@ -226,12 +226,12 @@ def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, fail_
     "error", [OSError(errno.ENOSPC, "No space left on device"), ValueError("odd"), MemoryError()]
 )
 def test_a_bundle_that_cannot_be_written_ends_no_run(
-    error, town_files, tmp_path, fail_for, monkeypatch, caplog
+    error, town_files, tmp_path, set_failing_ids, monkeypatch, caplog
 ):
     def refuse(*_):
         raise error
 
-    fail_for("house-0")
+    set_failing_ids("house-0")
     request = Request((town_files[0],), tmp_path / "kept", town_files[1])
     reconstruct_area(request)
     monkeypatch.setattr(bundles, "write_outline", refuse)
@@ -242,8 +242,8 @@ def test_a_bundle_that_cannot_be_written_ends_no_run(
     assert "the input of building house-0 could not be kept" in caplog.text
 
 
-def test_the_traceback_is_in_the_log(town_files, tmp_path, fail_for, caplog):
-    fail_for("house-2")
+def test_the_traceback_is_in_the_log(town_files, tmp_path, set_failing_ids, caplog):
+    set_failing_ids("house-2")
     with caplog.at_level("INFO", logger="hiproof"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
     (told,) = [
@@ -256,8 +256,8 @@ def test_the_traceback_is_in_the_log(town_files, tmp_path, fail_for, caplog):
 @pytest.mark.parametrize(
     "damage", ["no folder", "no points", "cut off", "no outline", "no settings", "other JSON"]
 )
-def test_a_damaged_bundle_is_refused_in_one_sentence(damage, town_files, tmp_path, fail_for):
-    fail_for("house-0")
+def test_a_damaged_bundle_is_refused_in_one_sentence(damage, town_files, tmp_path, set_failing_ids):
+    set_failing_ids("house-0")
     reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1]))
     (bundle,) = bundles.bundles_in(tmp_path / "out")
     if damage == "no folder":

@@ -19,7 +19,7 @@ from tiny_town import make_town, write_footprints, write_town
 
 
 @pytest.fixture
-def solved(monkeypatch):
+def solved_ids(monkeypatch):
     """The ids of buildings that are solved, as they are."""
     ids, original = [], solve.solve_one
 
@@ -33,7 +33,7 @@ def solved(monkeypatch):
 
 
 @pytest.fixture
-def town(tmp_path, solved):
+def town(tmp_path, solved_ids):
     """The houses, their cloud, and a way to write and run another set of them."""
     houses = make_town().footprints
     cloud, path = write_town(tmp_path / "town")
@@ -48,18 +48,18 @@ def town(tmp_path, solved):
     return houses, request, run
 
 
-def moved(polygon, shift):
+def move(polygon, shift):
     return shapely.transform(polygon, lambda xy: xy + shift)
 
 
 def changes(houses):
     """Name: (footprints, ids of those that have to be done)."""
     first, second, *_ = houses
-    far = moved(houses["house-0"], (0.0, 600.0))
+    far = move(houses["house-0"], (0.0, 600.0))
     return {
         "the same again": (houses, []),
         "one is gone": ({id: houses[id] for id in list(houses)[1:]}, []),
-        "one moved": ({**houses, second: moved(houses[second], (0.3, 0.0))}, [second]),
+        "one moved": ({**houses, second: move(houses[second], (0.3, 0.0))}, [second]),
         "one is new, far away": ({**houses, "new": far}, ["new"]),
         "another order": (dict(reversed(houses.items())), []),
         "two swap their names": (
@@ -76,41 +76,41 @@ def changes(houses):
 @pytest.mark.parametrize("name", changes(make_town().footprints))
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_changed_footprints_redo_what_changed_and_end_as_a_run_from_the_start(
-    name, town, solved, tmp_path
+    name, town, solved_ids, tmp_path
 ):
     houses, request, run = town
     footprints, expected = changes(houses)[name]
-    solved.clear()
+    solved_ids.clear()
     assert run(footprints).buildings == len(footprints)
-    assert sorted(solved) == sorted(expected)
+    assert sorted(solved_ids) == sorted(expected)
     fresh = dataclasses.replace(request, out=tmp_path / "fresh")
     reconstruct_area(fresh)
     assert records(request.out) == records(fresh.out)
-    solved.clear()
+    solved_ids.clear()
     reconstruct_area(request)
-    assert solved == []
+    assert solved_ids == []
 
 
-def test_another_choice_of_footprints_redoes_none(town, solved):
+def test_another_choice_of_footprints_redoes_none(town, solved_ids):
     houses, _, run = town
-    solved.clear()
+    solved_ids.clear()
     assert run(houses, where="id < 'house-2'").buildings == 2
     assert run(houses, bbox=houses["house-3"].bounds).buildings == 1
-    assert solved == ["house-3"]  # the condition had let it go
+    assert solved_ids == ["house-3"]  # the condition had let it go
 
 
-def test_a_run_killed_while_it_does_what_changed_goes_on(town, solved, monkeypatch):
+def test_a_run_killed_while_it_does_what_changed_goes_on(town, solved_ids, monkeypatch):
     houses, request, run = town
-    changed = {**houses, "house-1": moved(houses["house-1"], (0.3, 0.0))}
+    changed = {**houses, "house-1": move(houses["house-1"], (0.3, 0.0))}
     with monkeypatch.context() as patch:
         patch.setattr(city_run, "solve_tile", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             run(changed)
-    solved.clear()
-    assert reconstruct_area(request).buildings == 4 and solved == ["house-1"]
+    solved_ids.clear()
+    assert reconstruct_area(request).buildings == 4 and solved_ids == ["house-1"]
 
 
-def test_models_by_work_tile_follow_changed_footprints(town, solved, tmp_path):
+def test_models_by_work_tile_follow_changed_footprints(town, solved_ids, tmp_path):
     houses, _, run = town
     by_tile = Settings.from_dict({"city": {"models": "both"}})
     out = tmp_path / "tiles"
@@ -118,4 +118,4 @@ def test_models_by_work_tile_follow_changed_footprints(town, solved, tmp_path):
     run({id: houses[id] for id in list(houses)[:2]}, out=out, settings=by_tile)
     texts = [file.read_text() for file in sorted((out / "models").glob("*.jsonl"))]
     assert sum(text.count('"CityJSONFeature"') for text in texts) == 2
-    assert np.unique(solved).size == 4
+    assert np.unique(solved_ids).size == 4

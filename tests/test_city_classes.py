@@ -16,7 +16,7 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, InputWarning
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, random_compound, scan
-from leafy_scenes import drone, forest, house_under_a_tree
+from leafy_scenes import drone, forest, make_house_under_tree
 from tiny_town import make_town, write_cloud, write_footprints
 
 
@@ -29,11 +29,11 @@ def run(folder, xyz, classes, footprints=None, settings=None):
     return {row["id"]: row for row in read_parameters(folder / "out" / "parameters.jsonl")}
 
 
-def asked(roofs):
+def make_settings(roofs):
     return Settings.from_dict({"read": {"roofs": roofs}})
 
 
-def height_of(row, xy_world):
+def measure_height(row, xy_world):
     """Height (n,) in the world of the roof that a row of the parameters makes."""
     roof = build(row).roof
     return roof.height_at(xy_world - roof.frame.origin[:2]) + roof.frame.origin[2]
@@ -61,7 +61,7 @@ def test_nothing_but_points_is_enough(tmp_path):
 def test_shape_can_be_asked_for_although_there_is_a_class(tmp_path):
     town = make_town()
     wrong = np.where(np.arange(len(town.xyz)) % 2, town.classification, 1)
-    rows = run(tmp_path, town.xyz, wrong, settings=asked("shape"))
+    rows = run(tmp_path, town.xyz, wrong, settings=make_settings("shape"))
     assert [row["status"] for row in rows.values()] == ["modelled"] * 4
 
 
@@ -120,7 +120,7 @@ def test_a_roof_that_was_cut_out_is_one_building(tmp_path):
 
 @pytest.mark.parametrize("roofs", ["auto", "alone"])
 def test_a_tree_beside_a_roof_that_was_cut_out_is_no_part_of_it(tmp_path, roofs):
-    cloud, building = house_under_a_tree(np.random.default_rng(2), 0.4)
+    cloud, building = make_house_under_tree(np.random.default_rng(2), 0.4)
     points = cloud.points + (85000, 446000, 0)
     outline = shapely.transform(building.footprint, lambda xy: xy + (85000, 446000))
     cut = shapely.contains_xy(outline.buffer(1.5), *points[:, :2].T) & (
@@ -128,7 +128,9 @@ def test_a_tree_beside_a_roof_that_was_cut_out_is_no_part_of_it(tmp_path, roofs)
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # auto says what it takes the cloud for
-        (row,) = run(tmp_path, points[cut], np.ones(cut.sum()), settings=asked(roofs)).values()
+        (row,) = run(
+            tmp_path, points[cut], np.ones(cut.sum()), settings=make_settings(roofs)
+        ).values()
     found = shapely.transform(shapely.Polygon(row["outline"][0]), lambda xy: xy + row["origin"][:2])
     assert found.intersection(outline).area / found.union(outline).area > 0.9
 
@@ -140,7 +142,7 @@ def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path
     roof = cloud.points[cloud.source == SOURCES.index("roof")]
     with pytest.warns(InputWarning, match="no building class"):
         rows = run(tmp_path, roof, np.ones(len(roof)), {"house": building.footprint})
-    off = roof[:, 2] - height_of(rows["house"], roof[:, :2])
+    off = roof[:, 2] - measure_height(rows["house"], roof[:, :2])
     assert np.mean(np.abs(off) < 0.2) > 0.97
 
 
@@ -184,7 +186,7 @@ def test_a_footprint_on_a_lawn_holds_no_building_and_says_so(tmp_path):
 
 @pytest.mark.parametrize(("share", "remarks"), [(0.4, False), (0.95, True)])
 def test_a_house_under_a_tree_is_its_roof_or_mostly_not_seen(tmp_path, share, remarks):
-    cloud, building = house_under_a_tree(np.random.default_rng(2), share)
+    cloud, building = make_house_under_tree(np.random.default_rng(2), share)
     points = cloud.points + (85000, 446000, 0)
     outline = shapely.transform(building.footprint, lambda xy: xy + (85000, 446000))
     with pytest.warns(InputWarning):
@@ -194,7 +196,8 @@ def test_a_house_under_a_tree_is_its_roof_or_mostly_not_seen(tmp_path, share, re
     at = shapely.get_coordinates(building.outline.centroid)
     truth = building.roof.height_at(at) + building.roof.frame.origin[2]
     assert (
-        abs(height_of(row, at + building.roof.frame.origin[:2] + (85000, 446000)) - truth)[0] < 0.3
+        abs(measure_height(row, at + building.roof.frame.origin[:2] + (85000, 446000)) - truth)[0]
+        < 0.3
     )
 
 
@@ -209,7 +212,7 @@ def test_a_drones_cloud_is_as_good_as_it_is_dense(tmp_path):
     xy = rng.uniform(inner.bounds[:2], inner.bounds[2:], (500, 2))
     xy = xy[shapely.contains_xy(inner, *xy.T)]
     truth = building.roof.height_at(xy) + building.roof.frame.origin[2]
-    off = height_of(row, xy + building.roof.frame.origin[:2] + (85000, 446000)) - truth
+    off = measure_height(row, xy + building.roof.frame.origin[:2] + (85000, 446000)) - truth
     assert np.median(np.abs(off)) < 0.03
 
 
@@ -230,7 +233,7 @@ def test_a_sparse_cloud_gets_models_as_good_as_it_allows(tmp_path, density):
         assert row["status"] in ("modelled", "sparse")
         corners = shapely.get_coordinates(town.footprints[f"house-{i}"].buffer(-1.0))
         # the eave lies 5 m above the ground at 2 m
-        assert (height_of(row, corners) > 2.0 + 4.5).all()
+        assert (measure_height(row, corners) > 2.0 + 4.5).all()
 
 
 def test_where_classes_tell_the_ground_nothing_low_beside_a_roof_is_taken_for_one(tmp_path):
@@ -241,7 +244,9 @@ def test_where_classes_tell_the_ground_nothing_low_beside_a_roof_is_taken_for_on
     inside, roof = (x > 0) & (x < 14) & (y > 0) & (y < 6), (x > 0) & (x < 9) & (y > 0) & (y < 6)
     z = np.where(roof, 5.0, np.where(inside, 0.2, 0.0))  # beside the house a bed of plants
     house = {"house": shapely.box(0, 0, 14, 6)}
-    rows = run(tmp_path, np.column_stack([x, y, z]), np.where(inside, 1, 2), house, asked("shape"))
+    rows = run(
+        tmp_path, np.column_stack([x, y, z]), np.where(inside, 1, 2), house, make_settings("shape")
+    )
     (row,) = rows.values()
     assert all(
         part["type"] == "flat" and abs(part["position"][2] + row["origin"][2] - 5.0) < 0.1

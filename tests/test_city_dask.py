@@ -31,14 +31,14 @@ def small_tiles(monkeypatch):
 
 
 def test_a_cluster_whose_worker_is_killed_changes_no_byte(
-    town_files, undisturbed, cluster, tmp_path, monkeypatch
+    town_files, reference_run, cluster, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     reconstruct_area(
         Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address)
     )
     assert (tmp_path / ".hiproof" / "killed").exists()
-    assert records(tmp_path) == records(undisturbed)
+    assert records(tmp_path) == records(reference_run)
 
 
 def test_a_building_that_kills_dask_workers_is_left_out_alone(

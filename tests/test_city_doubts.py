@@ -40,7 +40,7 @@ def write_terrain(path, height, east=0.0):
     return str(path)
 
 
-def row_over(folder, height):
+def run_over_terrain(folder, height):
     """What the run writes of the only building over a terrain model of that height."""
     cloud, footprints = write_town(folder, TOWN)
     terrain = write_terrain(folder / "dtm.tif", height)
@@ -65,7 +65,7 @@ def row_over(folder, height):
     ],
 )
 def test_a_terrain_whose_heights_are_others_is_told_of(tmp_path, height, told):
-    row = row_over(tmp_path, height)
+    row = run_over_terrain(tmp_path, height)
     assert all(words in row["detail"] for words in told)
     assert bool(told) == ("lies" in row["detail"])
     is_used = abs(height - ORIGIN[2]) < 5.0
@@ -112,7 +112,7 @@ def test_a_terrain_model_without_any_height_is_told_of_once(tmp_path, nothing):
     with pytest.warns(
         InputWarning, match=r"dtm\.tif: has no height under any building, so the ground is taken"
     ) as told:
-        row = row_over(tmp_path, nothing)
+        row = run_over_terrain(tmp_path, nothing)
     assert len([w for w in told if issubclass(w.category, InputWarning)]) == 1
     assert (
         row["z_ground"] == pytest.approx(ORIGIN[2] + 0.08, abs=0.05)

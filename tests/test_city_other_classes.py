@@ -33,7 +33,7 @@ def run_of(folder, xyz, classification, settings=None):
     return {row["id"]: (row["status"], row["detail"]) for row in rows}, summary.doubts
 
 
-def ground_for(points):
+def make_ground(points):
     """Ground points below others."""
     return np.column_stack([points[:, :2], ORIGIN[2] + 0.01 * (points[:, 0] - ORIGIN[0])])
 
@@ -56,7 +56,7 @@ def test_a_roof_of_another_class_is_not_taken_for_missing(tmp_path):
 
 
 def test_bare_ground_where_a_house_should_stand_is_told_of(tmp_path):
-    xyz = np.concatenate([TOWN.xyz[~ON_FIRST], ground_for(TOWN.xyz[ON_FIRST])])
+    xyz = np.concatenate([TOWN.xyz[~ON_FIRST], make_ground(TOWN.xyz[ON_FIRST])])
     classes = np.concatenate([TOWN.classification[~ON_FIRST], np.full(ON_FIRST.sum(), 2, np.uint8)])
     told, doubts = run_of(tmp_path, xyz, classes)
     assert "its ground lies bare: nothing stood there" in told["house-0"][1]
@@ -70,7 +70,7 @@ def test_nothing_seen_keeps_its_advice(tmp_path):
 
 
 def test_a_house_pulled_down_between_two_flights_is_told_of(tmp_path):
-    later = ground_for(TOWN.xyz[ON_FIRST] + [0.2, 0.1, 0.0])
+    later = make_ground(TOWN.xyz[ON_FIRST] + [0.2, 0.1, 0.0])
     xyz = np.concatenate([TOWN.xyz, later])
     classes = np.concatenate([TOWN.classification, np.full(len(later), 2, np.uint8)])
     told, doubts = run_of(tmp_path, xyz, classes)

@@ -21,7 +21,7 @@ from hiproof.city.ground import (
 from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
-from small_tasks import die_on_two, double
+from small_tasks import die_at_number_two, double
 
 
 def jobs_at(xy):
@@ -184,7 +184,7 @@ def test_a_killed_worker_loses_its_tasks_but_not_the_others():
     tasks = [(i,) for i in range(6)]
     while tasks:
         again = []
-        for task, result, error in executor.run(die_on_two, tasks):
+        for task, result, error in executor.run(die_at_number_two, tasks):
             if error is None:
                 seen.add(result)
             else:

@@ -12,7 +12,7 @@ from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
 from hiproof.read.pointcloud import read_points
-from range_server import serving
+from range_server import serve
 from read.test_pointcloud import write_copc, write_ply, write_text
 from run_records import RECORDS
 from tiny_town import make_town, write_town
@@ -21,12 +21,12 @@ pytest.importorskip("aiohttp", reason="needs fsspec[http], part of the extra `ci
 
 
 @pytest.fixture
-def served(tmp_path):
+def server(tmp_path):
     """A folder, its address, and the file that lists the ranges asked for."""
     folder, log = tmp_path / "served", tmp_path / "ranges"
     folder.mkdir()
     log.touch()
-    with serving(folder, log) as address:
+    with serve(folder, log) as address:
         yield folder, address, log
 
 
@@ -50,10 +50,10 @@ def write_terrain(path, town):
 
 
 def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(
-    served, tmp_path, monkeypatch
+    server, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    folder, address, log = served
+    folder, address, log = server
     town = make_town()
     cloud, footprints = write_town(folder, town)
     terrain = write_terrain(folder / "terrain.tif", town)
@@ -74,8 +74,8 @@ def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(
     assert b"terrain model terrain.tif" in (tmp_path / "remote" / "parameters.jsonl").read_bytes()
 
 
-def test_copc_by_address_is_read_in_ranges(served, tmp_path):
-    folder, address, log = served
+def test_copc_by_address_is_read_in_ranges(server, tmp_path):
+    folder, address, log = server
     town = make_town()
     write_copc(folder / "a.copc.laz", town.xyz, town.classification)
     cloud = read_points(
@@ -86,8 +86,8 @@ def test_copc_by_address_is_read_in_ranges(served, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.ply", "b.ply", "c.xyz", "d.CSV"])
-def test_text_and_ply_by_address_are_what_the_files_hold(served, name):
-    folder, address, _ = served
+def test_text_and_ply_by_address_are_what_the_files_hold(server, name):
+    folder, address, _ = server
     xyz = np.random.default_rng(1).uniform(0, 1000, (40000, 3)).round(3)
     classes = np.arange(40000, dtype=np.uint8) % 7
     if name.endswith("ply"):
@@ -103,22 +103,22 @@ def test_text_and_ply_by_address_are_what_the_files_hold(served, name):
 
 
 @pytest.mark.parametrize("name", ["page.ply", "page.xyz"])
-def test_a_page_instead_of_points_gets_one_sentence(served, name):
-    folder, address, _ = served
+def test_a_page_instead_of_points_gets_one_sentence(server, name):
+    folder, address, _ = server
     (folder / name).write_text("<html>not a cloud</html>\n" * 50)
     with pytest.raises(InputError, match=name):
         read_points(f"{address}/{name}")
 
 
 @pytest.mark.parametrize("name", ["missing.laz", "missing.ply", "missing.xyz"])
-def test_an_address_that_answers_with_nothing_gets_one_sentence(served, name):
-    _, address, _ = served
+def test_an_address_that_answers_with_nothing_gets_one_sentence(server, name):
+    _, address, _ = server
     with pytest.raises(InputError, match=rf"{name}, got: 404, message='File not found'"):
         read_points(f"{address}/{name}")
 
 
-def test_an_address_of_something_else_gets_one_sentence(served):
-    folder, address, _ = served
+def test_an_address_of_something_else_gets_one_sentence(server):
+    folder, address, _ = server
     (folder / "page.laz").write_text("<html>not a cloud</html>" * 50)
     with pytest.raises(InputError, match=r"page\.laz"):
         read_points(f"{address}/page.laz")

@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 
 import hiproof
 import planted
-from handmade import courtyard, gable_house, modelled, unmodelled
+from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.city import run as city_run
 from hiproof.city.lock import hold_folder
 from hiproof.city.marks import compute_mark, describe_inputs, describe_selection, file_stamps
@@ -218,7 +218,7 @@ def test_a_folder_that_cannot_be_locked_says_so(tmp_path):
 @pytest.mark.parametrize("harm", ["removed", "cut", "one byte"])
 @pytest.mark.parametrize("name", ["buildings.gml", "parameters.jsonl", "buildings.gpkg"])
 def test_a_file_that_was_lost_or_damaged_is_made_again(
-    harm, name, town_files, undisturbed, tmp_path, quick
+    harm, name, town_files, reference_run, tmp_path, quick
 ):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
@@ -231,8 +231,8 @@ def test_a_file_that_was_lost_or_damaged_is_made_again(
         file.write_bytes(content if harm == "one byte" else content[:-1])
     with pytest.warns(UserWarning, match=f"{name} is gone or not as the run left it"):
         reconstruct_area(request)
-    assert records(tmp_path) == records(undisturbed)
-    assert file.read_bytes() == (undisturbed / name).read_bytes()
+    assert records(tmp_path) == records(reference_run)
+    assert file.read_bytes() == (reference_run / name).read_bytes()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         reconstruct_area(request)
@@ -299,12 +299,12 @@ def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, 
         tmp_path / "exploded",
     )
 
-    def stopped(step, done, total):
+    def stop(step, done, total):
         if step == "merge":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        reconstruct_area(request, stopped)
+        reconstruct_area(request, stop)
     state = tmp_path / "out" / ".hiproof"
     for file in [state / "plan.jsonl", *(state / "tiles").iterdir()]:
         whole = file.read_bytes()
@@ -366,9 +366,9 @@ def test_a_plan_comes_back_as_it_was(tmp_path):
 def test_texts_of_buildings_come_back_as_they_were(tmp_path):
     odd = {"n": 2**70, "x": 0.1 + 0.2, "no": None, "yes": True, "t": "ä\n\x7f'"}
     buildings = [
-        modelled(gable_house(), "a", attributes=odd),
-        unmodelled(),
-        modelled(courtyard(), "b"),
+        make_building(gable_house(), "a", attributes=odd),
+        make_lost_building(),
+        make_building(courtyard(), "b"),
     ]
     parts = [fragments(b, (b.id, b.id), FileHead(offset=np.zeros(3)))[1] for b in buildings]
     with open(tmp_path / "tile.npz", "wb") as file:

@@ -34,19 +34,19 @@ def small_tiles(monkeypatch):
 
 
 def test_a_worker_killed_from_outside_changes_no_byte(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
     assert (tmp_path / ".hiproof" / "killed").exists()
-    assert records(tmp_path) == records(undisturbed)
+    assert records(tmp_path) == records(reference_run)
 
 
 @pytest.mark.parametrize(
     "solve", [planted.solve_deadly, planted.solve_hungry], ids=["kills", "eats memory"]
 )
 def test_a_building_that_ends_its_process_is_left_out_alone(
-    solve, town_files, undisturbed, tmp_path, monkeypatch
+    solve, town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", solve)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
@@ -57,21 +57,21 @@ def test_a_building_that_ends_its_process_is_left_out_alone(
     rows = by_id(tmp_path)
     assert "process died" in rows.pop(planted.DEADLY)["detail"]
     assert [bundle.name for bundle in bundles_in(tmp_path)] == [planted.DEADLY]
-    assert rows == {id: row for id, row in by_id(undisturbed).items() if id != planted.DEADLY}
+    assert rows == {id: row for id, row in by_id(reference_run).items() if id != planted.DEADLY}
 
 
 def test_losses_with_the_main_process_lead_to_quarantine(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
-    def killed(step, done, total):
+    def kill(step, done, total):
         if step == "solve" and done == 1:
             raise SystemExit
 
     with pytest.raises(SystemExit):
-        reconstruct_area(request, killed)
+        reconstruct_area(request, kill)
     database = sqlite3.connect(tmp_path / ".hiproof" / "ledger.sqlite")
     database.execute("update task set losses = 3 where kind = 'solve' and state = 'open'")
     database.commit()
@@ -82,24 +82,24 @@ def test_losses_with_the_main_process_lead_to_quarantine(
     )
     reconstruct_area(request)
     assert len(alone) == 1
-    assert records(tmp_path) == records(undisturbed)
+    assert records(tmp_path) == records(reference_run)
 
 
 def test_points_that_somebody_removed_are_sorted_again(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
-    def killed(step, done, total):
+    def kill(step, done, total):
         if step == "solve" and done == 1:
             raise SystemExit
 
     with pytest.raises(SystemExit):
-        reconstruct_area(request, killed)
+        reconstruct_area(request, kill)
     shutil.rmtree(tmp_path / ".hiproof" / "points")
     reconstruct_area(request)
-    assert records(tmp_path) == records(undisturbed)
+    assert records(tmp_path) == records(reference_run)
 
 
 def test_a_damaged_list_of_what_to_redo_ends_in_one_sentence(town_files, tmp_path, monkeypatch):
@@ -112,7 +112,7 @@ def test_a_damaged_list_of_what_to_redo_ends_in_one_sentence(town_files, tmp_pat
 
 
 def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
@@ -131,11 +131,11 @@ def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(
         reconstruct_area(request)
     monkeypatch.setattr(output_files.OutputFile, "write", original)
     reconstruct_area(request)
-    assert records(tmp_path) == records(undisturbed)
+    assert records(tmp_path) == records(reference_run)
 
 
 def test_unfinished_files_of_a_killed_worker_are_not_read(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
@@ -146,7 +146,7 @@ def test_unfinished_files_of_a_killed_worker_are_not_read(
             (tmp_path / ".buildings.gml-1-abcd.gml").write_bytes(b"cut off")
 
     reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]), litter)
-    assert records(tmp_path) == records(undisturbed)
+    assert records(tmp_path) == records(reference_run)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".buildings")]
 
 
@@ -178,7 +178,7 @@ def test_a_full_disk_is_no_fault_of_the_ledger(town_files, tmp_path, monkeypatch
 
 
 def test_files_without_points_are_said_and_harm_none(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     empty = str(write_cloud(tmp_path / "empty.laz", np.zeros((0, 3)), np.zeros(0, np.uint8)))
@@ -186,10 +186,10 @@ def test_files_without_points_are_said_and_harm_none(
         reconstruct_area(Request((empty,), tmp_path / "none", town_files[1]))
     with pytest.warns(InputWarning, match=r"empty\.laz: holds no points"):
         reconstruct_area(Request((empty, town_files[0]), tmp_path / "out", town_files[1]))
-    assert by_id(tmp_path / "out") == by_id(undisturbed)
+    assert by_id(tmp_path / "out") == by_id(reference_run)
 
 
-def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_path, monkeypatch):
+def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     chunks, flush = [], Gatherer.flush
     monkeypatch.setattr(Gatherer, "flush", lambda self: (chunks.append(self.number), flush(self)))
@@ -210,7 +210,7 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_pat
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
     assert min(chunks.count(number) for number in (0, 1)) > 1
-    assert records(tmp_path / "out") == records(undisturbed)
+    assert records(tmp_path / "out") == records(reference_run)
 
 
 def test_points_in_several_files_count_once_where_a_footprint_is_moved(tmp_path):
@@ -274,7 +274,7 @@ def test_the_ledger_tells_losses_from_orderly_ends(tmp_path):
 
 
 def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(
-    undisturbed, tmp_path, monkeypatch
+    reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
@@ -282,11 +282,11 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(
     cloud = write_copc(tmp_path / "cloud.copc.laz", town.xyz, town.classification)
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
-    assert by_id(tmp_path / "out") == by_id(undisturbed)
+    assert by_id(tmp_path / "out") == by_id(reference_run)
 
 
 def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
-    undisturbed, tmp_path, monkeypatch
+    reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
@@ -296,17 +296,17 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
     write_lax(tmp_path / "cloud.lax", town.xyz[along])
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
-    assert records(tmp_path / "out") == records(undisturbed)
+    assert records(tmp_path / "out") == records(reference_run)
     alone = write_footprints(tmp_path / "alone.geojson", dict(list(town.footprints.items())[:1]))
     reconstruct_area(Request((str(cloud),), tmp_path / "alone", str(alone)))
-    assert by_id(tmp_path / "alone")["house-0"] == by_id(undisturbed)["house-0"]
+    assert by_id(tmp_path / "alone")["house-0"] == by_id(reference_run)["house-0"]
     tasks = Ledger(tmp_path / "alone" / ".hiproof" / "ledger.sqlite").tasks()
     (sort,) = [task for task in tasks if task.kind == "sort"]
     assert json.loads(sort.message)["points"] < 0.6 * len(town.xyz)
 
 
 def test_models_by_work_tile_are_the_merged_ones_cut(
-    town_files, undisturbed, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     by_tile, out = Settings.from_dict({"city": {"models": "tiles"}}), tmp_path / "out"
@@ -314,7 +314,7 @@ def test_models_by_work_tile_are_the_merged_ones_cut(
     files = sorted(path.name for path in (out / "models").iterdir())
     assert len(files) == 4 and not any(name.startswith(".") for name in files)
     assert not (out / "buildings.gml").exists() and not (out / "buildings.city.jsonl").exists()
-    assert by_id(out) == by_id(undisturbed)
+    assert by_id(out) == by_id(reference_run)
     for ending, merged in ((".gml", "buildings.gml"), (".city.jsonl", "buildings.city.jsonl")):
         cut = [
             line
@@ -323,7 +323,7 @@ def test_models_by_work_tile_are_the_merged_ones_cut(
             for line in (out / "models" / name).read_text().splitlines()
         ]
         buildings = [
-            line for line in (undisturbed / merged).read_text().splitlines() if "house-" in line
+            line for line in (reference_run / merged).read_text().splitlines() if "house-" in line
         ]
         assert sorted(line for line in cut if "house-" in line) == sorted(buildings)
 

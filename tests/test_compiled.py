@@ -53,7 +53,7 @@ def number(x):
 """
 
 
-def texts(factor):
+def make_sources(factor):
     """A package of three compiled functions, each calling the next; only the innermost knows
     `factor`.
     """
@@ -68,7 +68,7 @@ def texts(factor):
 @pytest.fixture
 def town(tmp_path, monkeypatch):
     """A folder with the package, which is forgotten again afterwards."""
-    for name, text in texts(3).items():
+    for name, text in make_sources(3).items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
@@ -299,14 +299,14 @@ print(answer(10), bool(answer._cache_hits))
     )
 
 
-def digest_of(text):
+def compute_digest(text):
     return base64.urlsafe_b64encode(hashlib.sha256(text.encode()).digest()).decode().rstrip("=")
 
 
 def write_wheel(folder, factor):
     wheel, info = folder / f"town-{factor}-py3-none-any.whl", f"town-{factor}.dist-info"
     files = {
-        **texts(factor),
+        **make_sources(factor),
         f"{info}/METADATA": f"Metadata-Version: 2.1\nName: town\nVersion: {factor}\n",
         f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: "
         "py3-none-any\n",
@@ -314,7 +314,9 @@ def write_wheel(folder, factor):
     with zipfile.ZipFile(wheel, "w") as archive:
         for name, text in files.items():
             archive.writestr(name, text)
-        lines = [f"{name},sha256={digest_of(text)},{len(text)}\n" for name, text in files.items()]
+        lines = [
+            f"{name},sha256={compute_digest(text)},{len(text)}\n" for name, text in files.items()
+        ]
         archive.writestr(f"{info}/RECORD", "".join([*lines, f"{info}/RECORD,,\n"]))
     return wheel
 
@@ -424,17 +426,17 @@ def test_every_stamp_stands_on_how_code_is_linked(tmp_path):
 def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, monkeypatch):
     files = {name: town / "town" / f"{name}.py" for name in ("outer", "middle", "inner")}
 
-    def stamps():
+    def compute_stamps():
         forget()
         return {name: stamp.compute_stamp(file) for name, file in files.items()}
 
-    before = stamps()
+    before = compute_stamps()
     files["middle"].write_text(MIDDLE + "\n# a word more\n")
-    after = stamps()
+    after = compute_stamps()
     assert after["inner"] == before["inner"]
     assert after["middle"] != before["middle"] and after["outer"] != before["outer"]
     monkeypatch.setattr(stamp, "read_version", lambda library: "another")
-    assert not set(stamps().values()) & set(after.values())
+    assert not set(compute_stamps().values()) & set(after.values())
 
 
 def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):

@@ -148,9 +148,9 @@ def test_snippets_run(page, at_hand, monkeypatch):
 
 
 def test_the_sites_generated_pages_tell_every_command_option_and_setting():
-    from docs.generated import commands_text, settings_text
+    from docs.generated import describe_commands, describe_settings
 
-    commands, settings = commands_text(), settings_text()
+    commands, settings = describe_commands(), describe_settings()
     for name, command in COMMANDS.items():
         assert f"## hiproof {name}\n" in commands
         assert [
@@ -167,9 +167,9 @@ def test_every_named_number_has_a_reason():
     """Its unit and what it does, behind it, above it or below it: the site's page of constants is
     made of these.
     """
-    from docs.generated import constants
+    from docs.generated import list_constants
 
-    found = constants()
+    found = list_constants()
     assert len(found) > 200
     assert [f"{c.file}: {', '.join(c.names)}" for c in found if len(c.why) < 4] == []
 

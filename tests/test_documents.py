@@ -36,12 +36,12 @@ ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}
 every_document = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 
 
-def spans(path):
+def list_spans(path):
     """What stands between backticks in the prose."""
     return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", path.read_text())
 
 
-def commands(path):
+def list_commands(path):
     """Spans, and lines of indented or fenced code, without their comments."""
     text = path.read_text()
     fenced = [
@@ -50,11 +50,11 @@ def commands(path):
         for line in block.splitlines()
     ]
     indented = re.findall(r"^    (\S.*)$", text, re.MULTILINE)
-    return spans(path) + [line.split(" # ")[0].strip() for line in fenced + indented]
+    return list_spans(path) + [line.split(" # ")[0].strip() for line in fenced + indented]
 
 
 @cache
-def source():
+def read_sources():
     """All text of the package, its benchmarks and tests, where names of files and values
     come from.
     """
@@ -63,7 +63,7 @@ def source():
     return "\n".join(file.read_text() for file in files if file != Path(__file__))
 
 
-def module_file(name):
+def find_module_file(name):
     """The file of a module that `python -m` may be given, None where there is none."""
     path = ROOT / name.replace(".", "/")
     found = (
@@ -94,11 +94,11 @@ def test_paths_exist(path):
     """Of the repository, or of a run's output, whose names stand in the source."""
     missing = [
         span
-        for span in spans(path)
+        for span in list_spans(path)
         if is_path(span)
         and not any((place / span).exists() for place in PLACES)
         and not (
-            re.search(rf"[\"'/]{re.escape(Path(span).name)}[\"'/]", source())
+            re.search(rf"[\"'/]{re.escape(Path(span).name)}[\"'/]", read_sources())
             and not span.endswith(".py")
         )
     ]
@@ -107,32 +107,34 @@ def test_paths_exist(path):
 
 @every_document
 def test_commands_exist(path):
-    named = [found for text in commands(path) for found in re.findall(r"^hiproof ([a-z]\w*)", text)]
+    named = [
+        found for text in list_commands(path) for found in re.findall(r"^hiproof ([a-z]\w*)", text)
+    ]
     assert [name for name in named if name not in COMMANDS] == []
     modules = [
-        found for text in commands(path) for found in re.findall(r"^python -m ([\w.]+)", text)
+        found for text in list_commands(path) for found in re.findall(r"^python -m ([\w.]+)", text)
     ]
     assert [
         name
         for name in modules
-        if name not in ("pytest", "venv", "pip") and module_file(name) is None
+        if name not in ("pytest", "venv", "pip") and find_module_file(name) is None
     ] == []
     targets = re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    made = [found for text in commands(path) for found in re.findall(r"^make ([\w-]+)", text)]
+    made = [found for text in list_commands(path) for found in re.findall(r"^make ([\w-]+)", text)]
     assert [name for name in made if name not in targets] == []
 
 
 @every_document
 def test_options_exist(path):
     missing = []
-    for text in commands(path):
+    for text in list_commands(path):
         if text.startswith(OTHER_PROGRAMS) or text.startswith("python -m pytest"):
             continue
         module = re.match(r"python -m ([\w.]+)", text)
         known = (
             OPTIONS
             if module is None
-            else set(re.findall(r"--[\w-]+", module_file(module[1]).read_text()))
+            else set(re.findall(r"--[\w-]+", find_module_file(module[1]).read_text()))
         )
         missing += [
             option for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text) if option not in known
@@ -156,14 +158,14 @@ def test_names_of_code_occur_in_it(path):
     """
     named = {
         span.split(".")[-1]
-        for span in spans(path)
+        for span in list_spans(path)
         if re.fullmatch(r"@?[a-z]\w*(_|\.[A-Za-z])\w*", span)
     }
     assert (
         sorted(
             name
             for name in named - ATTRIBUTES
-            if not re.search(rf"\b{re.escape(name)}\b", source())
+            if not re.search(rf"\b{re.escape(name)}\b", read_sources())
         )
         == []
     )

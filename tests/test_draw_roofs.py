@@ -16,8 +16,8 @@ pytest.importorskip("matplotlib", reason="drawing needs matplotlib (extra `repor
 draw_roofs = importlib.import_module("docs.draw_roofs")
 
 
-def lines_of(building):
-    return Counter(kind for kind, _ in draw_roofs.roof_lines(compose(building.roof, 0.0)))
+def count_lines(building):
+    return Counter(kind for kind, _ in draw_roofs.list_roof_lines(compose(building.roof, 0.0)))
 
 
 @pytest.mark.parametrize(
@@ -26,17 +26,17 @@ def lines_of(building):
 )
 def test_a_single_roof_has_its_ridges_and_eaves(type, ridges, eaves):
     building = random_building(np.random.default_rng(1), type)
-    assert lines_of(building) == Counter({"ridge": ridges, "eave": eaves})
+    assert count_lines(building) == Counter({"ridge": ridges, "eave": eaves})
 
 
 def test_valleys_and_steps_are_told_from_ridges():
     hips = random_compound(np.random.default_rng(0), "L_of_hips")
-    lines = draw_roofs.roof_lines(compose(hips.roof, 0.0))
+    lines = draw_roofs.list_roof_lines(compose(hips.roof, 0.0))
     valley = sum(
         float(np.linalg.norm(ends[1] - ends[0])) for kind, ends in lines if kind == "valley"
     )
     assert valley == pytest.approx(hips.parameters["width"] / np.sqrt(2), abs=0.01)
-    assert lines_of(random_compound(np.random.default_rng(0), "two_level"))["step"] >= 1
+    assert count_lines(random_compound(np.random.default_rng(0), "two_level"))["step"] >= 1
     assert "step" not in {kind for kind, _ in lines}
 
 
@@ -44,12 +44,12 @@ def test_points_have_their_height_over_the_roof():
     building = random_building(np.random.default_rng(2), "gable")
     points = uniform_points(building, np.random.default_rng(3), noise=0.0)
     shift = np.random.default_rng(4).uniform(-0.5, 0.5, len(points))
-    gap = draw_roofs.gaps(
+    gap = draw_roofs.measure_gaps(
         compose(building.roof, 0.0), points + np.column_stack([0 * shift, 0 * shift, shift])
     )
     assert np.allclose(gap, shift, atol=2e-3)
     assert np.isnan(
-        draw_roofs.gaps(compose(building.roof, 0.0), np.array([[99.0, 99.0, 5.0]]))
+        draw_roofs.measure_gaps(compose(building.roof, 0.0), np.array([[99.0, 99.0, 5.0]]))
     ).all()
 
 

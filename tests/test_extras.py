@@ -62,7 +62,7 @@ def gable_points():
 
 
 @pytest.fixture
-def hidden(monkeypatch):
+def hide_package(monkeypatch):
     """Hides a package, as if it were not installed."""
 
     def hide(package):
@@ -75,7 +75,7 @@ def hidden(monkeypatch):
     inference.load.cache_clear()
 
 
-def told(package):
+def make_pattern(package):
     return (
         rf"^expected the package {package}[\w.]* for [^;]+, got: .+; "
         rf"try: pip install 'hiproof\[{PACKAGES[package]}\]'"
@@ -92,7 +92,7 @@ def command(*arguments):
 
 @pytest.mark.parametrize("name", NEEDY)
 def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(
-    name, hidden, tmp_path, capsys
+    name, hide_package, tmp_path, capsys
 ):
     package, toml, options = NEEDY[name]
     cloud, config, out = tmp_path / "cloud.laz", tmp_path / "settings.toml", tmp_path / "out"
@@ -100,20 +100,20 @@ def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(
     config.write_text(toml.format(cloud=cloud.as_posix()))
     out.mkdir()
     (out / "buildings.gml").write_text("an earlier run's")
-    hidden(package)
+    hide_package(package)
     assert (
         command("reconstruct", cloud, "--out", out, "--config", config, "--restart", *options) == 2
     )
     (line,) = capsys.readouterr().err.splitlines()
-    assert re.match(told(package), line.removeprefix("hiproof: "))
+    assert re.match(make_pattern(package), line.removeprefix("hiproof: "))
     assert [path.read_text() for path in out.iterdir()] == ["an earlier run's"]
 
 
 @pytest.mark.parametrize("options", [["--parts", "one"], ["--objective", "paper"]])
 def test_one_primitive_by_the_points_alone_is_said_to_do_without(
-    options, hidden, town_files, tmp_path, capsys
+    options, hide_package, town_files, tmp_path, capsys
 ):
-    hidden("onnxruntime")
+    hide_package("onnxruntime")
     arguments = [
         "reconstruct",
         town_files[0],
@@ -131,39 +131,41 @@ def test_one_primitive_by_the_points_alone_is_said_to_do_without(
         assert command(*arguments, "--no-network") == 0
 
 
-def test_points_by_address_are_refused_before_anything_is_written(hidden, tmp_path):
-    hidden("fsspec")
-    with pytest.raises(InputError, match=told("fsspec")):
+def test_points_by_address_are_refused_before_anything_is_written(hide_package, tmp_path):
+    hide_package("fsspec")
+    with pytest.raises(InputError, match=make_pattern("fsspec")):
         reconstruct_area(Request(("https://example.org/a.laz",), tmp_path / "out"))
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("source", ["overture", "https://example.org/a.parquet"])
-def test_footprints_by_address_name_the_extra_of_their_format(source, hidden, tmp_path):
+def test_footprints_by_address_name_the_extra_of_their_format(source, hide_package, tmp_path):
     pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
-    hidden("fsspec")
+    hide_package("fsspec")
     with pytest.raises(InputError, match=r"fsspec for GeoParquet .+'hiproof\[parquet\]'$"):
         reconstruct_area(Request(("a.laz",), tmp_path / "out", source))
     assert not (tmp_path / "out").exists()
 
 
-def test_labelling_is_refused_before_it_reads_or_writes(hidden, tmp_path, capsys):
-    hidden("onnxruntime")
+def test_labelling_is_refused_before_it_reads_or_writes(hide_package, tmp_path, capsys):
+    hide_package("onnxruntime")
     assert (
         command("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz")
         == 2
     )
     (line,) = capsys.readouterr().err.splitlines()
-    assert re.match(told("onnxruntime"), line.removeprefix("hiproof: ")) and line.endswith(
+    assert re.match(make_pattern("onnxruntime"), line.removeprefix("hiproof: ")) and line.endswith(
         "'hiproof[network]'"
     )
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_neighbourhood_is_refused_before_it_is_written(hidden, tmp_path):
-    hidden("rasterio")
+def test_a_neighbourhood_is_refused_before_it_is_written(hide_package, tmp_path):
+    hide_package("rasterio")
     done = CliRunner().invoke(simulate, ["neighbourhood", str(tmp_path / "town")])
-    assert done.exit_code == 2 and re.match(told("rasterio"), done.output.removeprefix("error: "))
+    assert done.exit_code == 2 and re.match(
+        make_pattern("rasterio"), done.output.removeprefix("error: ")
+    )
     assert not (tmp_path / "town").exists()
 
 
@@ -189,14 +191,14 @@ def test_a_neighbourhood_is_refused_before_it_is_written(hidden, tmp_path):
         ),
     ],
 )
-def test_python_gets_the_same_sentence(package, call, hidden):
-    hidden(package)
-    with pytest.raises(InputError, match=told(package)):
+def test_python_gets_the_same_sentence(package, call, hide_package):
+    hide_package(package)
+    with pytest.raises(InputError, match=make_pattern(package)):
         call()
 
 
-def test_training_names_its_extra(hidden):
-    hidden("torch")
+def test_training_names_its_extra(hide_package):
+    hide_package("torch")
     with pytest.raises(
         InputError, match=r"expected the package torch for training, got: .+'hiproof\[train\]'$"
     ):
@@ -204,15 +206,17 @@ def test_training_names_its_extra(hidden):
 
 
 @pytest.mark.parametrize("given", [{}, {"fit": {"parts": "one"}, "segment": {"enabled": False}}])
-def test_a_roof_is_the_same_without_what_it_does_not_ask_for(given, hidden):
+def test_a_roof_is_the_same_without_what_it_does_not_ask_for(given, hide_package):
     settings = Settings.from_dict(given)
     before = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
-    hidden("onnxruntime"), hidden("rasterio")
+    hide_package("onnxruntime"), hide_package("rasterio")
     after = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
     assert after.type == "gable" and np.array_equal(after.solid.vertices, before.solid.vertices)
 
 
-def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(hidden, town_files, tmp_path):
+def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(
+    hide_package, town_files, tmp_path
+):
     files = demo_files()
     inside = shapely.box(91990, 450990, 92015, 451015).bounds
     out, inputs = tmp_path / "out", (str(files["cloud"]),)
@@ -220,7 +224,7 @@ def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(hidden, town_
         Request(inputs, out, str(files["footprints"]), str(files["terrain"]), bbox=inside)
     )
     assert RunPoints(out).missing == ""
-    hidden("rasterio")
+    hide_package("rasterio")
     assert "all but refitting works (expected the package rasterio" in RunPoints(out).missing
 
 
@@ -248,7 +252,7 @@ def test_the_demo_asks_for_no_extra(tmp_path):
     assert len(models) == 2 and models[0] == models[1]
 
 
-def names_in(requirements):
+def list_names(requirements):
     """The packages that requirements name: `laspy` of "laspy[lazrs]>=2.5.3"; of dask[distributed]
     what it is there for too.
     """
@@ -261,9 +265,9 @@ def test_each_sentence_names_the_extra_that_brings_the_package():
     sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
     found = set(re.findall(r'(?<!>> )import_extra\("(\w+)[\w.]*", "(\w+)"', sources))
     assert found == {*PACKAGES.items(), ("fsspec", "parquet")}
-    assert [pair for pair in found if pair[0] not in names_in(OPTIONAL[pair[1]])] == []
-    assert names_in(PROJECT["dependencies"]).isdisjoint(PACKAGES)
-    assert names_in(OPTIONAL["all"]) == {"hiproof", *PACKAGES.values()}
+    assert [pair for pair in found if pair[0] not in list_names(OPTIONAL[pair[1]])] == []
+    assert list_names(PROJECT["dependencies"]).isdisjoint(PACKAGES)
+    assert list_names(OPTIONAL["all"]) == {"hiproof", *PACKAGES.values()}
 
 
 def test_the_page_of_installing_tells_of_every_extra():

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from handmade import gable_house, modelled, unmodelled
+from handmade import gable_house, make_building, make_lost_building
 from hiproof import formats
 from hiproof.formats import (
     FORMATS,
@@ -75,7 +75,7 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     monkeypatch.setitem(
         formats.FORMATS, "names", Format("names.txt", "names alone", "names", "names")
     )
-    buildings = [modelled(gable_house(), "a"), unmodelled("b")]
+    buildings = [make_building(gable_house(), "a"), make_lost_building("b")]
     write_all(tmp_path / "one", buildings)
     head = FileHead(offset=np.array([85000.0, 446000.0, 0.0]))
     parts = [fragments(building, (building.id, building.id), head)[1] for building in buildings]
@@ -109,7 +109,7 @@ def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
         name.replace("buildings", "0_0_0") for name in files
     ]
     head = FileHead("EPSG:7415", offset=np.array([85000.0, 446000.0, 0.0]), write=settings.write)
-    building = modelled(gable_house(), "a")
+    building = make_building(gable_house(), "a")
     join_fragments(asked, [fragments(building, ("a", "a"), head)[1]], head)
     if version == "both":
         write_citygml3(tmp_path / "alone.gml", [building], "EPSG:7415")

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from prose import PAGES, ROOT, lengths, long_lines, sentences
+from prose import PAGES, ROOT, count_words, find_long_lines, split_sentences
 
 MOST_WORDS = {"README.md": 700, "ARCHITECTURE.md": 900, "CHANGELOG.md": 400}
 LONGEST_SENTENCE = 40  # words
@@ -22,19 +22,21 @@ def test_a_front_page_is_short(name):
 @every_page
 def test_no_sentence_is_long(page):
     text = page.read_text(encoding="utf-8")
-    assert [part for part in sentences(text) if len(part.split()) > LONGEST_SENTENCE] == []
+    assert [part for part in split_sentences(text) if len(part.split()) > LONGEST_SENTENCE] == []
 
 
 @every_page
 def test_lines_fit(page):
-    assert page.name in MADE or long_lines(page.read_text(encoding="utf-8")) == []
+    assert page.name in MADE or find_long_lines(page.read_text(encoding="utf-8")) == []
 
 
 def test_sentences_are_short_on_the_whole():
-    words = lengths((ROOT / "README.md").read_text(encoding="utf-8"))
+    words = count_words((ROOT / "README.md").read_text(encoding="utf-8"))
     assert words.mean() <= README_MEAN and sorted(words)[int(0.9 * len(words))] <= README_P90
     docs = [
-        lengths(page.read_text(encoding="utf-8")) for page in PAGES if page.parent.name == "docs"
+        count_words(page.read_text(encoding="utf-8"))
+        for page in PAGES
+        if page.parent.name == "docs"
     ]
     every = sorted(n for page in docs for n in page)
     assert every[int(0.9 * len(every))] <= DOCS_P90
@@ -45,5 +47,5 @@ def test_prose_is_told_from_code_and_tables():
         "# A title\n\nOne two. Three four\nfive.\n\n- item one\n- item two\n\n"
         "| a | b |\n\n    code here\n"
     )
-    assert sentences(text) == ["One two.", "Three four five.", "- item one", "- item two"]
-    assert not re.search("code|title|\\|", " ".join(sentences(text)))
+    assert split_sentences(text) == ["One two.", "Three four five.", "- item one", "- item two"]
+    assert not re.search("code|title|\\|", " ".join(split_sentences(text)))

@@ -18,7 +18,7 @@ from hiproof.cli import main
 from hiproof.errors import InputError, InputWarning, OutputError
 
 
-def said(path):
+def read_lines(path):
     """(level, message) of each line of a log file."""
     return [tuple(line.split(" ", 4)[i] for i in (2, 4)) for line in path.read_text().splitlines()]
 
@@ -37,7 +37,7 @@ def test_each_place_gets_its_levels(level, console, file, tmp_path, capsys):
     for name in ("debug", "info", "warning", "error"):
         log.LOGGER.log(log.Level(name).number, name)
     assert capsys.readouterr().err.splitlines() == [f"hiproof: {name}" for name in console]
-    assert said(tmp_path / "deep" / "run.log") == [(name.upper(), name) for name in file]
+    assert read_lines(tmp_path / "deep" / "run.log") == [(name.upper(), name) for name in file]
 
 
 def test_secrets_are_masked_in_messages_arguments_and_tracebacks(tmp_path, capsys):
@@ -67,7 +67,7 @@ def test_starting_again_adds_to_the_file_and_repeats_nothing(tmp_path, capsys):
     for _ in range(2):
         log.start(file=tmp_path / "run.log")
         log.LOGGER.warning("once")
-    assert said(tmp_path / "run.log") == [("WARNING", "once")] * 2
+    assert read_lines(tmp_path / "run.log") == [("WARNING", "once")] * 2
     assert capsys.readouterr().err == "hiproof: once\n" * 2
 
 
@@ -85,7 +85,7 @@ def test_workers_write_to_the_same_places(tmp_path, capfd):
         )
     )
     executor.close()
-    assert said(tmp_path / "run.log") == [
+    assert read_lines(tmp_path / "run.log") == [
         ("WARNING", "3 points of https://u:...@host were left out")
     ]
     assert capfd.readouterr().err == "hiproof: 3 points of https://u:...@host were left out\n"
@@ -97,7 +97,7 @@ def test_the_file_tells_of_every_step_and_of_lost_workers(
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     log.start(log.Level.debug, tmp_path / "run.log")
     reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], processes=2))
-    lines = said(tmp_path / "run.log")
+    lines = read_lines(tmp_path / "run.log")
     told = "\n".join(f"{level} {text}" for level, text in lines)
     assert "INFO version" in told and "4 buildings in 1 work tile\n" in told
     assert "INFO sort:0 is done" in told and "is done: 4 buildings" in told
@@ -125,7 +125,7 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
-    assert said(tmp_path / "run.log") == [
+    assert read_lines(tmp_path / "run.log") == [
         ("ERROR", "expected points at https://u:...@host, got none")
     ]
     assert capsys.readouterr().err == "hiproof: expected points at https://u:...@host, got none\n"
@@ -140,7 +140,9 @@ def test_lines_of_several_workers_stay_whole(tmp_path):
     executor = Processes(2)
     list(executor.run(warnings.warn, [(f"task {i}", InputWarning) for i in range(40)]))
     executor.close()
-    assert sorted(said(tmp_path / "run.log")) == sorted(("WARNING", f"task {i}") for i in range(40))
+    assert sorted(read_lines(tmp_path / "run.log")) == sorted(
+        ("WARNING", f"task {i}") for i in range(40)
+    )
 
 
 @pytest.mark.skipif(
@@ -158,4 +160,4 @@ def test_a_full_disk_ends_the_log_and_not_the_work(tmp_path, capsys):
     assert sorted(told) == sorted([full, *(f"hiproof: warning {number}" for number in range(3))])
     log.start(file=tmp_path / "run.log")
     log.LOGGER.warning("kept")
-    assert said(tmp_path / "run.log") == [("WARNING", "kept")]
+    assert read_lines(tmp_path / "run.log") == [("WARNING", "kept")]

@@ -37,14 +37,14 @@ def page(request, tmp_path, monkeypatch, capfd):
         (tmp_path / "secret.txt").write_text("secret")
         (folder / "link").symlink_to(tmp_path / "secret.txt")
         server, start = make_server(folder, "run"), "/"
-    with serving(server):
+    with serve(server):
         yield server.server_port, start
     said = capfd.readouterr()
     assert said.out + said.err == ""
 
 
 @contextmanager
-def serving(server):
+def serve(server):
     with server:
         thread = threading.Thread(target=server.serve_forever, args=(POLL_S,), daemon=True)
         thread.start()
@@ -53,7 +53,7 @@ def serving(server):
         thread.join()
 
 
-def asked(port, text, wait_s=20.0):
+def send(port, text, wait_s=20.0):
     """What comes back for bytes sent, until the server closes the line."""
     with socket.create_connection(("127.0.0.1", port), timeout=wait_s) as line:
         line.sendall(text)
@@ -79,7 +79,7 @@ def code(answer):
 
 def test_the_page_is_answered_with_headers_that_keep_it_to_itself(page):
     port, start = page
-    answer = asked(port, request(port, start))
+    answer = send(port, request(port, start))
     head, body = answer.split(b"\r\n\r\n", 1)
     assert code(answer) == 200 and b"<html" in body
     for header in (
@@ -98,8 +98,8 @@ def test_the_page_is_answered_with_headers_that_keep_it_to_itself(page):
 def test_head_is_get_without_a_body(page):
     port, start = page
     for target in (start, start + "missing"):
-        head, body = asked(port, request(port, target, "HEAD")).split(b"\r\n\r\n", 1)
-        whole, _ = asked(port, request(port, target)).split(b"\r\n\r\n", 1)
+        head, body = send(port, request(port, target, "HEAD")).split(b"\r\n\r\n", 1)
+        whole, _ = send(port, request(port, target)).split(b"\r\n\r\n", 1)
         drop = re.compile(rb"Date: [^\r]*")
         assert body == b"" and drop.sub(b"", head) == drop.sub(b"", whole)
 
@@ -119,14 +119,14 @@ def test_head_is_get_without_a_body(page):
 )
 def test_foreign_pages_and_names_are_refused(page, method, more):
     port, start = page
-    answer = asked(port, request(port, start, method, *more, "Content-Length: 2", body=b"{}"))
+    answer = send(port, request(port, start, method, *more, "Content-Length: 2", body=b"{}"))
     assert code(answer) == 403 and b"<html" not in answer
 
 
 def test_a_request_without_a_host_is_refused(page):
     port, start = page
-    assert code(asked(port, f"GET {start} HTTP/1.1\r\nConnection: close\r\n\r\n".encode())) == 403
-    assert b"<html" not in asked(port, f"GET {start}\r\n\r\n".encode())  # as of HTTP/0.9
+    assert code(send(port, f"GET {start} HTTP/1.1\r\nConnection: close\r\n\r\n".encode())) == 403
+    assert b"<html" not in send(port, f"GET {start}\r\n\r\n".encode())  # as of HTTP/0.9
 
 
 @pytest.mark.parametrize(
@@ -157,14 +157,14 @@ def test_a_request_without_a_host_is_refused(page):
 )
 def test_no_address_leads_elsewhere(page, target):
     port, start = page
-    answer = asked(port, request(port, start + target))
+    answer = send(port, request(port, start + target))
     assert code(answer) == (200 if target == "?x" else 404)
     assert b"secret" not in answer.split(b"\r\n\r\n", 1)[1] and b"Directory" not in answer
 
 
 @pytest.mark.parametrize("target", ["*", "http://[", "http://127.0.0.1/", "x", "[::1"])
 def test_what_is_no_path_is_refused(page, target):
-    assert code(asked(page[0], request(page[0], target))) in (400, 403)
+    assert code(send(page[0], request(page[0], target))) in (400, 403)
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_what_is_no_path_is_refused(page, target):
     ],
 )
 def test_what_is_no_request_ends_the_connection(page, text):
-    answer = asked(page[0], text)
+    answer = send(page[0], text)
     assert (
         answer == b""
         or b" 4" in answer[:14]
@@ -199,7 +199,7 @@ def test_what_is_no_request_ends_the_connection(page, text):
 )
 def test_a_length_that_is_none_is_refused(page, length):
     port, start = page
-    answer = asked(
+    answer = send(
         port, request(port, start + "change", "POST", None, f"Content-Length: {length}", body=b"{}")
     )
     assert code(answer) == 413
@@ -212,18 +212,18 @@ def test_a_chunked_body_is_no_second_request(page):
     )
     head = f"GET {start} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
     outer = f"{head}Transfer-Encoding: chunked\r\n\r\n".encode()
-    assert asked(port, outer + inner).count(b"HTTP/1.1 ") == 1
+    assert send(port, outer + inner).count(b"HTTP/1.1 ") == 1
 
 
 def test_silent_and_slow_connections_are_closed(page):
     port, start = page
     begun = time.monotonic()
-    assert asked(port, b"") == b""
-    assert asked(port, b"GET / HT") == b""
+    assert send(port, b"") == b""
+    assert send(port, b"GET / HT") == b""
     body = request(
         port, start, "POST", None, "Content-Type: application/json", "Content-Length: 9", body=b"{"
     )
-    assert asked(port, body) == b""
+    assert send(port, body) == b""
     with socket.create_connection(("127.0.0.1", port), timeout=20) as line:
         for _ in range(100):  # a byte now and then puts nothing off
             try:
@@ -234,12 +234,12 @@ def test_silent_and_slow_connections_are_closed(page):
         else:
             raise AssertionError("still open")
     assert time.monotonic() - begun < 15
-    assert code(asked(port, request(port, start))) == 200
+    assert code(send(port, request(port, start))) == 200
 
 
 def test_a_post_of_another_kind_changes_nothing(page):
     port, start = page
-    answer = asked(
+    answer = send(
         port, request(port, start + "change", "POST", None, "Content-Length: 2", body=b"{}")
     )
     assert code(answer) in (405, 415)
@@ -252,7 +252,7 @@ def test_a_client_that_goes_away_is_no_news(page):
         line.sendall(request(port, start))
         line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
         line.close()
-    assert code(asked(port, request(port, start))) == 200
+    assert code(send(port, request(port, start))) == 200
 
 
 def test_many_connections_at_once_leave_room(page, monkeypatch):
@@ -260,7 +260,7 @@ def test_many_connections_at_once_leave_room(page, monkeypatch):
     monkeypatch.setattr(loopback, "MOST_THREADS", threading.active_count() + 5)
     lines = [socket.create_connection(("127.0.0.1", port)) for _ in range(10)]
     time.sleep(1.0)  # those that are silent are closed
-    assert code(asked(port, request(port, start))) == 200
+    assert code(send(port, request(port, start))) == 200
     for line in lines:
         line.close()
 
@@ -279,7 +279,7 @@ def test_closing_waits_for_an_answer_on_its_way():
         threading.Thread(target=server.serve_forever, args=(POLL_S,), daemon=True).start()
         port = server.server_port
         threading.Thread(
-            target=asked, args=(port, request(port, "/", "POST", None, "Content-Length: 0"))
+            target=send, args=(port, request(port, "/", "POST", None, "Content-Length: 0"))
         ).start()
         begun.wait(10)
         server.shutdown()

@@ -30,7 +30,7 @@ PLAIN = Settings.from_dict({"segment": {"enabled": False}})
 
 
 @pytest.fixture(scope="module")
-def scanned():
+def gable_scan():
     """Points of a gable of 12 by 8 m with its ridge at 8 m and eaves at 5 m, and its footprint."""
     rng = np.random.default_rng(0)
     xy = rng.uniform((0, 0), (12, 8), (800, 2))
@@ -38,7 +38,7 @@ def scanned():
     return np.column_stack([xy, z]), shapely.box(0, 0, 12, 8)
 
 
-def obeyed(scanned, **said):
+def override(scanned, **said):
     return overridden(read_override({"id": "a", **said}), *scanned, settings=PLAIN, id="a")
 
 
@@ -46,22 +46,22 @@ def test_examples_in_the_docstrings_run():
     assert doctest.testmod(table_values).failed == 0
 
 
-def test_a_type_is_obeyed_and_the_rest_fitted(scanned):
-    house = obeyed(scanned, type="hip")
+def test_a_type_is_obeyed_and_the_rest_fitted(gable_scan):
+    house = override(gable_scan, type="hip")
     assert house.type == "hip" and not check_solid(house.solid)
     assert "overridden: type hip" in house.detail
 
 
-def test_a_ridge_is_obeyed_and_the_contradiction_is_said(scanned):
-    house = obeyed(scanned, ridge_height=12.0)
+def test_a_ridge_is_obeyed_and_the_contradiction_is_said(gable_scan):
+    house = override(gable_scan, ridge_height=12.0)
     assert house.solid.vertices[:, 2].max() == pytest.approx(12.0, abs=0.01)
     assert house.grade is Grade.POOR and "overridden: ridge_height 12.0" in house.detail
-    assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith(
+    assert override(gable_scan, ridge_height=8.0, who="anna", note="seen").detail.endswith(
         "ridge_height 8.0 (seen, anna)"
     )
 
 
-def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(scanned):
+def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(gable_scan):
     class Above:
         source = "a wrong terrain model"
 
@@ -70,15 +70,15 @@ def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(scanne
 
     for said, is_told in (({"type": "gable"}, True), ({"z_ground": 1.0}, False)):
         house = overridden(
-            read_override({"id": "a", **said}), *scanned, Above(), settings=PLAIN, id="a"
+            read_override({"id": "a", **said}), *gable_scan, Above(), settings=PLAIN, id="a"
         )
         assert ("above its eaves" in house.detail) == is_told
 
 
-def test_a_ground_above_the_eaves_is_said(scanned):
-    assert "ground given" not in obeyed(scanned, z_ground=1.0).detail
-    assert "ground given" not in obeyed(scanned, z_ground=-500.0).detail
-    house = obeyed(scanned, z_ground=7.0)
+def test_a_ground_above_the_eaves_is_said(gable_scan):
+    assert "ground given" not in override(gable_scan, z_ground=1.0).detail
+    assert "ground given" not in override(gable_scan, z_ground=-500.0).detail
+    house = override(gable_scan, z_ground=7.0)
     assert "the ground given lies above its lowest eave; overridden: z_ground 7.0" in house.detail
     assert house.solid.vertices[:, 2].min() < 5.0 and not check_solid(house.solid)
 
@@ -89,7 +89,7 @@ def test_no_more_parts_than_asked_for():
     z = np.where(xy[:, 0] < 10, 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0), 3.0)
     scan = np.column_stack([xy, z]), shapely.box(0, 0, 16, 8)
     assert len(hiproof.reconstruct(*scan, settings=PLAIN).parts) == 2
-    one = obeyed(scan, parts=1)
+    one = override(scan, parts=1)
     assert len(one.parts) == 1 and not check_solid(one.solid)
 
 
@@ -106,45 +106,45 @@ def test_parts_given_stand_where_the_run_moved_the_footprint():
     again = overridden(read_override(building_record(house)), scan, beside, settings=PLAIN, id="a")
     assert again.shift == house.shift and np.array_equal(again.solid.vertices, house.solid.vertices)
     assert again.quality == house.quality and "moved by" in again.detail
-    block = obeyed((scan, beside), block_height=6.0, z_ground=1.0)
+    block = override((scan, beside), block_height=6.0, z_ground=1.0)
     assert block.shift == house.shift and block.roof.outline.area == pytest.approx(96.0, abs=0.01)
 
 
-def test_ground_block_and_leaving_out(scanned):
-    assert obeyed(scanned, z_ground=1.5).solid.vertices[:, 2].min() == pytest.approx(1.5)
-    block = obeyed(scanned, block_height=6.0, z_ground=1.0)
+def test_ground_block_and_leaving_out(gable_scan):
+    assert override(gable_scan, z_ground=1.5).solid.vertices[:, 2].min() == pytest.approx(1.5)
+    block = override(gable_scan, block_height=6.0, z_ground=1.0)
     assert block.type == "flat" and np.ptp(block.solid.vertices[:, 2]) == pytest.approx(6.0)
-    left = obeyed(scanned, leave_out=True, note="torn down")
+    left = override(gable_scan, leave_out=True, note="torn down")
     assert left.status is Status.LEFT_OUT and left.built is None and "torn down" in left.detail
 
 
-def test_a_block_around_a_courtyard_needs_no_points(scanned):
+def test_a_block_around_a_courtyard_needs_no_points(gable_scan):
     court = shapely.box(4.0, 3.0, 8.0, 5.0)
-    footprint = scanned[1].difference(court)
-    block = obeyed((np.zeros((0, 3)), footprint), block_height=6.0, z_ground=1.0)
+    footprint = gable_scan[1].difference(court)
+    block = override((np.zeros((0, 3)), footprint), block_height=6.0, z_ground=1.0)
     assert block.volume == pytest.approx(6.0 * footprint.area)
 
 
-def test_parts_given_are_the_parts(scanned):
+def test_parts_given_are_the_parts(gable_scan):
     part = {
         "type": "hip",
         "parameters": {"width": 8, "length": 12, "height": 3, "ridge_length": 5},
         "position": [0, 0, 5],
     }
-    house = obeyed(scanned, parts=[part], origin=[6, 4, 0])
+    house = override(gable_scan, parts=[part], origin=[6, 4, 0])
     assert house.type == "hip" and house.parts[0].parameters["ridge_length"] == 5.0
     assert house.quality.points > 500 and house.attributes == {} and "fitted" not in house.detail
     empty = overridden(
         read_override({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}),
         np.zeros((0, 3)),
-        scanned[1],
+        gable_scan[1],
     )
     assert empty.status is Status.MODELLED and not check_solid(empty.solid)
 
 
-def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
+def test_a_part_list_that_makes_no_roof_is_one_sentence(gable_scan):
     part = {"type": "hip", "parameters": {"width": -8, "length": 12}, "position": [0, 0, 5]}
-    house = obeyed(scanned, parts=[part], origin=[6, 4, 0])
+    house = override(gable_scan, parts=[part], origin=[6, 4, 0])
     assert house.status is Status.NOT_BUILT and "positive width" in house.detail
 
 
@@ -192,7 +192,7 @@ def test_what_an_override_cannot_say_is_one_sentence(said, message):
 
 
 @pytest.fixture
-def counted(monkeypatch):
+def solved_ids(monkeypatch):
     """The ids of buildings that are solved, as they are."""
     solved, original = [], solve.solve_one
 
@@ -218,30 +218,31 @@ def request(town_files, out, path, *lines, **changes):
     )
 
 
-def test_a_run_with_other_overrides_redoes_those_buildings_alone(town_files, tmp_path, counted):
+def test_a_run_with_other_overrides_redoes_those_buildings_alone(town_files, tmp_path, solved_ids):
     out, path = tmp_path / "out", tmp_path / "o.jsonl"
     run = city_run.reconstruct_area
     run(request(town_files, out, None))
     plain, rows = records(out), by_id(out)
-    assert sorted(counted) == [f"house-{i}" for i in range(4)]
-    counted.clear()
+    assert sorted(solved_ids) == [f"house-{i}" for i in range(4)]
+    solved_ids.clear()
     run(request(town_files, out, path, {"id": "house-1", "type": "hip"}))
-    assert counted == ["house-1"]
+    assert solved_ids == ["house-1"]
     changed = by_id(out)
     assert {id for id in rows if changed[id] != rows[id]} == {"house-1"} and changed["house-1"][
         "type"
     ] == "hip"
-    counted.clear()
+    solved_ids.clear()
     run(request(town_files, out, path, {"id": "house-1", "type": "hip"}))
-    assert counted == []
+    assert solved_ids == []
     run(request(town_files, out, path, {"id": "house-2", "leave_out": True}))
     assert (
-        sorted(counted) == ["house-1", "house-2"] and by_id(out)["house-2"]["status"] == "left_out"
+        sorted(solved_ids) == ["house-1", "house-2"]
+        and by_id(out)["house-2"]["status"] == "left_out"
     )
     together = records(out)
-    counted.clear()
+    solved_ids.clear()
     run(request(town_files, out, None))
-    assert counted == ["house-2"] and records(out) == plain
+    assert solved_ids == ["house-2"] and records(out) == plain
     run(request(town_files, tmp_path / "new", path, {"id": "house-2", "leave_out": True}))
     assert records(tmp_path / "new") == together
 
@@ -277,7 +278,7 @@ def test_what_is_redone_reads_the_points_near_it_alone(kept, tmp_path, monkeypat
     assert records(out) == records(tmp_path / "new")
 
 
-def test_a_run_killed_while_it_redoes_goes_on(town_files, tmp_path, counted, monkeypatch):
+def test_a_run_killed_while_it_redoes_goes_on(town_files, tmp_path, solved_ids, monkeypatch):
     out, path = tmp_path / "out", tmp_path / "o.jsonl"
     city_run.reconstruct_area(request(town_files, out, None))
     ask = request(town_files, out, path, {"id": "house-0", "block_height": 4.0})
@@ -285,22 +286,24 @@ def test_a_run_killed_while_it_redoes_goes_on(town_files, tmp_path, counted, mon
         patch.setattr(city_run, "solve_tile", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             city_run.reconstruct_area(ask)
-    counted.clear()
+    solved_ids.clear()
     city_run.reconstruct_area(ask)
-    assert counted == ["house-0"] and by_id(out)["house-0"]["type"] == "flat"
+    assert solved_ids == ["house-0"] and by_id(out)["house-0"]["type"] == "flat"
 
 
-def test_without_kept_texts_all_is_made_again(town_files, tmp_path, counted):
+def test_without_kept_texts_all_is_made_again(town_files, tmp_path, solved_ids):
     out, path = tmp_path / "out", tmp_path / "o.jsonl"
     city_run.reconstruct_area(request(town_files, out, None))
     for file in (out / ".hiproof/tiles").iterdir():
         file.unlink()
-    counted.clear()
+    solved_ids.clear()
     city_run.reconstruct_area(request(town_files, out, path, {"id": "house-0", "type": "hip"}))
-    assert len(counted) == 4 and by_id(out)["house-0"]["type"] == "hip"
+    assert len(solved_ids) == 4 and by_id(out)["house-0"]["type"] == "hip"
 
 
-def test_a_runs_own_parameters_are_overrides_that_change_nothing(town_files, undisturbed, tmp_path):
+def test_a_runs_own_parameters_are_overrides_that_change_nothing(
+    town_files, reference_run, tmp_path
+):
     first = tmp_path / "first"
     city_run.reconstruct_area(request(town_files, first, None))
     ask = request(town_files, tmp_path / "again", None)

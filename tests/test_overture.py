@@ -21,7 +21,7 @@ from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
-from range_server import serving
+from range_server import serve
 from run_records import RECORDS
 from tiny_town import CRS, make_town, write_cloud, write_town
 
@@ -42,11 +42,11 @@ TOWN = make_town()
 FOOTER_BYTES = 1 << 16  # that pyarrow reads of a file's end at first
 
 
-def in_degrees(polygon):
+def convert_to_degrees(polygon):
     return shapely.transform(polygon, lambda xy: np.column_stack(TO_DEGREES.transform(*xy.T)))
 
 
-def shifted(polygon, x, y=0.0):
+def shift(polygon, x, y=0.0):
     return shapely.transform(polygon, lambda xy: xy + [x, y])
 
 
@@ -56,15 +56,18 @@ def town_rows():
     """
     houses = list(TOWN.footprints.items())
     known = dict(height=8.5, num_floors=2, roof_shape="gabled", min_height=0.0)
-    near = [building(f"gers-{id}", in_degrees(area)) for id, area in houses]
+    near = [building(f"gers-{id}", convert_to_degrees(area)) for id, area in houses]
     near[0] |= known
     near[1]["sources"] = [OSM, GOOGLE]
-    cellar = building("gers-cellar", in_degrees(shifted(houses[0][1], 2)), is_underground=True)
-    beside = building("gers-beside", in_degrees(shifted(houses[0][1], 0, 60)))
+    cellar = building(
+        "gers-cellar", convert_to_degrees(shift(houses[0][1], 2)), is_underground=True
+    )
+    beside = building("gers-beside", convert_to_degrees(shift(houses[0][1], 0, 60)))
     # of so many vertices that a row group is larger than what readers take for a file's end
     detailed = shapely.segmentize(houses[0][1], 0.02)
     far = [
-        building(f"gers-far-{i}", in_degrees(shifted(detailed, 3000 + 100 * i))) for i in range(40)
+        building(f"gers-far-{i}", convert_to_degrees(shift(detailed, 3000 + 100 * i)))
+        for i in range(40)
     ]
     return near, [cellar, beside], far
 
@@ -76,7 +79,7 @@ def first_byte(told, group):
 
 
 @pytest.fixture
-def served(tmp_path, monkeypatch):
+def served_release(tmp_path, monkeypatch):
     """A folder with the cloud of the town, settings that name the release's catalogue, and the file
     that lists the ranges asked for.
     """
@@ -88,7 +91,7 @@ def served(tmp_path, monkeypatch):
     folder.mkdir()
     log.touch()
     near, odd, far = town_rows()
-    with serving(folder, log) as address:
+    with serve(folder, log) as address:
         # the far ones of the first file stand in row groups of their own
         parts = [building("gers-part", near[0]["outline"], building_id="gers-house-0")]
         files = {"building": [near + far[:20], odd + far[20:30], far[30:]]}
@@ -108,8 +111,8 @@ def command(monkeypatch, *arguments):
     return ended.value.code
 
 
-def test_a_run_takes_the_buildings_of_the_clouds_extent(served, tmp_path):
-    cloud, settings, _ = served
+def test_a_run_takes_the_buildings_of_the_clouds_extent(served_release, tmp_path):
+    cloud, settings, _ = served_release
     out = tmp_path / "out"
     summary = reconstruct_area(Request((str(cloud),), out, "overture", settings=settings))
     assert summary.buildings == len(TOWN.footprints)
@@ -139,8 +142,8 @@ def test_a_run_takes_the_buildings_of_the_clouds_extent(served, tmp_path):
     assert record["inputs"]["footprints"] == str(out / ".hiproof" / "overture.gpkg")
 
 
-def test_a_finished_run_asks_for_no_network(served, tmp_path):
-    cloud, settings, _ = served
+def test_a_finished_run_asks_for_no_network(served_release, tmp_path):
+    cloud, settings, _ = served_release
     request = Request((str(cloud),), tmp_path / "out", "overture", settings=settings)
     first = reconstruct_area(request)
     (tmp_path / "served" / "catalog.json").unlink()
@@ -149,16 +152,18 @@ def test_a_finished_run_asks_for_no_network(served, tmp_path):
         reconstruct_area(dataclasses.replace(request, restart=True))
 
 
-def test_settings_beside_are_not_looked_for_where_overture_is(served, tmp_path, monkeypatch):
+def test_settings_beside_are_not_looked_for_where_overture_is(
+    served_release, tmp_path, monkeypatch
+):
     """The word names no file, so that the folder in which a run starts has no part in it."""
     (tmp_path / "start").mkdir()
     (tmp_path / "start" / "hiproof.toml").write_text("[fit]\nparts = 'one'\n")
     monkeypatch.chdir(tmp_path / "start")
-    assert find_settings_file(str(served[0]), "overture") is None
+    assert find_settings_file(str(served_release[0]), "overture") is None
 
 
-def test_a_kept_file_gives_the_same_models(served, tmp_path, monkeypatch, capsys):
-    cloud, settings, _ = served
+def test_a_kept_file_gives_the_same_models(served_release, tmp_path, monkeypatch, capsys):
+    cloud, settings, _ = served_release
     config, kept = tmp_path / "settings.toml", tmp_path / "kept.gpkg"
     config.write_text(settings.to_toml())
     assert command(monkeypatch, "footprints", cloud, "--out", kept, "--config", config) == 0
@@ -183,8 +188,10 @@ def test_a_kept_file_gives_the_same_models(served, tmp_path, monkeypatch, capsys
     assert notes[0] == notes[1]
 
 
-def test_only_the_row_groups_that_meet_the_extent_are_fetched(served, tmp_path, monkeypatch):
-    cloud, settings, log = served
+def test_only_the_row_groups_that_meet_the_extent_are_fetched(
+    served_release, tmp_path, monkeypatch
+):
+    cloud, settings, log = served_release
     config = tmp_path / "settings.toml"
     config.write_text(settings.to_toml())
     command(monkeypatch, "footprints", cloud, "--out", tmp_path / "a.gpkg", "--config", config)
@@ -203,8 +210,8 @@ def test_only_the_row_groups_that_meet_the_extent_are_fetched(served, tmp_path, 
         )
 
 
-def test_parts_are_read_as_a_layer(served, tmp_path):
-    cloud, settings, _ = served
+def test_parts_are_read_as_a_layer(served_release, tmp_path):
+    cloud, settings, _ = served_release
 
     def plan_of(layer):
         request = Request((str(cloud),), tmp_path, "overture", layer=layer, settings=settings)
@@ -216,17 +223,17 @@ def test_parts_are_read_as_a_layer(served, tmp_path):
         plan_of("roofs")
 
 
-def test_a_cloud_without_crs_is_refused_in_one_sentence(served, tmp_path):
-    _, settings, log = served
+def test_a_cloud_without_crs_is_refused_in_one_sentence(served_release, tmp_path):
+    _, settings, log = served_release
     cloud = write_cloud(tmp_path / "nowhere.laz", TOWN.xyz, TOWN.classification, crs=None)
     with pytest.raises(InputError, match=r"^expected clouds that name their CRS.+--crs$"):
         reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=settings))
     assert log.read_text() == ""
 
 
-def test_clouds_across_the_180th_meridian_are_refused(served, tmp_path):
+def test_clouds_across_the_180th_meridian_are_refused(served_release, tmp_path):
     """Their box in longitude and latitude would be a band around the Earth."""
-    _, settings, log = served
+    _, settings, log = served_release
     east = np.array([[815_000.0, 8_140_000.0, 2.0], [830_000.0, 8_141_000.0, 3.0]])
     cloud = write_cloud(
         tmp_path / "fiji.laz", east, np.array([6, 6], np.uint8), "EPSG:32760", east[0]
@@ -236,8 +243,8 @@ def test_clouds_across_the_180th_meridian_are_refused(served, tmp_path):
     assert log.read_text() == ""
 
 
-def test_a_run_without_a_network_is_refused_in_one_sentence(served, tmp_path):
-    cloud, _, _ = served
+def test_a_run_without_a_network_is_refused_in_one_sentence(served_release, tmp_path):
+    cloud, _, _ = served_release
     gone = Settings.from_dict({"read": {"overture_catalogue": "http://127.0.0.1:9/catalog.json"}})
     with pytest.raises(InputError, match=r"^expected a STAC catalogue at http://127.+network$"):
         reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=gone))

@@ -29,7 +29,7 @@ def run(*command, **options):
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory):
+def archive_and_wheel(tmp_path_factory):
     """(source archive, wheel made of nothing else)."""
     pytest.importorskip(
         "hatchling", reason="building needs hatchling, which the extra `test` brings"
@@ -55,7 +55,7 @@ def built(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def installed(built, tmp_path_factory):
+def installed_python(archive_and_wheel, tmp_path_factory):
     """The python of an environment that holds the wheel, and beside it only what the wheel depends
     on.
     """
@@ -72,7 +72,7 @@ def installed(built, tmp_path_factory):
         "--quiet",
         "--no-deps",
         "--no-index",
-        built[1],
+        archive_and_wheel[1],
     )
     (site,) = [path for path in home.rglob("site-packages") if (path / "hiproof").is_dir()]
     dependencies = [
@@ -89,29 +89,29 @@ def installed(built, tmp_path_factory):
     return python
 
 
-def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built):
-    with zipfile.ZipFile(built[1]) as wheel:
+def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(archive_and_wheel):
+    with zipfile.ZipFile(archive_and_wheel[1]) as wheel:
         names = {name for name in wheel.namelist() if ".dist-info/" not in name}
     assert names == OURS
     assert "hiproof/py.typed" in names
 
 
-def test_the_archive_is_small_and_holds_what_builds_and_tests_it(built):
-    with tarfile.open(built[0]) as archive:
+def test_the_archive_is_small_and_holds_what_builds_and_tests_it(archive_and_wheel):
+    with tarfile.open(archive_and_wheel[0]) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     assert {"pyproject.toml", "README.md", "LICENSE", "CITATION.cff", "tests/conftest.py"} <= names
     assert not any("__pycache__" in name for name in names)
-    assert built[0].stat().st_size < 20e6
+    assert archive_and_wheel[0].stat().st_size < 20e6
 
 
-def test_the_installed_wheel_is_imported_and_models_the_demo(installed, tmp_path):
+def test_the_installed_wheel_is_imported_and_models_the_demo(installed_python, tmp_path):
     environment = {
         name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
     }
     code = "import hiproof; print(hiproof.__file__); print(hiproof.__version__)"
-    place, version = run(installed, "-c", code, cwd=tmp_path, env=environment).split()
-    assert Path(place).is_relative_to(installed.parents[1])
-    command = installed.with_name("hiproof.exe" if os.name == "nt" else "hiproof")
+    place, version = run(installed_python, "-c", code, cwd=tmp_path, env=environment).split()
+    assert Path(place).is_relative_to(installed_python.parents[1])
+    command = installed_python.with_name("hiproof.exe" if os.name == "nt" else "hiproof")
     assert run(command, "--version", env=environment).split() == ["hiproof", version]
     said = run(command, "demo", tmp_path / "demo", env=environment)
     assert "26 buildings" in said and (tmp_path / "demo/buildings.gml").stat().st_size > 10_000

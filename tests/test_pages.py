@@ -14,12 +14,12 @@ from hiproof.view.server import make_server
 from pages import (
     SIZES,
     at_every_size,
-    complaints,
     is_too_wide,
+    list_complaints,
+    list_tab_stops,
     needs_browser,
-    opened,
-    places_on_canvas,
-    tab_stops,
+    open_page,
+    project_on_canvas,
 )
 from parametric_house import gable_house
 from sample_models import sample_points, write_sample_run
@@ -64,7 +64,7 @@ def is_whole(places):
 
 @at_every_size
 def test_the_viewer_shows_the_whole_scene(browser, view, size):
-    with opened(browser, view, size) as page:
+    with open_page(browser, view, size) as page:
         page.evaluate("() => ready")
         page.evaluate(READY)
         for shape in (size, size[::-1]):
@@ -72,48 +72,48 @@ def test_the_viewer_shows_the_whole_scene(browser, view, size):
             page.wait_for_timeout(200)
             for seen in ("scene.home()", "scene.turn(2, 0)", "scene.turn(0, 1.5)"):
                 page.evaluate(f"() => {{ {seen}; }}")
-                assert is_whole(places_on_canvas(page, "scene", "scene.layers[0].tile.corners"))
+                assert is_whole(project_on_canvas(page, "scene", "scene.layers[0].tile.corners"))
 
 
 @at_every_size
 def test_the_report_shows_the_whole_scene_and_a_whole_building(browser, report, size):
-    with opened(browser, report, size) as page:
+    with open_page(browser, report, size) as page:
         for seen in ("viewer.home()", "viewer.turn(2, 0)", "viewer.turn(0, 1.5)"):
             page.evaluate(f"() => {{ {seen}; }}")
-            assert is_whole(places_on_canvas(page, "viewer", "mesh.corners"))
+            assert is_whole(project_on_canvas(page, "viewer", "mesh.corners"))
         page.fill("#find", "house-1")
         page.keyboard.press("Enter")
         assert "house-1" in page.inner_text("#details")
         house = "mesh.corners.filter((_, i) => mesh.owner[Math.floor(i / 9)] === selected)"
-        assert is_whole(places_on_canvas(page, "viewer", house))
+        assert is_whole(project_on_canvas(page, "viewer", house))
         page.evaluate("() => viewer.zoom(0.5)")
-        assert not is_whole(places_on_canvas(page, "viewer", house))
+        assert not is_whole(project_on_canvas(page, "viewer", house))
 
 
 @at_every_size
 def test_axe_finds_nothing_in_the_viewer(browser, view, size):
-    with opened(browser, view, size) as page:
+    with open_page(browser, view, size) as page:
         page.evaluate("() => ready")
         page.evaluate(READY)
-        assert not is_too_wide(page) and complaints(page) == []
+        assert not is_too_wide(page) and list_complaints(page) == []
         page.evaluate("() => show({ tile: scene.layers[0].tile, row: 0 })")
         assert "house-1" in page.inner_text("#details")
-        assert not is_too_wide(page) and complaints(page) == []
+        assert not is_too_wide(page) and list_complaints(page) == []
 
 
 @at_every_size
 def test_axe_finds_nothing_in_the_report(browser, report, size):
-    with opened(browser, report, size) as page:
-        assert not is_too_wide(page) and complaints(page) == []
+    with open_page(browser, report, size) as page:
+        assert not is_too_wide(page) and list_complaints(page) == []
         page.evaluate("() => show(0)")
-        assert not is_too_wide(page) and complaints(page) == []
+        assert not is_too_wide(page) and list_complaints(page) == []
 
 
 def test_the_viewer_works_by_keys(browser, view):
-    with opened(browser, view, SIZES["laptop"]) as page:
+    with open_page(browser, view, SIZES["laptop"]) as page:
         page.evaluate("() => ready")
         page.evaluate(READY)
-        assert tab_stops(page, 2) == ["scene", "details-of"]
+        assert list_tab_stops(page, 2) == ["scene", "details-of"]
         page.focus("#scene")
         before = page.evaluate("() => [scene.azimuth, scene.elevation, scene.distance]")
         for key in ("ArrowRight", "ArrowDown", "+"):
@@ -133,9 +133,9 @@ def test_the_viewer_works_by_keys(browser, view):
 
 
 def test_the_report_works_by_keys(browser, report):
-    with opened(browser, report, SIZES["laptop"]) as page:
+    with open_page(browser, report, SIZES["laptop"]) as page:
         stops = ["mode", "find", "map", "bare: unknown, no model", "scene", "show-points", "panel"]
-        found = tab_stops(page, 9)
+        found = list_tab_stops(page, 9)
         assert [name.split(":")[0] for name in found[:7]] == [name.split(":")[0] for name in stops]
         assert found[7:] == ["figures by roof type", "block 2"]
         page.keyboard.press("Enter")
@@ -156,9 +156,9 @@ def test_a_notebook_shows_whole_houses_whichever_way_they_turn(browser, tmp_path
         f'<!doctype html><html lang="en"><title>a</title><main><h1>a</h1>{body}</main></html>',
         encoding="utf-8",
     )
-    with opened(browser, (tmp_path / "a.html").as_uri(), size) as page:
-        assert complaints(page) == []
-        assert all(name.startswith("hiproof-") for name in tab_stops(page, 2))
+    with open_page(browser, (tmp_path / "a.html").as_uri(), size) as page:
+        assert list_complaints(page) == []
+        assert all(name.startswith("hiproof-") for name in list_tab_stops(page, 2))
         for key in ("ArrowRight", "ArrowDown") * 8:
             page.keyboard.press(key)
             over = page.evaluate(

@@ -12,7 +12,7 @@ import shapely
 from shapely import affinity
 
 import hiproof
-from handmade import courtyard, gable_house, modelled, unmodelled
+from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
 from hiproof.parametric.run import build_file
@@ -21,7 +21,7 @@ from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_attributes, write_cityjson, write_parameters
 from hiproof.write.roof_figures import roof_figures
 from hiproof.write.tables.postgis import measure_plane
-from postgis_server import running, why_not
+from postgis_server import explain_absence, running
 from sample_models import write_sample_run
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -30,8 +30,8 @@ psycopg = pytest.importorskip("psycopg", reason="the extra `postgis` is not inst
 
 @pytest.fixture(scope="module")
 def database():
-    if why_not():
-        pytest.skip(why_not())
+    if explain_absence():
+        pytest.skip(explain_absence())
     with running() as dsn:
         with psycopg.connect(dsn) as connection:
             connection.execute("create extension postgis")
@@ -152,7 +152,7 @@ def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
         assert all(abs(slope - 36.87) < 0.01 for slope, _ in slopes)
 
 
-def reconstructed_gable(rotation=0.0):
+def reconstruct_gable(rotation=0.0):
     """A gable of 12 by 8 m whose ridge runs east, or so many degrees to the north of it, built of
     its parameters.
     """
@@ -192,9 +192,9 @@ def run_of_two(tmp_path):
     model.
     """
     buildings = [
-        modelled(gable_house(), "house"),
-        modelled(courtyard(), "yard", ("flat",)),
-        unmodelled(),
+        make_building(gable_house(), "house"),
+        make_building(courtyard(), "yard", ("flat",)),
+        make_lost_building(),
     ]
     (tmp_path / "run").mkdir()
     write_cityjson(tmp_path / "run" / "buildings.city.jsonl", buildings, "EPSG:7415")
@@ -230,7 +230,7 @@ def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
     azimuth.
     """
     write_parameters(
-        tmp_path / "parameters.jsonl", [reconstructed_gable(30.0), nearly_level()], "EPSG:7415"
+        tmp_path / "parameters.jsonl", [reconstruct_gable(30.0), nearly_level()], "EPSG:7415"
     )
     build_file(
         tmp_path / "parameters.jsonl", tmp_path / "run", changes={"write": {"out_crs": "EPSG:3857"}}
@@ -246,7 +246,7 @@ def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
     np.testing.assert_allclose(found, np.array(columns).T, rtol=1e-4)
 
 
-def documented(number, prefix):
+def read_documented_query(number, prefix):
     """A question of docs/tables.md, for the tables of a prefix."""
     return re.findall(r"```sql\n(.*?)```", (DOCS / "tables.md").read_text(), re.DOTALL)[
         number
@@ -257,12 +257,12 @@ def test_the_documented_question_of_a_solar_map(database, tmp_path):
     """Roof surfaces of 20 m2 or more that look between south-east and south-west, as docs/tables.md
     asks for them.
     """
-    house = reconstructed_gable()
+    house = reconstruct_gable()
     (tmp_path / "run").mkdir()
     write_all(tmp_path / "run", [house], "EPSG:7415")
     load_postgis(tmp_path / "run", database, "solar")
     with psycopg.connect(database) as connection:
-        rows = connection.execute(documented(1, "solar")).fetchall()
+        rows = connection.execute(read_documented_query(1, "solar")).fetchall()
     assert [(id, kind, round(azimuth)) for id, kind, azimuth, *_ in rows] == [
         ("south", "gable", 180)
     ]
@@ -270,12 +270,12 @@ def test_the_documented_question_of_a_solar_map(database, tmp_path):
 
 def test_the_documented_question_of_rectangles(database, tmp_path):
     """A part is drawn where it shows, and its whole rectangle is made of its columns."""
-    house = reconstructed_gable(rotation=30.0)
+    house = reconstruct_gable(rotation=30.0)
     (tmp_path / "run").mkdir()
     write_all(tmp_path / "run", [house], "EPSG:7415")
     load_postgis(tmp_path / "run", database, "whole")
     with psycopg.connect(database) as connection:
-        ((_, _, rectangle),) = connection.execute(documented(0, "whole")).fetchall()
+        ((_, _, rectangle),) = connection.execute(read_documented_query(0, "whole")).fetchall()
         (shown,) = connection.execute("select ST_AsBinary(geom) from whole_parts").fetchone()
     expected = affinity.translate(affinity.rotate(shapely.box(-6, -4, 6, 4), 30.0), 85000, 446000)
     assert shapely.from_wkb(rectangle).symmetric_difference(expected).area < 0.01
@@ -291,7 +291,7 @@ def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_
             "select 1 from pg_available_extensions where name = 'postgis_sfcgal'"
         ).fetchone():
             pytest.skip("PostGIS was built without SFCGAL, which computes volumes")
-        extension, question = documented(2, "volumes").split(";\n", 1)
+        extension, question = read_documented_query(2, "volumes").split(";\n", 1)
         connection.execute(extension)
         volumes = dict(connection.execute(question).fetchall())
     assert volumes == pytest.approx(

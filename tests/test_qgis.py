@@ -36,7 +36,7 @@ def plugin(monkeypatch):
     sys.modules.update(kept)
 
 
-def takes(command):
+def is_taken(command):
     """Whether hiproof's own parser takes a command line, without running it."""
     _, name, *arguments = command
     return COMMANDS[name].make_context(name, list(arguments), resilient_parsing=False).params
@@ -57,7 +57,7 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
         4,
         "--types 'gable,hip'",
     )
-    taken = takes(everything)
+    taken = is_taken(everything)
     assert (
         taken["clouds"] == ["a.laz", "b.laz"]
         and taken["jobs"] == 4
@@ -68,10 +68,12 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
         and taken["where"] == "year < 1950"
         and taken["layer"] == "pand"
     )
-    assert takes(commands.reconstruct("hiproof", ["a.laz"], "out"))["footprints"] is None
-    assert takes(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))["footprints"] == "f.gpkg"
-    assert takes(commands.convert("hiproof", "out", "obj"))["format"] == "obj"
-    assert takes(commands.status("hiproof", str(tmp_path)))["folder"] == tmp_path
+    assert is_taken(commands.reconstruct("hiproof", ["a.laz"], "out"))["footprints"] is None
+    assert (
+        is_taken(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))["footprints"] == "f.gpkg"
+    )
+    assert is_taken(commands.convert("hiproof", "out", "obj"))["format"] == "obj"
+    assert is_taken(commands.status("hiproof", str(tmp_path)))["folder"] == tmp_path
 
 
 def test_what_a_command_says_is_handed_on_and_its_end_told(plugin):
@@ -96,13 +98,13 @@ def test_a_cancelled_command_ends(plugin):
         process.run(slow, said.append, lambda: bool(said))
 
 
-def test_the_share_done_is_that_of_the_run(plugin, undisturbed, tmp_path):
+def test_the_share_done_is_that_of_the_run(plugin, reference_run, tmp_path):
     _, process = plugin
     program = Path(sys.executable).with_name("hiproof")
     if not program.exists():
         pytest.skip("the command is not beside this Python")
-    assert process.share_done(str(program), str(undisturbed)) == 100.0
-    assert process.share_done(str(program), str(tmp_path)) is None
+    assert process.measure_progress(str(program), str(reference_run)) == 100.0
+    assert process.measure_progress(str(program), str(tmp_path)) is None
 
 
 @pytest.mark.skipif(QGIS is None, reason="no qgis_process here: QGIS is not installed")

@@ -34,7 +34,7 @@ class Slope:
         return np.where(xy[:, 0] < 30, 0.1 * xy[:, 0] - 1.0, np.nan)
 
 
-def heights_of(building):
+def list_heights(building):
     return np.sort(building.solid.vertices[:, 2])
 
 
@@ -81,7 +81,7 @@ def test_a_turned_building_is_the_same_building():
     here = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
     there = hiproof.reconstruct(turned, turn(FOOTPRINT, angle, origin=(0, 0)), settings=PLAIN)
     assert there.type == here.type
-    assert heights_of(there) == pytest.approx(heights_of(here), abs=0.05)
+    assert list_heights(there) == pytest.approx(list_heights(here), abs=0.05)
 
 
 def test_without_terrain_the_assumption_is_named():
@@ -211,7 +211,7 @@ def two_level_points():
     return np.column_stack([x, y, np.where(x < 8, 9 - 0.6 * abs(y - 4), 4.0)])
 
 
-def refused(refuses):
+def refuse_roofs(refuses):
     """`compose` that refuses roofs of which `refuses` is true, as if its part 1 could not become
     valid.
     """
@@ -235,7 +235,7 @@ def test_a_part_that_cannot_be_composed_is_given_up_and_not_the_roof(monkeypatch
         return any(part.type == "gable" for part in roof.parts)
 
     points = two_level_points()
-    monkeypatch.setattr("hiproof.compose.readable.compose", refused(has_gable))
+    monkeypatch.setattr("hiproof.compose.readable.compose", refuse_roofs(has_gable))
     building = hiproof.reconstruct(points, shapely.box(0, 0, 12, 8), settings=PLAIN)
     assert building.status is Status.SIMPLIFIED
     assert "(gable) was made level" in building.detail and "planted" in building.detail

@@ -39,7 +39,7 @@ def files(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def finished(files, tmp_path_factory):
+def finished_run(files, tmp_path_factory):
     """An undisturbed run to compare with."""
     out = tmp_path_factory.mktemp("finished")
     cloud, footprints = files
@@ -54,8 +54,8 @@ def parameters(out):
     return read_parameters(out / "parameters.jsonl")
 
 
-def test_every_building_is_modelled_validly(finished):
-    out, summary = finished
+def test_every_building_is_modelled_validly(finished_run):
+    out, summary = finished_run
     assert summary.exit_code == 0
     assert summary.by_status == {"modelled": 4}
     solids = list(read_solids(out / "buildings.city.jsonl"))
@@ -65,8 +65,8 @@ def test_every_building_is_modelled_validly(finished):
     assert {p.name for p in out.iterdir()} == {*RECORDS, "buildings.gpkg", "run.json", ".hiproof"}
 
 
-def test_the_run_record_names_settings_version_inputs_and_counts(finished):
-    record = json.loads((finished[0] / "run.json").read_text())
+def test_the_run_record_names_settings_version_inputs_and_counts(finished_run):
+    record = json.loads((finished_run[0] / "run.json").read_text())
     assert Settings.from_dict(record["settings"]) == Settings()
     assert record["buildings"] == 4
     assert record["inputs"]["footprints"].endswith("footprints.geojson")
@@ -163,17 +163,18 @@ def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_para
     )
 
 
-def test_heights_are_the_towns(finished):
+def test_heights_are_the_towns(finished_run):
     heights = {
-        id: solid.vertices[:, 2] for id, solid in read_solids(finished[0] / "buildings.city.jsonl")
+        id: solid.vertices[:, 2]
+        for id, solid in read_solids(finished_run[0] / "buildings.city.jsonl")
     }
     for i in range(3):
         assert heights[f"house-{i}"].max() == pytest.approx(2 + 8 + 0.3 * i + 0.14, abs=0.35)
         assert heights[f"house-{i}"].min() == pytest.approx(2 + 0.3 * i + 0.08, abs=0.15)
 
 
-def test_running_again_redoes_nothing_and_changes_nothing(finished, files):
-    out, summary = finished
+def test_running_again_redoes_nothing_and_changes_nothing(finished_run, files):
+    out, summary = finished_run
     before = {name: (out / name).stat().st_mtime_ns for name in RECORDS}
     again = reconstruct_area(Request((str(files[0]),), out, str(files[1])))
     assert again.by_status == summary.by_status
@@ -197,7 +198,7 @@ def test_other_settings_on_the_same_folder_are_refused_unless_restarted(files, t
     assert reconstruct_area(anew).buildings == 4
 
 
-def test_how_the_area_is_cut_changes_no_byte(finished, tmp_path):
+def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
     town = make_town()
     rng = np.random.default_rng(3)
     names = rng.permutation(9)
@@ -218,7 +219,7 @@ def test_how_the_area_is_cut_changes_no_byte(finished, tmp_path):
         )
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(sorted(clouds)), tmp_path / "out", str(footprints)))
-    assert records(tmp_path / "out") == records(finished[0])
+    assert records(tmp_path / "out") == records(finished_run[0])
 
 
 def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, monkeypatch):
@@ -231,24 +232,24 @@ def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, m
     ]
 
 
-def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_path, monkeypatch):
+def test_two_workers_change_no_byte_and_compile_nothing(finished_run, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
     make_ready(ALL)
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
-    assert records(tmp_path) == records(finished[0])
+    assert records(tmp_path) == records(finished_run[0])
 
 
-def test_an_interrupted_run_goes_on_and_ends_the_same(finished, files, tmp_path, monkeypatch):
+def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
     request = Request((str(files[0]),), tmp_path, str(files[1]))
 
-    def interrupted(step, done, total):
+    def interrupt(step, done, total):
         if step == "solve" and done == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        reconstruct_area(request, interrupted)
+        reconstruct_area(request, interrupt)
     assert not (tmp_path / "buildings.gml").exists()
     solved = []
     original = city_run.solve_tile
@@ -257,10 +258,10 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished, files, tmp_path,
     )
     reconstruct_area(request)
     assert len(solved) == 2
-    assert records(tmp_path) == records(finished[0])
+    assert records(tmp_path) == records(finished_run[0])
 
 
-def test_a_killed_run_goes_on_and_ends_the_same(finished, files, tmp_path):
+def test_a_killed_run_goes_on_and_ends_the_same(finished_run, files, tmp_path):
     command = [
         sys.executable,
         "-m",
@@ -282,7 +283,7 @@ def test_a_killed_run_goes_on_and_ends_the_same(finished, files, tmp_path):
         ).returncode
         == 0
     )
-    assert records(tmp_path) == records(finished[0])
+    assert records(tmp_path) == records(finished_run[0])
 
 
 def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(
@@ -292,12 +293,12 @@ def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(
 
     original = stages.fit
 
-    def fails_on_one(points, outline, recognised, settings):
+    def fail_for_one_building(points, outline, recognised, settings):
         if outline.bounds[0] < -6.4:
             raise RuntimeError("planted")
         return original(points, outline, recognised, settings)
 
-    monkeypatch.setattr(stages, "fit", fails_on_one)
+    monkeypatch.setattr(stages, "fit", fail_for_one_building)
     summary = reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1])))
     assert summary.exit_code == 1
     assert 1 <= summary.by_status["internal_error"] < 4
@@ -330,7 +331,7 @@ def test_strange_footprints_each_get_an_outcome(tmp_path):
     assert any(id.startswith("bow-tie") for id in by_id)
 
 
-def test_a_damaged_tile_is_named_and_harms_no_other(finished, files, tmp_path):
+def test_a_damaged_tile_is_named_and_harms_no_other(finished_run, files, tmp_path):
     town = make_town()
     west = town.xyz[:, 0] < town.xyz[:, 0].min() + 60
     good = write_cloud(tmp_path / "a.laz", town.xyz[west], town.classification[west])
@@ -339,7 +340,7 @@ def test_a_damaged_tile_is_named_and_harms_no_other(finished, files, tmp_path):
     summary = reconstruct_area(Request((str(good), str(bad)), tmp_path / "out", str(files[1])))
     assert summary.exit_code == 2
     assert [name for name, _ in summary.broken_inputs] == [str(bad)]
-    whole = {row["id"]: row for row in parameters(finished[0])}
+    whole = {row["id"]: row for row in parameters(finished_run[0])}
     rows = {row["id"]: row for row in parameters(tmp_path / "out")}
     assert set(rows) == set(whole)
     assert all(rows[id] == whole[id] for id in ("house-0", "house-1"))
@@ -406,8 +407,8 @@ def test_the_command_line_says_what_it_did(files, tmp_path):
     assert "buildings done: 4 of 4" in invoke("status", tmp_path).output
 
 
-def test_check_finds_a_broken_solid(files, finished, tmp_path):
-    lines = (finished[0] / "buildings.city.jsonl").read_text().splitlines()
+def test_check_finds_a_broken_solid(files, finished_run, tmp_path):
+    lines = (finished_run[0] / "buildings.city.jsonl").read_text().splitlines()
     feature = json.loads(lines[1])
     solid = next(g for g in feature["CityObjects"]["house-0"]["geometry"] if g["type"] == "Solid")
     solid["boundaries"][0].pop()

@@ -66,7 +66,7 @@ class Algorithm(QgsProcessingAlgorithm):
         except process.Failed as error:
             raise QgsProcessingException(str(error)) from error
 
-    def source_of(self, parameters, name, context):
+    def get_source(self, parameters, name, context):
         """(path, layer, condition) of a vector layer, each None where there is none."""
         layer = self.parameterAsVectorLayer(parameters, name, context)
         if layer is None:
@@ -81,10 +81,10 @@ class Algorithm(QgsProcessingAlgorithm):
     def load(self, folder, raised, context):
         """Have the layers of a run's GeoPackage loaded, with their styles."""
         loaded = {}
-        for name, layer in results.layers_of(folder):
+        for name, layer in results.load_layers(folder):
             context.temporaryLayerStore().addMapLayer(layer)
             details = QgsProcessingContext.LayerDetails(layer.name(), context.project(), name)
-            details.setPostProcessor(results.Styled(results.style_of(name, raised)))
+            details.setPostProcessor(results.Styled(results.choose_style(name, raised)))
             context.addLayerToLoadOnCompletion(layer.id(), details)
             loaded[name.upper()] = layer.id()
         return loaded
@@ -144,7 +144,7 @@ class Reconstruct(Algorithm):
         }
 
     def command(self, parameters, context, program, folder):
-        footprints, layer, where = self.source_of(parameters, "FOOTPRINTS", context)
+        footprints, layer, where = self.get_source(parameters, "FOOTPRINTS", context)
         terrain = self.parameterAsRasterLayer(parameters, "TERRAIN", context)
         crs = self.parameterAsCrs(parameters, "CRS", context)
         extent = self.parameterAsExtent(parameters, "EXTENT", context)
@@ -166,7 +166,7 @@ class Reconstruct(Algorithm):
 
 def tell(program, folder, feedback):
     """Move the progress bar to the share of buildings done."""
-    share = process.share_done(program, folder)
+    share = process.measure_progress(program, folder)
     if share is not None:
         feedback.setProgress(share)
 
@@ -198,7 +198,7 @@ class Evaluate(Algorithm):
         clouds = [
             cloud for cloud in self.parameterAsFileList(parameters, "CLOUDS", context) if cloud
         ]
-        footprints, layer, _ = self.source_of(parameters, "FOOTPRINTS", context)
+        footprints, layer, _ = self.get_source(parameters, "FOOTPRINTS", context)
         program = self.parameterAsString(parameters, "PROGRAM", context)
         self.call(commands.evaluate(program, folder, clouds, footprints, layer), feedback)
         return {"TABLE": os.path.join(folder, "evaluation.csv")}

@@ -32,7 +32,7 @@ def run(command, say, cancelled, progress=None):
             stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL,
             text=True,
-            **surroundings(),
+            **make_environment(),
         )
     except OSError as error:
         raise Failed(
@@ -40,7 +40,7 @@ def run(command, say, cancelled, progress=None):
             "name it in the parameter Program"
         ) from error
     said = []
-    reader = threading.Thread(target=hand_on, args=(process.stdout, say, said), daemon=True)
+    reader = threading.Thread(target=pass_lines, args=(process.stdout, say, said), daemon=True)
     reader.start()
     asked = time.monotonic()
     while process.poll() is None:
@@ -61,13 +61,13 @@ def run(command, say, cancelled, progress=None):
     return process.returncode
 
 
-def hand_on(lines, say, said):
+def pass_lines(lines, say, said):
     for line in lines:
         said.append(line.rstrip())
         say(said[-1])
 
 
-def surroundings():
+def make_environment():
     """QGIS sets variables for its own Python, which are not for another's; on Windows no window is
     to open.
     """
@@ -82,10 +82,10 @@ def surroundings():
     }
 
 
-def share_done(program, folder):
+def measure_progress(program, folder):
     """The share of buildings done [%] of the run in `folder`, None while that is not known."""
     asked = subprocess.run(
-        commands.status(program, folder), capture_output=True, text=True, **surroundings()
+        commands.status(program, folder), capture_output=True, text=True, **make_environment()
     )
     found = DONE.search(asked.stdout)
     return 100.0 * int(found[1]) / int(found[2]) if found and int(found[2]) else None

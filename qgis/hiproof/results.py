@@ -15,7 +15,7 @@ from qgis.core import (
 HEIGHT = 'coalesce("rf_h_roof_max" - "rf_h_ground", 0)'
 
 
-def layers_of(folder):
+def load_layers(folder):
     """(name, QgsVectorLayer) of those layers that the run's GeoPackage has."""
     path = os.path.join(folder, "buildings.gpkg")
     found = (
@@ -25,7 +25,7 @@ def layers_of(folder):
     return [(name, layer) for name, layer in found if layer.isValid()]
 
 
-def style_of(name, raised):
+def choose_style(name, raised):
     """A function that styles a layer: buildings raised to their height, or as the file itself keeps
     it, by roof type.
     """

@@ -1,7 +1,7 @@
 """A number is changed in a module's text and nowhere else."""
 
 import pytest
-from benchmarks.constants import changed
+from benchmarks.constants import change_value
 
 TEXT = '"""Größen."""\nMOST, LEAST_M = 7, 0.5  # größer\nNAMES = ("a",)\nTILE_M = 250.0\n'
 
@@ -11,12 +11,12 @@ TEXT = '"""Größen."""\nMOST, LEAST_M = 7, 0.5  # größer\nNAMES = ("a",)\nTIL
     [("MOST", 2.0, "14, 0.5"), ("LEAST_M", 0.5, "7, 0.25"), ("TILE_M", 2.0, "500.0")],
 )
 def test_one_number_is_changed(name, factor, now):
-    text = changed(TEXT, name, factor)
+    text = change_value(TEXT, name, factor)
     assert now in text and len(text.splitlines()) == len(TEXT.splitlines())
-    assert changed(TEXT, name, 1.0) == TEXT
+    assert change_value(TEXT, name, 1.0) == TEXT
 
 
 @pytest.mark.parametrize("name", ["NAMES", "OTHER"])
 def test_what_is_no_number_is_refused(name):
     with pytest.raises(SystemExit, match=f"got {name}"):
-        changed(TEXT, name, 2.0)
+        change_value(TEXT, name, 2.0)

@@ -10,11 +10,11 @@ pytest.importorskip("matplotlib", reason="the curve is drawn with matplotlib (ex
 
 
 def test_a_price_of_one_is_the_default_and_others_multiply_it():
-    from benchmarks.curve import PRICE, priced
+    from benchmarks.curve import PRICE, set_price
 
-    assert priced(1.0) == Settings()
+    assert set_price(1.0) == Settings()
     for name in PRICE:
-        assert getattr(priced(4.0).compound, name) == pytest.approx(
+        assert getattr(set_price(4.0).compound, name) == pytest.approx(
             4.0 * getattr(Settings().compound, name)
         )
 

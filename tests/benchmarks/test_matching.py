@@ -7,10 +7,21 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
-from benchmarks.compounds import compared, sigma_report
-from benchmarks.judging import area_by_type, named_share, raster, visible_areas
-from benchmarks.matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
-from benchmarks.named_roofs import demo, judged, parts_in
+from benchmarks.compounds import compare_parts, report_sigmas
+from benchmarks.judging import (
+    make_raster,
+    measure_named_share,
+    measure_visible_areas,
+    sum_area_by_type,
+)
+from benchmarks.matching import (
+    compute_sigma_errors,
+    has_hidden_end,
+    list_right_types,
+    match_parts,
+    merge_alike,
+)
+from benchmarks.named_roofs import judge_types, move_parts, read_demo
 
 from hiproof.compose import compose
 from hiproof.frames import LocalFrame
@@ -29,12 +40,12 @@ def part(type="gable", x=0.0, y=0.0, z=3.0, kappa=0.0, **parameters):
 def test_the_truth_is_right_in_any_order(kind):
     for seed in range(4):
         roof = random_compound(np.random.default_rng(seed), kind).roof
-        parts = told_apart(roof.parts)
+        parts = merge_alike(roof.parts)
         order = np.random.default_rng(seed).permutation(len(parts))
         shuffled = [parts[k] for k in order]
-        wanted, right, _ = compared(roof, tuple(shuffled))
+        wanted, right, _ = compare_parts(roof, tuple(shuffled))
         assert wanted == len(parts) and right
-        assert [order[j] for j in matched(parts, shuffled, raster(roof.outline))] == list(
+        assert [order[j] for j in match_parts(parts, shuffled, make_raster(roof.outline))] == list(
             range(len(parts))
         )
 
@@ -45,43 +56,49 @@ def test_a_missing_a_needless_and_a_wrongly_named_part_are_wrong():
     hidden = part("flat", *annex.translation[:2], 0.5, annex.kappa, length=2.0, width=2.0)
     misnamed = dataclasses.replace(annex, type="pyramid")
     for parts in ((house,), (house, annex, hidden), (house, misnamed)):
-        assert not compared(roof, parts)[1]
+        assert not compare_parts(roof, parts)[1]
 
 
 def test_a_hidden_volume_does_not_change_what_stands_for_what():
     roof = random_compound(np.random.default_rng(5), "T").roof
     hidden = part("flat", *(roof.parts[0].translation - (0.0, 0.0, 0.5)), length=2.0, width=2.0)
-    xy = raster(roof.outline)
-    assert matched(roof.parts, (hidden, *roof.parts), xy) == [1, 2]
-    assert visible_areas(dataclasses.replace(roof, parts=(hidden, *roof.parts)))[0] == 0.0
+    xy = make_raster(roof.outline)
+    assert match_parts(roof.parts, (hidden, *roof.parts), xy) == [1, 2]
+    assert measure_visible_areas(dataclasses.replace(roof, parts=(hidden, *roof.parts)))[0] == 0.0
 
 
 def test_equal_neighbours_are_one_and_a_step_of_a_decimetre_keeps_them_apart():
     alike = [part(x=6.0 * k) for k in range(4)]
-    one = told_apart(alike)
+    one = merge_alike(alike)
     assert len(one) == 1 and one[0].area == pytest.approx(4 * 48.0)
     assert one[0].parameters == pytest.approx({"width": 8.0, "height": 3.0})
-    assert len(told_apart([*alike[:2], part(x=12.0, z=3.1), part(x=18.0, z=3.1)])) == 2
-    assert len(told_apart([alike[0], part(x=6.5)])) == 2  # half a metre of nothing between them
-    assert len(told_apart([alike[0], part("flat", x=6.0, length=6.0, width=8.0)])) == 2
+    assert len(merge_alike([*alike[:2], part(x=12.0, z=3.1), part(x=18.0, z=3.1)])) == 2
+    assert len(merge_alike([alike[0], part(x=6.5)])) == 2  # half a metre of nothing between them
+    assert len(merge_alike([alike[0], part("flat", x=6.0, length=6.0, width=8.0)])) == 2
 
 
 def test_only_ends_under_another_part_are_hidden():
     house = part(length=12.0, width=8.0, height=4.0)
     wing = part(y=4.0, kappa=np.pi / 2, length=8.0, width=5.0, height=2.5)
-    assert hidden_end(wing, [house]) and not hidden_end(house, [wing]) and not hidden_end(house, [])
-    assert right_types(part("hip", length=9.0, width=6.0, height=3.0, ridge_length=3.0), True) == {
+    assert (
+        has_hidden_end(wing, [house])
+        and not has_hidden_end(house, [wing])
+        and not has_hidden_end(house, [])
+    )
+    assert list_right_types(
+        part("hip", length=9.0, width=6.0, height=3.0, ridge_length=3.0), True
+    ) == {
         "hip",
         "side_hip",
     }
-    assert right_types(wing, True) == {"gable"}
+    assert list_right_types(wing, True) == {"gable"}
 
 
 def test_an_asymmetric_gable_of_equal_slopes_may_be_called_a_gable():
     size = {"length": 9.0, "width": 8.0, "height": 3.0, "ridge_offset": 1.0}
     even = part("asymmetric_gable", **size, eave_step=3.0 * (1 - 3.0 / 5.0))
-    assert right_types(even, False) == {"asymmetric_gable", "gable"}
-    assert right_types(part("asymmetric_gable", **size, eave_step=0.0), False) == {
+    assert list_right_types(even, False) == {"asymmetric_gable", "gable"}
+    assert list_right_types(part("asymmetric_gable", **size, eave_step=0.0), False) == {
         "asymmetric_gable"
     }
 
@@ -92,10 +109,10 @@ def test_errors_are_counted_in_sigmas_and_not_along_what_is_hidden():
     fit = part(x=0.3, z=3.04, kappa=np.pi + 0.02, length=6.2, width=8.1, height=2.9)
     fit = dataclasses.replace(fit, sigma=sigma)
     expected = {"width": 1.0, "length": 1.0, "height": -2.0, "t_x": 3.0, "t_z": 2.0, "kappa": 2.0}
-    assert errors_in_sigmas(truth, fit, hidden=False) == pytest.approx(expected)
-    assert set(errors_in_sigmas(truth, fit, hidden=True)) == {"width", "height", "t_z", "kappa"}
-    assert errors_in_sigmas(dataclasses.replace(truth, type="hip"), fit, hidden=False) == {}
-    assert errors_in_sigmas(part(kappa=np.pi / 2), fit, hidden=False) == {}
+    assert compute_sigma_errors(truth, fit, hidden=False) == pytest.approx(expected)
+    assert set(compute_sigma_errors(truth, fit, hidden=True)) == {"width", "height", "t_z", "kappa"}
+    assert compute_sigma_errors(dataclasses.replace(truth, type="hip"), fit, hidden=False) == {}
+    assert compute_sigma_errors(part(kappa=np.pi / 2), fit, hidden=False) == {}
 
 
 def test_normal_errors_of_their_sigma_have_a_root_mean_square_of_one():
@@ -105,7 +122,7 @@ def test_normal_errors_of_their_sigma_have_a_root_mean_square_of_one():
         for error in rng.standard_normal(2000)
     ]
     ratios = [
-        errors_in_sigmas(truth, dataclasses.replace(p, sigma={"height": 0.05}), False)
+        compute_sigma_errors(truth, dataclasses.replace(p, sigma={"height": 0.05}), False)
         for p in heights
     ]
     rms = np.sqrt(np.mean([ratio["height"] ** 2 for ratio in ratios]))
@@ -113,7 +130,7 @@ def test_normal_errors_of_their_sigma_have_a_root_mean_square_of_one():
 
 
 def test_no_standard_deviations_are_said_so():
-    assert "no part has standard deviations" in sigma_report([])
+    assert "no part has standard deviations" in report_sigmas([])
 
 
 def standing(roof, id="house"):
@@ -125,42 +142,44 @@ def standing(roof, id="house"):
 def test_areas_that_show_make_up_the_outline():
     for kind in COMPOUND_KINDS:
         roof = random_compound(np.random.default_rng(1), kind).roof
-        assert visible_areas(roof).sum() == pytest.approx(roof.outline.area)
+        assert measure_visible_areas(roof).sum() == pytest.approx(roof.outline.area)
     roof = random_building(np.random.default_rng(0), "hip").roof
     model = standing(roof)
-    assert named_share([model]) == 1.0 and area_by_type([model])["hip"] == pytest.approx(
-        roof.outline.area
-    )
+    assert measure_named_share([model]) == 1.0 and sum_area_by_type([model])[
+        "hip"
+    ] == pytest.approx(roof.outline.area)
     free = standing(
         dataclasses.replace(roof, parts=(dataclasses.replace(roof.parts[0], type="free"),))
     )
-    assert named_share([free]) == 0.0 and named_share([model, free]) == pytest.approx(0.5)
+    assert measure_named_share([free]) == 0.0 and measure_named_share(
+        [model, free]
+    ) == pytest.approx(0.5)
 
 
 def test_a_roof_keeps_its_place_in_another_frame():
     roof = random_compound(np.random.default_rng(2), "L", origin=(500.0, 700.0, 20.0)).roof
     origin = np.array([490.0, 720.0, 3.0])
     moved = Roof(
-        parts_in(roof, origin),
+        move_parts(roof, origin),
         shapely.transform(roof.outline, lambda xy: xy + (10.0, -20.0)),
         LocalFrame(origin),
     )
-    xy = raster(roof.outline)[::7]
+    xy = make_raster(roof.outline)[::7]
     assert np.allclose(moved.height_at(xy + (10.0, -20.0)), roof.height_at(xy) + 17.0)
 
 
 def test_the_demos_truth_is_right_and_a_flat_block_is_not():
-    for truth, points, footprint in demo():
+    for truth, points, footprint in read_demo():
         assert len(points) > 50
         model = standing(truth.roof)
-        assert judged(truth, model) == (True, True)
+        assert judge_types(truth, model) == (True, True)
         assert (
             truth.footprint.symmetric_difference(footprint.polygon).area
             < 0.05 * truth.footprint.area
         )
         flat = dataclasses.replace(truth.roof.parts[0], type="flat")
         block = standing(dataclasses.replace(truth.roof, parts=(flat,)))
-        assert judged(truth, block) == (
+        assert judge_types(truth, block) == (
             truth.type == "flat",
             truth.type == "flat" and truth.kind == "single",
         )

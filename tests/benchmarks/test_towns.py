@@ -7,19 +7,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from benchmarks.delft import asked_footprints
-from benchmarks.judging import SHARED, raster
+from benchmarks.delft import select_footprints
+from benchmarks.judging import SHARED, make_raster
 from benchmarks.towns import (
     TOWNS,
-    all_modelled,
-    chosen,
-    composed,
-    ground_of,
+    choose_buildings,
+    compose_truth,
+    find_ground,
+    group_touching,
+    model_all,
     read_town,
-    touching,
     write_truth,
 )
-from benchmarks.wireframes import Score, WireframeCounts, count_wireframes, summed, table_by_size
+from benchmarks.wireframes import (
+    Score,
+    WireframeCounts,
+    count_wireframes,
+    make_size_table,
+    sum_counts,
+)
 
 from handmade import box
 from hiproof.compose import compose
@@ -35,7 +41,7 @@ needs_delft = pytest.mark.skipif(
 )
 
 
-def simulated(kind, seed):
+def simulate_building(kind, seed):
     """A simulated compound with its solid, as a reconstruction would return it."""
     made = random_compound(
         np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0)
@@ -49,7 +55,8 @@ def small_town(tmp_path) -> Path:
     """Three simulated compounds as a CityJSON file."""
     path = tmp_path / "town.city.json"
     write_cityjson(
-        path, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))]
+        path,
+        [simulate_building(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))],
     )
     return path
 
@@ -57,7 +64,7 @@ def small_town(tmp_path) -> Path:
 def test_a_town_is_read_with_its_outlines(small_town):
     buildings = {building.id: building for building in read_town(small_town)}
     for seed, kind in enumerate(("L", "dormered", "two_level")):
-        truth = simulated(kind, seed).roof
+        truth = simulate_building(kind, seed).roof
         outline = shapely.transform(truth.outline, truth.frame.to_world)
         assert buildings[f"{kind}-{seed}"].footprint.symmetric_difference(outline).area < 0.05
     assert read_town(small_town, smallest_m2=1e4) == []
@@ -65,9 +72,9 @@ def test_a_town_is_read_with_its_outlines(small_town):
 
 def test_a_scan_lies_on_the_building_and_is_always_the_same(small_town):
     building = next(b for b in read_town(small_town) if b.id == "L-0")
-    points = building.scanned(4.0)
-    assert np.array_equal(points, building.scanned(4.0))
-    made = simulated("L", 0)
+    points = building.scan_points(4.0)
+    assert np.array_equal(points, building.scan_points(4.0))
+    made = simulate_building("L", 0)
     local = made.roof.frame.to_local(points)
     inside = shapely.contains_xy(made.roof.outline.buffer(-0.4), *local[:, :2].T)
     gap = made.roof.height_at(local[inside, :2]) - local[inside, 2]
@@ -82,11 +89,12 @@ def test_true_models_are_right_in_everything(small_town, tmp_path):
     truth, models = tmp_path / "truth.city.json", tmp_path / "models.city.jsonl"
     write_truth(truth, small_town, buildings)
     write_cityjson(
-        models, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))]
+        models,
+        [simulate_building(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))],
     )
     counts = count_wireframes(models, truth)
     assert counts.keys() == {building.id for building in buildings} and len(counts) == 3
-    for one in (*counts.values(), summed(counts.values())):
+    for one in (*counts.values(), sum_counts(counts.values())):
         assert one.edge_f1 == one.corner_f1 == 100.0
         assert (one.edges, one.corners, one.faces) == (
             one.true_edges,
@@ -99,8 +107,8 @@ def test_true_models_are_right_in_everything(small_town, tmp_path):
 def test_true_roofs_composed_anew_have_the_true_heights(small_town):
     for building in read_town(small_town):
         kind, seed = building.id.rsplit("-", 1)
-        truth, again = simulated(kind, int(seed)), composed(building)
-        xy = raster(truth.roof.outline.buffer(-0.05)) + truth.roof.frame.origin[:2]
+        truth, again = simulate_building(kind, int(seed)), compose_truth(building)
+        xy = make_raster(truth.roof.outline.buffer(-0.05)) + truth.roof.frame.origin[:2]
         heights = [
             b.roof.height_at(xy - b.roof.frame.origin[:2]) + b.roof.frame.origin[2]
             for b in (truth, again)
@@ -112,7 +120,7 @@ def test_true_roofs_composed_anew_have_the_true_heights(small_town):
 @needs_judge
 @needs_towns
 def test_a_missing_model_counts_as_missed(tmp_path):
-    buildings = chosen(read_town(TOWNS["essen"]), every=30)
+    buildings = choose_buildings(read_town(TOWNS["essen"]), every=30)
     write_truth(tmp_path / "truth.city.json", TOWNS["essen"], buildings)
     solids = [next(iter(building.solids.values())) for building in buildings]
     models = [
@@ -122,13 +130,13 @@ def test_a_missing_model_counts_as_missed(tmp_path):
     write_cityjson(tmp_path / "models.city.jsonl", models[1:])
     counts = count_wireframes(tmp_path / "models.city.jsonl", tmp_path / "truth.city.json")
     assert [counts[b.id].edge_f1 for b in buildings] == [0.0, *[100.0] * (len(buildings) - 1)]
-    total = summed(counts.values())
+    total = sum_counts(counts.values())
     assert total.right_edges == total.edges == total.true_edges - counts[buildings[0].id].true_edges
 
 
 def flat_roof(building) -> Roof:
     """Any roof: what is judged is the solid."""
-    return simulated("L", 0).roof
+    return simulate_building("L", 0).roof
 
 
 def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
@@ -137,29 +145,33 @@ def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
         box().move(np.array([4.0, 0.0, 0.0])),
         box(2.0, 2.0).move(np.array([20.0, 0.0, 0.0])),
     )
-    found = touching("house", {"a": first, "b": beside, "c": apart})
+    found = group_touching("house", {"a": first, "b": beside, "c": apart})
     assert [building.id for building in found] == ["house", "house~2"]
     assert [sorted(building.solids) for building in found] == [["a", "b"], ["c"]]
     assert found[0].footprint.equals_exact(
         shapely.box(0, 0, 8, 5).normalize(), 1e-6, normalize=True
     )
-    assert ground_of(apart).area == pytest.approx(4.0)
+    assert find_ground(apart).area == pytest.approx(4.0)
 
 
 def test_draws_are_parts_of_the_whole_and_always_the_same():
     every = list(range(101))
-    even, odd = (chosen(every, parity=parity) for parity in ("even", "odd"))
+    even, odd = (choose_buildings(every, parity=parity) for parity in ("even", "odd"))
     assert sorted(even + odd) == every and even[:2] == [0, 2]
-    assert chosen(every, every=10) == every[::10]
-    drawn = chosen(every, most=12)
-    assert len(drawn) == 12 and drawn == sorted(set(drawn)) and drawn == chosen(every, most=12)
-    assert chosen(every, most=500) == every
+    assert choose_buildings(every, every=10) == every[::10]
+    drawn = choose_buildings(every, most=12)
+    assert (
+        len(drawn) == 12
+        and drawn == sorted(set(drawn))
+        and drawn == choose_buildings(every, most=12)
+    )
+    assert choose_buildings(every, most=500) == every
 
 
 def test_a_table_has_a_row_for_every_size_there_is_pooled_and_by_building():
     small = Score("small", WireframeCounts(8, 8, 8, 6, 6, 6, 6), 100.0, 0.01, 1, 1.0)
     large = Score("large", WireframeCounts(10, 30, 30, 12, 24, 24, 12), 900.0, 0.18, 4, 0.5)
-    head, *rows = (line.split("  ") for line in table_by_size([small, large]))
+    head, *rows = (line.split("  ") for line in make_size_table([small, large]))
     cells = [[cell.strip() for cell in row if cell.strip()] for row in (head, *rows)]
     assert [row[0] for row in cells] == ["footprint", "all", "< 200 m2", "> 800 m2"]
     every = dict(zip(*cells[:2], strict=True))
@@ -179,7 +191,7 @@ def test_towns_have_the_buildings_that_are_known(town, n):
 def test_even_and_odd_footprints_are_all_footprints():
     path = SHARED / "data/delft/footprints.gpkg"
     even, odd, every = (
-        {f.id for f in asked_footprints(path, parity)} for parity in ("even", "odd", None)
+        {f.id for f in select_footprints(path, parity)} for parity in ("even", "odd", None)
     )
     assert even | odd == every and not even & odd and min(len(even), len(odd)) > 0.4 * len(every)
 
@@ -188,5 +200,5 @@ def test_even_and_odd_footprints_are_all_footprints():
 @pytest.mark.parametrize("ending", ["j64", "j7G"])
 def test_two_or_three_points_of_its_walls_are_no_part_of_a_gable(ending):
     building = next(b for b in read_town(TOWNS["nrw_5657"]) if b.id.endswith(ending))
-    (model,), _ = all_modelled([building], [building.scanned(2.0)], True)
+    (model,), _ = model_all([building], [building.scan_points(2.0)], True)
     assert [part.type for part in model.parts] == ["gable"]

@@ -6,7 +6,7 @@ import shapely
 
 from hiproof.classify import BUILDING, GROUND_CLASS, UNKNOWN, classify, roof_points
 from leafy_scenes import GROUND as GROUND_SOURCE
-from leafy_scenes import TREE, drone, forest, house_under_a_tree, town
+from leafy_scenes import TREE, drone, forest, make_house_under_tree, town
 
 
 def f1(found, truth):
@@ -67,7 +67,7 @@ def test_points_in_one_place_are_no_building():
 
 
 def test_within_an_outline_leaves_are_left_out_and_the_roof_stays():
-    cloud, building = house_under_a_tree(np.random.default_rng(2), 0.5)
+    cloud, building = make_house_under_tree(np.random.default_rng(2), 0.5)
     within = shapely.contains_xy(building.footprint, *cloud.points[:, :2].T)
     points, source = cloud.points[within], cloud.source[within]
     kept = roof_points(points)

@@ -28,7 +28,7 @@ KINDS = [
 ]
 
 
-def scanned(kind, density, seed=0, at=(0.0, 0.0, 0.0)):
+def scan_building(kind, density, seed=0, at=(0.0, 0.0, 0.0)):
     rng = np.random.default_rng(seed)
     building = (
         random_compound(rng, kind, at) if kind in KINDS[5:] else random_building(rng, kind, at)
@@ -39,7 +39,7 @@ def scanned(kind, density, seed=0, at=(0.0, 0.0, 0.0)):
 @pytest.mark.parametrize("density", [1.5, 5.0, 20.0])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_roof_with_its_walls_or_without_is_cut_out_and_one_on_its_ground_is_not(kind, density):
-    cloud = scanned(kind, density)
+    cloud = scan_building(kind, density)
     assert is_cut_out(cloud.points[cloud.source != GROUND]) is not False
     assert is_cut_out(cloud.points[cloud.source == ROOF]) is not False
     assert is_cut_out(cloud.points) is False
@@ -56,7 +56,7 @@ def test_a_house_from_a_drone_is_told_from_its_lawn_and_is_one_building_without(
 
 @pytest.mark.parametrize("kind", KINDS[:5])
 def test_the_answer_is_that_of_the_points_turned_moved_and_in_another_order(kind):
-    cloud = scanned(kind, 5.0)
+    cloud = scan_building(kind, 5.0)
     for points, wanted in ((cloud.points, False), (cloud.points[cloud.source == ROOF], True)):
         turned = points[:, [1, 0, 2]] * (-1, 1, 1) + (85000.0, 446000.0, 30.0)
         assert (is_cut_out(turned[::-1]) is not False) == wanted
@@ -85,7 +85,8 @@ def test_the_next_cell_with_points_is_that_of_a_plain_search():
 
 def test_several_roofs_cut_out_are_a_building_each_with_all_of_their_points():
     clouds = [
-        scanned(kind, 5.0, 3, (40.0 * k, 0.0, 0.0)) for k, kind in enumerate(("gable", "L", "T"))
+        scan_building(kind, 5.0, 3, (40.0 * k, 0.0, 0.0))
+        for k, kind in enumerate(("gable", "L", "T"))
     ]
     points = np.concatenate([cloud.points[cloud.source == ROOF] for cloud in clouds])
     found = split_buildings(PointCloud(points))

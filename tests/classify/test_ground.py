@@ -14,7 +14,7 @@ def land(slope=0.0, side=60.0, density=4.0, seed=0):
     return np.column_stack([xy, rise(xy)]), rise
 
 
-def with_house(xyz, size=(14.0, 9.0), height=6.0):
+def add_house(xyz, size=(14.0, 9.0), height=6.0):
     offset = np.abs(xyz[:, :2] - xyz[:, :2].mean(axis=0))
     on = (offset < np.array(size) / 2).all(axis=1)
     return np.where(on[:, None], xyz + (0, 0, height), xyz), on
@@ -23,7 +23,7 @@ def with_house(xyz, size=(14.0, 9.0), height=6.0):
 @pytest.mark.parametrize("slope", [0.0, 0.1, 0.3])
 def test_a_house_is_taken_away_and_the_ground_under_it_is_that_around(slope):
     xyz, rise = land(slope)
-    house, on = with_house(xyz)
+    house, on = add_house(xyz)
     off = ground_grid(house).height_at(house[on]) - rise(house[on])
     assert np.abs(off).mean() < 0.15 + slope  # lowest in cells of a metre
 
@@ -43,7 +43,7 @@ def test_a_pit_of_noise_is_no_ground():
 
 @pytest.mark.parametrize("z", [-9999.0, -1e5])
 def test_a_height_that_stands_for_none_tilts_no_ground(z):
-    house, on = with_house(land(0.1)[0])
+    house, on = add_house(land(0.1)[0])
     pit = np.concatenate([house, [[*(house[:, :2].min(axis=0) + 5.0), z]]])
     np.testing.assert_allclose(
         ground_grid(pit).height_at(house[on]), ground_grid(house).height_at(house[on]), atol=0.01
@@ -51,7 +51,7 @@ def test_a_height_that_stands_for_none_tilts_no_ground(z):
 
 
 def test_bare_points_are_those_of_the_ground():
-    xyz, _ = with_house(land()[0])
+    xyz, _ = add_house(land()[0])
     cells = np.unique(np.floor(xyz[:, :2]), axis=0, return_index=True)[1]
     bare = bare_points(xyz[cells])
     assert 0.8 * len(cells) < len(bare) < len(cells)

@@ -22,7 +22,7 @@ L_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 8), (9, 8), (9, 18), (0, 18)])
 BLOCKS = Settings.from_dict({"read": {"split_houses": False}})
 
 
-def turned(polygon, degrees, at=(85000.0, 446000.0)):
+def turn_polygon(polygon, degrees, at=(85000.0, 446000.0)):
     return shapely.affinity.translate(shapely.affinity.rotate(polygon, degrees, origin=(0, 0)), *at)
 
 
@@ -41,12 +41,12 @@ def iou(a, b):
 def street(density=8.0):
     """Five houses, the second and third sharing a wall, with ground of class 2 around them."""
     houses = [
-        turned(shapely.box(x, 0, x + w, 9), 20)
+        turn_polygon(shapely.box(x, 0, x + w, 9), 20)
         for x, w in ((0, 8), (11, 8), (19, 8), (30, 8), (41, 8))
     ]
     roofs = [points_in(house, density, seed, 8.0 + seed) for seed, house in enumerate(houses)]
     ground = points_in(
-        turned(shapely.box(-5, -15, 55, 20), 20) - shapely.union_all(houses), 4, 9, 1.0
+        turn_polygon(shapely.box(-5, -15, 55, 20), 20) - shapely.union_all(houses), 4, 9, 1.0
     )
     xyz = np.concatenate([*roofs, ground])
     return PointCloud(
@@ -101,7 +101,7 @@ def test_groups_are_those_of_a_plain_search_over_all_pairs(seed):
 
 @pytest.mark.parametrize("classes", [None, 0, 1])
 def test_a_small_cloud_without_classes_is_one_building(classes):
-    points = points_in(turned(L_SHAPE, 30), 5)
+    points = points_in(turn_polygon(L_SHAPE, 30), 5)
     classification = None if classes is None else np.full(len(points), classes, np.uint8)
     (building,) = split_buildings(PointCloud(points, classification))
     assert building.is_cut_out and len(building.index) == len(points) and building.area.area > 200
@@ -167,8 +167,8 @@ def test_groups_too_small_are_left_out_with_a_warning():
 
 
 def test_density_is_that_of_the_roof_not_of_its_box():
-    assert plan_density(points_in(turned(L_SHAPE, 45), 12.0)) == pytest.approx(12, rel=0.15)
-    assert plan_density(points_in(turned(L_SHAPE, 45), 1.0)) == pytest.approx(1, rel=0.3)
+    assert plan_density(points_in(turn_polygon(L_SHAPE, 45), 12.0)) == pytest.approx(12, rel=0.15)
+    assert plan_density(points_in(turn_polygon(L_SHAPE, 45), 1.0)) == pytest.approx(1, rel=0.3)
 
 
 def test_every_exported_name_exists():

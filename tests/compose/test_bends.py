@@ -10,10 +10,10 @@ from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
 from hiproof.model import Face, Solid
 from hiproof.settings import Settings
-from roof_zoo import KINDS, generated
+from roof_zoo import KINDS, generate_roof
 
 
-def widest_angle(rings):
+def measure_widest_angle(rings):
     """Largest angle (deg) between two triangles of a face's constrained Delaunay triangulation,
     worked out plainly.
     """
@@ -36,11 +36,11 @@ def widest_angle(rings):
     )
 
 
-def faces_of(solid):
+def list_faces(solid):
     return [[solid.vertices[list(ring)] for ring in face.rings] for face in solid.faces]
 
 
-def shaken(solid, rng):
+def shake(solid, rng):
     """Every face by itself, some of its vertices doubled beside themselves, all off their plane by
     a few tenths of a millimetre.
     """
@@ -57,11 +57,11 @@ def shaken(solid, rng):
 def test_bent_faces_are_those_that_triangles_show(kind):
     rng, verdicts = np.random.default_rng(3), set()
     for seed in range(6):
-        for ring in shaken(compose(generated(kind, seed), 0.0), rng):
+        for ring in shake(compose(generate_roof(kind, seed), 0.0), rng):
             solid = Solid(ring, (Face((tuple(range(len(ring))),), "RoofSurface"),))
             codes = {finding.code for finding in check_solid(solid, planarity_m=0.01)}
             if codes <= {204, 301}:
-                angle = widest_angle([ring])
+                angle = measure_widest_angle([ring])
                 assert (204 in codes) == (angle > 20), angle
                 verdicts.add(204 in codes)
     assert verdicts == {True, False}
@@ -70,8 +70,8 @@ def test_bent_faces_are_those_that_triangles_show(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_composed_face_is_bent(kind):
     for seed in range(8):
-        solid = compose(generated(kind, seed), -2.0)
-        assert max(map(widest_angle, faces_of(solid))) <= 20
+        solid = compose(generate_roof(kind, seed), -2.0)
+        assert max(map(measure_widest_angle, list_faces(solid))) <= 20
 
 
 def test_few_roofs_need_coarser_snapping():
@@ -81,7 +81,7 @@ def test_few_roofs_need_coarser_snapping():
     options = Settings().compose
     first = 0
     for seed in range(100):
-        problem = composing.plan_problem(generated("unions", seed))
+        problem = composing.plan_problem(generate_roof("unions", seed))
         solid = composing.compose_at(problem, 0.0, options, options.snap_m, merge_walls=True)
         first += check_solid(solid, planarity_m=options.planarity_m) == ()
     assert first >= 97
@@ -94,7 +94,7 @@ def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
     """
     options = Settings().compose
     for seed in range(4):
-        problem = composing.plan_problem(generated(kind, seed))
+        problem = composing.plan_problem(generate_roof(kind, seed))
         plain, turned = (
             composing.compose_at(
                 problem, -2.0, options, options.snap_m, merge_walls=False, turn_in=turn

@@ -38,7 +38,7 @@ def roof(*parts):
     )
 
 
-def together(solids):
+def join_shells(solids):
     """Solids as the shells of one, over common vertices, as a file holds them."""
     numbers, faces = {}, []
     for solid in solids:
@@ -73,7 +73,7 @@ def test_parts_are_valid_do_not_overlap_and_make_up_the_whole(kind, seed):
         assert sum(part.solid.volume for part in parts) == pytest.approx(solid.volume, rel=1e-4)
         faces = [face for part in parts for face in part.solid.select_faces(ROOF)]
         assert len(faces) == len(solid.select_faces(ROOF))
-        whole = join_parts(together([part.solid for part in parts]))
+        whole = join_parts(join_shells([part.solid for part in parts]))
         assert check_solid(whole) == () and whole.volume == pytest.approx(solid.volume, rel=1e-4)
 
 

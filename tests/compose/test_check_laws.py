@@ -9,14 +9,14 @@ import pytest
 
 from hiproof.compose import check_solid, compose
 from hiproof.model import Face, Solid
-from roof_zoo import generated
+from roof_zoo import generate_roof
 
 CORNERS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
 BOX_RINGS = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6)]
 TOP = 1
 
 
-def solid_of(vertices, rings):
+def make_solid(vertices, rings):
     """Faces given as a ring or as a list of rings."""
     faces = [
         Face(tuple(ring) if isinstance(ring, list) else (ring,), "WallSurface") for ring in rings
@@ -25,10 +25,10 @@ def solid_of(vertices, rings):
 
 
 def box(scale=(1, 1, 1), shift=(0, 0, 0)):
-    return solid_of(CORNERS * scale + shift, BOX_RINGS)
+    return make_solid(CORNERS * scale + shift, BOX_RINGS)
 
 
-def joined(first, second):
+def join(first, second):
     """Two shells as one."""
     offset = len(first.vertices)
     faces = [
@@ -38,20 +38,20 @@ def joined(first, second):
     return Solid(np.vstack((first.vertices, second.vertices)), (*first.faces, *faces))
 
 
-def with_top(rings, extra=()):
+def replace_top(rings, extra=()):
     """The ten-metre box with another top face, given as rings over its corners and extra vertices
     8, 9, ...
     """
     vertices = np.vstack((CORNERS * 10, np.array(extra, float).reshape(-1, 3)))
-    return solid_of(
+    return make_solid(
         vertices, [list(rings) if k == TOP else ring for k, ring in enumerate(BOX_RINGS)]
     )
 
 
-def with_vertex(vertex, shift, scale=10):
+def move_vertex(vertex, shift, scale=10):
     vertices = CORNERS * scale
     vertices[vertex] += shift
-    return solid_of(vertices, BOX_RINGS)
+    return make_solid(vertices, BOX_RINGS)
 
 
 def square(x, y, size=2.0, clockwise=True):
@@ -73,55 +73,55 @@ DENT = [
     (7, 6, 8),
     (6, 4, 8),
 ]
-CUT_BOX = solid_of([*CORNERS, (0.5, -0.3, 0.5)], [r for r in BOX_RINGS if r != (4, 5, 7, 6)] + [
+CUT_BOX = make_solid([*CORNERS, (0.5, -0.3, 0.5)], [r for r in BOX_RINGS if r != (4, 5, 7, 6)] + [
     (4, 5, 8), (5, 7, 8), (7, 6, 8), (6, 4, 8)])  # fmt: skip
 
 BROKEN = {
-    "ring of two": (101, with_top([(4, 5)])),
-    "face without rings": (101, with_top([])),
-    "index twice": (102, with_top([(4, 4, 5, 7, 6)])),
-    "points half a millimetre apart": (102, with_top([(4, 8, 5, 7, 6)], [(0.0003, 0.0003, 10)])),
-    "bow tie": (104, with_top([(4, 7, 5, 6)])),
-    "spike": (104, with_top([(4, 5, 8, 5, 7, 6)], [(20, 0, 10)])),
-    "ring touches itself": (104, with_top([(4, 8, 5, 7, 8, 6)], [(5, 5, 10)])),
-    "vertex on an edge of its ring": (104, with_top([(4, 5, 7, 8, 6)], [(5, 0, 10)])),
-    "folded to a line": (104, with_top([(4, 8, 5)], [(5, 0, 10)])),
-    "rings cross": (201, with_top([OUTER, HOLE], square(9, 4))),
-    "rings share a stretch": (201, with_top([OUTER, HOLE], square(8, 4))),
-    "two holes cross": (201, with_top([OUTER, HOLE, HOLE_2], square(3, 3) + square(4, 4))),
-    "ring twice": (202, with_top([OUTER, HOLE, HOLE[1:] + HOLE[:1]], square(3, 3))),
-    "outer ring twice": (202, with_top([OUTER, OUTER[::-1]])),
+    "ring of two": (101, replace_top([(4, 5)])),
+    "face without rings": (101, replace_top([])),
+    "index twice": (102, replace_top([(4, 4, 5, 7, 6)])),
+    "points half a millimetre apart": (102, replace_top([(4, 8, 5, 7, 6)], [(0.0003, 0.0003, 10)])),
+    "bow tie": (104, replace_top([(4, 7, 5, 6)])),
+    "spike": (104, replace_top([(4, 5, 8, 5, 7, 6)], [(20, 0, 10)])),
+    "ring touches itself": (104, replace_top([(4, 8, 5, 7, 8, 6)], [(5, 5, 10)])),
+    "vertex on an edge of its ring": (104, replace_top([(4, 5, 7, 8, 6)], [(5, 0, 10)])),
+    "folded to a line": (104, replace_top([(4, 8, 5)], [(5, 0, 10)])),
+    "rings cross": (201, replace_top([OUTER, HOLE], square(9, 4))),
+    "rings share a stretch": (201, replace_top([OUTER, HOLE], square(8, 4))),
+    "two holes cross": (201, replace_top([OUTER, HOLE, HOLE_2], square(3, 3) + square(4, 4))),
+    "ring twice": (202, replace_top([OUTER, HOLE, HOLE[1:] + HOLE[:1]], square(3, 3))),
+    "outer ring twice": (202, replace_top([OUTER, OUTER[::-1]])),
     "hole from border to border": (
         205,
-        with_top([OUTER, HOLE], [(0, 5, 10), (5, 6, 10), (10, 5, 10), (5, 4, 10)]),
+        replace_top([OUTER, HOLE], [(0, 5, 10), (5, 6, 10), (10, 5, 10), (5, 4, 10)]),
     ),
-    "hole outside": (206, with_top([OUTER, HOLE], square(12, 4))),
-    "hole in a hole": (207, with_top([OUTER, HOLE, HOLE_2], square(2, 2, 6) + square(4, 4))),
-    "hole runs as its ring": (208, with_top([OUTER, HOLE], square(4, 4, clockwise=False))),
-    "vertex lifted": (203, with_vertex(7, (0, 0, 0.02))),
+    "hole outside": (206, replace_top([OUTER, HOLE], square(12, 4))),
+    "hole in a hole": (207, replace_top([OUTER, HOLE, HOLE_2], square(2, 2, 6) + square(4, 4))),
+    "hole runs as its ring": (208, replace_top([OUTER, HOLE], square(4, 4, clockwise=False))),
+    "vertex lifted": (203, move_vertex(7, (0, 0, 0.02))),
     "fold of a centimetre": (
         204,
-        with_top([(4, 5, 7, 8, 9, 6)], [(0.02, 10, 10.008), (0.01, 10, 10)]),
+        replace_top([(4, 5, 7, 8, 9, 6)], [(0.02, 10, 10.008), (0.01, 10, 10)]),
     ),
     "three faces": (301, Solid(CORNERS, box().faces[:3])),
     "face missing": (302, Solid(CORNERS, box().faces[1:])),
-    "hole left open": (302, with_top([OUTER, HOLE], square(3, 3))),
-    "boxes share an edge": (303, joined(box(), box(shift=(1, 1, 0)))),
-    "dent down to a vertex of the bottom": (303, solid_of([*CORNERS, (0.5, 0.5, 0)], DENT)),
-    "boxes share a vertex": (305, joined(box(), box(shift=(1, 1, 1)))),
-    "boxes apart": (305, joined(box(), box(shift=(3, 0, 0)))),
-    "box in a box": (305, joined(box(), box((0.2, 0.2, 0.2), (0.4, 0.4, 0.4)))),
-    "boxes overlap": (306, joined(box(), box(shift=(0.5, 0.4, 0.3)))),
+    "hole left open": (302, replace_top([OUTER, HOLE], square(3, 3))),
+    "boxes share an edge": (303, join(box(), box(shift=(1, 1, 0)))),
+    "dent down to a vertex of the bottom": (303, make_solid([*CORNERS, (0.5, 0.5, 0)], DENT)),
+    "boxes share a vertex": (305, join(box(), box(shift=(1, 1, 1)))),
+    "boxes apart": (305, join(box(), box(shift=(3, 0, 0)))),
+    "box in a box": (305, join(box(), box((0.2, 0.2, 0.2), (0.4, 0.4, 0.4)))),
+    "boxes overlap": (306, join(box(), box(shift=(0.5, 0.4, 0.3)))),
     "dent through a wall": (306, CUT_BOX),
     "face flipped": (
         307,
-        solid_of(CORNERS, [ring[::-1] if k == TOP else ring for k, ring in enumerate(BOX_RINGS)]),
+        make_solid(CORNERS, [ring[::-1] if k == TOP else ring for k, ring in enumerate(BOX_RINGS)]),
     ),
-    "inside out": (405, solid_of(CORNERS, [ring[::-1] for ring in BOX_RINGS])),
-    "apex under its base": (405, solid_of([*CORNERS[:4], (0.5, 0.5, -1)], PYRAMID)),
+    "inside out": (405, make_solid(CORNERS, [ring[::-1] for ring in BOX_RINGS])),
+    "apex under its base": (405, make_solid([*CORNERS[:4], (0.5, 0.5, -1)], PYRAMID)),
     "open ring in the file": (103, Solid(CORNERS, box().faces, ((103, 2),))),
-    "index out of range": (101, solid_of(CORNERS[:7], BOX_RINGS)),
-    "not a number": (101, with_vertex(3, np.nan)),
+    "index out of range": (101, make_solid(CORNERS[:7], BOX_RINGS)),
+    "not a number": (101, move_vertex(3, np.nan)),
 }
 
 
@@ -134,7 +134,7 @@ def test_broken_solid_is_named_by_its_code(name):
 
 
 @pytest.mark.parametrize(
-    "solid", [box(), box((30, 0.01, 200)), solid_of([*CORNERS[:4], (0.5, 0.5, 1)], PYRAMID)]
+    "solid", [box(), box((30, 0.01, 200)), make_solid([*CORNERS[:4], (0.5, 0.5, 1)], PYRAMID)]
 )
 def test_sound_solid_has_no_findings(solid):
     assert check_solid(solid) == ()
@@ -142,12 +142,12 @@ def test_sound_solid_has_no_findings(solid):
 
 def test_hole_may_touch_its_outer_ring_in_one_point():
     extra = [(0, 5, 10), (3, 6, 10), (3, 4, 10)]
-    found = check_solid(with_top([OUTER, (8, 9, 10)], extra))
+    found = check_solid(replace_top([OUTER, (8, 9, 10)], extra))
     assert not {finding.code for finding in found} & {201, 205, 206}
 
 
 def test_planarity_is_the_callers():
-    solid = with_vertex(7, (0, 0, 0.02))
+    solid = move_vertex(7, (0, 0, 0.02))
     assert 203 in {finding.code for finding in check_solid(solid, planarity_m=0.001)}
     assert check_solid(solid, planarity_m=0.01) == ()
 
@@ -161,12 +161,12 @@ def test_duplicate_vertices_are_welded():
     for ring in BOX_RINGS:
         faces.append(tuple(range(len(vertices), len(vertices) + len(ring))))
         vertices += [CORNERS[v] + 1e-4 * (len(vertices) % 3) for v in ring]
-    assert check_solid(solid_of(vertices, faces), planarity_m=0.001) == ()
+    assert check_solid(make_solid(vertices, faces), planarity_m=0.001) == ()
 
 
 @pytest.mark.parametrize("kind", ["partition", "towers", "row_house"])
 def test_findings_do_not_depend_on_where_the_solid_stands(kind):
-    solid = compose(generated(kind, 5), 0.0)
+    solid = compose(generate_roof(kind, 5), 0.0)
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     far = Solid(solid.vertices @ turn.T + [85000.0, 446000.0, 10.0], solid.faces)
@@ -174,7 +174,7 @@ def test_findings_do_not_depend_on_where_the_solid_stands(kind):
     assert far.volume == pytest.approx(solid.volume, rel=1e-6)
 
 
-def broken_edges(solid):
+def find_broken_edges(solid):
     """Edges not used once each way, counted plainly."""
     uses = Counter(
         (a, b) for f in solid.faces for r in f.rings for a, b in zip(r, (*r[1:], r[0]), strict=True)
@@ -186,8 +186,8 @@ def broken_edges(solid):
 def test_every_single_fault_in_a_composed_solid_is_found(kind):
     rng = np.random.default_rng(7)
     for seed in range(6):
-        solid = compose(generated(kind, seed), 0.0)
-        assert broken_edges(solid) == 0
+        solid = compose(generate_roof(kind, seed), 0.0)
+        assert find_broken_edges(solid) == 0
         k = int(rng.integers(len(solid.faces)))
         face = solid.faces[k]
         flipped = Face(tuple(ring[::-1] for ring in face.rings), face.kind)
@@ -196,7 +196,7 @@ def test_every_single_fault_in_a_composed_solid_is_found(kind):
         twice = Solid(solid.vertices, (*solid.faces, face))
         lifted = solid.vertices.copy()
         lifted[face.rings[0][0]] += (0.3, 0.4, 50.0)
-        assert broken_edges(dropped) and {f.code for f in check_solid(dropped)} <= {301, 302}
+        assert find_broken_edges(dropped) and {f.code for f in check_solid(dropped)} <= {301, 302}
         assert 307 in {f.code for f in check_solid(turned)}
         assert 303 in {f.code for f in check_solid(twice)}
         assert check_solid(Solid(lifted, solid.faces))
@@ -217,7 +217,7 @@ def field(n):
     rings += [(at[i, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(n) for j in range(n)]
     rings += [(base[a], base[b], b, a) for a, b in zip(rim, rim[1:] + rim[:1], strict=True)]
     rings.append(tuple(base[v] for v in reversed(rim)))
-    return solid_of(
+    return make_solid(
         np.vstack((top, top[rim] * [1, 1, 0])), [tuple(map(int, ring)) for ring in rings]
     )
 
@@ -232,5 +232,5 @@ def test_shell_of_many_faces_is_checked_face_by_face():
 
 def test_long_thin_face_is_as_planar_as_its_best_plane():
     ring = [(0, 0, 0), (9, 0, 0), (9, 0.02, 1e-4), (0.02, 0.02, 0), (0.02, 9, 1e-4), (0, 9, 0)]
-    codes = {finding.code for finding in check_solid(solid_of(ring, [tuple(range(6))]))}
+    codes = {finding.code for finding in check_solid(make_solid(ring, [tuple(range(6))]))}
     assert 203 not in codes

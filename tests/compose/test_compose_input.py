@@ -90,5 +90,5 @@ def test_slivers_join_a_neighbour_by_the_settings():
 
 
 def test_coordinates_are_multiples_of_a_tenth_of_a_millimetre():
-    solid = compose(roof_zoo.generated("cross_gables", 1), -1.23456789)
+    solid = compose(roof_zoo.generate_roof("cross_gables", 1), -1.23456789)
     assert np.abs(solid.vertices * 1e4 - np.rint(solid.vertices * 1e4)).max() < 1e-6

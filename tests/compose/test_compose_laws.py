@@ -10,7 +10,7 @@ import roof_zoo
 from hiproof.compose import check_solid, compose, terrain_intersection
 from hiproof.model import Part, Piece, Roof, Solid
 from hiproof.settings import Settings
-from roof_zoo import KINDS, generated, moved
+from roof_zoo import KINDS, generate_roof, move_roof
 
 Z_GROUND = -2.0
 # random roofs are full of faces thinner than a person draws, which by default join a neighbour:
@@ -25,19 +25,19 @@ def plan_polygon(solid, face):
     return shapely.Polygon(rings[0], rings[1:])
 
 
-def plane_of(solid, face):
+def fit_plane(solid, face):
     """The face's plane (a, b, c) by least squares."""
     points = solid.vertices[[v for ring in face.rings for v in ring]]
     design = np.column_stack((points[:, :2], np.ones(len(points))))
     return np.linalg.lstsq(design, points[:, 2], rcond=None)[0]
 
 
-def roof_height(solid, xy):
+def measure_roof_height(solid, xy):
     """Height (n,) of the solid's roof faces at `xy`, and how many of them cover each point."""
     z, covering = np.full(len(xy), np.nan), np.zeros(len(xy), int)
     for face in solid.select_faces("RoofSurface"):
         inside = shapely.contains_xy(plan_polygon(solid, face), xy[:, 0], xy[:, 1])
-        z[inside] = np.column_stack((xy, np.ones(len(xy))))[inside] @ plane_of(solid, face)
+        z[inside] = np.column_stack((xy, np.ones(len(xy))))[inside] @ fit_plane(solid, face)
         covering += inside
     return z, covering
 
@@ -50,21 +50,21 @@ def sample(roof, count, seed):
 
 
 @pytest.fixture(scope="module")
-def composed():
+def solids():
     """Every (kind, seed) of the zoo with its roof and solid."""
-    roofs = {(kind, seed): generated(kind, seed) for kind in KINDS for seed in SEEDS}
+    roofs = {(kind, seed): generate_roof(kind, seed) for kind in KINDS for seed in SEEDS}
     return {key: (roof, compose(roof, Z_GROUND, EXACT)) for key, roof in roofs.items()}
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_solid_is_valid_also_in_the_world_and_rounded_as_written(composed, kind):
+def test_solid_is_valid_also_in_the_world_and_rounded_as_written(solids, kind):
     for seed in SEEDS:
-        _, solid = composed[kind, seed]
+        _, solid = solids[kind, seed]
         assert check_solid(solid) == ()
         assert check_solid(Solid(np.round(solid.vertices + WORLD, 4), solid.faces)) == ()
 
 
-def roof_heights_of(solid):
+def measure_roof_heights(solid):
     """Lowest and highest height of a solid's roof faces."""
     z = solid.vertices[
         np.unique(
@@ -75,7 +75,7 @@ def roof_heights_of(solid):
     return z.min(), z.max()
 
 
-def thin_faces(solid):
+def count_thin_faces(solid):
     """How many roof faces are thinner than nobody draws."""
     faces = [plan_polygon(solid, face) for face in solid.select_faces("RoofSurface")]
     return sum(2 * face.area / face.length < Settings().compose.min_face_width_m for face in faces)
@@ -83,84 +83,84 @@ def thin_faces(solid):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_thin_faces_join_neighbours_that_carry_their_planes_no_further_than_what_is_around(
-    composed, kind
+    solids, kind
 ):
     before = after = 0
     for seed in SEEDS:
-        roof, exact = composed[kind, seed]
+        roof, exact = solids[kind, seed]
         solid = compose(roof, Z_GROUND)
         assert check_solid(solid) == ()
-        (low, high), (lowest, highest) = roof_heights_of(solid), roof_heights_of(exact)
+        (low, high), (lowest, highest) = measure_roof_heights(solid), measure_roof_heights(exact)
         # a decimetre; two where slivers lie side by side
         assert lowest - 0.2 < low and high < highest + 0.2
-        found, covering = roof_height(solid, xy := sample(roof, 1500, seed))
+        found, covering = measure_roof_height(solid, xy := sample(roof, 1500, seed))
         assert (covering == 1).all()
         wanted = roof.height_at(xy)
         assert (np.abs(found - wanted) > 2e-3)[np.isfinite(wanted)].mean() < 0.1
-        before, after = before + thin_faces(exact), after + thin_faces(solid)
+        before, after = before + count_thin_faces(exact), after + count_thin_faces(solid)
     assert after <= 0.4 * before
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_roof_of_the_solid_is_the_height_function(composed, kind):
+def test_roof_of_the_solid_is_the_height_function(solids, kind):
     for seed in SEEDS:
-        roof, solid = composed[kind, seed]
+        roof, solid = solids[kind, seed]
         xy = sample(roof, 1500, seed)
         wanted = roof.height_at(xy)
-        found, covering = roof_height(solid, xy)
+        found, covering = measure_roof_height(solid, xy)
         assert (covering == 1).all()
         off = np.abs(found - wanted)[np.isfinite(wanted)] > 2e-3
         assert off.mean() < 2e-3, f"{kind} {seed}: {off.sum()} of {len(off)} points off"
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_roof_faces_tile_the_outline(composed, kind):
+def test_roof_faces_tile_the_outline(solids, kind):
     for seed in SEEDS:
-        roof, solid = composed[kind, seed]
+        roof, solid = solids[kind, seed]
         area = sum(plan_polygon(solid, face).area for face in solid.select_faces("RoofSurface"))
         assert area == pytest.approx(roof.outline.area, abs=2e-3 * roof.outline.length)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_volume_is_the_integral_over_the_roof(composed, kind):
+def test_volume_is_the_integral_over_the_roof(solids, kind):
     for seed in SEEDS:
-        _, solid = composed[kind, seed]
+        _, solid = solids[kind, seed]
         z_ground = solid.vertices[:, 2].min()
         total = 0.0
         for face in solid.select_faces("RoofSurface"):
             polygon = plan_polygon(solid, face)
             middle = np.array([polygon.centroid.x, polygon.centroid.y, 1.0])
-            total += polygon.area * (middle @ plane_of(solid, face) - z_ground)
+            total += polygon.area * (middle @ fit_plane(solid, face) - z_ground)
         assert solid.volume == pytest.approx(total, rel=1e-4, abs=1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_answer_moves_with_the_roof(composed, kind):
+def test_answer_moves_with_the_roof(solids, kind):
     for seed in SEEDS:
-        roof, solid = composed[kind, seed]
-        other = compose(moved(roof, 33.3, np.array([12.3456, -7.8912])), Z_GROUND, EXACT)
+        roof, solid = solids[kind, seed]
+        other = compose(move_roof(roof, 33.3, np.array([12.3456, -7.8912])), Z_GROUND, EXACT)
         extent = solid.vertices[:, 2].max() - solid.vertices[:, 2].min()
         assert other.volume == pytest.approx(solid.volume, abs=2e-3 * roof.outline.length * extent)
 
 
-def test_a_part_under_the_others_changes_nothing(composed):
+def test_a_part_under_the_others_changes_nothing(solids):
     for kind in ("partition", "saw_tooth", "towers"):
-        roof, solid = composed[kind, 1]
+        roof, solid = solids[kind, 1]
         low = Part("flat", (Piece(shapely.box(-9, -9, 9, 9), np.array([[0.0, 0.0, -50.0]])),))
         other = compose(Roof((*roof.parts, low), roof.outline, roof.frame), Z_GROUND, EXACT)
         assert other.volume == pytest.approx(solid.volume, rel=1e-4)
         assert len(other.select_faces("RoofSurface")) == len(solid.select_faces("RoofSurface"))
 
 
-def test_order_of_the_parts_does_not_matter(composed):
+def test_order_of_the_parts_does_not_matter(solids):
     for kind in ("partition", "cross_gables", "towers"):
-        roof, solid = composed[kind, 2]
+        roof, solid = solids[kind, 2]
         other = compose(Roof(roof.parts[::-1], roof.outline, roof.frame), Z_GROUND, EXACT)
         assert other.volume == pytest.approx(solid.volume, rel=1e-4)
 
 
 def test_same_roof_same_bytes():
-    first, second = (compose(generated("towers", 3), Z_GROUND) for _ in range(2))
+    first, second = (compose(generate_roof("towers", 3), Z_GROUND) for _ in range(2))
     assert first.faces == second.faces and first.vertices.tobytes() == second.vertices.tobytes()
 
 
@@ -234,7 +234,7 @@ def test_gap_takes_the_roof_of_the_piece_beside_it():
     outline = shapely.box(-1, -1, 11, 8)
     solid = compose(roof_zoo.roof([Piece(HOUSE, GABLE)], outline), 0.0)
     inside = np.array([[-0.5, 2.0], [10.5, 6.0], [5.0, -0.5]])
-    assert roof_height(solid, inside)[0] == pytest.approx(
+    assert measure_roof_height(solid, inside)[0] == pytest.approx(
         Piece(HOUSE, GABLE).height_at(inside), abs=1e-3
     )
 

@@ -16,7 +16,7 @@ from roof_zoo import FRAME
 ROOFS = sorted((Path(__file__).parents[1] / "regressions").glob("*/roof.json"))
 
 
-def roof_from(path):
+def read_roof(path):
     stored = json.loads(path.read_text())
     parts = [
         Part(
@@ -30,4 +30,4 @@ def roof_from(path):
 
 @pytest.mark.parametrize("path", ROOFS, ids=lambda path: path.parent.name)
 def test_roof_becomes_a_valid_solid(path):
-    assert check_solid(compose(roof_from(path), -2.0)) == ()
+    assert check_solid(compose(read_roof(path), -2.0)) == ()

@@ -5,14 +5,14 @@ import shutil
 import pytest
 
 import hiproof
-from flat_town import request_over
+from flat_town import make_request
 
 
 @pytest.fixture(scope="session")
 def wrong_run(town_files, tmp_path_factory):
     """The output folder of the run with the wrong types; not to be written."""
     out = tmp_path_factory.mktemp("wrong")
-    hiproof.reconstruct_area(request_over(town_files, out))
+    hiproof.reconstruct_area(make_request(town_files, out))
     return out
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import hiproof
-from flat_town import request_over
+from flat_town import make_request
 from hiproof.city.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
@@ -32,7 +32,7 @@ def desk(folder):
     return Desk(folder, "anna")
 
 
-def edited(desk, parts, id=ID, **asked):
+def edit(desk, parts, id=ID, **asked):
     return desk.change(id, {"parts": parts, "asked": asked})
 
 
@@ -40,14 +40,14 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
     was = by_id(folder)
     start = desk.building(ID)
     assert start["type"] == "flat" and start["version"] == UNTOUCHED
-    gable = edited(desk, start["parts"], action="change", part=0, change={"type": "gable"})
-    fitted = edited(desk, gable["parts"], action="refit")
+    gable = edit(desk, start["parts"], action="change", part=0, change={"type": "gable"})
+    fitted = edit(desk, gable["parts"], action="refit")
     assert fitted["type"] == "gable"
     assert fitted["figures"]["share_within_20cm"] > 0.95 > start["figures"]["share_within_20cm"]
     desk.accept(
         ID, {"parts": fitted["parts"], "version": start["version"], "note": "seen from the street"}
     )
-    hiproof.reconstruct_area(request_over(town_files, folder, folder / EDITS_FILE))
+    hiproof.reconstruct_area(make_request(town_files, folder, folder / EDITS_FILE))
     now = by_id(folder)
     assert now[ID]["type"] == "gable" and "(seen from the street, anna, " in now[ID]["detail"]
     assert now[ID]["parts"] == fitted["parts"]
@@ -62,16 +62,14 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
 
 def test_on_a_level_roof_a_dormer_is_a_block_that_a_hand_can_size(desk):
     start = desk.building("house-3")  # flat indeed
-    block = edited(desk, start["parts"], id="house-3", action="dormer", part=0)
+    block = edit(desk, start["parts"], id="house-3", action="dormer", part=0)
     assert [part["type"] for part in block["parts"]] == ["flat", "flat"]
     grown = (
         block["figures"]["ridge_height"]
-        - edited(desk, start["parts"], id="house-3", action="show")["figures"]["ridge_height"]
+        - edit(desk, start["parts"], id="house-3", action="show")["figures"]["ridge_height"]
     )
     assert grown == pytest.approx(2.5, abs=1e-3)
-    wide = edited(
-        desk, block["parts"], id="house-3", action="change", part=1, change={"width": 4.0}
-    )
+    wide = edit(desk, block["parts"], id="house-3", action="change", part=1, change={"width": 4.0})
     assert wide["figures"]["volume_m3"] > block["figures"]["volume_m3"] + 1.0
 
 
@@ -84,7 +82,7 @@ def test_ground_and_leaving_out_are_kept_in_place_of_each_other(desk):
     assert (
         raised["figures"]["z_ground"]
         == 1.25
-        != edited(desk, start["parts"], action="show")["figures"]["z_ground"]
+        != edit(desk, start["parts"], action="show")["figures"]["z_ground"]
     )
     version = desk.accept(ID, {"parts": start["parts"], "z_ground": 1.25, "version": UNTOUCHED})[
         "version"
@@ -150,47 +148,47 @@ def test_whatever_speaks_against_a_model_adds_to_its_doubt(said, reason):
 
 def test_every_edit_gives_a_valid_model(desk):
     start = desk.building(ID)
-    gable = edited(
+    gable = edit(
         desk,
         start["parts"],
         action="change",
         part=0,
         change={"type": "gable", "ridge_height": 12.0},
     )
-    two = edited(desk, gable["parts"], action="split", part=0)
+    two = edit(desk, gable["parts"], action="split", part=0)
     assert len(two["parts"]) == 2 and two["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
     )
-    one = edited(desk, two["parts"], action="merge", part=0, other=1)
+    one = edit(desk, two["parts"], action="merge", part=0, other=1)
     assert len(one["parts"]) == 1 and one["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
     )
     assert one["parts"][0]["parameters"]["length"] == pytest.approx(
         gable["parts"][0]["parameters"]["length"], abs=1e-3
     )
-    dormer = edited(desk, one["parts"], action="dormer", part=0)
+    dormer = edit(desk, one["parts"], action="dormer", part=0)
     assert (
         len(dormer["parts"]) == 2
         and dormer["figures"]["volume_m3"] > one["figures"]["volume_m3"] + 0.1
     )
-    again = edited(desk, dormer["parts"], action="remove", part=1)
+    again = edit(desk, dormer["parts"], action="remove", part=1)
     assert again["mesh"] == one["mesh"]
 
 
 def test_what_is_held_is_not_refitted(desk):
     start = desk.building(ID)
-    raised = edited(
+    raised = edit(
         desk,
         start["parts"],
         action="change",
         part=0,
         change={"type": "gable", "ridge_height": 12.0},
     )
-    held = edited(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
+    held = edit(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
     assert held["figures"]["ridge_height"] == pytest.approx(12.0, abs=0.01)
-    assert edited(desk, raised["parts"], action="refit")["figures"][
-        "ridge_height"
-    ] == pytest.approx(10.1, abs=0.1)
+    assert edit(desk, raised["parts"], action="refit")["figures"]["ridge_height"] == pytest.approx(
+        10.1, abs=0.1
+    )
 
 
 def test_types_are_tried_and_the_right_one_wins(desk):
@@ -229,7 +227,7 @@ def test_two_windows_lose_nothing(folder):
     seen = one.building(ID), other.building(ID)
     flat, gable = (
         seen[0]["parts"],
-        edited(other, seen[1]["parts"], action="change", part=0, change={"type": "gable"}),
+        edit(other, seen[1]["parts"], action="change", part=0, change={"type": "gable"}),
     )
     mine = one.accept(ID, {"parts": flat, "version": seen[0]["version"]})
     with pytest.raises(OtherVersion, match="anna accepted") as caught:
@@ -246,12 +244,12 @@ def test_two_windows_lose_nothing(folder):
 def test_no_process_writes_over_another(folder):
     """Two processes accept on one folder at once, each other buildings."""
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        done = list(pool.map(accept_many, [folder] * 2, range(2)))
+        done = list(pool.map(accept_overrides, [folder] * 2, range(2)))
     kept = {id: record["ridge_height"] for id, record in read_overrides(str(folder / EDITS_FILE))}
     assert kept == {id: height for own in done for id, height in own.items()}
 
 
-def accept_many(folder, number):
+def accept_overrides(folder, number):
     """Keep overrides of ten buildings of this process's own; their heights."""
     edits, done = Edits(folder), {}
     for k in range(10):
@@ -280,7 +278,7 @@ def test_what_makes_no_solid_is_not_accepted(folder, desk):
 def test_the_file_starts_with_the_overrides_that_the_run_obeyed(town_files, folder, tmp_path):
     known = tmp_path / "known.jsonl"
     known.write_text(json.dumps({"id": "house-1", "ridge_height": 9.5}) + "\n")
-    hiproof.reconstruct_area(request_over(town_files, folder, known))
+    hiproof.reconstruct_area(make_request(town_files, folder, known))
     desk = Desk(folder, "anna")
     desk.accept(ID, {"parts": desk.building(ID)["parts"], "version": UNTOUCHED})
     kept = dict(read_overrides(str(folder / EDITS_FILE)))
@@ -294,15 +292,15 @@ def test_points_are_those_of_the_run(desk):
 
 def test_without_its_points_all_but_refitting_works(town_files, tmp_path):
     cloud = shutil.copy(town_files[0], tmp_path / "cloud.laz")
-    hiproof.reconstruct_area(request_over([str(cloud), town_files[1]], tmp_path / "run"))
+    hiproof.reconstruct_area(make_request([str(cloud), town_files[1]], tmp_path / "run"))
     (tmp_path / "cloud.laz").unlink()
     desk = Desk(tmp_path / "run", "anna")
     assert "points are gone" in desk.cloud(ID)["missing"] and desk.cloud(ID)["count"] == 0
     start = desk.building(ID)
-    gable = edited(desk, start["parts"], action="change", part=0, change={"type": "gable"})
+    gable = edit(desk, start["parts"], action="change", part=0, change={"type": "gable"})
     assert gable["type"] == "gable" and gable["figures"]["share_within_20cm"] is None
     with pytest.raises(HiproofError, match="3 points or more"):
-        edited(desk, gable["parts"], action="refit")
+        edit(desk, gable["parts"], action="refit")
     desk.accept(ID, {"parts": gable["parts"], "version": start["version"]})
     assert (tmp_path / "run" / EDITS_FILE).exists()
 
@@ -317,7 +315,7 @@ def run_by_relative_names(town_files, tmp_path, monkeypatch):
     cloud, footprints = (Path(shutil.copy(file, project)).name for file in town_files)
     (project / "known.jsonl").write_text(json.dumps({"id": "house-1", "ridge_height": 9.5}) + "\n")
     monkeypatch.chdir(project)
-    hiproof.reconstruct_area(request_over([cloud, footprints], Path("run"), "known.jsonl"))
+    hiproof.reconstruct_area(make_request([cloud, footprints], Path("run"), "known.jsonl"))
     monkeypatch.chdir(tmp_path)
     return project
 
@@ -336,7 +334,7 @@ def test_the_same_run_from_elsewhere_redoes_nothing(town_files, run_by_relative_
     was = (run_by_relative_names / "run/buildings.gml").stat().st_ino
     there = [str(run_by_relative_names / Path(file).name) for file in town_files]
     known = run_by_relative_names / "known.jsonl"
-    hiproof.reconstruct_area(request_over(there, run_by_relative_names / "run", known))
+    hiproof.reconstruct_area(make_request(there, run_by_relative_names / "run", known))
     assert (run_by_relative_names / "run/buildings.gml").stat().st_ino == was
 
 
@@ -344,7 +342,7 @@ def test_a_run_goes_on_where_its_files_were_moved(town_files, run_by_relative_na
     project = run_by_relative_names.rename(tmp_path / "archive")
     was = (project / "run/buildings.gml").stat().st_ino
     there = [str(project / Path(file).name) for file in town_files]
-    hiproof.reconstruct_area(request_over(there, project / "run", project / "known.jsonl"))
+    hiproof.reconstruct_area(make_request(there, project / "run", project / "known.jsonl"))
     assert (project / "run/buildings.gml").stat().st_ino == was
     assert Desk(project / "run", "anna").cloud(ID)["count"]
 
@@ -367,12 +365,12 @@ def test_files_that_moved_are_found_in_the_folder_that_a_person_names(
 
 def test_points_that_can_no_longer_be_read_are_said_once(town_files, tmp_path):
     cloud = shutil.copy(town_files[0], tmp_path / "cloud.laz")
-    hiproof.reconstruct_area(request_over([str(cloud), town_files[1]], tmp_path / "run"))
+    hiproof.reconstruct_area(make_request([str(cloud), town_files[1]], tmp_path / "run"))
     (tmp_path / "cloud.laz").write_bytes(b"no cloud")
     desk = Desk(tmp_path / "run", "anna")
     assert "cannot be read" in desk.cloud(ID)["missing"]
     assert (
-        edited(desk, desk.building(ID)["parts"], action="change", part=0, change={"type": "hip"})[
+        edit(desk, desk.building(ID)["parts"], action="change", part=0, change={"type": "hip"})[
             "type"
         ]
         == "hip"
@@ -395,14 +393,14 @@ def test_buildings_that_are_not_there_are_a_sentence(desk):
 
 def test_gaps_are_heights_of_the_points_drawn_over_the_roof(desk):
     start, cloud = desk.building(ID), desk.cloud(ID)
-    shown = edited(desk, start["parts"], action="show")
-    places = np.frombuffer(bytes_of(cloud["places"]), "<f4").reshape(-1, 3)
-    gaps = np.frombuffer(bytes_of(shown["gaps"]), "<f4")
+    shown = edit(desk, start["parts"], action="show")
+    places = np.frombuffer(decode_bytes(cloud["places"]), "<f4").reshape(-1, 3)
+    gaps = np.frombuffer(decode_bytes(shown["gaps"]), "<f4")
     level = start["parts"][0]["position"][2]
     inside = gaps != 9.0  # a point on the outline itself may have no roof under it
     assert len(gaps) == len(places) and inside.mean() > 0.98
     assert gaps[inside] == pytest.approx(places[inside, 2] - level, abs=1e-4)
 
 
-def bytes_of(text):
+def decode_bytes(text):
     return base64.b64decode(text)

@@ -8,14 +8,14 @@ import pytest
 
 import hiproof
 import pages
-from flat_town import request_over
+from flat_town import make_request
 from hiproof.city.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.edits import EDITS_FILE
 from hiproof.edit.server import Server, Service
 from hiproof.read.solids import read_solids
-from pages import at_every_size, complaints, is_too_wide, needs_browser, places_on_canvas
+from pages import at_every_size, is_too_wide, list_complaints, needs_browser, project_on_canvas
 from run_records import by_id
 
 WAIT_S = 60
@@ -24,7 +24,7 @@ pytestmark = needs_browser
 
 
 @pytest.fixture
-def served(folder):
+def page_service(folder):
     """A service that answers, over a folder of the test's own."""
     service = Service(Desk(folder, "anna"))
     with Server(service) as server:
@@ -34,14 +34,14 @@ def served(folder):
 
 
 @pytest.fixture
-def page(browser, served):
-    page = opened(browser, served)
+def page(browser, page_service):
+    page = open_window(browser, page_service)
     yield page
     assert page.faults == []
     page.context.close()
 
 
-def opened(browser, served):
+def open_window(browser, served):
     """A window on the page, ready on its first building; its `faults` are what scripts complained
     of.
     """
@@ -50,11 +50,11 @@ def opened(browser, served):
     page.faults = []
     page.on("pageerror", lambda error: page.faults.append(str(error)))
     page.goto(served.address)
-    wait_for(page, "house-")
+    wait_for_building(page, "house-")
     return page
 
 
-def until(page, expression):
+def wait_until_true(page, expression):
     """Wait until an expression of the page is true.
 
     The page forbids eval, which playwright's own waiting needs.
@@ -65,9 +65,9 @@ def until(page, expression):
         page.wait_for_timeout(20)
 
 
-def wait_for(page, title):
+def wait_for_building(page, title):
     """Wait until a building is there with its points."""
-    until(
+    wait_until_true(
         page,
         f"$('title').textContent.startsWith('{title}') && "
         "Boolean(document.querySelector('[data-figure=points]'))",
@@ -77,14 +77,14 @@ def wait_for(page, title):
 
 def choose(page, id):
     page.click(f"[data-id={id}]")
-    wait_for(page, id)
+    wait_for_building(page, id)
 
 
-def figure(page, name):
+def read_figure(page, name):
     return float(page.get_attribute(f"[data-figure={name}]", "data-value"))
 
 
-def key(page, letter):
+def press_key(page, letter):
     """Press a key, and wait until what it asks for is done."""
     page.keyboard.press(letter)
     page.evaluate("() => queue")
@@ -92,17 +92,17 @@ def key(page, letter):
 
 def test_from_a_wrong_type_to_a_rebuilt_valid_citygml(town_files, page, folder):
     choose(page, "house-0")
-    assert figure(page, "share_within_20cm") < 0.5
+    assert read_figure(page, "share_within_20cm") < 0.5
     page.select_option("#type", "gable")
-    wait_for(page, "house-0: gable")
-    key(page, "r")
-    assert figure(page, "share_within_20cm") > 0.95
+    wait_for_building(page, "house-0: gable")
+    press_key(page, "r")
+    assert read_figure(page, "share_within_20cm") > 0.95
     page.fill("#note", "seen from the street")
     page.keyboard.press("Enter")
-    key(page, "a")
+    press_key(page, "a")
     assert page.inner_text("#say") == "accepted"
     assert page.get_attribute("[data-id=house-0]", "class").split() == ["current", "accepted"]
-    hiproof.reconstruct_area(request_over(town_files, folder, folder / EDITS_FILE))
+    hiproof.reconstruct_area(make_request(town_files, folder, folder / EDITS_FILE))
     rows = by_id(folder)
     assert {id: row["type"] for id, row in rows.items()} == {
         "house-0": "gable",
@@ -120,25 +120,25 @@ def test_from_a_wrong_type_to_a_rebuilt_valid_citygml(town_files, page, folder):
 def test_keys_go_through_the_buildings(page):
     first = page.inner_text("#title")
     for letter in "n", "p":
-        key(page, letter)
+        press_key(page, letter)
     assert page.inner_text("#title") == first
-    key(page, "a")
-    key(page, "n")
+    press_key(page, "a")
+    press_key(page, "n")
     second = page.inner_text("#title")
     assert second != first
-    key(page, "s")
+    press_key(page, "s")
     assert page.locator("[data-part]").count() == 2
-    key(page, "u")
+    press_key(page, "u")
     assert page.locator("[data-part]").count() == 1
-    key(page, "u")
+    press_key(page, "u")
     assert page.inner_text("#say") == "nothing to undo"
 
 
 def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
     choose(page, "house-0")
     page.select_option("#type", "gable")
-    wait_for(page, "house-0: gable")
-    was = figure(page, "ridge_height")
+    wait_for_building(page, "house-0: gable")
+    was = read_figure(page, "ridge_height")
     box = page.locator("[data-handle=ridge]").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
@@ -146,43 +146,45 @@ def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
     page.mouse.move(x, y - 25, steps=4)
     page.mouse.move(x, y - 50, steps=4)
     page.mouse.up()
-    until(page, f"now.model.figures.ridge_height > {was + 0.5}")
+    wait_until_true(page, f"now.model.figures.ridge_height > {was + 0.5}")
     page.evaluate("() => queue")
     assert page.is_checked("[data-pin=height]")
-    raised = figure(page, "ridge_height")
-    key(page, "r")
+    raised = read_figure(page, "ridge_height")
+    press_key(page, "r")
     # what a hand set is kept
-    assert figure(page, "ridge_height") == pytest.approx(raised, abs=0.005)
-    key(page, "u")
-    key(page, "u")
-    assert figure(page, "ridge_height") == was and not page.is_checked("[data-pin=height]")
+    assert read_figure(page, "ridge_height") == pytest.approx(raised, abs=0.005)
+    press_key(page, "u")
+    press_key(page, "u")
+    assert read_figure(page, "ridge_height") == was and not page.is_checked("[data-pin=height]")
 
 
 def test_an_edge_and_a_number_change_the_model(page):
     choose(page, "house-0")
-    volume = figure(page, "volume_m3")
+    volume = read_figure(page, "volume_m3")
     page.fill("[data-name=ridge_height]", "11")
     page.keyboard.press("Enter")
-    until(page, "now.model.figures.ridge_height === 11")
-    assert figure(page, "volume_m3") > volume
+    wait_until_true(page, "now.model.figures.ridge_height === 11")
+    assert read_figure(page, "volume_m3") > volume
     page.fill("[data-name=rotation]", "")  # no number changes nothing
     page.keyboard.press("Tab")
     page.evaluate("() => queue")
-    assert figure(page, "ridge_height") == 11.0 and page.input_value("[data-name=rotation]") != ""
+    assert (
+        read_figure(page, "ridge_height") == 11.0 and page.input_value("[data-name=rotation]") != ""
+    )
     page.fill("[data-name=width]", "-3")
     page.keyboard.press("Enter")
     page.evaluate("() => queue")
     assert (
         "expected a positive width" in page.inner_text("#say")
-        and figure(page, "ridge_height") == 11.0
+        and read_figure(page, "ridge_height") == 11.0
     )
 
 
 def test_a_click_on_the_roof_chooses_its_part(page):
     choose(page, "house-0")
-    key(page, "s")
+    press_key(page, "s")
     # else both are one face
-    page.fill("[data-name=ridge_height]", str(figure(page, "ridge_height") + 0.5))
+    page.fill("[data-name=ridge_height]", str(read_figure(page, "ridge_height") + 0.5))
     page.keyboard.press("Enter")
     page.evaluate("() => queue")
     page.evaluate(
@@ -203,40 +205,40 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
     town_files, page, folder
 ):
     choose(page, "house-1")
-    was = figure(page, "volume_m3")
+    was = read_figure(page, "volume_m3")
     page.fill("#ground", "1.25")
     page.keyboard.press("Enter")
-    until(page, "now.model.figures.z_ground === 1.25")
+    wait_until_true(page, "now.model.figures.z_ground === 1.25")
     page.evaluate("() => queue")
-    assert figure(page, "volume_m3") > was
-    key(page, "u")
-    assert figure(page, "volume_m3") == was and page.input_value("#ground") != "1.25"
+    assert read_figure(page, "volume_m3") > was
+    press_key(page, "u")
+    assert read_figure(page, "volume_m3") == was and page.input_value("#ground") != "1.25"
     page.fill("#ground", "1.25")
     page.keyboard.press("Enter")
-    key(page, "a")
+    press_key(page, "a")
     assert page.inner_text("#say") == "accepted"
     choose(page, "house-2")
-    key(page, "o")
+    press_key(page, "o")
     assert page.inner_text("#title") == "house-2: left out" and "no model" in page.inner_text(
         "#say"
     )
-    key(page, "r")
+    press_key(page, "r")
     assert "left out; keep it in first" in page.inner_text("#say")
-    key(page, "u")
+    press_key(page, "u")
     assert page.inner_text("#title") == "house-2: flat"
     page.click("#leave-out")
-    key(page, "a")
+    press_key(page, "a")
     said = dict(read_overrides(str(folder / EDITS_FILE)))
     assert (
         said["house-1"]["z_ground"] == 1.25
         and said["house-2"]["leave_out"] is True
         and "parts" not in said["house-2"]
     )
-    hiproof.reconstruct_area(request_over(town_files, folder, folder / EDITS_FILE))
+    hiproof.reconstruct_area(make_request(town_files, folder, folder / EDITS_FILE))
     rows = by_id(folder)
     assert rows["house-1"]["z_ground"] == 1.25 and rows["house-2"]["status"] == "left_out"
     page.reload()
-    wait_for(page, "house-")
+    wait_for_building(page, "house-")
     page.evaluate("() => inTurn(() => open('house-2'))")
     page.evaluate("() => queue")
     assert (
@@ -252,14 +254,14 @@ def test_undo_back_to_what_was_accepted_leaves_nothing_changed(page):
     choose(page, "house-0")
     mark = "[data-id=house-0]"
     page.select_option("#type", "gable")
-    wait_for(page, "house-0: gable")
+    wait_for_building(page, "house-0: gable")
     assert "draft" in page.get_attribute(mark, "class").split()
-    key(page, "u")
+    press_key(page, "u")
     assert page.get_attribute(mark, "class").split() == ["current"]
-    key(page, "a")
+    press_key(page, "a")
     page.select_option("#type", "gable")
-    wait_for(page, "house-0: gable")
-    key(page, "u")
+    wait_for_building(page, "house-0: gable")
+    press_key(page, "u")
     assert page.get_attribute(mark, "class").split() == ["current", "accepted"]
 
 
@@ -268,63 +270,63 @@ def test_a_server_that_is_gone_is_said_and_costs_nothing(page):
     browser a moment.
     """
     choose(page, "house-0")
-    shown = page.inner_text("#title"), figure(page, "share_within_20cm")
+    shown = page.inner_text("#title"), read_figure(page, "share_within_20cm")
     page.evaluate("() => { window.reached = window.fetch; }")
     for answer, told in [
         ("Promise.reject(new TypeError('Failed to fetch'))", "the server does not answer"),
         ("Promise.resolve(new Response('<html>', { status: 502 }))", "the server answered 502"),
     ]:
         page.evaluate(f"() => {{ window.fetch = () => {answer}; }}")
-        key(page, "r")
+        press_key(page, "r")
         assert told in page.inner_text("#say")
-        assert (page.inner_text("#title"), figure(page, "share_within_20cm")) == shown
+        assert (page.inner_text("#title"), read_figure(page, "share_within_20cm")) == shown
     page.evaluate("() => { window.fetch = window.reached; }")
-    key(page, "r")
+    press_key(page, "r")
     assert page.inner_text("#say") == ""
 
 
-def test_two_windows_and_one_building(browser, served, page):
-    other = opened(browser, served)
+def test_two_windows_and_one_building(browser, page_service, page):
+    other = open_window(browser, page_service)
     for window in (page, other):
         choose(window, "house-2")
-    key(page, "a")
+    press_key(page, "a")
     other.select_option("#type", "hip")
-    wait_for(other, "house-2: hip")
-    key(other, "a")
+    wait_for_building(other, "house-2: hip")
+    press_key(other, "a")
     assert "anna accepted" in other.inner_text("#say")
     other.click("#mine")
-    until(other, "$('say').textContent === 'accepted'")
-    assert served.desk.edits.of("house-2")[0]["parts"][0]["type"] == "hip"
+    wait_until_true(other, "$('say').textContent === 'accepted'")
+    assert page_service.desk.edits.of("house-2")[0]["parts"][0]["type"] == "hip"
     page.reload()
-    wait_for(page, "house-")
+    wait_for_building(page, "house-")
     choose(page, "house-2")
     assert page.inner_text("#title") == "house-2: hip"
     page.click("#withdraw")
-    wait_for(page, "house-2: flat")
+    wait_for_building(page, "house-2: flat")
     assert other.faults == []
     other.context.close()
 
 
 @at_every_size
-def test_axe_finds_nothing_and_the_whole_building_is_shown(browser, served, size):
-    with pages.opened(browser, served.address, size) as page:
-        wait_for(page, "house-")
-        places = places_on_canvas(page, "viewer", "viewer.corners")
+def test_axe_finds_nothing_and_the_whole_building_is_shown(browser, page_service, size):
+    with pages.open_page(browser, page_service.address, size) as page:
+        wait_for_building(page, "house-")
+        places = project_on_canvas(page, "viewer", "viewer.corners")
         low, high = np.min(places, axis=0), np.max(places, axis=0)
         assert (low >= 0).all() and (high <= 1).all() and (high - low).max() > 0.4
-        assert complaints(page) == [] and not is_too_wide(page)
+        assert list_complaints(page) == [] and not is_too_wide(page)
         for letter in "a", "s":
-            key(page, letter)
+            press_key(page, letter)
         page.evaluate("() => inTurn(tryTypes)")
         assert page.locator("[data-try]").count() > 5
-        assert complaints(page) == [] and not is_too_wide(page)
+        assert list_complaints(page) == [] and not is_too_wide(page)
 
 
 def test_the_tag_of_a_building_stands_in_its_own_row(page):
     choose(page, "house-0")
-    key(page, "a")
+    press_key(page, "a")
     choose(page, "house-1")
-    key(page, "s")
+    press_key(page, "s")
     for id, text in (("house-0", "accepted"), ("house-1", "changed")):
         row, tag = page.locator(f"[data-id={id}]"), page.locator(f"[data-id={id}] .tag")
         assert tag.inner_text() == text
@@ -335,7 +337,7 @@ def test_the_tag_of_a_building_stands_in_its_own_row(page):
     assert page.locator(".tag:visible").count() == 2
 
 
-def focused(page):
+def read_focus(page):
     return page.evaluate(
         "() => ({ id: document.activeElement.id, ...document.activeElement.dataset })"
     )
@@ -343,40 +345,40 @@ def focused(page):
 
 def test_a_building_is_edited_by_keys_alone(page):
     first, second, *_ = page.evaluate("() => rows.map(row => row.id)")
-    assert pages.tab_stops(page, 2)[0] == "find"
-    assert focused(page)["open"] == first
+    assert pages.list_tab_stops(page, 2)[0] == "find"
+    assert read_focus(page)["open"] == first
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
-    wait_for(page, second)
-    assert focused(page)["open"] == second
+    wait_for_building(page, second)
+    assert read_focus(page)["open"] == second
     assert page.get_attribute(f"[data-open={second}]", "aria-current") == "true"
-    key(page, "s")
+    press_key(page, "s")
     page.focus("[data-part='1']")
     page.keyboard.press("Enter")
     assert page.get_attribute("[data-part='1']", "class") == "part current"
-    assert focused(page)["part"] == "1"
+    assert read_focus(page)["part"] == "1"
     page.focus("#type")
     page.keyboard.press("ArrowDown")
-    until(page, "now.model.parts[1].type !== now.model.parts[0].type")
+    wait_until_true(page, "now.model.parts[1].type !== now.model.parts[0].type")
     page.evaluate("() => queue")
-    assert focused(page)["id"] == "type"
+    assert read_focus(page)["id"] == "type"
     page.focus("[data-name=width]")
     page.keyboard.press("ArrowUp")
     page.keyboard.press("Tab")
     page.evaluate("() => queue")
-    assert focused(page)["name"] == "length"
+    assert read_focus(page)["name"] == "length"
     page.focus("#refit")
     page.keyboard.press("Enter")
     page.evaluate("() => queue")
-    assert focused(page)["id"] == "refit"
+    assert read_focus(page)["id"] == "refit"
 
 
 def test_letter_keys_can_be_turned_off(page):
     choose(page, "house-0")
     page.focus("#letter-keys")
     page.keyboard.press("Space")
-    key(page, "s")
+    press_key(page, "s")
     assert page.locator("[data-part]").count() == 1
     page.keyboard.press("Space")
-    key(page, "s")
+    press_key(page, "s")
     assert page.locator("[data-part]").count() == 2

@@ -31,7 +31,7 @@ def service(folder):
     return made
 
 
-def code(service, target=None, method="GET", body=b"", **headers):
+def get_status(service, target=None, method="GET", body=b"", **headers):
     target = f"/{service.token}/buildings" if target is None else target
     told = {**OWN, **{name.replace("_", "-"): value for name, value in headers.items()}}
     return service.answer(
@@ -40,9 +40,9 @@ def code(service, target=None, method="GET", body=b"", **headers):
 
 
 def test_the_page_and_its_own_requests_are_answered(service):
-    assert code(service) == 200
-    assert code(service, Origin="http://127.0.0.1:8000", Sec_Fetch_Site="same-origin") == 200
-    assert code(service, Host="localhost:8000", Origin="http://localhost:8000") == 200
+    assert get_status(service) == 200
+    assert get_status(service, Origin="http://127.0.0.1:8000", Sec_Fetch_Site="same-origin") == 200
+    assert get_status(service, Host="localhost:8000", Origin="http://localhost:8000") == 200
     for name in (
         "",
         "edit.js",
@@ -53,7 +53,7 @@ def test_the_page_and_its_own_requests_are_answered(service):
         "drawing?type=hip",
         "points?id=house-0",
     ):
-        assert code(service, f"/{service.token}/{name}") == 200, name
+        assert get_status(service, f"/{service.token}/{name}") == 200, name
 
 
 @pytest.mark.parametrize(
@@ -72,8 +72,8 @@ def test_others_are_refused(service, folder, headers):
     body = json.dumps(
         {"id": "house-0", "parts": service.desk.building("house-0")["parts"], "version": UNTOUCHED}
     )
-    assert code(service, **headers) == 403
-    assert code(service, f"/{service.token}/accept", "POST", body.encode(), **headers) == 403
+    assert get_status(service, **headers) == 403
+    assert get_status(service, f"/{service.token}/accept", "POST", body.encode(), **headers) == 403
     assert not (folder / EDITS_FILE).exists()
 
 
@@ -103,10 +103,10 @@ def test_no_path_leads_out_of_the_page(service, folder):
         "assets/edit.js",
         "edits.jsonl",
     ):
-        assert code(service, f"/{service.token}/{name}") == 404, name
+        assert get_status(service, f"/{service.token}/{name}") == 404, name
     for name in ("building", "points"):
-        assert code(service, f"/{service.token}/{name}?id=../secret.txt") == 422
-    assert code(service, f"/{service.token}/drawing?type=../secret") == 422
+        assert get_status(service, f"/{service.token}/{name}?id=../secret.txt") == 422
+    assert get_status(service, f"/{service.token}/drawing?type=../secret") == 422
 
 
 @pytest.mark.parametrize(
@@ -129,9 +129,10 @@ def test_a_body_that_makes_no_sense_is_one_sentence(service, body, wanted):
 
 def test_only_json_is_taken_as_an_edit(service):
     assert (
-        code(service, f"/{service.token}/accept", "POST", b"{}", Content_Type="text/plain") == 415
+        get_status(service, f"/{service.token}/accept", "POST", b"{}", Content_Type="text/plain")
+        == 415
     )
-    assert code(service, f"/{service.token}/delete", "POST", b'{"id": "house-0"}') == 404
+    assert get_status(service, f"/{service.token}/delete", "POST", b'{"id": "house-0"}') == 404
 
 
 def test_another_version_is_told_to_the_page(service):
@@ -151,7 +152,7 @@ def test_it_listens_at_the_loopback_address_alone(service):
         threading.Thread(target=server.serve_forever, daemon=True).start()
         with pytest.raises(InputError, match="expected a free port"):
             Server(service, server.server_port)
-        answer = asked(service.address, "GET", "")
+        answer = request(service.address, "GET", "")
         server.shutdown()
     assert answer.status == 200
     assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
@@ -167,7 +168,7 @@ def test_a_body_without_a_length_is_refused(service):
         server.shutdown()
 
 
-def asked(address, method, name, body=None):
+def request(address, method, name, body=None):
     """An answer read to its end."""
     split = urlsplit(address)
     line = http.client.HTTPConnection(split.hostname, split.port, timeout=60)
@@ -179,7 +180,7 @@ def asked(address, method, name, body=None):
     return answer
 
 
-def started(folder):
+def start_server(folder):
     """A server in a process of its own, and its address."""
     command = [sys.executable, "-m", "hiproof", "edit", str(folder), "--who", "anna"]
     process = subprocess.Popen(
@@ -191,31 +192,31 @@ def started(folder):
     raise AssertionError(f"the server ended with {process.wait()}")
 
 
-def accept_until(folder, number):
+def accept_until_killed(folder, number):
     """Start a server, accept one edit after the other, and send it a signal meanwhile; the process
     and what it confirmed.
     """
-    process, address = started(folder)
+    process, address = start_server(folder)
     confirmed = {}
 
-    def accept_on_and_on():
+    def accept_repeatedly():
         """Accept one building after the other until nobody answers."""
         versions, number = {}, 0
         try:
             while True:
                 id, number = f"house-{number % 3}", number + 1
                 if id not in versions:
-                    seen = json.loads(asked(address, "GET", f"building?id={id}").text)
+                    seen = json.loads(request(address, "GET", f"building?id={id}").text)
                     versions[id], parts = seen["version"], seen["parts"]
                 body = {"id": id, "parts": parts, "version": versions[id], "note": f"edit {number}"}
-                answer = asked(address, "POST", "accept", body)
+                answer = request(address, "POST", "accept", body)
                 assert answer.status == 200, answer.text
                 versions[id] = json.loads(answer.text)["version"]
                 confirmed[id] = f"edit {number}"
         except (OSError, http.client.HTTPException):
             return
 
-    thread = threading.Thread(target=accept_on_and_on)
+    thread = threading.Thread(target=accept_repeatedly)
     thread.start()
     while len(confirmed) < 3:
         thread.join(0.05)
@@ -229,13 +230,13 @@ def accept_until(folder, number):
 
 def test_ctrl_c_leaves_nothing_half_written(folder):
     before = {path.name for path in folder.iterdir()}
-    process, _ = accept_until(folder, signal.SIGINT)
+    process, _ = accept_until_killed(folder, signal.SIGINT)
     assert process.returncode == 0
     assert {path.name for path in folder.iterdir()} - before == {EDITS_FILE, f".{EDITS_FILE}.lock"}
 
 
 def test_a_kill_loses_no_accepted_edit(folder):
-    _, confirmed = accept_until(folder, signal.SIGKILL)
+    _, confirmed = accept_until_killed(folder, signal.SIGKILL)
     kept = dict(read_overrides(str(folder / EDITS_FILE)))
     assert set(kept) == set(confirmed)
     for id, note in confirmed.items():  # one that was on its way may have come through as well

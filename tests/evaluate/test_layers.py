@@ -12,7 +12,7 @@ import hiproof
 from hiproof.evaluate.layers import find_second_surface, split_cells, unseen_share
 from hiproof.settings import Settings
 from hiproof.simulate import random_compound
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 UNMOVED = Settings.from_dict({"reconstruct": {"align": "off"}})
 SEEDS = st.integers(0, 2**32 - 1)
@@ -21,7 +21,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def compound(seed, density=6.0, noise_m=0.03):
     """A compound roof, and points (n, 3) on it in its own frame."""
     roof = random_compound(np.random.default_rng(seed)).roof
-    return roof, sampled(
+    return roof, sample_heights(
         lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, noise_m, seed
     )
 
@@ -74,7 +74,7 @@ def test_the_split_of_a_cell_is_the_best_of_all():
 
 def test_a_building_says_that_its_points_lie_on_two_surfaces():
     outline = shapely.box(0, 0, 12, 8)
-    points = sampled(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
+    points = sample_heights(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
     assert "two surfaces" not in hiproof.reconstruct(points, outline).detail
     points[::2, 2] += 0.4
     assert "points lie on two surfaces, 0.40 m apart" in hiproof.reconstruct(points, outline).detail
@@ -91,7 +91,9 @@ def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, 
 
 
 def test_a_score_of_points_in_a_corner_of_a_large_outline_leaves_the_rest_unseen():
-    points = sampled(lambda x, y: np.full(len(x), 5.0), shapely.box(0, 0, 2.5, 2.5), density=3.5)
+    points = sample_heights(
+        lambda x, y: np.full(len(x), 5.0), shapely.box(0, 0, 2.5, 2.5), density=3.5
+    )
     assert 12 <= len(points) < 30
     assert unseen_share(points, shapely.box(0, 0, 15, 10)) > 0.6
     assert unseen_share(points, shapely.box(0, 0, 2.5, 2.5)) == 0.0
@@ -99,7 +101,7 @@ def test_a_score_of_points_in_a_corner_of_a_large_outline_leaves_the_rest_unseen
 
 def test_a_building_says_that_half_of_it_has_no_points():
     outline = shapely.box(0, 0, 12, 8)
-    points = sampled(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
+    points = sample_heights(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
     assert hiproof.reconstruct(points, outline).detail == ""
     detail = hiproof.reconstruct(points[points[:, 0] < 6], outline, settings=UNMOVED).detail
     assert "% of its outline hold no points; the roof there is a guess" in detail

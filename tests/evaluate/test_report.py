@@ -77,7 +77,7 @@ def page(run):
     return report_html(run, "a <sample> run")
 
 
-def in_browser(page, folder, *flags):
+def run_in_browser(page, folder, *flags):
     """What the script ACT saw of the page in headless Chromium."""
     acting = page.replace("<head>", "<head>" + LISTEN, 1).replace("</body>", ACT + "</body>", 1)
     (folder / "page.html").write_text(acting)
@@ -106,46 +106,49 @@ def in_browser(page, folder, *flags):
 
 
 @pytest.fixture(scope="module")
-def said(page, tmp_path_factory):
-    return in_browser(page, tmp_path_factory.mktemp("browser"), "--enable-unsafe-swiftshader")
+def browser_answer(page, tmp_path_factory):
+    return run_in_browser(page, tmp_path_factory.mktemp("browser"), "--enable-unsafe-swiftshader")
 
 
 @needs_browser
-def test_no_script_errs_or_complains(said):
-    assert said["faults"] == []
+def test_no_script_errs_or_complains(browser_answer):
+    assert browser_answer["faults"] == []
 
 
 @needs_browser
-def test_every_building_of_the_run_is_shown(said, run):
-    assert said["marks"] == len(run.models)
+def test_every_building_of_the_run_is_shown(browser_answer, run):
+    assert browser_answer["marks"] == len(run.models)
 
 
 @needs_browser
-def test_a_click_on_the_map_shows_the_building(said):
-    assert "house-1" in said["afterMapClick"] and "rf_volume_lod22" in said["afterMapClick"]
-
-
-@needs_browser
-def test_a_click_in_the_scene_shows_the_building_under_it(said):
-    assert said["webgl"] and "block 2" in said["afterSceneClick"]
-
-
-@needs_browser
-def test_the_worst_leads_to_its_building(said):
-    assert "block 2" in said["afterWorstClick"]
-
-
-@needs_browser
-def test_the_colours_follow_the_choice(said):
+def test_a_click_on_the_map_shows_the_building(browser_answer):
     assert (
-        said["type"] == said["before"]
-        and len({said["residual"], said["status"], said["type"]}) == 3
+        "house-1" in browser_answer["afterMapClick"]
+        and "rf_volume_lod22" in browser_answer["afterMapClick"]
+    )
+
+
+@needs_browser
+def test_a_click_in_the_scene_shows_the_building_under_it(browser_answer):
+    assert browser_answer["webgl"] and "block 2" in browser_answer["afterSceneClick"]
+
+
+@needs_browser
+def test_the_worst_leads_to_its_building(browser_answer):
+    assert "block 2" in browser_answer["afterWorstClick"]
+
+
+@needs_browser
+def test_the_colours_follow_the_choice(browser_answer):
+    assert (
+        browser_answer["type"] == browser_answer["before"]
+        and len({browser_answer["residual"], browser_answer["status"], browser_answer["type"]}) == 3
     )
 
 
 @needs_browser
 def test_without_webgl_the_map_still_works(page, tmp_path):
-    said = in_browser(page, tmp_path, "--disable-3d-apis")
+    said = run_in_browser(page, tmp_path, "--disable-3d-apis")
     assert (
         not said["webgl"]
         and said["marks"] == 3

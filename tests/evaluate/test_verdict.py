@@ -22,7 +22,7 @@ from hiproof.evaluate.verdict import judge_model
 from hiproof.model import Model
 from hiproof.settings import Settings
 from hiproof.simulate import random_compound
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 from tiny_town import make_town, write_cloud, write_footprints
 
 OUTLINE = shapely.box(0.0, 0.0, 12.0, 9.0)
@@ -59,7 +59,7 @@ def cluster(count, height, around=(6.0, 5.0), width=2.5):
 @given(st.integers(0, 2**32 - 1), st.floats(2.0, 20.0))
 def test_the_true_roof_is_good(seed, density):
     roof = random_compound(np.random.default_rng(seed)).roof
-    points = sampled(
+    points = sample_heights(
         lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, 0.03, seed
     )
     model = Model(roof, compose(roof, 0.0).move(roof.frame.origin))

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 from experiments.cramer_rao import (
-    best_covariance,
-    bounds_by_name,
-    edge_information,
-    height_information,
+    compute_best_covariance,
+    compute_bounds,
+    compute_edge_information,
+    compute_height_information,
 )
 
 from hiproof.errors import FitError
@@ -36,14 +36,14 @@ EXAMPLES = {
 }
 
 
-def theta_of(kind, kappa=0.4):
+def make_theta(kind, kappa=0.4):
     primitive = CATALOGUE[kind].variant(EXAMPLES[kind])
     return primitive, primitive.to_theta(EXAMPLES[kind], kappa, np.array([1.0, -2.0, 5.0]))
 
 
 def test_a_flat_roofs_height_is_the_mean_of_its_points():
-    primitive, theta = theta_of("flat")
-    assert bounds_by_name(primitive, theta, 5.0, 0.1)["q0"] == pytest.approx(
+    primitive, theta = make_theta("flat")
+    assert compute_bounds(primitive, theta, 5.0, 0.1)["q0"] == pytest.approx(
         0.1 / math.sqrt(5 * 96), rel=1e-6
     )
 
@@ -51,16 +51,16 @@ def test_a_flat_roofs_height_is_the_mean_of_its_points():
 def test_a_gables_ridge_and_slope_are_those_of_a_straight_line():
     # By symmetry z = q0 - q1 |v| is a line over |v| uniform in [0, V]: var q1 = s^2 / (n V^2 / 12),
     # var q0 = 4 s^2 / n.
-    primitive, theta = theta_of("gable")
+    primitive, theta = make_theta("gable")
     n = 4.72 * 96
-    bounds = bounds_by_name(primitive, theta, 4.72, 0.09)
+    bounds = compute_bounds(primitive, theta, 4.72, 0.09)
     assert bounds["q0"] == pytest.approx(2 * 0.09 / math.sqrt(n), rel=1e-3)
     assert bounds["q1"] == pytest.approx(0.09 / math.sqrt(n * 16 / 12), rel=1e-3)
 
 
 def test_an_edges_limit_is_the_mean_distance_to_its_nearest_point():
-    primitive, theta = theta_of("flat")
-    bounds = bounds_by_name(primitive, theta, 2.0, 0.1)
+    primitive, theta = make_theta("flat")
+    bounds = compute_bounds(primitive, theta, 2.0, 0.1)
     assert bounds["half_length"] == pytest.approx(1 / (2 * 8) / math.sqrt(2))
     assert bounds["width"] == pytest.approx(2 / (2 * 12) / math.sqrt(2))
     assert math.isinf(bounds["kappa"])
@@ -71,9 +71,9 @@ def test_gauss_newton_with_known_sides_reaches_the_bound(kind):
     """Least squares of the heights, linear about the truth: its covariance is the bound without the
     edges' part.
     """
-    primitive, theta = theta_of(kind)
+    primitive, theta = make_theta(kind)
     rng = np.random.default_rng(5)
-    from experiments.cramer_rao import height_gradient
+    from experiments.cramer_rao import compute_height_gradient
 
     used = [2, *range(5, primitive.theta_size)]
     half_width, half_length = theta[3:5]
@@ -83,19 +83,19 @@ def test_gauss_newton_with_known_sides_reaches_the_bound(kind):
         u, v = rng.uniform(-half_length, half_length, n), rng.uniform(-half_width, half_width, n)
         c, s = math.cos(theta[2]), math.sin(theta[2])
         xy = np.column_stack([theta[0] + u * c - v * s, theta[1] + u * s + v * c])
-        gradient = height_gradient(primitive, theta, xy)[:, used]
+        gradient = compute_height_gradient(primitive, theta, xy)[:, used]
         errors.append(np.linalg.lstsq(gradient, rng.normal(0, 0.1, n), rcond=None)[0])
-    information = height_information(primitive, theta, 4.0, 0.1)[np.ix_(used, used)]
+    information = compute_height_information(primitive, theta, 4.0, 0.1)[np.ix_(used, used)]
     bound = np.sqrt(np.diag(np.linalg.inv(information)))
     np.testing.assert_allclose(np.std(errors, axis=0) / bound, 1, atol=0.15)
 
 
 @pytest.mark.parametrize("kind", EXAMPLES)
 def test_every_primitive_has_a_bound_that_a_turn_does_not_change(kind):
-    primitive, theta = theta_of(kind)
-    bounds = bounds_by_name(primitive, theta, 4.72, 0.1)
+    primitive, theta = make_theta(kind)
+    bounds = compute_bounds(primitive, theta, 4.72, 0.1)
     turned = theta + np.array([50.0, 20, 1.1, 0, 0, 0, 0, 0, 0])
-    for name, value in bounds_by_name(primitive, turned, 4.72, 0.1).items():
+    for name, value in compute_bounds(primitive, turned, 4.72, 0.1).items():
         if name not in ("x", "y"):
             assert value == pytest.approx(bounds[name], rel=1e-4, abs=1e-9), name
     for name in ("q0", "along", "across", "width", "length"):
@@ -103,19 +103,19 @@ def test_every_primitive_has_a_bound_that_a_turn_does_not_change(kind):
 
 
 def test_less_noise_and_more_points_tell_more():
-    primitive, theta = theta_of("hip")
-    base = bounds_by_name(primitive, theta, 4.0, 0.1)
-    assert bounds_by_name(primitive, theta, 4.0, 0.2)["q0"] > base["q0"]
-    assert bounds_by_name(primitive, theta, 8.0, 0.1)["width"] < base["width"] / 1.9
-    assert bounds_by_name(primitive, theta, 16.0, 0.1)["q1"] == pytest.approx(
+    primitive, theta = make_theta("hip")
+    base = compute_bounds(primitive, theta, 4.0, 0.1)
+    assert compute_bounds(primitive, theta, 4.0, 0.2)["q0"] > base["q0"]
+    assert compute_bounds(primitive, theta, 8.0, 0.1)["width"] < base["width"] / 1.9
+    assert compute_bounds(primitive, theta, 16.0, 0.1)["q1"] == pytest.approx(
         base["q1"] / 2, rel=0.1
     )
 
 
 def test_the_covariance_is_symmetric_and_positive():
     for kind in EXAMPLES:
-        primitive, theta = theta_of(kind)
-        covariance = best_covariance(primitive, theta, 4.72, 0.1)
+        primitive, theta = make_theta(kind)
+        covariance = compute_best_covariance(primitive, theta, 4.72, 0.1)
         known = np.isfinite(np.diag(covariance))
         inner = covariance[np.ix_(known, known)]
         np.testing.assert_allclose(inner, inner.T, rtol=1e-6, atol=1e-12)
@@ -123,8 +123,8 @@ def test_the_covariance_is_symmetric_and_positive():
 
 
 def test_edges_say_nothing_of_heights():
-    primitive, theta = theta_of("hip")
-    assert not edge_information(primitive, theta, 4.72)[5:].any()
+    primitive, theta = make_theta("hip")
+    assert not compute_edge_information(primitive, theta, 4.72)[5:].any()
 
 
 def test_dimensions_that_are_missing_are_refused():

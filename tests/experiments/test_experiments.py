@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import pytest
 from experiments.__main__ import NAMES, main
-from experiments.data import named_samples
-from experiments.fig8 import without_corner
-from experiments.methods import fit_model, in_parallel
+from experiments.data import collect_samples
+from experiments.fig8 import remove_corner
+from experiments.methods import fit_model, run_in_parallel
 from experiments.output import Options, Table
-from experiments.ransac import available, detect_planes, match_faces
-from experiments.robust import with_outliers, without_strip
-from experiments.table3 import record_of, same_way_round
+from experiments.ransac import detect_planes, is_available, match_faces
+from experiments.robust import add_outliers, remove_strip
+from experiments.table3 import orient_truth, record_errors
 from scipy import optimize
 
 from hiproof.errors import InputError
@@ -25,7 +25,7 @@ pytest.importorskip(
     "matplotlib", reason="the experiments draw with matplotlib (extra `experiments`)"
 )
 needs_ransac = pytest.mark.skipif(
-    not available(), reason="pyransac3d is not installed (extra `experiments`)"
+    not is_available(), reason="pyransac3d is not installed (extra `experiments`)"
 )
 
 
@@ -73,7 +73,7 @@ def test_a_roof_found_exactly_has_no_errors():
     theta = primitive.to_theta(
         {"width": 8, "length": 14, "height": 3, "ridge_length": 6}, 0.3, np.array([1.0, 2, 5])
     )
-    record = record_of(primitive, theta, theta, {"q0": 0.01})
+    record = record_errors(primitive, theta, theta, {"q0": 0.01})
     assert record["bound:q0"] == 0.01
     assert all(abs(value) < 1e-12 for name, value in record.items() if not name.startswith("bound"))
 
@@ -83,7 +83,7 @@ def test_half_a_turn_is_no_error_where_the_roof_does_not_change():
     theta = gable.to_theta({"width": 8, "length": 12, "height": 3}, 1.5, np.zeros(3))
     turned = theta.copy()
     turned[2] -= math.pi
-    assert record_of(gable, theta, turned, {})["kappa"] == pytest.approx(0)
+    assert record_errors(gable, theta, turned, {})["kappa"] == pytest.approx(0)
     saltbox = CATALOGUE["asymmetric_gable"]
     theta = saltbox.to_theta(
         {"width": 8, "length": 12, "height": 3, "ridge_offset": 1, "eave_step": 0.0},
@@ -92,25 +92,27 @@ def test_half_a_turn_is_no_error_where_the_roof_does_not_change():
     )
     turned = theta.copy()
     turned[2] += math.pi
-    twin = same_way_round(saltbox, theta, turned)
+    twin = orient_truth(saltbox, theta, turned)
     xy = np.random.default_rng(0).uniform(-4, 4, (30, 2))
     np.testing.assert_allclose(saltbox.height_at(twin, xy), saltbox.height_at(theta, xy))
 
 
 def test_work_shared_out_comes_back_in_order():
     work = [(2, i) for i in range(6)]
-    assert in_parallel(pow, work, 2) == in_parallel(pow, work, 1) == [2**i for i in range(6)]
+    assert (
+        run_in_parallel(pow, work, 2) == run_in_parallel(pow, work, 1) == [2**i for i in range(6)]
+    )
 
 
 @needs_ransac
 def test_ransac_finds_the_planes_of_a_clean_hip_and_repeats_itself():
     building = random_building(np.random.default_rng(1), "hip")
     points = uniform_points(building, np.random.default_rng(2), 8.0, 0.02)
-    from experiments.fig8 import true_faces
+    from experiments.fig8 import list_true_faces
 
     planes = detect_planes(points)
-    assert match_faces(planes, true_faces(building)) == (4, 0)
-    assert match_faces([*planes, planes[0]], true_faces(building)) == (4, 1)
+    assert match_faces(planes, list_true_faces(building)) == (4, 0)
+    assert match_faces([*planes, planes[0]], list_true_faces(building)) == (4, 1)
     again = detect_planes(points)
     assert [p.inliers.tolist() for p in planes] == [p.inliers.tolist() for p in again]
 
@@ -131,11 +133,11 @@ def test_troubles_do_what_they_say():
     building = random_building(np.random.default_rng(3), "gable", kappa=0.7)
     points = uniform_points(building, np.random.default_rng(4))
     rng = np.random.default_rng(5)
-    assert len(without_corner(points, building, 0.4)) == len(points) - int(0.4 * len(points))
-    assert len(without_strip(points, building, 0.3, rng)) == pytest.approx(
+    assert len(remove_corner(points, building, 0.4)) == len(points) - int(0.4 * len(points))
+    assert len(remove_strip(points, building, 0.3, rng)) == pytest.approx(
         0.7 * len(points), rel=0.15
     )
-    moved = np.any(with_outliers(points, 0.2, rng) != points, axis=1).mean()
+    moved = np.any(add_outliers(points, 0.2, rng) != points, axis=1).mean()
     assert moved == pytest.approx(0.2, abs=0.07)
 
 
@@ -150,7 +152,7 @@ def test_roofn3d_csv_is_data_too(tmp_path):
     )
     path = tmp_path / "roofn3d_buildings.csv"
     path.write_text(header + "\n" + row + "\n")
-    samples = named_samples(Options(quick=True, data=path))
+    samples = collect_samples(Options(quick=True, data=path))
     (sample,) = samples["RoofN3D csv"]
     assert sample.type == "gable" and len(sample.points) == 108 and sample.outline.area == 88
     assert len(samples["simulated"]) == 3
@@ -158,7 +160,7 @@ def test_roofn3d_csv_is_data_too(tmp_path):
 
 def test_data_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match="--data"):
-        named_samples(Options(data=tmp_path))
+        collect_samples(Options(data=tmp_path))
 
 
 def test_an_unknown_experiment_is_refused(capsys):

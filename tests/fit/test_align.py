@@ -25,7 +25,7 @@ def points_in(outline, density=5.0, seed=0, noise_m=0.05):
     return np.column_stack([xy + rng.normal(0.0, noise_m, xy.shape), z])
 
 
-def moved(outline, shift):
+def move(outline, shift):
     return shapely.transform(outline, lambda c: c + shift)
 
 
@@ -33,7 +33,7 @@ def moved(outline, shift):
 @pytest.mark.parametrize("angle", [0.3, 2.0, 4.4])
 def test_the_shift_is_found(far, angle):
     shift = far * np.array([np.cos(angle), np.sin(angle)])
-    found = find_shift(points_in(L_SHAPE)[:, :2], moved(L_SHAPE, -shift))
+    found = find_shift(points_in(L_SHAPE)[:, :2], move(L_SHAPE, -shift))
     assert found.is_clear
     assert np.hypot(*(found.xy - shift)) < 0.1
     assert (np.abs(found.xy - shift) < 4 * found.sigma).all()
@@ -51,7 +51,7 @@ def test_a_house_in_a_row_is_not_moved_along_the_row():
 
 
 def test_points_cut_off_at_the_footprint_tell_nothing():
-    footprint = moved(L_SHAPE, (1.0, 0.5))
+    footprint = move(L_SHAPE, (1.0, 0.5))
     points = points_in(L_SHAPE)
     inside = points[shapely.contains_xy(footprint, points[:, 0], points[:, 1])]
     assert not find_shift(inside[:, :2], footprint).is_clear
@@ -75,7 +75,7 @@ def test_points_in_one_place_tell_nothing():
 
 def test_reconstruct_moves_the_outline_and_keeps_the_footprint():
     house = shapely.box(0, 0, 12, 8)
-    points, footprint = points_in(house), moved(house, (-1.0, 0.5))
+    points, footprint = points_in(house), move(house, (-1.0, 0.5))
     assert AROUND_M == PLANNED_AROUND_M
     found = reconstruct(points, footprint)
     assert found.shift == (pytest.approx(1.0, abs=0.1), pytest.approx(-0.5, abs=0.1))
@@ -87,7 +87,7 @@ def test_reconstruct_moves_the_outline_and_keeps_the_footprint():
 
 def test_align_off_leaves_it():
     house = shapely.box(0, 0, 12, 8)
-    found = reconstruct(points_in(house), moved(house, (-1.0, 0.5)), settings=OFF)
+    found = reconstruct(points_in(house), move(house, (-1.0, 0.5)), settings=OFF)
     assert found.shift == (0.0, 0.0) and "moved" not in found.detail
 
 
@@ -96,6 +96,6 @@ def test_align_off_leaves_it():
 def test_a_roof_that_overhangs_all_around_does_not_hide_the_shift(overhang, far):
     shift = far * np.array([0.8, 0.6])
     roof = points_in(L_SHAPE.buffer(overhang, join_style="mitre"))[:, :2]
-    found = find_shift(roof, moved(L_SHAPE, -shift))
+    found = find_shift(roof, move(L_SHAPE, -shift))
     assert np.hypot(*(found.xy - shift)) < 0.1 and found.is_clear == (far > 0)
     assert found.is_size_clear and found.beyond == pytest.approx(overhang, abs=0.1)

@@ -20,7 +20,7 @@ YARDS = {
 }
 
 
-def scattered(area, density, seed=0):
+def scatter(area, density, seed=0):
     """Points (n, 2) evenly over an area, with a jitter."""
     rng = np.random.default_rng(seed)
     step = 1 / math.sqrt(density)
@@ -36,15 +36,15 @@ def test_a_yard_is_cut_out_within_a_few_per_cent(place, density, turn, shift):
     yard = YARDS[place]
     rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
 
-    def placed(xy):
+    def place(xy):
         return xy @ rotation + shift
 
     roof, ground = (
-        placed(scattered(FOOTPRINT - yard, density)),
-        placed(scattered(yard.buffer(-0.3), 1, 1)),
+        place(scatter(FOOTPRINT - yard, density)),
+        place(scatter(yard.buffer(-0.3), 1, 1)),
     )
-    found = find_bare_ground(shapely.transform(FOOTPRINT, placed), roof, ground)
-    true = shapely.transform(FOOTPRINT - yard, placed)
+    found = find_bare_ground(shapely.transform(FOOTPRINT, place), roof, ground)
+    true = shapely.transform(FOOTPRINT - yard, place)
     assert (
         found.outline.is_valid and found.outline.symmetric_difference(true).area < 0.05 * true.area
     )
@@ -56,8 +56,8 @@ def test_a_yard_is_cut_out_within_a_few_per_cent(place, density, turn, shift):
 
 def test_ground_that_a_wall_hides_is_bare_as_far_as_there_is_no_roof():
     yard = YARDS["in the middle"]
-    seen = scattered(shapely.box(5.3, 3.3, 8.8, 8.7), 1)  # the eastern 2 m lie in the shadow
-    found = find_bare_ground(FOOTPRINT, scattered(FOOTPRINT - yard, 8), seen)
+    seen = scatter(shapely.box(5.3, 3.3, 8.8, 8.7), 1)  # the eastern 2 m lie in the shadow
+    found = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 8), seen)
     assert found.outline.symmetric_difference(FOOTPRINT - yard).area < 0.04 * 156
 
 
@@ -65,18 +65,18 @@ def test_ground_that_a_wall_hides_is_bare_as_far_as_there_is_no_roof():
     "ground",
     [
         np.zeros((0, 2)),
-        scattered(shapely.box(0, 0, 16, 1), 1),  # beside a wall
-        scattered(shapely.box(5, 4, 7, 6), 1),  # of 4 m2
-        scattered(FOOTPRINT, 1),  # under the whole roof: two dates, or glass
+        scatter(shapely.box(0, 0, 16, 1), 1),  # beside a wall
+        scatter(shapely.box(5, 4, 7, 6), 1),  # of 4 m2
+        scatter(FOOTPRINT, 1),  # under the whole roof: two dates, or glass
     ],
 )
 def test_a_roof_stays_whole(ground):
-    assert find_bare_ground(FOOTPRINT, scattered(FOOTPRINT, 5), ground) is None
+    assert find_bare_ground(FOOTPRINT, scatter(FOOTPRINT, 5), ground) is None
 
 
 def test_a_yard_that_would_leave_two_buildings_is_measured_and_not_cut():
     yard = shapely.box(5, 0, 11, 12)
-    found = find_bare_ground(FOOTPRINT, scattered(FOOTPRINT - yard, 5), scattered(yard, 1))
+    found = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 5), scatter(yard, 1))
     assert found.outline is None and found.area_m2 == pytest.approx(72, rel=0.1)
 
 
@@ -99,30 +99,30 @@ def sloping(xy):
 
 
 def test_the_ground_is_a_plane_by_what_is_known_of_it():
-    def half_known(xy):
+    def measure_half(xy):
         return np.where(xy[:, 1] < 6, sloping(xy) + 2.0 * (xy[:, 0] < -5), np.nan)  # with a terrace
 
-    assert ground_plane(FOOTPRINT, half_known) == pytest.approx([0.1, -0.2, 3.0], abs=1e-6)
+    assert ground_plane(FOOTPRINT, measure_half) == pytest.approx([0.1, -0.2, 3.0], abs=1e-6)
     assert ground_plane(FOOTPRINT, lambda xy: np.full(len(xy), np.nan)) is None
 
 
 @pytest.mark.parametrize("share, is_empty", [(0.0, True), (0.3, True), (0.6, False), (1.0, False)])
 def test_nothing_stands_where_few_points_lie_above_the_ground(share, is_empty):
-    xy = scattered(FOOTPRINT, 4)
+    xy = scatter(FOOTPRINT, 4)
     points = np.column_stack([xy, sloping(xy) + np.where(xy[:, 0] < 16 * share, 4.0, 0.1)])
     found = classify_standing(points, np.array([0.1, -0.2, 3.0]))
     assert found.is_empty == is_empty and found.low_share == pytest.approx(1 - share, abs=0.05)
 
 
 def test_ground_seen_below_a_roof_does_not_make_it_none():
-    xy = scattered(FOOTPRINT, 4)
+    xy = scatter(FOOTPRINT, 4)
     points = np.concatenate([np.column_stack([xy, np.full(len(xy), z)]) for z in (0.0, 2.4)])
     found = classify_standing(points, np.zeros(3))
     assert found.low_share == 0.5 and not found.is_empty and cover(points, ~found.is_low) > 0.8
 
 
 def test_points_of_another_height_system_lie_on_no_ground():
-    xy = scattered(FOOTPRINT, 4)
+    xy = scatter(FOOTPRINT, 4)
     assert not classify_standing(
         np.column_stack([xy, np.full(len(xy), -43.0)]), np.zeros(3)
     ).is_low.any()

@@ -65,7 +65,7 @@ def points_in(outline, density, angle=0.3, seed=0):
     return xy @ turn.T, shapely.transform(outline, lambda c: c @ turn.T)
 
 
-def corner_count(outline):
+def count_corners(outline):
     return len(outline.exterior.coords) - 1
 
 
@@ -77,7 +77,7 @@ def test_the_outline_is_found_without_bias_and_with_the_corners_there_are(name, 
     assert outline.is_valid and not outline.interiors
     assert iou(outline, truth) > 0.96
     assert outline.area == pytest.approx(truth.area, rel=0.04)
-    assert corner_count(outline) == corner_count(truth)
+    assert count_corners(outline) == count_corners(truth)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3])
@@ -109,10 +109,10 @@ def test_points_on_the_walls_do_not_push_the_sides_out():
         np.concatenate([xy, walls]) + rng.normal(0, 0.06, (len(xy) + 150, 2))
     )
     assert (outline.area - truth.area) / truth.length == pytest.approx(0.0, abs=0.04)
-    assert corner_count(outline) == 6
+    assert count_corners(outline) == 6
 
 
-def seen_by_a_drone(overhang, roof_density, walls_a_metre):
+def scan_by_drone(overhang, roof_density, walls_a_metre):
     """Points (n, 3) of a level roof and of the walls below, `overhang` metres behind its eaves; and
     the eaves.
     """
@@ -131,24 +131,24 @@ def seen_by_a_drone(overhang, roof_density, walls_a_metre):
 
 @pytest.mark.parametrize("overhang", [0.5, 0.7])
 def test_walls_seen_below_wide_eaves_do_not_pull_the_outline_in(overhang):
-    points, truth = seen_by_a_drone(overhang, roof_density=40.0, walls_a_metre=60)
+    points, truth = scan_by_drone(overhang, roof_density=40.0, walls_a_metre=60)
     assert shapely.hausdorff_distance(estimate_outline(points).exterior, truth.exterior) < 0.15
 
 
 def test_outlines_are_drawn_straight_where_most_points_are_of_walls():
-    points, truth = seen_by_a_drone(0.6, roof_density=25.0, walls_a_metre=200)
+    points, truth = scan_by_drone(0.6, roof_density=25.0, walls_a_metre=200)
     outline = estimate_outline(points)
-    assert corner_count(outline) == 4
+    assert count_corners(outline) == 4
     assert shapely.hausdorff_distance(outline.exterior, truth.exterior) < 0.2
 
 
 def test_an_oblique_wall_is_drawn_as_one():
     xy, truth = points_in(shapely.Polygon([(0, 0), (16, 0), (11, 9), (0, 9)]), 6.0)
     outline = estimate_outline(xy)
-    assert corner_count(outline) == 4 and iou(outline, truth) > 0.96
+    assert count_corners(outline) == 4 and iou(outline, truth) > 0.96
 
 
-def scanned_block(outline, seed=0, high=6.0, step_at=None):
+def scan_block(outline, seed=0, high=6.0, step_at=None):
     """Points (n, 3), evenly spread, 5 a square metre, of a level roof with walls; beyond x =
     `step_at` three metres lower.
     """
@@ -180,12 +180,12 @@ def scanned_block(outline, seed=0, high=6.0, step_at=None):
 def test_a_shallow_bay_is_drawn_where_its_walls_are_seen(depth):
     bay = shapely.box(4, 8 + min(depth, 0), 8, 8 + max(depth, 0))
     truth = shapely.box(0, 0, 14, 8).symmetric_difference(bay)
-    outline = estimate_outline(scanned_block(truth), 0.0)
-    assert corner_count(outline) == 8 and iou(outline, truth) > 0.97
+    outline = estimate_outline(scan_block(truth), 0.0)
+    assert count_corners(outline) == 8 and iou(outline, truth) > 0.97
 
 
 def test_walls_of_a_step_inside_are_walls_but_draw_no_side():
-    points = scanned_block(shapely.box(0, 0, 14, 8), step_at=9.0)
+    points = scan_block(shapely.box(0, 0, 14, 8), step_at=9.0)
     wall = on_walls(points, points, 0.4)
     x, y = points[:, :2].T
     inner = (
@@ -194,7 +194,7 @@ def test_walls_of_a_step_inside_are_walls_but_draw_no_side():
     deep = (abs(x - 4.0) < 3.0) & (abs(y - 4.0) < 3.0)
     assert wall[inner].mean() > 0.9 and not wall[deep].any()
     assert wall[(x < 0.05) & (points[:, 2] < 4.5)].mean() > 0.8
-    assert corner_count(estimate_outline(points, 0.0)) == 4
+    assert count_corners(estimate_outline(points, 0.0)) == 4
 
 
 def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
@@ -243,19 +243,19 @@ def test_a_court_is_drawn_as_the_outline_is(name):
         "l": shapely.Polygon([(4, 4), (14, 4), (14, 7), (7, 7), (7, 10), (4, 10)]),
     }[name]
     truth = shapely.box(0, 0, 18, 14) - court
-    outline = estimate_outline(scanned_block(truth), 0.0)
-    assert len(outline.interiors) == 1 and corner_count(outline) == 4
-    assert corner_count(shapely.Polygon(outline.interiors[0])) == corner_count(court)
+    outline = estimate_outline(scan_block(truth), 0.0)
+    assert len(outline.interiors) == 1 and count_corners(outline) == 4
+    assert count_corners(shapely.Polygon(outline.interiors[0])) == count_corners(court)
     assert iou(shapely.Polygon(outline.interiors[0]), court) > 0.95
 
 
 def test_a_gap_in_a_roof_that_is_smaller_than_a_building_is_no_court():
     truth = shapely.box(0, 0, 14, 10)
-    assert not estimate_outline(scanned_block(truth - shapely.box(6, 4, 7.7, 5.7)), 0.0).interiors
+    assert not estimate_outline(scan_block(truth - shapely.box(6, 4, 7.7, 5.7)), 0.0).interiors
 
 
 def test_a_block_with_a_court_has_a_valid_solid_with_one():
-    building = reconstruct(scanned_block(shapely.box(0, 0, 18, 14) - shapely.box(5, 5, 10, 9)))
+    building = reconstruct(scan_block(shapely.box(0, 0, 18, 14) - shapely.box(5, 5, 10, 9)))
     assert building.status is Status.MODELLED and not check_solid(building.solid)
     assert len(building.roof.outline.interiors) == 1
     assert building.roof.outline.area == pytest.approx(18 * 14 - 20, rel=0.03)
@@ -289,7 +289,7 @@ def test_levels_of_columns_are_the_cheapest_of_all():
 def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
     rng, box = np.random.default_rng(2), shapely.box(0, 0, 30, 30)
     assert unevenness(rng.uniform(0, 30, (4500, 2)), box, 0.45) == pytest.approx(1.0, abs=0.1)
-    assert unevenness(scanned_block(box)[:, :2], box, 0.45) < 0.7
+    assert unevenness(scan_block(box)[:, :2], box, 0.45) < 0.7
     assert unevenness(rng.uniform(0, 2, (20, 2)), shapely.box(0, 0, 2, 2), 0.45) == 1.0
 
 

@@ -9,7 +9,7 @@ from hiproof.fit import fit_roof
 from hiproof.fit.single import in_order
 from hiproof.primitives import CATALOGUE
 from hiproof.settings import Settings
-from points_of_roofs import points_on, typical_theta
+from points_of_roofs import sample_roof, typical_theta
 
 NAMES = tuple(CATALOGUE)
 
@@ -20,7 +20,7 @@ def only(*types):
 
 @pytest.fixture(scope="module")
 def gable_points():
-    return points_on("gable", typical_theta("gable"), outlier_share=0.03)
+    return sample_roof("gable", typical_theta("gable"), outlier_share=0.03)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -28,7 +28,7 @@ def test_a_generated_roof_is_recovered_with_its_type(name):
     theta = typical_theta(
         name, height=1.5 if name == "shed" else 3.0, teeth=3 if name == "shed" else None
     )
-    fit = fit_roof(points_on(name, theta, density=6.0, teeth=3))
+    fit = fit_roof(sample_roof(name, theta, density=6.0, teeth=3))
     assert fit.type == name
     truth = CATALOGUE[name].variant({"teeth": 3}) if name == "shed" else CATALOGUE[name]
     theta_p, kappa, translation = truth.from_theta(truth.canonical_theta(theta))
@@ -44,7 +44,7 @@ def test_errors_are_a_few_standard_deviations():
     truth, _, _ = CATALOGUE["hip"].from_theta(theta)
     scores = []
     for seed in range(20):
-        fit = fit_roof(points_on("hip", theta, seed=seed), settings=only("hip"))
+        fit = fit_roof(sample_roof("hip", theta, seed=seed), settings=only("hip"))
         scores.append(
             [(fit.parameters[key] - value) / fit.sigma[key] for key, value in truth.items()]
         )
@@ -58,7 +58,7 @@ def test_a_wide_steep_roof_among_outliers_keeps_its_type(name, seed):
     """
     width, length, height = (10.6, 22.0, 5.4) if name == "corner_mansard" else (11.8, 25.0, 5.9)
     theta = typical_theta(name, width, length, height, kappa=0.97)
-    points = points_on(name, theta, density=5.0, noise_m=0.08, outlier_share=0.05, seed=seed)
+    points = sample_roof(name, theta, density=5.0, noise_m=0.08, outlier_share=0.05, seed=seed)
     assert fit_roof(points).type == name
 
 
@@ -85,7 +85,7 @@ def test_order_of_points_does_not_matter(gable_points):
 
 @pytest.mark.parametrize("name", ["gable", "hip", "half_hip"])
 def test_the_fit_moves_with_the_points(name):
-    points = points_on(name, typical_theta(name))
+    points = sample_roof(name, typical_theta(name))
     shift = np.array([1e7, -1e7, 500.0])
     moved = fit_roof(points + shift)
     still = fit_roof(points)
@@ -94,7 +94,7 @@ def test_the_fit_moves_with_the_points(name):
 
 @pytest.mark.parametrize("name", ["gable", "hip", "half_hip"])
 def test_the_fit_turns_with_the_points(name):
-    points = points_on(name, typical_theta(name))
+    points = sample_roof(name, typical_theta(name))
     c, s = np.cos(1.1), np.sin(1.1)
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
     still, turned = fit_roof(points), fit_roof(points @ turn)
@@ -109,7 +109,7 @@ def test_the_fit_turns_with_the_points(name):
 
 def test_outline_gives_the_plan_and_only_heights_are_fitted():
     theta = typical_theta("gable", kappa=0.4)
-    points = points_on("gable", theta, density=4.0)
+    points = sample_roof("gable", theta, density=4.0)
     plan = CATALOGUE["gable"].part(theta).pieces[0].outline.buffer(0.8, join_style="mitre")
     around = np.random.default_rng(2).uniform(-12, 12, (60, 3))
     fit = fit_roof(np.vstack([points, around]), plan, only("gable"))
@@ -139,7 +139,7 @@ def test_height_at_and_vertices_agree(gable_points):
 
 def test_weights_take_a_tree_out_of_the_roof():
     theta = typical_theta("gable", kappa=0.0)
-    roof = points_on("gable", theta)
+    roof = sample_roof("gable", theta)
     tree = np.random.default_rng(3).normal((8.0, 0.0, 6.0), (1.0, 2.0, 1.0), (150, 3))
     weights = np.concatenate([np.ones(len(roof)), np.full(len(tree), 0.01)])
     fit = fit_roof(np.vstack([roof, tree]), weights=weights)
@@ -148,7 +148,7 @@ def test_weights_take_a_tree_out_of_the_roof():
 
 
 def test_log_prior_decides_between_what_points_cannot():
-    level = points_on("flat", typical_theta("flat"), density=1.0)
+    level = sample_roof("flat", typical_theta("flat"), density=1.0)
     assert fit_roof(level, settings=only("flat", "gable")).type == "flat"
     prior = {"gable": 0.0, "flat": -1e4}
     assert fit_roof(level, settings=only("flat", "gable"), type_log_prior=prior).type == "gable"
@@ -169,7 +169,7 @@ def test_too_few_points_are_one_sentence(count):
 
 @pytest.mark.parametrize("count", [4, 5, 8])
 def test_four_points_and_more_have_a_fit(count):
-    points = points_on("flat", typical_theta("flat"), density=1.0)[:count]
+    points = sample_roof("flat", typical_theta("flat"), density=1.0)[:count]
     assert np.isfinite(fit_roof(points).vertices).all()
 
 

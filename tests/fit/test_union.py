@@ -11,7 +11,7 @@ from hiproof.fit.union import fit_building
 from hiproof.fit.union.clamp import CLAMP_M, LEAST_M2, MISSED_SPACINGS, clamped
 from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 
 def gable_with_shed(x, y):
@@ -46,7 +46,7 @@ def height_of(fit, xy):
 
 
 def test_a_house_with_a_flat_extension_is_three_planes():
-    points = sampled(gable_with_shed, HOUSE)
+    points = sample_heights(gable_with_shed, HOUSE)
     fit = fit_building(points, HOUSE)
     planes = {tuple(np.round(plane, 9)) for part in fit.roof_parts for piece in part.pieces for plane in piece.planes}
     assert len(planes) == 3
@@ -60,7 +60,7 @@ def test_a_house_with_a_flat_extension_is_three_planes():
 @pytest.mark.parametrize("points_wanted", [1, 2, 3, 4, 7, 30, 400])
 def test_pieces_cover_the_outline_and_stay_near_the_points(name, points_wanted):
     outline = OUTLINES[name]
-    points = sampled(lambda x, y: 5.0 + np.where(x + y > 6.0, 2.0, 0.1 * x), outline, density=60.0)[:points_wanted]
+    points = sample_heights(lambda x, y: 5.0 + np.where(x + y > 6.0, 2.0, 0.1 * x), outline, density=60.0)[:points_wanted]
     fit = fit_building(points, outline)
     outlines = [piece.outline for part in fit.roof_parts for piece in part.pieces]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in outlines)
@@ -104,7 +104,7 @@ def test_fewer_than_four_points_give_a_flat_roof_at_their_median():
 
 
 def test_the_order_of_the_points_does_not_matter():
-    points = sampled(gable_with_shed, HOUSE)
+    points = sample_heights(gable_with_shed, HOUSE)
     shuffled = points[np.random.default_rng(1).permutation(len(points))]
     one, other = fit_building(points, HOUSE), fit_building(shuffled, HOUSE)
     assert one.objective == other.objective
@@ -114,20 +114,20 @@ def test_the_order_of_the_points_does_not_matter():
 
 
 def test_points_outside_the_outline_do_not_count():
-    points = sampled(gable_with_shed, HOUSE)
-    beside = sampled(lambda x, y: 20.0 + 0.0 * x, shapely.box(12.5, 0, 20, 7))
+    points = sample_heights(gable_with_shed, HOUSE)
+    beside = sample_heights(lambda x, y: 20.0 + 0.0 * x, shapely.box(12.5, 0, 20, 7))
     assert fit_building(np.vstack([points, beside]), HOUSE).objective == fit_building(points, HOUSE).objective
 
 
 def test_the_roof_moves_with_its_points():
-    points, shift = sampled(gable_with_shed, HOUSE), np.array([103.0, -57.0, 12.0])
+    points, shift = sample_heights(gable_with_shed, HOUSE), np.array([103.0, -57.0, 12.0])
     moved = fit_building(points + shift, shapely.transform(HOUSE, lambda xy: xy + shift[:2]))
     before = height_of(fit_building(points, HOUSE), points[:, :2])
     assert height_of(moved, points[:, :2] + shift[:2]) == pytest.approx(before + shift[2], abs=1e-3)
 
 
 def test_the_roof_turns_with_its_points():
-    points = sampled(gable_with_shed, HOUSE)
+    points = sample_heights(gable_with_shed, HOUSE)
     cos, sin = np.cos(0.4), np.sin(0.4)
     turn = np.array([[cos, -sin], [sin, cos]])
     turned = np.column_stack([points[:, :2] @ turn.T, points[:, 2]])
@@ -137,7 +137,7 @@ def test_the_roof_turns_with_its_points():
 
 
 def test_one_unseen_side_of_a_gable_grows_no_spike():
-    points = sampled(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
+    points = sample_heights(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
     seen = points[points[:, 1] < 3.6]
     fit = fit_building(seen, HOUSE)
     corners = np.concatenate([shapely.get_coordinates(p.outline) for part in fit.roof_parts for p in part.pieces])
@@ -153,7 +153,7 @@ def test_no_points_inside_the_outline_is_an_error_with_a_sentence():
 
 @pytest.mark.parametrize("columns", [[0, 1], [0, 1, 2, 2]])
 def test_points_of_another_shape_are_not_taken_for_others(columns):
-    points = sampled(gable_with_shed, HOUSE)[:, columns]
+    points = sample_heights(gable_with_shed, HOUSE)[:, columns]
     with pytest.raises(InputError, match=r"shape \(n, 3\)"):
         fit_building(points, HOUSE)
 
@@ -163,11 +163,11 @@ def test_points_of_another_shape_are_not_taken_for_others(columns):
 )
 def test_an_outline_without_area_is_an_error_with_a_sentence(outline):
     with pytest.raises(FitError, match="expected an outline with an area"):
-        fit_building(sampled(gable_with_shed, HOUSE), outline)
+        fit_building(sample_heights(gable_with_shed, HOUSE), outline)
 
 
 def test_points_that_are_not_finite_are_left_out():
-    points = sampled(gable_with_shed, HOUSE)
+    points = sample_heights(gable_with_shed, HOUSE)
     dirty = np.vstack([points, [[1.0, 1.0, np.nan], [np.inf, 2.0, 3.0]]])
     assert fit_building(dirty, HOUSE).objective == fit_building(points, HOUSE).objective
 
@@ -180,7 +180,7 @@ def test_repeated_points_and_points_on_a_line_are_survived():
 
 
 def test_a_single_gable_comes_out_as_from_the_single_primitive_road():
-    points = sampled(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
+    points = sample_heights(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
     part = fit_building(points, HOUSE).roof_parts[0]
     alone = fit_roof(points, outline=HOUSE)
     assert part.type == alone.type == "gable"
@@ -191,7 +191,7 @@ def test_a_single_gable_comes_out_as_from_the_single_primitive_road():
 
 
 def test_parts_are_named_by_the_catalogue_with_parameters_and_deviations():
-    parts = {part.type: part for part in fit_building(sampled(gable_with_shed, HOUSE), HOUSE).roof_parts}
+    parts = {part.type: part for part in fit_building(sample_heights(gable_with_shed, HOUSE), HOUSE).roof_parts}
     assert set(parts) == {"gable", "flat"}
     assert parts["gable"].parameters["height"] == pytest.approx(0.9 * 3.5, abs=0.05)
     assert 0.0 < parts["gable"].sigma["height"] < 0.05
@@ -200,7 +200,7 @@ def test_parts_are_named_by_the_catalogue_with_parameters_and_deviations():
 
 def test_equal_monopitches_in_a_row_are_one_saw_tooth():
     hall = shapely.box(0, 0, 12, 15)
-    fit = fit_building(sampled(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall), hall)
+    fit = fit_building(sample_heights(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall), hall)
     assert [part.type for part in fit.roof_parts] == ["shed"]
     assert fit.roof_parts[0].parameters["teeth"] == 3
 
@@ -213,7 +213,7 @@ def tooth_edges(fit):
 
 def test_teeth_are_equally_wide_however_the_points_beside_a_step_lie():
     hall = shapely.box(0, 0, 12, 15)
-    points = sampled(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall)
+    points = sample_heights(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall)
     points[:, :2] += np.random.default_rng(1).normal(0.0, 0.05, (len(points), 2))
     fit = fit_building(points, hall)
     assert [part.type for part in fit.roof_parts] == ["shed"]
@@ -223,7 +223,7 @@ def test_teeth_are_equally_wide_however_the_points_beside_a_step_lie():
 def test_uneven_teeth_stay_uneven():
     edges = np.array([0.0, 5.0, 10.4, 15.0])
     hall = shapely.box(0, 0, 12, 15)
-    points = sampled(lambda x, y: 4.0 + 0.5 * (y - edges[np.searchsorted(edges, y, side="right") - 1]), hall)
+    points = sample_heights(lambda x, y: 4.0 + 0.5 * (y - edges[np.searchsorted(edges, y, side="right") - 1]), hall)
     fit = fit_building(points, hall)
     assert {part.type for part in fit.roof_parts} == {"monopitch"}  # a saw-tooth's parameters say one width
     found = np.unique(np.round(tooth_edges(fit), 1))
@@ -239,7 +239,7 @@ def test_detail_says_how_small_a_dormer_may_be(half_width, depth, top, parts):
         dormer = (abs(x - 6) < half_width) & (y > 1.0) & (y < 1.0 + depth)
         return np.where(dormer, top, 8.0 - 0.9 * np.abs(y - 3.5))
 
-    points = sampled(with_dormer, HOUSE)
+    points = sample_heights(with_dormer, HOUSE)
     found = {
         detail: len(fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": detail}})).roof_parts)
         for detail in parts
@@ -248,7 +248,7 @@ def test_detail_says_how_small_a_dormer_may_be(half_width, depth, top, parts):
 
 
 def test_without_an_outline_the_plan_is_estimated():
-    points = sampled(gable_with_shed, HOUSE)
+    points = sample_heights(gable_with_shed, HOUSE)
     fit = fit_building(points)
     assert iou(fit.outline, HOUSE) > 0.9
     assert fit.unexplained < 0.1

@@ -6,7 +6,7 @@ import shapely
 
 from hiproof.fit.union import agree, fit_building
 from hiproof.model import Roof
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 6), (6, 6), (6, 15), (0, 15)])
 
@@ -31,7 +31,7 @@ def tops(fit):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_wings_of_one_height_have_one_ridge_height(seed):
-    fit = fit_building(sampled(two_wings(0.0), L_SHAPE, 10.0, 0.02, seed), L_SHAPE)
+    fit = fit_building(sample_heights(two_wings(0.0), L_SHAPE, 10.0, 0.02, seed), L_SHAPE)
     low, high = tops(fit)
     assert high - low < 1e-4
     assert high == pytest.approx(8.0, abs=0.05)
@@ -39,17 +39,17 @@ def test_wings_of_one_height_have_one_ridge_height(seed):
 
 @pytest.mark.parametrize("lower", [0.15, 0.4])
 def test_wings_of_two_heights_keep_them(lower):
-    low, high = tops(fit_building(sampled(two_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE))
+    low, high = tops(fit_building(sample_heights(two_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE))
     assert high - low == pytest.approx(lower, abs=0.04)
 
 
 def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
     """Where no common fit is proper the wings keep their own planes; they took any, and pitches became negative."""
-    fit = fit_building(sampled(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
+    fit = fit_building(sample_heights(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
     low, high = tops(fit)
     assert high - low < 1e-4
     monkeypatch.setattr(agree, "proper", lambda *_: False)
-    low, high = tops(fit_building(sampled(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE))
+    low, high = tops(fit_building(sample_heights(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE))
     assert high - low > 1e-3
     assert (low, high) == pytest.approx((8.0, 8.0), abs=0.15)
 
@@ -77,7 +77,7 @@ def bent(angle_deg):
 @pytest.mark.parametrize("angle", [20.0, 32.0, 44.0])
 def test_a_bent_house_is_two_wings_that_meet_on_one_line(angle):
     outline, height = bent(angle)
-    fit = fit_building(sampled(height, outline, 8.0, 0.02), outline)
+    fit = fit_building(sample_heights(height, outline, 8.0, 0.02), outline)
     assert [part.type for part in fit.roof_parts] == ["gable", "gable"]
     xy = shapely.get_coordinates(shapely.intersection(outline.buffer(-0.1), shapely.MultiPoint(grid_over(outline))))
     error = Roof(fit.roof_parts, fit.outline, None).height_at(xy) - height(xy[:, 0], xy[:, 1])

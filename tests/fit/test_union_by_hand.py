@@ -8,7 +8,7 @@ import shapely
 from shapely import box
 
 from hiproof.fit.union import fit_building
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 
 def level(z):
@@ -103,7 +103,7 @@ def test_a_roof_by_hand_is_the_parts_a_person_sees(name):
         return np.max([np.where(shapely.intersects_xy(own, x, y), height(x, y), 0.0) for own, height in parts], axis=0)
 
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    points, places = sampled(z, outline), sampled(z, outline, noise=0.0, seed=1)
+    points, places = sample_heights(z, outline), sample_heights(z, outline, noise=0.0, seed=1)
     for cloud in points, places:
         cloud[:, :2] = cloud[:, :2] @ axes
     found = fit_building(points, shapely.transform(outline, lambda xy: xy @ axes)).roof_parts

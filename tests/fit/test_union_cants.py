@@ -12,7 +12,7 @@ import hiproof
 from hiproof.compose import check_solid
 from hiproof.fit.union import fit_building
 from hiproof.parametric.arrange import merged_parts, split_part
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 EAVE = 3.0
 OCTAGON = shapely.Polygon([(5 * math.cos(a), 5 * math.sin(a)) for a in np.arange(8) * math.pi / 4 + math.pi / 8])
@@ -53,7 +53,7 @@ def misfit(parts, outline, height):
 @pytest.mark.parametrize(("name", "kind", "count"), [("tower", "pyramid", 4), ("bay", "side_hip", 2)])
 def test_a_roof_that_rises_from_every_wall_is_one_part(name, kind, count, seed):
     outline, height = house(name)
-    (part,) = fit_building(sampled(height, outline, 8.0, 0.02, seed), outline).roof_parts
+    (part,) = fit_building(sample_heights(height, outline, 8.0, 0.02, seed), outline).roof_parts
     assert part.type == kind
     assert len(cants_in(part)) == count
     assert misfit([part], outline, height) < 0.03
@@ -63,7 +63,7 @@ def test_a_roof_that_rises_from_every_wall_is_one_part(name, kind, count, seed):
 @pytest.mark.parametrize("degrees", [33.0, 117.0, 250.0])
 def test_cants_turn_with_the_points(degrees):
     outline, height = house("bay")
-    points = sampled(height, outline, 8.0, 0.02, 1)
+    points = sample_heights(height, outline, 8.0, 0.02, 1)
     turned = affinity.rotate(outline, degrees, (0, 0))
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     moved = np.column_stack([points[:, :2] @ np.array([[c, s], [-s, c]]), points[:, 2]])
@@ -82,28 +82,28 @@ def test_a_bay_runs_into_the_roof_behind_it(seed):
         main = np.where(y <= 9, EAVE + 0.8 * np.minimum(y, 9 - y), -np.inf)
         return np.where(shapely.intersects_xy(bay, x, y), np.maximum(main, over_bay(x, y)), main)
 
-    parts = fit_building(sampled(height, outline, 10.0, 0.02, seed), outline).roof_parts
+    parts = fit_building(sample_heights(height, outline, 10.0, 0.02, seed), outline).roof_parts
     assert sorted(len(cants_in(part)) for part in parts) == [0, 2]
     assert misfit(parts, outline, height) < 0.03
 
 
 def test_a_gable_over_a_cut_corner_has_no_cant():
     outline = shapely.Polygon([(0, 0), (10, 0), (12, 2), (12, 8), (0, 8)])
-    points = sampled(lambda x, y: 8.0 - 0.8 * np.abs(y - 4.0), outline, 8.0, 0.02)
+    points = sample_heights(lambda x, y: 8.0 - 0.8 * np.abs(y - 4.0), outline, 8.0, 0.02)
     (part,) = fit_building(points, outline).roof_parts
     assert part.type == "gable" and not cants_in(part)
 
 
 def test_a_canted_roof_is_built_again_of_its_parameters():
     outline, height = house("bay")
-    building = hiproof.reconstruct(sampled(height, outline, 8.0, 0.02), outline)
+    building = hiproof.reconstruct(sample_heights(height, outline, 8.0, 0.02), outline)
     record = hiproof.write.parameters.building_record(building)
     again = hiproof.build(record)
     assert cants_in(building.parts[0]) and not check_solid(building.solid)
     assert np.array_equal(again.solid.vertices, building.solid.vertices)
     higher = building.with_part(0, ridge_height=float(building.solid.vertices[:, 2].max()) + 1.0)
     assert cants_in(higher.parts[0]) == cants_in(building.parts[0]) and not check_solid(higher.solid)
-    refitted = higher.refit(sampled(height, outline, 8.0, 0.02, 3))
+    refitted = higher.refit(sample_heights(height, outline, 8.0, 0.02, 3))
     assert (
         misfit(
             refitted.roof.parts,
@@ -117,7 +117,7 @@ def test_a_canted_roof_is_built_again_of_its_parameters():
 @pytest.mark.parametrize("side", ["length", "width"])
 def test_a_part_cut_in_two_and_merged_again_has_its_cants_over_the_same_walls(side):
     outline, height = house("bay")
-    building = hiproof.reconstruct(sampled(height, outline, 8.0, 0.02), outline)
+    building = hiproof.reconstruct(sample_heights(height, outline, 8.0, 0.02), outline)
     record = hiproof.write.parameters.building_record(building)
     halves = split_part(record["parts"][0], side, 0.6)
     merged = hiproof.build({**record, "parts": [merged_parts(*halves)]})

@@ -8,7 +8,7 @@ from hiproof.compose import compose
 from hiproof.fit.union import fit_building
 from hiproof.frames import LocalFrame
 from hiproof.model import ROOF, Roof
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 DRAWN_M = 0.3  # a draughtsman draws no shorter edge on these roofs
 EAVE, SLOPE = 3.0, 0.8
@@ -50,7 +50,7 @@ def roof_edges(fit):
 @pytest.mark.parametrize("seed", range(2))
 def test_creases_end_in_corners_where_points_lie_a_little_beside_the_outline(name, beside, seed):
     outline, height = house(name)
-    fit = fit_building(sampled(height, outline, 5.0, 0.02, seed) + (*beside, 0.0), outline)
+    fit = fit_building(sample_heights(height, outline, 5.0, 0.02, seed) + (*beside, 0.0), outline)
     assert len(fit.roof_parts) == 2
     assert roof_edges(fit).min() > DRAWN_M
 
@@ -62,7 +62,7 @@ def test_eaves_of_two_heights_keep_them_though_their_hip_ends_beside_the_corner(
     def height(x, y):
         return np.minimum(wing(x, y, (0, 0, 14, 8), ""), EAVE - lower + SLOPE * x)
 
-    points = sampled(height, outline, 10.0, 0.02)
+    points = sample_heights(height, outline, 10.0, 0.02)
     fit = fit_building(points, outline)
     error = Roof(fit.roof_parts, fit.outline, None).height_at(points[:, :2]) - points[:, 2]
     assert np.sqrt(np.mean(error**2)) < 0.04
@@ -75,7 +75,7 @@ def test_a_step_below_a_hip_lies_where_its_plane_meets_the_eaves(seed):
     def height(x, y):
         return np.where(x < 10.3, wing(x, y, (0, 0, 10.3, 8), ""), 1.0)
 
-    fit = fit_building(sampled(height, outline, 2.0, 0.02, seed), outline)
+    fit = fit_building(sample_heights(height, outline, 2.0, 0.02, seed), outline)
     lowest = min(fit.roof_parts, key=lambda part: part.pieces[0].planes[:, 2].min())
     assert lowest.type == "flat"
     assert min(piece.outline.bounds[0] for piece in lowest.pieces) == pytest.approx(10.3, abs=0.1)

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
-from benchmarks.matching import hidden_end, right_types, told_apart
+from benchmarks.matching import has_hidden_end, list_right_types, merge_alike
 
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
@@ -105,7 +105,7 @@ def test_the_catalogues_other_shapes_are_found_again(type):
     z = building.roof.height_at(xy)
     fit = fit_building(np.column_stack([xy, z]), building.outline)
     (truth,) = building.roof.parts
-    assert [part.type for part in fit.roof_parts] in [[name] for name in right_types(truth, hidden=False)]
+    assert [part.type for part in fit.roof_parts] in [[name] for name in list_right_types(truth, hidden=False)]
     assert np.mean(np.abs(height_of(fit, xy) - z) < DEAD_M) > 0.9
     assert np.median(np.abs(height_of(fit, xy) - z)) < 0.01
 
@@ -113,8 +113,8 @@ def test_the_catalogues_other_shapes_are_found_again(type):
 def told_right(building, fit):
     """Whether a fit has the true number of parts, and types that these may be called by."""
     parts = building.roof.parts
-    hidden = [hidden_end(part, [other for other in parts if other is not part]) for part in parts]
-    names = set().union(*(right_types(part, end) for part, end in zip(parts, hidden, strict=True)))
+    hidden = [has_hidden_end(part, [other for other in parts if other is not part]) for part in parts]
+    names = set().union(*(list_right_types(part, end) for part, end in zip(parts, hidden, strict=True)))
     return len(fit.roof_parts) == len(parts) and all(part.type in names for part in fit.roof_parts)
 
 
@@ -326,4 +326,4 @@ def count_parts(kind, density, seed):
     cloud = scan(building, rng, ScanSettings(density=density, defects=Defects.none()))
     points = building.roof.frame.to_local(cloud.points[cloud.source != 2])
     fit = fit_building(points, building.outline)
-    return len(fit.roof_parts), len(told_apart(building.roof.parts))
+    return len(fit.roof_parts), len(merge_alike(building.roof.parts))

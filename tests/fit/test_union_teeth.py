@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from benchmarks.compounds import drawn
+from benchmarks.compounds import draw_compound
 
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
@@ -14,7 +14,7 @@ from hiproof.fit.union.regions import area_of
 from hiproof.fit.union.shown import with_slivers
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 SLOPE, WIDTH, LENGTH, LOW = 0.5, 5.0, 12.0, 4.0  # of every tooth; the height at which each begins
 
@@ -90,7 +90,7 @@ def test_wings_beside_a_yard_or_in_a_row_are_two_and_what_crosses_a_roof_is_one(
     row = shapely.box(-3, -11, 3, 11)
     beside = shapely.union_all([shapely.box(-12, -4, 12, 4), shapely.box(-12, 4, -6, 11), shapely.box(6, 4, 12, 11)])
     for outline, count in ((across, 2), (row, 3), (beside, 3)):
-        parts = fit_building(sampled(z, outline), outline).roof_parts
+        parts = fit_building(sample_heights(z, outline), outline).roof_parts
         assert [part.type for part in parts] == ["flat"] * count
         assert sorted(round(part.translation[2], 1) for part in parts) == [6.0] * (count - 1) + [9.0]
 
@@ -106,6 +106,6 @@ def test_a_strip_a_grid_step_off_its_neighbour_joins_it():
 
 def test_a_row_that_only_touches_what_it_would_reach_into_is_a_saw_tooth():
     """Two areas that touch have a line in common, and the building failed on it."""
-    building, points = drawn("saw_tooth_hall", 2.0, 2036)
+    building, points = draw_compound("saw_tooth_hall", 2.0, 2036)
     fit = fit_building(points, building.outline)
     assert sorted(part.type for part in fit.roof_parts) == ["flat", "shed"]

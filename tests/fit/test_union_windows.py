@@ -20,7 +20,7 @@ from hiproof.fit.union.unite import drawn, ends_of
 from hiproof.fit.union.volumes import LEVEL, OFFSET, PLANES, U0, U1, V0, V1, base_only
 from hiproof.fit.union.whole import Whole
 from hiproof.status import Status
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 
 HALL = shapely.box(0, 0, 35, 22)
 BOXES = [(x, y, x + 4.0, y + 3.0) for x in (3.0, 15.0, 27.0) for y in (3.0, 15.0)]
@@ -39,13 +39,13 @@ def heights(fit, xy):
 
 
 def whole_of(height, outline, density=5.0):
-    plan = lay_out_plan(sampled(height, outline, density, 0.02), outline)
+    plan = lay_out_plan(sample_heights(height, outline, density, 0.02), outline)
     scene = scene_of(plan, outline, directions_of(outline, plan), 2.0, 0.2, allowed_shapes(()))
     return Whole(scene, plan, outline)
 
 
 def test_boxes_on_a_large_level_roof_are_found():
-    fit = fit_building(sampled(hall, HALL, 5.0, 0.02), HALL)
+    fit = fit_building(sample_heights(hall, HALL, 5.0, 0.02), HALL)
     xy = np.array([[0.5 * (x0 + x1), 0.5 * (y0 + y1)] for x0, y0, x1, y1 in BOXES])
     assert heights(fit, xy) == pytest.approx(11.0, abs=0.03)
     assert heights(fit, xy + [5.0, 0.0]) == pytest.approx(8.0, abs=0.03)
@@ -53,7 +53,7 @@ def test_boxes_on_a_large_level_roof_are_found():
 
 
 def test_the_roof_does_not_depend_on_the_order_of_its_points():
-    points = sampled(hall, HALL, 3.0, 0.02)
+    points = sample_heights(hall, HALL, 3.0, 0.02)
     one = fit_building(points, HALL)
     other = fit_building(points[np.random.default_rng(1).permutation(len(points))], HALL)
     assert len(one.roof_parts) == len(other.roof_parts)
@@ -70,9 +70,9 @@ def test_halves_far_apart_have_the_roofs_that_each_has_alone():
     def gables(x, y):
         return np.where((x < 26) | (x > 90), 9.0 - 0.7 * np.abs(y - 6.0), 4.0) + np.where(x > 90, 1.0, 0.0)
 
-    together = fit_building(sampled(gables, both, 4.0, 0.02), both)
+    together = fit_building(sample_heights(gables, both, 4.0, 0.02), both)
     for half in (left, right):
-        alone = fit_building(sampled(gables, half, 4.0, 0.02), half)
+        alone = fit_building(sample_heights(gables, half, 4.0, 0.02), half)
         inside = shapely.buffer(half, -0.5)
         x, y = np.meshgrid(np.arange(0.5, 116.0), np.arange(0.5, 12.0))
         xy = np.column_stack([x.ravel(), y.ravel()])
@@ -82,7 +82,7 @@ def test_halves_far_apart_have_the_roofs_that_each_has_alone():
 
 
 def test_a_large_roof_is_a_valid_solid():
-    model = reconstruct(sampled(hall, HALL, 3.0, 0.02), HALL)
+    model = reconstruct(sample_heights(hall, HALL, 3.0, 0.02), HALL)
     assert model.status is Status.MODELLED
     assert not check_solid(model.built.solid)
 

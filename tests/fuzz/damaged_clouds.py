@@ -57,7 +57,7 @@ def damaged_clouds(folder: Path, seed: int = 0) -> list[Damaged]:
         cases |= {
             f"{what} in {name}": (ending, *rest) for what, rest in header_lies(name, raw).items()
         }
-    cases |= laz_lies(sound) | copc_lies(sound) | text_and_ply() | garbled(sound, seed)
+    cases |= laz_lies(sound) | copc_lies(sound) | text_and_ply() | garble(sound, seed)
     found = []
     for name, (ending, content, sentence) in cases.items():
         path = folder / (re.sub(r"[^\w.+-]", "_", name) + ending)
@@ -91,14 +91,14 @@ def write_las(path: Path, town, version: str, point_format: int) -> None:
     las.write(path)
 
 
-def with_field(raw: bytes, field: str, value: float) -> bytes:
+def replace_field(raw: bytes, field: str, value: float) -> bytes:
     form, place = FIELDS[field]
     changed = bytearray(raw)
     struct.pack_into(form, changed, place, value)
     return bytes(changed)
 
 
-def field_of(raw: bytes, field: str) -> float:
+def read_field(raw: bytes, field: str) -> float:
     form, place = FIELDS[field]
     return struct.unpack_from(form, raw, place)[0]
 
@@ -106,7 +106,7 @@ def field_of(raw: bytes, field: str) -> float:
 def header_lies(name: str, raw: bytes) -> dict[str, tuple[bytes, str]]:
     """One field of the header changed: (content, sentence) by what was done."""
     count = "count 1.2" if "1.2" in name else "count"
-    true = field_of(raw, count)
+    true = read_field(raw, count)
     lies = {
         "count 0": (count, 0, "0 points"),
         "half the count": (count, true // 2, f"{true // 2} points"),
@@ -120,12 +120,12 @@ def header_lies(name: str, raw: bytes) -> dict[str, tuple[bytes, str]]:
         "scale halved": ("z scale", 0.0005, "bounds"),
         "offset 1e12": ("x offset", 1e12, "bounds"),
         "offset 1e300": ("y offset", 1e300, "offset"),
-        "offset moved by 64 m": ("y offset", field_of(raw, "y offset") + 64, "bounds"),
+        "offset moved by 64 m": ("y offset", read_field(raw, "y offset") + 64, "bounds"),
         "bound 1e300": ("x max", 1e300, "bounds"),
         "bound infinite": ("y max", np.inf, "bounds"),
         "bound not a number": ("z max", np.nan, "bounds"),
-        "bounds swapped": ("x min", field_of(raw, "x max") + 10, "bounds"),
-        "bound too narrow": ("x max", field_of(raw, "x max") - 10, "bounds"),
+        "bounds swapped": ("x min", read_field(raw, "x max") + 10, "bounds"),
+        "bound too narrow": ("x max", read_field(raw, "x max") - 10, "bounds"),
         "vlr count": ("vlr count", 2**32 - 1, "4294967295 records"),
         "record length 0": ("record length", 0, "0 bytes each"),
         "record length 65535": ("record length", 65535, "points|cannot be decoded"),
@@ -136,18 +136,18 @@ def header_lies(name: str, raw: bytes) -> dict[str, tuple[bytes, str]]:
         lies["count of a million millions"] = (count, 10**12, "1000000000000 points")
         lies["evlr count"] = ("evlr count", 2**32 - 1, "4294967295 records")
     changed = {
-        what: (with_field(raw, field, value), sentence)
+        what: (replace_field(raw, field, value), sentence)
         for what, (field, value, sentence) in lies.items()
     }
     if "laz" in name or name == "copc":
         place = 227 if "1.2" in name else 375  # COPC's own record, else LASzip's
-        changed["record of 65535 bytes"] = (packed(raw, "<H", place + 20, 65535), "record")
+        changed["record of 65535 bytes"] = (pack(raw, "<H", place + 20, 65535), "record")
     changed["cut in half"] = (raw[: len(raw) // 2], "cut off|truncated|byte")
     changed["cut inside the header"] = (raw[:150], "header")
     return changed
 
 
-def packed(raw: bytes, form: str, place: int, *values: int) -> bytes:
+def pack(raw: bytes, form: str, place: int, *values: int) -> bytes:
     changed = bytearray(raw)
     struct.pack_into(form, changed, place, *values)
     return bytes(changed)
@@ -158,7 +158,7 @@ def laz_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
     cases = {}
     for name in ("laz 1.2", "laz 1.4"):
         ending, raw = sound[name]
-        start = int(field_of(raw, "data start"))
+        start = int(read_field(raw, "data start"))
         table = struct.unpack_from("<q", raw, start)[0]
         lies = {
             "4 billion chunks": ("<I", table + 4, 2**32 - 1, "4294967295 chunks"),
@@ -169,7 +169,7 @@ def laz_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
             "chunk table before the points": ("<q", start, 10, "chunk table"),
         }
         for what, (form, place, value, sentence) in lies.items():
-            cases[f"{what} in {name}"] = (ending, packed(raw, form, place, value), sentence)
+            cases[f"{what} in {name}"] = (ending, pack(raw, form, place, value), sentence)
     return cases
 
 
@@ -180,17 +180,17 @@ def copc_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
     """
     ending, raw = sound["copc"]
     page = struct.unpack_from("<Q", raw, 375 + 54 + 40)[0]
-    itself = packed(raw, "<Qii", page + 16, page, 32, -1)
+    itself = pack(raw, "<Qii", page + 16, page, 32, -1)
     lies = {
         "page points to itself": (itself, "itself"),
-        "page beyond the end": (packed(raw, "<Q", 375 + 54 + 40, len(raw)), "page"),
-        "page of no bytes": (packed(raw, "<Q", 375 + 54 + 48, 0), "0 points"),
-        "page of a billion bytes": (packed(raw, "<Q", 375 + 54 + 48, 10**9), "page"),
-        "node of two billion points": (packed(raw, "<i", page + 28, 2**31 - 1), "2147483647"),
-        "node beyond the end": (packed(raw, "<Q", page + 16, len(raw)), "node"),
-        "node of negative size": (packed(raw, "<i", page + 24, -5), "node"),
-        "octree of no width": (packed(raw, "<d", 375 + 54 + 24, 0.0), "octree"),
-        "octree elsewhere": (packed(raw, "<d", 375 + 54, 0.0), "octree"),
+        "page beyond the end": (pack(raw, "<Q", 375 + 54 + 40, len(raw)), "page"),
+        "page of no bytes": (pack(raw, "<Q", 375 + 54 + 48, 0), "0 points"),
+        "page of a billion bytes": (pack(raw, "<Q", 375 + 54 + 48, 10**9), "page"),
+        "node of two billion points": (pack(raw, "<i", page + 28, 2**31 - 1), "2147483647"),
+        "node beyond the end": (pack(raw, "<Q", page + 16, len(raw)), "node"),
+        "node of negative size": (pack(raw, "<i", page + 24, -5), "node"),
+        "octree of no width": (pack(raw, "<d", 375 + 54 + 24, 0.0), "octree"),
+        "octree elsewhere": (pack(raw, "<d", 375 + 54, 0.0), "octree"),
     }
     return {f"{what} in copc": (ending, *rest) for what, rest in lies.items()}
 
@@ -241,12 +241,12 @@ def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
     }
 
 
-def garbled(sound: dict, seed: int) -> dict[str, tuple[str, bytes, str]]:
+def garble(sound: dict, seed: int) -> dict[str, tuple[str, bytes, str]]:
     """Bytes of the compressed points themselves overwritten at random."""
     rng, cases = np.random.default_rng(seed), {}
     for name in ("laz 1.2", "laz 1.4", "copc"):
         ending, raw = sound[name]
-        start = int(field_of(raw, "data start")) + 100
+        start = int(read_field(raw, "data start")) + 100
         changed = bytearray(raw)
         for place in rng.integers(start, len(raw) - 300, 40):
             changed[place] ^= int(rng.integers(1, 256))

@@ -36,7 +36,7 @@ def star(points: int) -> np.ndarray:
     return np.array([14, 16]) + 4 * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def stretched(place: int, x: float) -> list:
+def stretch(place: int, x: float) -> list:
     """The first house with one corner's x moved."""
     return [
         (x, y) if number in (place, (place + 4) % 8) else (x0, y)
@@ -45,9 +45,9 @@ def stretched(place: int, x: float) -> list:
 
 
 ODD = {
-    "1e15 m wide": (stretched(1, 1e15), "bad_footprint"),
-    "1e300 m wide": (stretched(1, 1e300), "bad_footprint"),
-    "10 km wide": (stretched(1, 10_000.0), "bad_footprint"),
+    "1e15 m wide": (stretch(1, 1e15), "bad_footprint"),
+    "1e300 m wide": (stretch(1, 1e300), "bad_footprint"),
+    "10 km wide": (stretch(1, 10_000.0), "bad_footprint"),
     "one point": (CORNERS[:1] * 4, "bad_footprint"),
     "two points": ([*CORNERS[:2], CORNERS[0]], "bad_footprint"),
     "on a line": ([(8, 12), (20, 12), (14, 12), (8, 12)], "bad_footprint"),

@@ -20,7 +20,7 @@ def sound_lines(folder: Path) -> list[dict]:
     return [json.loads(line) for line in (folder / "buildings.city.jsonl").read_text().splitlines()]
 
 
-def changed(
+def change(
     lines: list[dict], *path: str | int, to: object = None, by: Callable | None = None
 ) -> bytes:
     """The file with the member at `path` (line, key, key, ...) replaced;
@@ -32,10 +32,10 @@ def changed(
     for step in path[:-1]:
         place = place[next(iter(place)) if step is ... else step]
     place[path[-1]] = by(place[path[-1]]) if by else to
-    return as_text(lines)
+    return join_lines(lines)
 
 
-def as_text(lines: list[dict]) -> bytes:
+def join_lines(lines: list[dict]) -> bytes:
     return ("\n".join(map(json.dumps, lines)) + "\n").encode()
 
 
@@ -44,7 +44,7 @@ def damaged_files(folder: Path) -> dict[str, bytes]:
     header.
     """
     lines = sound_lines(folder)
-    sound = as_text(lines)
+    sound = join_lines(lines)
     return {
         "empty": b"",
         "blank": b"\n \n",
@@ -57,16 +57,14 @@ def damaged_files(folder: Path) -> dict[str, bytes]:
         "a text": b'"buildings"\n',
         "nested a million deep": b"[" * DEEP + b"]" * DEEP,
         "a number of 5000 digits": sound.replace(b"0.0001", b"9" * 5000, 1),
-        "header is a list": changed(lines, 0, to=[]),
-        "no header": as_text(lines[1:]),
-        "transform is a text": changed(lines, 0, "transform", to="none"),
-        "transform is a list": changed(lines, 0, "transform", to=[1]),
-        "scale of two": changed(lines, 0, "transform", "scale", to=[1, 1]),
-        "scale of words": changed(lines, 0, "transform", "scale", to=["a", "b", "c"]),
-        "huge scale": changed(lines, 0, "transform", "scale", to=[HUGE, 1, 1]),
-        "infinite translation": changed(
-            lines, 0, "transform", "translate", to=[float("inf"), 0, 0]
-        ),
+        "header is a list": change(lines, 0, to=[]),
+        "no header": join_lines(lines[1:]),
+        "transform is a text": change(lines, 0, "transform", to="none"),
+        "transform is a list": change(lines, 0, "transform", to=[1]),
+        "scale of two": change(lines, 0, "transform", "scale", to=[1, 1]),
+        "scale of words": change(lines, 0, "transform", "scale", to=["a", "b", "c"]),
+        "huge scale": change(lines, 0, "transform", "scale", to=[HUGE, 1, 1]),
+        "infinite translation": change(lines, 0, "transform", "translate", to=[float("inf"), 0, 0]),
     }
 
 
@@ -81,24 +79,24 @@ def damaged_models(folder: Path) -> dict[str, bytes]:
 def damaged_members(lines: list[dict]) -> dict[str, bytes]:
     """Lines, vertices, objects and attributes that are something else than they should be."""
     attributes = (1, "CityObjects", ..., "attributes")
-    head, first, *others = as_text(lines).splitlines(keepends=True)
+    head, first, *others = join_lines(lines).splitlines(keepends=True)
     return {
         "cut off": head + b"".join(others) + first[: len(first) // 2],
         "nested after the header": head + b"[" * DEEP + b"]" * DEEP + b"\n" + b"".join(others),
-        "feature is a list": changed(lines, 1, to=[]),
-        "feature is null": changed(lines, 1, to=None),
-        "vertices of two": changed(lines, 1, "vertices", by=lambda v: [p[:2] for p in v]),
-        "vertices of words": changed(
+        "feature is a list": change(lines, 1, to=[]),
+        "feature is null": change(lines, 1, to=None),
+        "vertices of two": change(lines, 1, "vertices", by=lambda v: [p[:2] for p in v]),
+        "vertices of words": change(
             lines, 1, "vertices", by=lambda v: [["a", "b", "c"] for _ in v]
         ),
-        "vertices null": changed(lines, 1, "vertices"),
-        "a huge vertex": changed(lines, 1, "vertices", 0, 0, to=HUGE),
-        "a vertex that is no number": changed(lines, 1, "vertices", 0, 0, to=float("nan")),
-        "objects are a list": changed(lines, 1, "CityObjects", to=[]),
-        "objects are null": changed(lines, 1, "CityObjects"),
-        "an object is null": changed(lines, 1, "CityObjects", "house-1"),
-        "an object is a text": changed(lines, 1, "CityObjects", "house-1", to="gable"),
-        "an attribute that is no number": changed(
+        "vertices null": change(lines, 1, "vertices"),
+        "a huge vertex": change(lines, 1, "vertices", 0, 0, to=HUGE),
+        "a vertex that is no number": change(lines, 1, "vertices", 0, 0, to=float("nan")),
+        "objects are a list": change(lines, 1, "CityObjects", to=[]),
+        "objects are null": change(lines, 1, "CityObjects"),
+        "an object is null": change(lines, 1, "CityObjects", "house-1"),
+        "an object is a text": change(lines, 1, "CityObjects", "house-1", to="gable"),
+        "an attribute that is no number": change(
             lines, *attributes, by=lambda a: a | {"height": float("nan")}
         ),
     }
@@ -110,24 +108,24 @@ def damaged_geometries(lines: list[dict]) -> dict[str, bytes]:
     solid = (*geometry, 0)
     face = (*solid, "boundaries", 0, 0)
     return {
-        "geometry is a text": changed(lines, *geometry, to="solid"),
-        "geometry is a number": changed(lines, *geometry, to=5),
-        "a geometry is null": changed(lines, *solid),
-        "boundaries are null": changed(lines, *solid, "boundaries"),
-        "boundaries are numbers": changed(lines, *solid, "boundaries", to=[[1, 2, 3]]),
-        "boundaries are a text": changed(lines, *solid, "boundaries", to="abc"),
-        "boundaries nested too deep": changed(lines, *solid, "boundaries", by=lambda b: [b]),
-        "an index beyond": changed(lines, *face, 0, 0, to=999),
-        "a huge index": changed(lines, *face, 0, 0, to=HUGE),
-        "a negative index": changed(lines, *face, 0, 0, to=-1),
-        "an index with decimals": changed(lines, *face, 0, 0, to=0.5),
-        "an index that is a text": changed(lines, *face, 0, 0, to="0"),
-        "an index that is null": changed(lines, *face, 0, 0),
-        "semantics are a list": changed(lines, *solid, "semantics", to=[1]),
-        "semantics are a text": changed(lines, *solid, "semantics", to="roof"),
-        "a surface beyond": changed(lines, *solid, "semantics", "values", 0, 0, to=99),
-        "a surface that is a text": changed(lines, *solid, "semantics", "values", 0, 0, to="roof"),
-        "surfaces are numbers": changed(lines, *solid, "semantics", "surfaces", to=[1, 2, 3]),
+        "geometry is a text": change(lines, *geometry, to="solid"),
+        "geometry is a number": change(lines, *geometry, to=5),
+        "a geometry is null": change(lines, *solid),
+        "boundaries are null": change(lines, *solid, "boundaries"),
+        "boundaries are numbers": change(lines, *solid, "boundaries", to=[[1, 2, 3]]),
+        "boundaries are a text": change(lines, *solid, "boundaries", to="abc"),
+        "boundaries nested too deep": change(lines, *solid, "boundaries", by=lambda b: [b]),
+        "an index beyond": change(lines, *face, 0, 0, to=999),
+        "a huge index": change(lines, *face, 0, 0, to=HUGE),
+        "a negative index": change(lines, *face, 0, 0, to=-1),
+        "an index with decimals": change(lines, *face, 0, 0, to=0.5),
+        "an index that is a text": change(lines, *face, 0, 0, to="0"),
+        "an index that is null": change(lines, *face, 0, 0),
+        "semantics are a list": change(lines, *solid, "semantics", to=[1]),
+        "semantics are a text": change(lines, *solid, "semantics", to="roof"),
+        "a surface beyond": change(lines, *solid, "semantics", "values", 0, 0, to=99),
+        "a surface that is a text": change(lines, *solid, "semantics", "values", 0, 0, to="roof"),
+        "surfaces are numbers": change(lines, *solid, "semantics", "surfaces", to=[1, 2, 3]),
     }
 
 
@@ -139,15 +137,15 @@ def invalid_models(folder: Path) -> dict[str, bytes]:
     solid = (1, "CityObjects", ..., "geometry", 0)
     face = (*solid, "boundaries", 0, 0)
     return {
-        "a ring of two points": changed(lines, *face, 0, by=lambda ring: ring[:2]),
-        "a ring of one point": changed(lines, *face, 0, by=lambda ring: ring[:1]),
-        "a ring of no points": changed(lines, *face, 0, to=[]),
-        "a face of no rings": changed(lines, *face, to=[]),
-        "a ring of one point thrice": changed(lines, *face, 0, by=lambda ring: ring[:1] * 3),
-        "a ring on a line": changed(lines, *face, 0, by=lambda ring: [*ring[:2], ring[0]]),
-        "no faces": changed(lines, *solid, "boundaries", to=[[]]),
-        "a hole of two points": changed(lines, *face, by=lambda rings: [*rings, rings[0][:2]]),
-        "a vertex far away": changed(lines, 1, "vertices", 0, 0, to=10**300),
+        "a ring of two points": change(lines, *face, 0, by=lambda ring: ring[:2]),
+        "a ring of one point": change(lines, *face, 0, by=lambda ring: ring[:1]),
+        "a ring of no points": change(lines, *face, 0, to=[]),
+        "a face of no rings": change(lines, *face, to=[]),
+        "a ring of one point thrice": change(lines, *face, 0, by=lambda ring: ring[:1] * 3),
+        "a ring on a line": change(lines, *face, 0, by=lambda ring: [*ring[:2], ring[0]]),
+        "no faces": change(lines, *solid, "boundaries", to=[[]]),
+        "a hole of two points": change(lines, *face, by=lambda rings: [*rings, rings[0][:2]]),
+        "a vertex far away": change(lines, 1, "vertices", 0, 0, to=10**300),
     }
 
 
@@ -157,25 +155,25 @@ def odd_models(folder: Path) -> dict[str, bytes]:
     attributes = (1, "CityObjects", ..., "attributes")
     solid = (1, "CityObjects", ..., "geometry", 0)
     return {
-        "attributes null": changed(lines, *attributes),
-        "a huge attribute": changed(lines, *attributes, by=lambda a: a | {"height": HUGE}),
-        "attributes with objects": changed(
+        "attributes null": change(lines, *attributes),
+        "a huge attribute": change(lines, *attributes, by=lambda a: a | {"height": HUGE}),
+        "attributes with objects": change(
             lines, *attributes, by=lambda a: a | {"owner": {"names": [1, [2, None]]}}
         ),
-        "roof type is a number": changed(
+        "roof type is a number": change(
             lines, *attributes, by=lambda a: a | {"hiproof_roof_type": 7}
         ),
-        "status is a list": changed(
+        "status is a list": change(
             lines, *attributes, by=lambda a: a | {"hiproof_status": ["modelled"]}
         ),
-        "roof type with markup": changed(
+        "roof type with markup": change(
             lines, *attributes, by=lambda a: a | {"hiproof_roof_type": "[/red]"}
         ),
-        "geometry null": changed(lines, 1, "CityObjects", ..., "geometry"),
-        "no semantics": changed(lines, *solid, "semantics"),
-        "lod is a word": changed(lines, *solid, "lod", to="two"),
-        "metadata is a list": changed(lines, 0, "metadata", to=[]),
-        "no metadata": changed(lines, 0, "metadata"),
+        "geometry null": change(lines, 1, "CityObjects", ..., "geometry"),
+        "no semantics": change(lines, *solid, "semantics"),
+        "lod is a word": change(lines, *solid, "lod", to="two"),
+        "metadata is a list": change(lines, 0, "metadata", to=[]),
+        "no metadata": change(lines, 0, "metadata"),
     }
 
 

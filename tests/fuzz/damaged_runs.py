@@ -237,7 +237,7 @@ def sentence(error: HiproofError) -> None:
     text.encode()
 
 
-def fault_of(read: Callable[[Path], Any], folder: Path) -> str:
+def find_fault(read: Callable[[Path], Any], folder: Path) -> str:
     """What goes wrong when a reader reads a run, other than that it says so; empty where nothing
     does.
     """
@@ -268,7 +268,7 @@ def write_sound_run(folder: Path) -> Path:
     return folder / "run"
 
 
-def faults(
+def find_faults(
     sound: Path, work: Path, count: int, seed: int, readers: int = len(READERS)
 ) -> Iterator[tuple[int, str, str]]:
     """Yield (number, reader, what goes wrong) of `count` runs made of a sound one, each read by so
@@ -287,7 +287,7 @@ def faults(
             (work / name).write_bytes(content)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
-                fault = fault_of(READERS[reader][0], work)
+                fault = find_fault(READERS[reader][0], work)
             if fault:
                 yield number, reader, fault
 
@@ -297,7 +297,7 @@ def main() -> None:
     found: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         sound = write_sound_run(Path(folder))
-        for number, reader, fault in faults(sound, Path(folder) / "work", count, seed):
+        for number, reader, fault in find_faults(sound, Path(folder) / "work", count, seed):
             lines = fault.strip().splitlines()
             key = f"{lines[-1][:150]} {lines[-3].strip() if len(lines) > 3 else ''}"
             found[key] += 1

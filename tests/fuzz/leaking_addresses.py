@@ -89,13 +89,13 @@ SHAPES = (
 )
 
 
-def secret(rng: random.Random) -> str:
+def draw_secret(rng: random.Random) -> str:
     sign = (rng.choice(SIGNS), rng.choice(SIGNS))
     made = PARTS[0] + sign[0] + PARTS[1] + (sign[1] + PARTS[2] if rng.random() < 0.5 else "")
     return quote(made, safe="") if rng.random() < 0.2 else made
 
 
-def address(rng: random.Random) -> str:
+def draw_address(rng: random.Random) -> str:
     """An address with a secret, in some with a character dropped or repeated outside of it."""
     before, after = rng.choice(SHAPES).split("{}")
     if rng.random() < 0.2 and len(after) > 3:
@@ -105,10 +105,10 @@ def address(rng: random.Random) -> str:
             + after[place:][rng.choice([0, 1]) :]
             + rng.choice(["", "", "@", ":", " "])
         )
-    return before + secret(rng) + after
+    return before + draw_secret(rng) + after
 
 
-def called(*arguments: str) -> str:
+def call(*arguments: str) -> str:
     """What the command line says."""
     out = StringIO()
     level, handlers, show, listener = (
@@ -127,7 +127,7 @@ def called(*arguments: str) -> str:
     return out.getvalue()
 
 
-def files_in(folder: Path) -> str:
+def read_files(folder: Path) -> str:
     """The content of all files, as text."""
     return "\n".join(
         f"{file.name}\n{file.read_bytes().decode('latin-1')}"
@@ -136,7 +136,7 @@ def files_in(folder: Path) -> str:
     )
 
 
-def ways(folder: Path) -> dict[str, Callable[[str], str]]:
+def list_ways(folder: Path) -> dict[str, Callable[[str], str]]:
     """All that may repeat an address, by what the address is given as; texts of screen, log and
     files.
     """
@@ -161,25 +161,25 @@ def ways(folder: Path) -> dict[str, Callable[[str], str]]:
         return said.getvalue()
 
     return {
-        "load": lambda told: called("load", str(run), told),
-        "load in pieces": lambda told: called("load", str(run), *told.split()),
+        "load": lambda told: call("load", str(run), told),
+        "load in pieces": lambda told: call("load", str(run), *told.split()),
         "footprints": lambda told: (
-            called(*asked, cloud, "--footprints", told) + files_in(out) + files_in(log.parent)
+            call(*asked, cloud, "--footprints", told) + read_files(out) + read_files(log.parent)
         ),
-        "cloud": lambda told: called(*asked, cloud, told) + files_in(out) + files_in(log.parent),
-        "terrain": lambda told: called(*asked, cloud, "--terrain", told) + files_in(out),
-        "overrides": lambda told: called(*asked, cloud, f"--overrides={told}") + files_in(out),
+        "cloud": lambda told: call(*asked, cloud, told) + read_files(out) + read_files(log.parent),
+        "terrain": lambda told: call(*asked, cloud, "--terrain", told) + read_files(out),
+        "overrides": lambda told: call(*asked, cloud, f"--overrides={told}") + read_files(out),
         "evaluate": lambda told: (
-            called("evaluate", str(run), told, "--out", str(out)) + files_in(out)
+            call("evaluate", str(run), told, "--out", str(out)) + read_files(out)
         ),
-        "classify": lambda told: called("classify", told, str(out / "c.laz")),
-        "check": lambda told: called("check", told),
-        "wrong command": lambda told: called(told),
+        "classify": lambda told: call("classify", told, str(out / "c.laz")),
+        "check": lambda told: call("check", told),
+        "wrong command": lambda told: call(told),
         "from Python": api,
     }
 
 
-def leak(text: str) -> str:
+def find_leak(text: str) -> str:
     """Which part of a secret stands in a text, as it is or encoded; empty where none does."""
     for some in (text, unquote(text), unquote(unquote(text))):
         for part in PARTS:
@@ -189,7 +189,7 @@ def leak(text: str) -> str:
     return ""
 
 
-def leaks(
+def find_leaks(
     folder: Path, count: int, seed: int = 0, chosen: int = 100
 ) -> Iterator[tuple[str, str, str]]:
     """Yield (way, address, what was said) of those of `count` addresses whose secret is repeated by
@@ -197,17 +197,17 @@ def leaks(
     """
     write_sample_run(folder / "run")
     (folder / "cloud.xyz").write_text("".join(f"{x} {y} 5.0\n" for x in range(8) for y in range(8)))
-    known = ways(folder)
+    known = list_ways(folder)
     for number in range(seed, seed + count):
         rng = random.Random(number)
-        told = address(rng)
+        told = draw_address(rng)
         for way in rng.sample(sorted(known), min(chosen, len(known))):
             masking.SECRETS = masking.Secrets()
             said = known[way](told)
             for file in (folder / "log", *(folder / "out").rglob("*")):
                 if file.is_file():
                     file.unlink()
-            if leak(said):
+            if find_leak(said):
                 yield way, told, said
 
 
@@ -215,9 +215,9 @@ def main() -> None:
     count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
     logging.captureWarnings(False)
     with tempfile.TemporaryDirectory() as folder:
-        found = list(leaks(Path(folder), count, seed))
+        found = list(find_leaks(Path(folder), count, seed))
     for way, told, said in found[:20]:
-        around = [line for line in said.splitlines() if leak(line)]
+        around = [line for line in said.splitlines() if find_leak(line)]
         print(f"--- {way}\n{told}\n{re.sub(chr(10), ' ', str(around[:3]))[:600]}")
     print(f"{count} addresses, {len(found)} leaks")
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzz.damaged_clouds import damaged_clouds, field_of, sound_clouds
+from fuzz.damaged_clouds import damaged_clouds, read_field, sound_clouds
 from hiproof.errors import InputError
 from hiproof.read.pointcloud import iter_points, read_header
 
@@ -81,7 +81,7 @@ def test_sound_clouds_are_read(sound):
 @given(data=st.data())
 def test_a_changed_byte_before_the_points_is_noticed_or_changes_nothing(name, sound, data):
     file = sound[name]
-    place = data.draw(st.integers(0, int(field_of(file.raw, "data start")) - 1))
+    place = data.draw(st.integers(0, int(read_field(file.raw, "data start")) - 1))
     changed = bytearray(file.raw)
     changed[place] ^= data.draw(st.integers(1, 255))
     answer = file.answer(bytes(changed))

@@ -40,7 +40,7 @@ def cloud(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def alone(cloud, tmp_path_factory):
+def single_result(cloud, tmp_path_factory):
     """What the sound footprint comes to by itself."""
     folder = tmp_path_factory.mktemp("alone")
     footprints = write_footprints(folder / "footprints.geojson", {"sound": SOUND_IN_THE_WORLD})
@@ -50,14 +50,14 @@ def alone(cloud, tmp_path_factory):
 
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 @pytest.mark.parametrize("name", ODD)
-def test_an_odd_footprint_gets_a_status_and_harms_no_other(name, cloud, alone, tmp_path):
+def test_an_odd_footprint_gets_a_status_and_harms_no_other(name, cloud, single_result, tmp_path):
     ring, status = ODD[name]
     footprints = write_beside_a_sound_one(tmp_path / "footprints.geojson", ring)
     summary = reconstruct_area(Request((cloud,), tmp_path / "out", str(footprints)))
     rows = by_id(tmp_path / "out")
     assert summary.exit_code == 0
     assert rows["odd"]["status"] == status
-    assert rows["sound"] == alone
+    assert rows["sound"] == single_result
     if status == "modelled":
         assert "outline of 10001 vertices was simplified" in rows["odd"]["detail"]
 

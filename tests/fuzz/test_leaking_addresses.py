@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from fuzz.leaking_addresses import PARTS, address, leak, leaks
+from fuzz.leaking_addresses import PARTS, draw_address, find_leak, find_leaks
 from hiproof.masking import mask, remember
 
 COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_addresses` tries more
@@ -13,15 +13,15 @@ COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_add
 
 @pytest.mark.filterwarnings("ignore")
 def test_no_command_repeats_a_password(tmp_path):
-    assert list(leaks(tmp_path, COUNT, chosen=1)) == []
+    assert list(find_leaks(tmp_path, COUNT, chosen=1)) == []
 
 
 def test_pieces_that_a_library_may_quote_are_hidden():
     for number in range(200):
-        told = address(random.Random(number))
+        told = draw_address(random.Random(number))
         remember(told)
         for text in (told, repr(told), *re.split(r"[@:/?#&= '\"]", told)):
-            assert leak(mask(f"got: {text!r}; check it")) == "", told
+            assert find_leak(mask(f"got: {text!r}; check it")) == "", told
 
 
 def test_sentences_keep_their_words():

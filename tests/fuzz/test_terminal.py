@@ -12,7 +12,7 @@ import warnings
 import pytest
 
 import planted
-from fuzz.damaged_models import changed, sound_lines
+from fuzz.damaged_models import change, sound_lines
 from hiproof import cli
 from hiproof.city import run as city_run
 from hiproof.city.executors import Processes
@@ -61,7 +61,7 @@ def test_an_interrupted_run_says_what_is_kept_and_goes_on(
     assert "solve 0.0 s" in capsys.readouterr().out
 
 
-def interrupted_in_compiled_code(*_, **__):
+def interrupt_compiled_code(*_, **__):
     """What a call of compiled code does when Ctrl-C comes meanwhile."""
     inner = SystemError("returned a result with an exception set")
     inner.__cause__ = KeyboardInterrupt()
@@ -76,7 +76,7 @@ def test_an_interrupt_within_compiled_code_is_no_failure(
 ):
     command = ("reconstruct", town[0], "--footprints", town[1], "--out", tmp_path / "out")
     with monkeypatch.context() as patch:
-        patch.setattr(f"hiproof.city.{place}", interrupted_in_compiled_code)
+        patch.setattr(f"hiproof.city.{place}", interrupt_compiled_code)
         assert hiproof(*command) == 130
     assert "the same command goes on from there" in capsys.readouterr().err
     assert hiproof(*command) == 0
@@ -85,7 +85,7 @@ def test_an_interrupt_within_compiled_code_is_no_failure(
 def test_an_interrupt_ends_a_build_from_parameters(hiproof, town, tmp_path, monkeypatch):
     out = tmp_path / "out"
     assert hiproof("reconstruct", town[0], "--footprints", town[1], "--out", out) == 0
-    monkeypatch.setattr("hiproof.parametric.run.build", interrupted_in_compiled_code)
+    monkeypatch.setattr("hiproof.parametric.run.build", interrupt_compiled_code)
     assert hiproof("build", out / "parameters.jsonl", "--out", tmp_path / "built") == 130
 
 
@@ -113,7 +113,7 @@ def test_importing_the_package_leaves_interrupts_alone():
     )
 
 
-def interrupted_worker():
+def interrupt_worker():
     os.kill(os.getpid(), signal.SIGINT)
     return "finished"
 
@@ -121,7 +121,7 @@ def interrupted_worker():
 def test_workers_leave_an_interrupt_to_their_parent():
     processes = Processes(1)
     try:
-        ((_, result, error),) = processes.run(interrupted_worker, [()])
+        ((_, result, error),) = processes.run(interrupt_worker, [()])
     finally:
         processes.close()
     assert (result, error) == ("finished", None)
@@ -150,7 +150,7 @@ def test_a_file_that_is_named_like_markup_is_named_as_it_is(hiproof, town, tmp_p
 def test_a_roof_type_that_looks_like_markup_is_shown_as_it_is(tmp_path, capsys):
     lines = sound_lines(tmp_path)
     attributes = (1, "CityObjects", ..., "attributes")
-    marked = changed(lines, *attributes, by=lambda known: known | {"hiproof_roof_type": "[/red]"})
+    marked = change(lines, *attributes, by=lambda known: known | {"hiproof_roof_type": "[/red]"})
     (tmp_path / "buildings.city.jsonl").write_bytes(marked)
     (tmp_path / "points.xyz").write_text("85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n")
     evaluate(tmp_path, [str(tmp_path / "points.xyz")], None, None, None, None)

@@ -25,7 +25,7 @@ TINY = TrainSettings(
 )  # fmt: skip
 
 
-def weights_of(folder):
+def read_weights(folder):
     return torch.load(folder / "checkpoint.pt", weights_only=True)["network"]
 
 
@@ -41,7 +41,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(tmp_path):
         train("simulated", tmp_path / "killed", TINY, report=kill)
     train("simulated", tmp_path / "killed", TINY, report=lines.append)
     assert len(lines) == 3
-    whole, resumed = weights_of(tmp_path / "whole"), weights_of(tmp_path / "killed")
+    whole, resumed = read_weights(tmp_path / "whole"), read_weights(tmp_path / "killed")
     assert all(torch.equal(whole[name], resumed[name]) for name in whole)
 
     card = json.loads((tmp_path / "whole" / "model_card.json").read_text())

@@ -10,7 +10,7 @@ import pytest
 import shapely
 from shapely import affinity
 
-from handmade import RD_ORIGIN, courtyard, modelled, unmodelled
+from handmade import RD_ORIGIN, courtyard, make_building, make_lost_building
 from hiproof.city.solve import make_outcome
 from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
@@ -22,12 +22,12 @@ from hiproof.write import write_all
 from hiproof.write.osm_tags import osm_tags
 from hiproof.write.roof_figures import roof_figures
 from hiproof.write.tables.rows import table_rows
-from roof_zoo import FRAME, KINDS, generated
+from roof_zoo import FRAME, KINDS, generate_roof
 
 SNAPPED_M = 0.05  # composing moves edges by less than this
 
 
-def composed(roof):
+def compose_building(roof):
     """A building as it stands in a national grid."""
     roof = replace(roof, frame=LocalFrame(RD_ORIGIN))
     return Building("a", Status.MODELLED, built=Model(roof, compose(roof, 0.0).move(RD_ORIGIN)))
@@ -40,7 +40,7 @@ def flat(z, *box):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", KINDS)
 def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
-    building = composed(generated(kind, seed))
+    building = compose_building(generate_roof(kind, seed))
     areas = building.compute_visible_areas()
     assert len(areas) == len(building.parts)
     assert shapely.is_valid(areas).all()
@@ -53,7 +53,7 @@ def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["partition", "cross_gables", "steps"])
 def test_where_a_part_shows_none_is_higher(kind, seed):
-    building = composed(generated(kind, seed))
+    building = compose_building(generate_roof(kind, seed))
     roof, rng = building.roof, np.random.default_rng(seed)
     for part, area in zip(roof.parts, building.compute_visible_areas(), strict=True):
         inner = shapely.buffer(shapely.transform(area, roof.frame.to_local), -2 * SNAPPED_M)
@@ -71,7 +71,7 @@ def test_parts_in_one_plane_share_a_surface_by_their_outlines():
         shapely.box(0, 0, 10, 5),
         FRAME,
     )
-    building = composed(roof)
+    building = compose_building(roof)
     assert len(building.solid.select_faces("RoofSurface")) == 1
     assert [area.area for area in building.compute_visible_areas()] == pytest.approx(
         [30.0, 20.0, 0.0]
@@ -90,7 +90,7 @@ def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
     )
     hidden = flat(3.0, 2, 1, 8, 4)
     roof = Roof((flat(2.5, 0, 0, 12, 5), gable, hidden), shapely.box(0, 0, 12, 5), FRAME)
-    building = replace(composed(roof), z_ground=0.0)
+    building = replace(compose_building(roof), z_ground=0.0)
     assert building.type == "gable" and building.model.visible_m2 == pytest.approx(
         (15.0, 45.0, 0.0)
     )
@@ -109,14 +109,16 @@ def test_hidden_parts_do_not_make_a_roof_a_mixed_one(tmp_path):
     gable = Part(
         "gable", (Piece(shapely.box(0, 0, 9, 5), np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])),)
     )
-    building = composed(Roof((flat(3.0, 2, 1, 8, 4), gable), shapely.box(0, 0, 9, 5), FRAME))
+    building = compose_building(
+        Roof((flat(3.0, 2, 1, 8, 4), gable), shapely.box(0, 0, 9, 5), FRAME)
+    )
     write_all(tmp_path, [replace(building, z_ground=0.0)])
     assert "1030</bldg:roofType>" in (tmp_path / "buildings.gml").read_text()
 
 
 def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one():
     roof = Roof((flat(3.0, -5, -5, 20, 20), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
-    (geometry, values), (hidden, of_hidden) = table_rows(composed(roof), None, {}).parts
+    (geometry, values), (hidden, of_hidden) = table_rows(compose_building(roof), None, {}).parts
     x, y, _ = RD_ORIGIN
     assert (
         shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5))
@@ -161,7 +163,9 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
         for box in (first, second)
     ]
     parts = tuple(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)) for box in boxes)
-    building = composed(Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME))
+    building = compose_building(
+        Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME)
+    )
     areas = building.compute_visible_areas()
     assert shapely.is_valid(areas).all() and {area.geom_type for area in areas} == {"Polygon"}
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0], abs=0.1)
@@ -170,14 +174,14 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
 def test_a_part_drawn_with_a_spike_of_no_width_shares_its_surface_all_the_same():
     spiked = shapely.Polygon([(0, 0), (6, 0), (6, 3), (9, 3), (6, 3), (6, 5), (0, 5)])
     parts = (Part("flat", (Piece(spiked, np.array([[0.0, 0.0, 3.0]])),)), flat(3.0, 6, 0, 10, 5))
-    areas = composed(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)).compute_visible_areas()
+    areas = compose_building(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)).compute_visible_areas()
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0])
 
 
 def test_a_part_around_a_yard_has_a_hole():
-    (area,) = modelled(courtyard(), kinds=("flat",)).compute_visible_areas()
+    (area,) = make_building(courtyard(), kinds=("flat",)).compute_visible_areas()
     assert area.area == pytest.approx(84.0) and len(area.interiors) == 1
 
 
 def test_a_building_without_a_model_shows_nothing():
-    assert unmodelled().compute_visible_areas() == []
+    assert make_lost_building().compute_visible_areas() == []

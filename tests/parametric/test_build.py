@@ -143,7 +143,7 @@ def test_numbers_are_what_they_say():
     assert solid.vertices[:, :2].min(axis=0).tolist() == [84994.0, 445996.0]
 
 
-def spoilt(change):
+def spoil(change):
     record = house()
     change(record)
     return record
@@ -200,7 +200,7 @@ BAD = {
 def test_what_is_wrong_is_one_sentence(name):
     change, message = BAD[name]
     with pytest.raises(InputError, match=message) as caught:
-        hiproof.build(spoilt(change))
+        hiproof.build(spoil(change))
     assert str(caught.value).startswith(("expected", "part 0")) and "\n" not in str(caught.value)
 
 
@@ -211,7 +211,7 @@ def test_a_roof_that_does_not_close_is_one_sentence():
 
 
 def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
-    wrong = spoilt(lambda r: r["parts"][0]["parameters"].update(width=-8.0)) | {"id": "wrong"}
+    wrong = spoil(lambda r: r["parts"][0]["parameters"].update(width=-8.0)) | {"id": "wrong"}
     path = write_lines(
         tmp_path / "p.jsonl", house() | {"id": "one"}, wrong, house() | {"id": "two"}
     )
@@ -287,9 +287,9 @@ def test_a_file_is_read_as_it_is_needed(tmp_path):
             next(records)
 
 
-def test_a_runs_own_folder_is_not_built_into(undisturbed):
+def test_a_runs_own_folder_is_not_built_into(reference_run):
     with pytest.raises(HiproofError, match="choose another --out"):
-        build_file(undisturbed / "parameters.jsonl", undisturbed)
+        build_file(reference_run / "parameters.jsonl", reference_run)
 
 
 def test_buildings_may_be_fewer_and_in_another_order(demo_run, tmp_path):

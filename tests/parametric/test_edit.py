@@ -4,7 +4,7 @@ valid solid or one sentence.
 
 import numpy as np
 import pytest
-from benchmarks.edits import generated
+from benchmarks.edits import generate_buildings
 from benchmarks.edits import main as random_edits
 
 import hiproof
@@ -34,7 +34,7 @@ RECOVERED = (
 )
 
 
-def built(roof, id="house"):
+def build_house(roof, id="house"):
     return with_model(hiproof.Building(id, Status.MODELLED, z_ground=0.0), settled_roof(roof))
 
 
@@ -180,8 +180,8 @@ def test_what_cannot_be_is_one_sentence(gable):
 @pytest.mark.parametrize("kind", RECOVERED)
 def test_a_refit_finds_what_was_changed(kind):
     roof = random_building(np.random.default_rng(5), kind).roof
-    house = built(roof)
-    points = sampled(house, np.random.default_rng(6))
+    house = build_house(roof)
+    points = sample_house(house, np.random.default_rng(6))
     name = "height"
     true = house.parts[0].parameters[name]
     changed = house.with_part(
@@ -193,7 +193,7 @@ def test_a_refit_finds_what_was_changed(kind):
     assert found.status is Status.MODELLED and "fitted" in found.detail
 
 
-def sampled(house, rng, noise=0.03):
+def sample_house(house, rng, noise=0.03):
     """Points (n, 3) on the roof of a building, world metres."""
     x0, y0, x1, y1 = house.roof.outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (1500, 2))
@@ -203,14 +203,14 @@ def sampled(house, rng, noise=0.03):
 
 
 def test_a_refit_keeps_what_is_held(gable):
-    points = sampled(gable, np.random.default_rng(1))
+    points = sample_house(gable, np.random.default_rng(1))
     changed = gable.with_part(0, height=2.0)
     assert changed.refit(points, fixed={0: ("height",)}).parts[0].parameters["height"] == 2.0
     assert changed.refit(points).parts[0].parameters["height"] == pytest.approx(3.0, abs=0.02)
 
 
 def test_a_wrong_type_fits_poorly_and_says_so(gable):
-    points = sampled(gable.with_part(0, ridge_height=14.0), np.random.default_rng(2))
+    points = sample_house(gable.with_part(0, ridge_height=14.0), np.random.default_rng(2))
     flat = gable.with_part(0, type="flat").refit(points)
     assert flat.grade is Grade.POOR and "%" in flat.detail
 
@@ -228,4 +228,4 @@ def test_random_edits_are_valid_or_one_sentence():
 
 
 def test_the_benchmarks_buildings_are_valid():
-    assert all(not check_solid(house.solid) for house in generated(6))
+    assert all(not check_solid(house.solid) for house in generate_buildings(6))

@@ -13,7 +13,7 @@ from parametric_house import gable_house
 DEPTH_M, SIDE_M = 2.5, 3.0
 
 
-def rebuilt(house, parts):
+def rebuild(house, parts):
     return build({**building_record(house), "parts": parts})
 
 
@@ -25,7 +25,7 @@ def house():
 @pytest.fixture(scope="module")
 def sunk(house):
     """The house with a recess in the middle of its ridge."""
-    return rebuilt(house, with_recess(building_record(house)["parts"], house.roof, 0))
+    return rebuild(house, with_recess(building_record(house)["parts"], house.roof, 0))
 
 
 def test_a_recess_is_as_deep_as_it_says_and_changes_nothing_beside_it(house, sunk):
@@ -48,7 +48,7 @@ def test_where_a_recess_goes_the_roof_comes_back(house, sunk, change):
     back = there.with_part(1, position=position, rotation=0.0, width=SIDE_M, length=SIDE_M)
     assert not check_solid(there.solid)
     assert back.solid.volume == pytest.approx(sunk.solid.volume, abs=0.01)
-    direct = rebuilt(house, with_recess(building_record(house)["parts"], house.roof, 0)).with_part(
+    direct = rebuild(house, with_recess(building_record(house)["parts"], house.roof, 0)).with_part(
         1, **change
     )
     assert there.solid.volume == pytest.approx(direct.solid.volume, abs=0.01)
@@ -56,7 +56,7 @@ def test_where_a_recess_goes_the_roof_comes_back(house, sunk, change):
 
 def test_a_recess_of_the_same_area_takes_the_same_volume_anywhere_on_a_level_roof(house):
     flat = house.with_part(0, type="flat")
-    sunk = rebuilt(flat, with_recess(building_record(flat)["parts"], flat.roof, 0))
+    sunk = rebuild(flat, with_recess(building_record(flat)["parts"], flat.roof, 0))
     taken = flat.solid.volume - sunk.solid.volume
     moved = sunk.with_part(1, position=[2.5, -1.5, float(sunk.parts[1].translation[2])])
     assert taken == pytest.approx(SIDE_M**2 * DEPTH_M, abs=0.01)
@@ -74,7 +74,7 @@ def test_a_part_that_leaves_nothing_out_stays_as_it_is(house):
 def test_a_recess_beside_the_roof_or_over_all_of_a_part_is_one_sentence(house):
     parts = building_record(house)["parts"]
     with pytest.raises(InputError, match="outside it"):
-        rebuilt(house, with_recess(parts, house.roof, 0, (99.0, 0.0)))
+        rebuild(house, with_recess(parts, house.roof, 0, (99.0, 0.0)))
     small = house.with_part(1, type="flat", width=1.0, length=1.0, position=[0.0, 0.0, 12.0])
     with pytest.raises(InputError, match="delete the part"):
         with_recess(building_record(small)["parts"], small.roof, 0, (0.0, 0.0))

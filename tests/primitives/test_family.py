@@ -26,7 +26,7 @@ SHAPE_NAMES = [name for name, _ in GENERAL_SHAPES.values()]
 each_shape = pytest.mark.parametrize("shape", SHAPE_NAMES)
 
 
-def str_of(shape):
+def name_shape(shape):
     return f"{shape.name}-{len(shape.parameters)}"
 
 
@@ -37,10 +37,10 @@ def members(shape, count=12):
     for seed in range(count):
         rng = np.random.default_rng([seed, SHAPE_NAMES.index(shape)])
         member = member_of_shape(rng, shape, regular=seed % 4 == 1, skewed=seed % 4 == 2)
-        yield with_cants(rng, member) if seed % 4 == 3 and any(member.has) else member
+        yield add_cants(rng, member) if seed % 4 == 3 and any(member.has) else member
 
 
-def with_cants(rng, member, most=3):
+def add_cants(rng, member, most=3):
     """The member with one to `most` planes over walls that cut corners of its rectangle off."""
     count = rng.integers(1, most + 1)
     facing = 0.5 * math.pi * rng.permutation(4)[:count] + rng.uniform(0.3, 1.2, count)
@@ -58,14 +58,14 @@ def with_cants(rng, member, most=3):
     )
 
 
-def over_plan(member):
+def strew_over_plan(member):
     """Places (200, 2) strewn over a member's plan and a little beyond."""
     corners = rectangle_of(member)
     shares = np.random.default_rng(0).uniform(-0.1, 1.1, (200, 2))
     return corners[0] + shares @ np.array([corners[1] - corners[0], corners[3] - corners[0]])
 
 
-def in_one_order(planes):
+def sort_planes(planes):
     return planes[np.lexsort(np.round(planes.T, 6))]
 
 
@@ -73,7 +73,7 @@ def in_one_order(planes):
 def test_planes_follow_from_the_description(shape):
     for member in members(shape):
         planes = compute_planes(member.name, *member.describe())
-        assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
+        assert sort_planes(planes) == pytest.approx(sort_planes(member.planes()), abs=1e-9)
 
 
 @each_shape
@@ -82,7 +82,7 @@ def test_planes_follow_from_the_description_side_by_side(shape):
         parameters, kappa, translation = member.describe(as_catalogue=False)
         if any(member.has):  # a flat roof has no side to be described by
             planes = compute_planes(member.name, parameters, kappa, translation)
-            assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
+            assert sort_planes(planes) == pytest.approx(sort_planes(member.planes()), abs=1e-9)
 
 
 @each_shape
@@ -91,11 +91,11 @@ def test_planes_follow_from_written_parameters_to_a_millimetre(shape):
         parameters, kappa, translation = member.describe()
         written = {name: round(value, 6) for name, value in parameters.items()}
         planes = compute_planes(member.name, written, round(kappa, 6), np.round(translation, 6))
-        xy = over_plan(member)
+        xy = strew_over_plan(member)
         assert lowest_of(planes, xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-3)
 
 
-def short_of_a_run():
+def draw_members_without_run():
     """Members with a slope that runs over nothing: its rectangle ends where it begins."""
     half, inf = np.array([6.0, 4.0]), np.inf
     up_to_the_top = Member(
@@ -133,12 +133,12 @@ def short_of_a_run():
 
 def test_what_runs_over_nothing_is_written_so_that_it_can_be_read():
     """Slopes do not follow from lengths of nothing: such a member is given side by side."""
-    for member in short_of_a_run():
+    for member in draw_members_without_run():
         words, kappa, place = member.describe()
         written = {name: round(value, 6) for name, value in words.items()}
         refuse_no_shape(member.name, written, "part 0")
         planes = compute_planes(member.name, written, kappa, place)
-        at = np.column_stack([over_plan(member), np.ones(200)])
+        at = np.column_stack([strew_over_plan(member), np.ones(200)])
         assert (at @ planes.T).min(axis=1) == pytest.approx(
             (at @ member.planes().T).min(axis=1), abs=1e-3
         )
@@ -147,7 +147,7 @@ def test_what_runs_over_nothing_is_written_so_that_it_can_be_read():
 @each_shape
 def test_turning_the_axes_keeps_surface_plan_and_name(shape):
     for member in members(shape):
-        turned, xy = member, over_plan(member)
+        turned, xy = member, strew_over_plan(member)
         for _ in range(4):
             turned = turned.turn()
             assert lowest_of(turned.planes(), xy) == pytest.approx(
@@ -175,7 +175,7 @@ def test_however_its_axes_were_turned_a_member_is_described_alike(shape):
 def test_a_member_over_its_whole_plan_is_the_lowest_of_its_planes(shape):
     for member in members(shape, 6):
         part = member.part([plan_of(member)])
-        xy = over_plan(member)
+        xy = strew_over_plan(member)
         assert part.type == member.name
         assert part.pieces[0].height_at(xy) == pytest.approx(
             lowest_of(member.planes(), xy), abs=1e-9
@@ -241,7 +241,7 @@ def test_a_shape_of_the_catalogue_is_told_by_its_own_parameters(name):
 
 
 @pytest.mark.parametrize(
-    "shape", [v for p in CATALOGUE.values() if p.is_of_family for v in p.variants], ids=str_of
+    "shape", [v for p in CATALOGUE.values() if p.is_of_family for v in p.variants], ids=name_shape
 )
 def test_a_member_like_a_shape_is_described_in_its_words(shape):
     """What `fit_roof` and the union call such a roof, and by which parameters, is one thing."""
@@ -268,7 +268,7 @@ def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes
     not.
     """
     member = planted_gable(eaves=(3.0, 3.0 + 1e-4 * (1 - 2 * lower)))
-    changes = several(
+    changes = stack_members(
         [
             replace(member, eaves=member.eaves + change)
             for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])
@@ -284,7 +284,7 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
     member = member_of_shape(np.random.default_rng(3), shape, regular=regular).canonical()
     kind = get(shape) if regular else None
     if not regular and any(member.has):
-        member = with_cants(np.random.default_rng(4), member)
+        member = add_cants(np.random.default_rng(4), member)
     each = [
         replace(
             member,
@@ -298,7 +298,7 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
     looks_alike = member.turn(2).has == member.has  # else it is seen from one side alone
     for kappa in [member.turn(quarters).kappa for quarters in (range(4) if looks_alike else (0,))]:
         together, alone = (
-            several(each).measure_as(kind, kappa),
+            stack_members(each).measure_as(kind, kappa),
             [own.measure_as(kind, kappa) for own in each],
         )
         assert np.array([np.broadcast_to(of, 3) for of in together]) == pytest.approx(
@@ -306,7 +306,7 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
         )
 
 
-def several(members):
+def stack_members(members):
     """Members of one direction as one that is several."""
     arrays = (
         np.stack([getattr(member, of) for member in members], axis=1)
@@ -330,7 +330,7 @@ def test_a_cant_rises_square_from_its_wall(shape):
         member = member_of_shape(rng, shape)
         if not any(member.has):
             continue
-        parameters, kappa, translation = with_cants(rng, member).describe()
+        parameters, kappa, translation = add_cants(rng, member).describe()
         told = [name.split("_")[1] for name in parameters if name.startswith("facing_")]
         planes = read_member(member.name, parameters, kappa, translation).planes()[
             -len(told) - member.has_top :

@@ -37,7 +37,7 @@ def curb():
 
 
 @pytest.fixture(scope="module")
-def scanned():
+def house_and_points():
     """A made-up building of that type and the points on its roof."""
     rng = np.random.default_rng(3)
     building = random_building(rng, NAME)
@@ -46,8 +46,8 @@ def scanned():
 
 
 @pytest.fixture(scope="module")
-def house(scanned):
-    building, points = scanned
+def house(house_and_points):
+    building, points = house_and_points
     return hiproof.reconstruct(points, building.footprint)
 
 
@@ -62,8 +62,8 @@ def test_it_obeys_the_laws_of_all_shapes(curb):
         law(curb)
 
 
-def test_it_is_simulated(scanned, curb):
-    building, points = scanned
+def test_it_is_simulated(house_and_points, curb):
+    building, points = house_and_points
     assert building.type == NAME and set(building.parameters) == set(curb.parameters)
     assert len(points) > 4 * building.outline.area
     _, labels, _ = training_sample(np.random.default_rng(0), ("flat", NAME), density=(5.0, 6.0))
@@ -72,8 +72,8 @@ def test_it_is_simulated(scanned, curb):
 
 @pytest.mark.parametrize("parts", ["one", "compound"])
 @pytest.mark.parametrize("types", [(), (NAME,)])
-def test_it_is_found_as_a_whole_and_as_a_union_of_volumes(scanned, parts, types):
-    building, points = scanned
+def test_it_is_found_as_a_whole_and_as_a_union_of_volumes(house_and_points, parts, types):
+    building, points = house_and_points
     settings = hiproof.Settings.from_dict({"fit": {"parts": parts, "types": list(types)}})
     model = hiproof.reconstruct(points, building.footprint, settings=settings)
     assert [part.type for part in model.parts] == [NAME]
@@ -96,8 +96,8 @@ def test_it_is_built_from_what_is_written(house):
         hiproof.build(record)
 
 
-def test_it_is_edited_and_refitted(house, scanned):
-    _, points = scanned
+def test_it_is_edited_and_refitted(house, house_and_points):
+    _, points = house_and_points
     gable = house.with_part(0, type="gable")
     back = gable.with_part(
         0, type=NAME, ridge_height=house.parts[0].translation[2] + house.roof.frame.origin[2] + 3.0

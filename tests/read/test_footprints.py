@@ -46,7 +46,7 @@ def write(path, geometries, crs="EPSG:28992", **fields):
     return path
 
 
-def shifted(polygon, x):
+def shift(polygon, x):
     return shapely.transform(polygon, lambda xy: xy + [x, 0])
 
 
@@ -59,7 +59,7 @@ def test_examples_in_the_docstrings_run():
 def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
     path = write(
         tmp_path / f"a.{ending}",
-        [SQUARE, shifted(HOLED, 20)],
+        [SQUARE, shift(HOLED, 20)],
         name=np.array(["A", "B"], object),
         floors=np.array([2, 3], np.int32),
         height=np.array([7.5, np.nan]),
@@ -68,7 +68,7 @@ def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
     # FlatGeobuf reorders
     first, second = sorted(read_footprints(path, id_attribute="name"), key=lambda f: f.id)
     assert (first.id, second.id) == ("A", "B")
-    assert first.polygon.equals(SQUARE) and second.polygon.equals(shifted(HOLED, 20))
+    assert first.polygon.equals(SQUARE) and second.polygon.equals(shift(HOLED, 20))
     built = first.attributes.pop("built")
     assert built.startswith("1931-05-17") and first.attributes == {
         "name": "A",
@@ -84,7 +84,7 @@ def test_which_way_rings_go_round_depends_on_no_format(tmp_path, ending):
     """A fit that begins at an edge sees a roof from the other side where its outline goes round the
     other way.
     """
-    path = write(tmp_path / f"a.{ending}", [SQUARE, shapely.reverse(SQUARE), shifted(HOLED, 20)])
+    path = write(tmp_path / f"a.{ending}", [SQUARE, shapely.reverse(SQUARE), shift(HOLED, 20)])
     for footprint in read_footprints(path):
         assert not footprint.polygon.exterior.is_ccw and all(
             hole.is_ccw for hole in footprint.polygon.interiors
@@ -93,7 +93,7 @@ def test_which_way_rings_go_round_depends_on_no_format(tmp_path, ending):
 
 def write_with_gaps(path, **fields):
     """Three squares, of which the second has none of the `fields`."""
-    squares = np.array([shapely.to_wkb(shifted(SQUARE, 20 * i)) for i in range(3)], object)
+    squares = np.array([shapely.to_wkb(shift(SQUARE, 20 * i)) for i in range(3)], object)
     gap = np.array([False, True, False])
     columns = [np.array(["A", "B", "C"], object), *fields.values()]
     pyogrio.raw.write(
@@ -169,8 +169,8 @@ def test_heights_of_the_outline_are_left_out(tmp_path):
 
 
 def test_multipolygons_are_split_and_name_their_feature(tmp_path):
-    both = shapely.MultiPolygon([SQUARE, shifted(HOLED, 20)])
-    path = write(tmp_path / "a.gpkg", [both, shifted(SQUARE, 60)], id=np.array(["M", "N"], object))
+    both = shapely.MultiPolygon([SQUARE, shift(HOLED, 20)])
+    path = write(tmp_path / "a.gpkg", [both, shift(SQUARE, 60)], id=np.array(["M", "N"], object))
     footprints = read_footprints(path)
     assert [f.id for f in footprints] == ["M-1", "M-2", "N"]
     assert (
@@ -205,7 +205,7 @@ def test_footprints_without_a_crs_are_taken_to_be_in_the_clouds(tmp_path):
 
 def test_ids_come_from_a_usual_attribute_without_gaps_or_repeats(tmp_path):
     twins = np.array(["x", "x"], object)
-    geometries = [SQUARE, shifted(SQUARE, 20)]
+    geometries = [SQUARE, shift(SQUARE, 20)]
     path = write(tmp_path / "a.gpkg", geometries, id=twins, Identificatie=np.array([7.0, 9.0]))
     assert [f.id for f in read_footprints(path)] == ["7", "9"]
     for name, ids in (
@@ -223,7 +223,7 @@ def test_ids_come_from_a_usual_attribute_without_gaps_or_repeats(tmp_path):
 def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
     path = write(
         tmp_path / "a.gpkg",
-        [SQUARE, SQUARE.reverse(), shifted(SQUARE, 20)],
+        [SQUARE, SQUARE.reverse(), shift(SQUARE, 20)],
         k=np.array(["x", "x", "x_2"], object),
     )
     with pytest.warns(InputWarning) as caught:
@@ -241,12 +241,12 @@ def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
 def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_not(
     tmp_path, recwarn
 ):
-    ring = shapely.Polygon(shifted(SQUARE, 50).buffer(5).exterior, [shifted(SQUARE, 50).exterior])
-    apart = [SQUARE, shifted(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shifted(SQUARE, 50)]
+    ring = shapely.Polygon(shift(SQUARE, 50).buffer(5).exterior, [shift(SQUARE, 50).exterior])
+    apart = [SQUARE, shift(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shift(SQUARE, 50)]
     read_footprints(write(tmp_path / "a.gpkg", apart))
     assert not recwarn.list
     ids = np.array(["house", "annex", "block"], object)
-    path = write(tmp_path / "b.gpkg", [SQUARE, SQUARE.buffer(-2), shifted(SQUARE, 20)], id=ids)
+    path = write(tmp_path / "b.gpkg", [SQUARE, SQUARE.buffer(-2), shift(SQUARE, 20)], id=ids)
     with pytest.warns(
         InputWarning, match=r"1 footprint on top of a larger one \(annex on house\): models of both"
     ):
@@ -299,7 +299,7 @@ def test_coordinates_that_are_no_numbers_enclose_no_area():
 def test_a_file_of_several_layers_needs_a_name(tmp_path):
     path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
     more = [np.array(["B", "C"], object)]
-    squares = shapely.to_wkb(np.array([shifted(SQUARE, 20), shifted(SQUARE, 40)], object))
+    squares = shapely.to_wkb(np.array([shift(SQUARE, 20), shift(SQUARE, 40)], object))
     pyogrio.raw.write(
         path,
         squares,
@@ -334,28 +334,28 @@ def test_a_table_without_geometry_is_no_layer_to_choose_from(tmp_path):
 
 
 def test_features_of_several_polygons_are_said_once(tmp_path):
-    both = shapely.MultiPolygon([SQUARE, shifted(SQUARE, 20)])
+    both = shapely.MultiPolygon([SQUARE, shift(SQUARE, 20)])
     with pytest.warns(
         InputWarning, match="2 features of several polygons became 4 buildings"
     ) as told:
         read_footprints(
-            write(tmp_path / "a.gpkg", [both, shifted(both, 60)], id=np.array(["M", "N"], object))
+            write(tmp_path / "a.gpkg", [both, shift(both, 60)], id=np.array(["M", "N"], object))
         )
     assert len(told) == 1
 
 
-def moved(xy, source, target):
+def reproject(xy, source, target):
     return np.column_stack(Transformer.from_crs(source, target, always_xy=True).transform(*xy.T))
 
 
 HERE = np.array([[85005.0, 446005.0], [85035.0, 446005.0]])
-IN_UTM = moved(HERE, RD, UTM31)
+IN_UTM = reproject(HERE, RD, UTM31)
 SLIPS = {
     "swapped axes": (HERE[:, ::-1], RD, HERE, RD, "x and y look swapped"),
     "swapped axes of an unknown CRS": (HERE[:, ::-1], None, HERE, None, "x and y look swapped"),
-    "degrees": (moved(HERE, RD, WGS84), None, HERE, RD, "longitude and latitude in degrees"),
+    "degrees": (reproject(HERE, RD, WGS84), None, HERE, RD, "longitude and latitude in degrees"),
     "degrees, latitude first": (
-        moved(HERE, RD, WGS84)[:, ::-1],
+        reproject(HERE, RD, WGS84)[:, ::-1],
         None,
         HERE,
         RD,
@@ -364,14 +364,14 @@ SLIPS = {
     "a cloud in degrees": (
         HERE,
         RD,
-        moved(HERE, RD, WGS84),
+        reproject(HERE, RD, WGS84),
         None,
         "the cloud looks like longitude and latitude",
     ),
     "the wrong label": (HERE, UTM31, HERE, RD, "look like the cloud's EPSG:28992"),
     "a neighbouring zone": (IN_UTM, UTM32, IN_UTM, UTM31, "look like the cloud's EPSG:25831"),
     "two zones off": (
-        moved(IN_UTM, UTM31, UTM32),
+        reproject(IN_UTM, UTM31, UTM32),
         None,
         IN_UTM,
         UTM31,
@@ -380,7 +380,7 @@ SLIPS = {
     "a cloud in the next zone": (
         IN_UTM,
         UTM31,
-        moved(IN_UTM, UTM31, UTM32),
+        reproject(IN_UTM, UTM31, UTM32),
         None,
         "the cloud looks like EPSG:25832",
     ),
@@ -394,7 +394,7 @@ SLIPS = {
 @pytest.mark.parametrize("slip", SLIPS)
 def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     xy, named, cloud_xy, cloud, expected = SLIPS[slip]
-    in_use = xy if named is None or cloud is None else moved(xy, named, cloud)
+    in_use = xy if named is None or cloud is None else reproject(xy, named, cloud)
     footprints = [
         Footprint(str(i), shapely.Point(point).buffer(1e-3)) for i, point in enumerate(in_use)
     ]
@@ -410,7 +410,7 @@ def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     [
         (7415, HERE, None),
         (25831, IN_UTM, None),
-        (25832, moved(IN_UTM, UTM31, UTM32), None),
+        (25832, reproject(IN_UTM, UTM31, UTM32), None),
         (25831, HERE, "far from where EPSG:25831 (ETRS89 / UTM zone 31N) is used (0 to 6 E, 37 to"),
         (2263, HERE, "far from where EPSG:2263"),
         (25831, HERE * 1e7, "nowhere on Earth"),
@@ -447,7 +447,7 @@ def test_what_names_no_crs_and_counts_in_degrees_is_refused():
 def test_footprints_in_degrees_that_name_no_crs_are_refused_although_none_has_an_area(
     tmp_path, target
 ):
-    in_degrees = shapely.transform(SQUARE, lambda xy: moved(xy, RD, WGS84))
+    in_degrees = shapely.transform(SQUARE, lambda xy: reproject(xy, RD, WGS84))
     path = write(tmp_path / "a.gpkg", [in_degrees, None], crs=None)
     with pytest.raises(
         InputError, match=r"names no CRS, in metres, got .* look like degrees; name their CRS"

@@ -17,7 +17,7 @@ from read.test_pointcloud import write_las
 POINTS = 4000
 
 
-def cell_of(x, y, root, level):
+def find_cell(x, y, root, level):
     """Number of the cell of a level that holds (x, y), halving in float32."""
     (x0, y0), (x1, y1) = np.float32(root[:2]), np.float32(root[2:])
     index = 0
@@ -37,7 +37,7 @@ def write_lax(path, xyz, level=4, coarse_west=True, gap=3):
     cells = {}
     for i, (x, y, _) in enumerate(xyz):
         cells.setdefault(
-            cell_of(x, y, root, level - 2 if coarse_west and x < middle else level), []
+            find_cell(x, y, root, level - 2 if coarse_west and x < middle else level), []
         ).append(i)
     words = [
         struct.pack(
@@ -77,7 +77,7 @@ def swath(seed=0):
 
 
 @pytest.fixture
-def indexed(tmp_path):
+def indexed_cloud(tmp_path):
     xyz = swath()
     path = write_las(tmp_path / "a.laz", xyz)
     write_lax(tmp_path / "a.lax", xyz)
@@ -85,9 +85,9 @@ def indexed(tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_runs_hold_every_point_of_any_boxes(indexed, seed, monkeypatch):
+def test_the_runs_hold_every_point_of_any_boxes(indexed_cloud, seed, monkeypatch):
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 10)
-    path, xyz = indexed
+    path, xyz = indexed_cloud
     rng = np.random.default_rng(seed)
     low = rng.uniform((610990, 6269990), (611380, 6270280), (3, 2))
     boxes = np.hstack([low, low + rng.uniform(1, 60, (3, 2))])
@@ -100,8 +100,8 @@ def test_the_runs_hold_every_point_of_any_boxes(indexed, seed, monkeypatch):
     assert len(read) == (runs[:, 1] - runs[:, 0]).sum() < POINTS
 
 
-def test_boxes_away_from_all_points_read_nothing(indexed):
-    path, _ = indexed
+def test_boxes_away_from_all_points_read_nothing(indexed_cloud):
+    path, _ = indexed_cloud
     runs = read_lax(path).find_runs(np.array([[0.0, 0.0, 9.0, 9.0]]))
     assert len(runs) == 0 and list(iter_points(path, runs=runs)) == []
 
@@ -120,8 +120,8 @@ def test_a_file_without_index_has_none(tmp_path):
 @pytest.mark.parametrize(
     "harm", ["cut off", "of another file", "something else", "empty", "64 bits"]
 )
-def test_an_index_that_cannot_be_used_is_left_aside(indexed, harm):
-    path, xyz = indexed
+def test_an_index_that_cannot_be_used_is_left_aside(indexed_cloud, harm):
+    path, xyz = indexed_cloud
     if harm == "of another file":
         write_las(path, xyz[:-1])
     beside = path.with_suffix(".lax")

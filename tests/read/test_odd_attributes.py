@@ -33,7 +33,7 @@ def write_geojson(path, **columns):
     return path
 
 
-def values_of(path, name, **options):
+def read_values(path, name, **options):
     """The attribute of each footprint, and the remarks that reading them made."""
     with pytest.warns(InputWarning) as told:
         footprints = read_footprints(path, **options)
@@ -56,7 +56,7 @@ ODD = {
 def test_one_impossible_date_refuses_no_file(tmp_path, kind):
     dates = ODD[kind]
     path = write_geojson(tmp_path / "a.geojson", built=dates, year=[1999, 2024, 2001, None])
-    found, remarks = values_of(path, "built")
+    found, remarks = read_values(path, "built")
     assert found == dates
     assert len(remarks) == 1 and "read as text" in remarks[0] and remarks[0].endswith(": built")
     years = [footprint.attributes.get("year") for footprint in read_footprints(path)]
@@ -88,7 +88,7 @@ def test_a_date_of_a_shapefile_that_is_none_is_text(tmp_path):
     )
     table = (tmp_path / "a.dbf").read_bytes()
     (tmp_path / "a.dbf").write_bytes(table.replace(b"19991231", b"19500000", 1))
-    assert values_of(path, "built")[0] == ["1950-00-00", "1999-12-31", "1999-12-31", "1999-12-31"]
+    assert read_values(path, "built")[0] == ["1950-00-00", "1999-12-31", "1999-12-31", "1999-12-31"]
 
 
 def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
@@ -110,7 +110,7 @@ def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
         ).fetchall():
             base.execute(f'drop trigger "{trigger}"')
         base.execute("update a set name = cast(x'41ff42' as text) where name = 'b'")
-    found, remarks = values_of(path, "name")
+    found, remarks = read_values(path, "name")
     assert found == ["Straße", "A\ufffdB", "c", "d"] and len(remarks) == 1
 
 
@@ -119,19 +119,19 @@ def test_several_odd_attributes_are_named_in_one_remark(tmp_path):
     path = write_geojson(
         tmp_path / "a.geojson", built=ODD["the year nought"], flags=lists, name=list("abcd")
     )
-    found, remarks = values_of(path, "name")
+    found, remarks = read_values(path, "name")
     assert found == list("abcd") and len(remarks) == 1 and remarks[0].endswith(": built, flags")
 
 
 def test_more_attributes_than_a_geopackage_has_columns_are_told_before_work(recwarn):
-    def with_attributes(count):
+    def write_attributes(count):
         return (Footprint("a", SQUARES[0], {f"a{i}": i for i in range(count)}),)
 
     room = attributes_with_a_column()
     assert 1900 < room < 1998
-    say_if_columns_run_out("f.gpkg", with_attributes(room))
+    say_if_columns_run_out("f.gpkg", write_attributes(room))
     assert not recwarn
     with pytest.warns(
         InputWarning, match=f"has 2,500 attributes; buildings.gpkg holds the first {room:,}"
     ):
-        say_if_columns_run_out("f.gpkg", with_attributes(2500))
+        say_if_columns_run_out("f.gpkg", write_attributes(2500))

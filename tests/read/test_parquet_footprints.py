@@ -12,7 +12,7 @@ from pyproj import CRS
 
 from hiproof.errors import InputError
 from hiproof.read.footprints import footprint_crs, read_footprints
-from range_server import serving
+from range_server import serve
 
 pyarrow = pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
 parquet = pytest.importorskip("pyarrow.parquet")
@@ -24,11 +24,11 @@ HOLED = shapely.Polygon(shapely.box(85000, 446000, 85010, 446010).exterior, [HOL
 SIDES = ("xmin", "ymin", "xmax", "ymax")
 
 
-def shifted(polygon, x):
+def shift(polygon, x):
     return shapely.transform(polygon, lambda xy: xy + [x, 0])
 
 
-SHAPES = [shifted(HOLED, 20 * i) for i in range(9)]
+SHAPES = [shift(HOLED, 20 * i) for i in range(9)]
 IDS = [f"h{i}" for i in range(9)]
 YEARS = [None if i == 4 else 1900 + i for i in range(9)]
 
@@ -163,7 +163,7 @@ def test_only_row_groups_around_a_box_are_fetched(tmp_path):
     wkb = shapely.to_wkb(detailed).tolist()
     path = write(folder / "a.parquet", wkb, covering=boxes(SHAPES), id=IDS)
     box = {"bbox": (85155, 446000, 85161, 446001), "target_crs": RD}
-    with serving(folder, log) as address:
+    with serve(folder, log) as address:
         found = read_footprints(f"{address}/a.parquet", **box)
         with pytest.raises(InputError, match=r"^expected GeoParquet footprints at .+no\.parquet"):
             read_footprints(f"{address}/no.parquet")

@@ -309,7 +309,7 @@ AS_TOLD = {
 """Name and content of files that nobody has to damage."""
 
 
-def damaged(tmp_path, kind):
+def write_damaged(tmp_path, kind):
     """Where a file lies that is wrong in this way; "missing" is none."""
     if kind in AS_TOLD:
         name, content = AS_TOLD[kind]
@@ -383,7 +383,7 @@ BAD = {
 @pytest.mark.parametrize("kind", BAD)
 def test_what_cannot_be_read_gets_one_full_sentence(tmp_path, kind):
     with pytest.raises(InputError, match=BAD[kind]) as caught:
-        read_points(damaged(tmp_path, kind))
+        read_points(write_damaged(tmp_path, kind))
     message = str(caught.value)
     assert message.startswith("expected") and "got" in message and "Traceback" not in message
 

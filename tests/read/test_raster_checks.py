@@ -62,7 +62,7 @@ def write(
     return path
 
 
-def found(path, **asked):
+def read_height(path, **asked):
     return read_terrain(path, **asked).height_at(PLACE)[0]
 
 
@@ -95,7 +95,7 @@ def test_examples_in_the_docstrings_run():
 )
 def test_the_unit_of_the_band_counts(tmp_path, name, metres):
     path = write(tmp_path / "dtm.tif", setup=lambda file: setattr(file, "units", (name,)))
-    assert found(path) == pytest.approx(metres * height(PLACE)[0], abs=1e-9)
+    assert read_height(path) == pytest.approx(metres * height(PLACE)[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["degree", "K", "counts", "percent"])
@@ -111,13 +111,19 @@ def test_a_unit_that_is_no_length_is_refused(tmp_path, name):
     "scale, offset, unit", [(0.1, 0.0, ""), (1.0, 10.0, ""), (0.01, -5.0, "m"), (0.5, 2.0, "ft")]
 )
 def test_scale_and_offset_of_the_band_count(tmp_path, scale, offset, unit):
-    def scaled(file):
+    def set_scale(file):
         file.scales, file.offsets, file.units = (scale,), (offset,), (unit,)
 
     path = write(
-        tmp_path / "dtm.tif", np.full((SIDE, SIDE), -20), dtype="int16", nodata=-32768, setup=scaled
+        tmp_path / "dtm.tif",
+        np.full((SIDE, SIDE), -20),
+        dtype="int16",
+        nodata=-32768,
+        setup=set_scale,
     )
-    assert found(path) == pytest.approx((-20 * scale + offset) * (0.3048 if unit == "ft" else 1.0))
+    assert read_height(path) == pytest.approx(
+        (-20 * scale + offset) * (0.3048 if unit == "ft" else 1.0)
+    )
 
 
 def test_a_scale_of_0_is_refused(tmp_path):
@@ -136,7 +142,7 @@ def test_a_scale_of_0_is_refused(tmp_path):
     ],
 )
 def test_a_raster_lies_where_its_geotransform_says(tmp_path, transform):
-    assert found(write(tmp_path / "dtm.tif", transform=transform)) == pytest.approx(
+    assert read_height(write(tmp_path / "dtm.tif", transform=transform)) == pytest.approx(
         height(PLACE)[0], abs=1e-6
     )
 
@@ -173,7 +179,7 @@ def test_declared_nodata_of_any_type_is_no_height(tmp_path, nodata, dtype):
     assert not model.is_coded_at(xy).any()
 
 
-def half_masked(file):
+def mask_half(file):
     mask = np.full((SIDE, SIDE), 255, np.uint8)
     mask[:, :20] = 0
     file.write_mask(mask)
@@ -186,7 +192,7 @@ def half_transparent(file):
 
 
 @pytest.mark.parametrize(
-    "options", [{"setup": half_masked}, {"bands": 2, "alpha": "yes", "setup": half_transparent}]
+    "options", [{"setup": mask_half}, {"bands": 2, "alpha": "yes", "setup": half_transparent}]
 )
 @pytest.mark.filterwarnings("error::hiproof.errors.InputWarning")
 def test_masked_and_transparent_pixels_are_no_heights(tmp_path, options):
@@ -200,7 +206,7 @@ def test_of_several_bands_the_first_is_taken_and_named(tmp_path):
         tmp_path / "dtm.tif", bands=3, setup=lambda file: file.write(np.zeros((SIDE, SIDE)), 2)
     )
     with pytest.warns(InputWarning, match="has 3 bands; the heights are taken from band 1"):
-        assert found(path) == pytest.approx(height(PLACE)[0])
+        assert read_height(path) == pytest.approx(height(PLACE)[0])
 
 
 def palette(file):
@@ -226,7 +232,7 @@ def test_a_tiny_raster_is_a_level_or_a_slope(tmp_path, side):
     options = {"driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32"}
     with rasterio.open(path, "w", crs="EPSG:28992", transform=transform, **options) as file:
         file.write(np.full((1, side, side), 4.5, "float32"))
-    assert found(path) == 4.5
+    assert read_height(path) == 4.5
 
 
 def test_heights_in_feet_of_the_rasters_crs(tmp_path):
@@ -268,7 +274,7 @@ def test_a_virtual_raster_whose_source_is_missing_says_so_when_it_is_asked(tmp_p
     </SimpleSource></VRTRasterBand>
     </VRTDataset>"""
     (tmp_path / "all.vrt").write_text(text)
-    assert found(tmp_path / "all.vrt") == pytest.approx(height(PLACE)[0])
+    assert read_height(tmp_path / "all.vrt") == pytest.approx(height(PLACE)[0])
     source.unlink()
     with pytest.raises(DamagedRaster, match="expected a complete raster"):
         read_terrain(tmp_path / "all.vrt").knows_any(PLACE)

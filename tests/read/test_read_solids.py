@@ -11,10 +11,10 @@ import pytest
 from hiproof.compose import check_solid, compose
 from hiproof.errors import InputError
 from hiproof.read.solids import read_solids
-from roof_zoo import generated
+from roof_zoo import generate_roof
 
 DEN_HAAG = Path(__file__).parents[2] / "../shared/data/denhaag/DenHaag_01.city.json"
-SOLID = compose(generated("towers", 1), 0.0)
+SOLID = compose(generate_roof("towers", 1), 0.0)
 TRANSFORM = {"scale": [1e-4] * 3, "translate": [85000.0, 446000.0, 0.0]}
 OTHER_SURFACES = [{"type": "RoofSurface"}, {"type": "WallSurface"}, {"type": "GroundSurface"}]
 
@@ -90,7 +90,7 @@ def gml(xlinked=True, points="posList"):
     return f"<CityModel {names}><cityObjectMember>{building}</cityObjectMember></CityModel>"
 
 
-def written(folder, name, text):
+def write_text(folder, name, text):
     path = folder / name
     path.write_text(text)
     return path
@@ -118,7 +118,7 @@ FILES = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_solid_comes_back(tmp_path, name):
-    ((found_id, solid),) = read_solids(written(tmp_path, name, FILES[name]))
+    ((found_id, solid),) = read_solids(write_text(tmp_path, name, FILES[name]))
     assert found_id == "house"
     assert check_solid(solid) == ()
     assert solid.volume == pytest.approx(SOLID.volume)
@@ -133,7 +133,7 @@ def test_solid_comes_back(tmp_path, name):
     ("kind", "ids"), [("MultiSurface", 1), ("CompositeSolid", 2), ("MultiSolid", 2)]
 )
 def test_other_geometries_come_out_shell_by_shell(tmp_path, kind, ids):
-    found = list(read_solids(written(tmp_path, "a.city.json", json.dumps(city(kind)))))
+    found = list(read_solids(write_text(tmp_path, "a.city.json", json.dumps(city(kind)))))
     assert [name for name, _ in found] == ["house", "house#2"][:ids]
     assert all(check_solid(solid) == () for _, solid in found)
 
@@ -146,7 +146,7 @@ def test_inner_shell_is_turned_inside_out(tmp_path):
         [[ring[::-1] for ring in face] for face in outer],
     ]
     del model["CityObjects"]["house"]["geometry"][0]["semantics"]
-    found = list(read_solids(written(tmp_path, "a.json", json.dumps(model))))
+    found = list(read_solids(write_text(tmp_path, "a.json", json.dumps(model))))
     assert len(found) == 2 and all(check_solid(solid) == () for _, solid in found)
 
 
@@ -155,7 +155,7 @@ def test_open_ring_is_a_finding(tmp_path):
     start = text.index("<gml:posList>") + len("<gml:posList>")
     stop = text.index("</gml:posList>")
     opened = text[:start] + " ".join(text[start:stop].split()[:-3]) + text[stop:]
-    ((_, solid),) = read_solids(written(tmp_path, "open.gml", opened))
+    ((_, solid),) = read_solids(write_text(tmp_path, "open.gml", opened))
     assert [finding.code for finding in check_solid(solid)] == [103]
 
 
@@ -163,7 +163,7 @@ def test_building_without_solid_gives_its_surfaces(tmp_path):
     text = gml()
     start, stop = text.index("<bldg:lod2Solid>"), text.index("</bldg:lod2Solid>")
     ((name, solid),) = read_solids(
-        written(tmp_path, "surfaces.gml", text[:start] + text[stop + len("</bldg:lod2Solid>") :])
+        write_text(tmp_path, "surfaces.gml", text[:start] + text[stop + len("</bldg:lod2Solid>") :])
     )
     assert name == "house" and check_solid(solid) == ()
 
@@ -189,7 +189,7 @@ BROKEN = {
 def test_broken_file_raises_a_sentence(tmp_path, name):
     text, sentence = BROKEN[name]
     with pytest.raises(InputError, match=sentence):
-        list(read_solids(written(tmp_path, name, text)))
+        list(read_solids(write_text(tmp_path, name, text)))
 
 
 def test_missing_and_binary_files_raise_a_sentence(tmp_path):

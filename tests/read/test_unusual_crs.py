@@ -43,12 +43,12 @@ def local(unit, axes="east,north"):
     )
 
 
-def with_unit(wkt, unit):
+def replace_unit(wkt, unit):
     """UTM with another unit in plan."""
     return wkt.partition('UNIT["metre"')[0] + f'UNIT[{unit}],AXIS["E",EAST],AXIS["N",NORTH]]'
 
 
-def with_heights(plan, unit, direction="UP"):
+def add_heights(plan, unit, direction="UP"):
     vertical = f'VERT_CS["h",VERT_DATUM["x",2005],UNIT[{unit}],AXIS["H",{direction}]]'
     return f'COMPD_CS["both",{plan},{vertical}]'
 
@@ -87,7 +87,7 @@ UNDERSTOOD = {
         US_FOOT,
     ),
     "a projection nobody knows": (
-        with_unit(UTM, f'"foot",{FOOT}').replace("Transverse_Mercator", "Mine"),
+        replace_unit(UTM, f'"foot",{FOOT}').replace("Transverse_Mercator", "Mine"),
         FOOT,
         FOOT,
     ),
@@ -117,7 +117,7 @@ LOCAL = {
         1.0,
     ),
     "with heights": (
-        with_heights('LOCAL_CS["site",UNIT["foot",0.3048]]', f'"US survey foot",{US_FOOT}'),
+        add_heights('LOCAL_CS["site",UNIT["foot",0.3048]]', f'"US survey foot",{US_FOOT}'),
         FOOT,
         US_FOOT,
     ),
@@ -145,12 +145,12 @@ REFUSED = {
         "depths",
     ),
     "units of 1e-300 m": ("+proj=utm +zone=33 +datum=WGS84 +to_meter=1e-300", "1e-300"),
-    "units of nothing": (with_unit(UTM, '"unknown",0'), "unit of length"),
-    "units below nothing": (with_unit(UTM, '"metre",-1'), "unit of length"),
+    "units of nothing": (replace_unit(UTM, '"unknown",0'), "unit of length"),
+    "units below nothing": (replace_unit(UTM, '"metre",-1'), "unit of length"),
     "a local one in parsecs": ('LOCAL_CS["far",UNIT["parsec",3.08e16]]', "unit of length"),
-    "a plan in degrees": (with_unit(UTM, '"degree",0.0174532925199433'), "degree"),
-    "heights in degrees": (with_heights(UTM, '"degree",0.0174532925199433'), "degree"),
-    "heights in nothing": (with_heights(UTM, '"unknown",0'), "unit of length"),
+    "a plan in degrees": (replace_unit(UTM, '"degree",0.0174532925199433'), "degree"),
+    "heights in degrees": (add_heights(UTM, '"degree",0.0174532925199433'), "degree"),
+    "heights in nothing": (add_heights(UTM, '"unknown",0'), "unit of length"),
     "two units": (
         'ENGCRS["s",EDATUM["P1"],CS[Cartesian,2],AXIS["x",east,LENGTHUNIT["foot",0.3048]],'
         'AXIS["y",north,LENGTHUNIT["metre",1]]]',
@@ -405,7 +405,7 @@ def test_footprints_that_PROJ_cannot_move_are_refused_in_one_sentence(tmp_path, 
         read_footprints(path, target_crs="EPSG:28992")
 
 
-def frame_of(folder, record, footprints=None, **read):
+def find_frame(folder, record, footprints=None, **read):
     crs_through_a_file(folder, record, (34737, CITATION))
     cloud, footprints = str(folder / "a.las"), footprints and str(footprints)
     settings = Settings.from_dict({"read": read})
@@ -421,28 +421,28 @@ OWN_METRES = (34735, directory(*OWN, *short(k3076=9001, k4096=5703)))
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 def test_a_local_cloud_takes_its_place_from_the_footprints_and_keeps_its_heights(tmp_path):
     path = write_footprints(tmp_path / "f.gpkg", "EPSG:32633")
-    frame = frame_of(tmp_path, OWN_METRES, path)
+    frame = find_frame(tmp_path, OWN_METRES, path)
     assert (
         frame.crs.sub_crs_list[0].to_epsg() == 32633 and vertical_crs(frame.crs).to_epsg() == 5703
     )
-    alone = frame_of(tmp_path, OWN_FEET)
+    alone = find_frame(tmp_path, OWN_FEET)
     assert (alone.units.plan, alone.units.height) == pytest.approx((US_FOOT, 1.0))
-    heights = frame_of(tmp_path, (34735, directory(*short(k4099=9003))), path)
+    heights = find_frame(tmp_path, (34735, directory(*short(k4099=9003))), path)
     assert (heights.units.plan, heights.units.height) == pytest.approx((1.0, US_FOOT))
-    assert frame_of(tmp_path, (34735, directory(*short(k4099=9001)))).crs is None
+    assert find_frame(tmp_path, (34735, directory(*short(k4099=9001)))).crs is None
 
 
 def test_clouds_and_footprints_in_two_units_and_one_unknown_place_are_refused(tmp_path):
     path = write_footprints(tmp_path / "f.gpkg", "EPSG:32633")
     with pytest.raises(InputError, match="say with --crs in which the clouds are"):
-        frame_of(tmp_path, OWN_FEET, path)
+        find_frame(tmp_path, OWN_FEET, path)
     with pytest.raises(InputError, match="heights alone"):
-        frame_of(tmp_path, (34735, directory(*short(k4099=9003))))
+        find_frame(tmp_path, (34735, directory(*short(k4099=9003))))
 
 
 def test_what_is_local_is_said(tmp_path):
     with pytest.warns(InputWarning, match="names a local CRS, NAD83 / Texas Central"):
-        frame_of(tmp_path, OWN_FEET)
+        find_frame(tmp_path, OWN_FEET)
 
 
 @pytest.mark.parametrize(

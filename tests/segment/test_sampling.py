@@ -20,26 +20,26 @@ LAYOUT = Layout(points=COUNT, levels=LEVELS, neighbours=GROUP)
 
 
 def some_cloud(seed=0, count=200):
-    return centred(training_sample(np.random.default_rng(seed))[0][:count])
+    return centre(training_sample(np.random.default_rng(seed))[0][:count])
 
 
-def centred(xyz):
+def centre(xyz):
     return np.ascontiguousarray(xyz - xyz.mean(axis=0))
 
 
-def turned(xyz, angle):
+def turn(xyz, angle):
     c, s = np.cos(angle), np.sin(angle)
     return xyz @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def distances(a, b):
+def compute_distances(a, b):
     return np.sqrt(((a[:, None] - b) ** 2).sum(axis=2))
 
 
 def slow_farthest_points(xyz, count):
     chosen = [int(np.argmax(((xyz - xyz.mean(axis=0)) ** 2).sum(axis=1)))]
     while len(chosen) < count:
-        chosen.append(int(np.argmax(distances(xyz, xyz[chosen]).min(axis=1))))
+        chosen.append(int(np.argmax(compute_distances(xyz, xyz[chosen]).min(axis=1))))
     return chosen
 
 
@@ -47,7 +47,7 @@ def slow_surface(xyz, i):
     """Normal, roughness, convexity and offset over reach of point `i`, by the eigenvectors of its
     neighbours.
     """
-    away = distances(xyz[i : i + 1], xyz)[0]
+    away = compute_distances(xyz[i : i + 1], xyz)[0]
     nearest = np.argsort(away)[:SURFACE_NEIGHBOURS]
     mean = xyz[nearest].mean(axis=0)
     values, vectors = np.linalg.eigh(np.cov(xyz[nearest].T, bias=True))
@@ -81,7 +81,9 @@ def slow_groups(xyz, centres, sources, count, radius):
     """Sorted distances of the nearest `count` within `radius`, the nearest repeated where there are
     fewer.
     """
-    away = np.sort(distances(xyz[np.arange(centres) % len(xyz)], xyz[:sources]), axis=1)[:, :count]
+    away = np.sort(compute_distances(xyz[np.arange(centres) % len(xyz)], xyz[:sources]), axis=1)[
+        :, :count
+    ]
     away = np.pad(away, ((0, 0), (0, count - away.shape[1])), constant_values=np.inf)
     return np.where(away <= radius, away, away[:, :1])
 
@@ -92,7 +94,7 @@ def test_neighbourhoods_equal_the_slow_oracle(count):
     order, _, groups, radii, ups, weights = arrange_cloud(xyz, COUNT, *LEVELS, GROUP)
     found, chosen = len(order), xyz[order]
     for above, level, index, radius in zip((COUNT, *LEVELS), LEVELS, groups, radii, strict=False):
-        cover = distances(xyz, chosen[:level]).min(axis=1).max()
+        cover = compute_distances(xyz, chosen[:level]).min(axis=1).max()
         assert radius == pytest.approx(BALL_FACTOR * max(cover, 1e-3), rel=1e-5)
         centres = chosen[np.arange(level) % found]
         told = np.sqrt(((chosen[index] - centres[:, None]) ** 2).sum(axis=2))
@@ -157,7 +159,7 @@ def test_a_tilted_plane_has_its_normal_everywhere_and_falls_along_an_axis():
 @pytest.mark.parametrize("angle", [0.3, 1.9, -2.5, np.pi / 2, np.pi])
 def test_features_do_not_change_when_the_points_turn(angle):
     xyz = some_cloud(4, 400)
-    before, after = arrange(xyz, LAYOUT), arrange(turned(xyz, angle), LAYOUT)
+    before, after = arrange(xyz, LAYOUT), arrange(turn(xyz, angle), LAYOUT)
     np.testing.assert_array_equal(before.select, after.select)
     np.testing.assert_allclose(before.features, after.features, atol=1e-4)
 
@@ -167,7 +169,7 @@ def test_the_first_axis_is_the_long_one():
     xy = rng.uniform((0, 0), (14, 6), (300, 2))
     gable = np.column_stack([xy, 3 - 0.6 * abs(xy[:, 1] - 3)])
     for angle in (0.0, 0.7, 2.0):
-        spread = arrange(turned(gable, angle), LAYOUT).features[:, :2].std(axis=0)
+        spread = arrange(turn(gable, angle), LAYOUT).features[:, :2].std(axis=0)
         assert spread[0] > 1.5 * spread[1]
 
 

@@ -18,7 +18,7 @@ REAL_ROOFS = Path(__file__).parents[2] / ".." / "shared" / "data" / "roofn3d" / 
 AS_GABLE = {"asymmetric_gable": "gable"}
 
 
-def turned(xyz, angle):
+def turn(xyz, angle):
     c, s = np.cos(angle), np.sin(angle)
     return xyz @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -60,7 +60,7 @@ def test_simulated_roofs_are_recognised_and_freed_of_what_is_no_roof():
 def test_turning_about_z_changes_nothing(angle):
     for seed in range(3):
         points, _, _ = cloud(seed)
-        before, after = segment(points), segment(turned(points, angle))
+        before, after = segment(points), segment(turn(points, angle))
         np.testing.assert_allclose(
             list(after.types.values()), list(before.types.values()), atol=1e-3
         )

@@ -16,7 +16,7 @@ from hiproof.settings import Settings
 from hiproof.simulate import training_sample
 
 
-def written_cloud(path, seed, shift=(85_000.0, 446_000.0, 10.0)):
+def write_cloud(path, seed, shift=(85_000.0, 446_000.0, 10.0)):
     points = np.round(training_sample(np.random.default_rng(seed))[0] + shift, 3)
     np.savetxt(path, points, fmt="%.3f")
     return points
@@ -24,7 +24,7 @@ def written_cloud(path, seed, shift=(85_000.0, 446_000.0, 10.0)):
 
 def test_points_and_table_say_what_segment_says(tmp_path):
     clouds = [tmp_path / "a.xyz", tmp_path / "b.xyz"]
-    points = [written_cloud(path, seed) for seed, path in enumerate(clouds)]
+    points = [write_cloud(path, seed) for seed, path in enumerate(clouds)]
     out = tmp_path / "labelled.laz"
     assert segment_files(clouds, out, Settings()) == {}
     las = laspy.read(out)
@@ -38,7 +38,7 @@ def test_points_and_table_say_what_segment_says(tmp_path):
 
 
 def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path):
-    written_cloud(tmp_path / "good.xyz", 1)
+    write_cloud(tmp_path / "good.xyz", 1)
     np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
     app = typer.Typer()
     app.command()(command)

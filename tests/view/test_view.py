@@ -120,7 +120,7 @@ def answer(port, path, host=None):
     return response.status, response.read()
 
 
-def document_of(page, folder, serving, profile):
+def render_document(page, folder, serving, profile):
     """The page over the tiles in `folder` after its scripts ran, as text."""
     port = serving(LoopbackServer(partial(ViewHandler, directory=str(folder), page=page)))
     command = [
@@ -143,7 +143,7 @@ def document_of(page, folder, serving, profile):
 @needs_browser
 def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving, tmp_path):
     page = render_page("a <run>").replace("</body>", ACT + "</body>")
-    text = document_of(page, tiles, serving, tmp_path / "profile")
+    text = render_document(page, tiles, serving, tmp_path / "profile")
     said = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
     assert said, f"the page's scripts did not run to their end: {text[-2000:]}"
     say = json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
@@ -169,10 +169,10 @@ def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
         render_page("run").replace("</body>", UNTIL_SETTLED + "</body>"),
         tmp_path / "broken",
     )
-    text = document_of(page, folder, serving, tmp_path / "first")
+    text = render_document(page, folder, serving, tmp_path / "first")
     assert "Some tiles cannot be read (tiles/r.glb: 404)" in text
     (folder / "tileset.json").unlink()
-    assert "is hiproof view still running" in document_of(
+    assert "is hiproof view still running" in render_document(
         page, folder, serving, tmp_path / "second"
     )
 
@@ -225,7 +225,7 @@ def refuse_writing_below(folder, monkeypatch):
     """Make `folder` part of a read-only file system, as far as our writers see."""
     read_only = OSError(errno.EROFS, os.strerror(errno.EROFS))
 
-    def refusing(function):
+    def make_refusing(function):
         def call(path, *args, **named):
             if Path(path).is_relative_to(folder):
                 raise read_only
@@ -234,15 +234,15 @@ def refuse_writing_below(folder, monkeypatch):
         return call
 
     for name in ("mkdir", "unlink", "rename"):
-        monkeypatch.setattr(Path, name, refusing(getattr(Path, name)))
+        monkeypatch.setattr(Path, name, make_refusing(getattr(Path, name)))
     opened = files.OutputFile.__init__
     monkeypatch.setattr(
         files.OutputFile,
         "__init__",
-        lambda file, hidden, path: refusing(opened_at)(hidden, file, path),
+        lambda file, hidden, path: make_refusing(open_at)(hidden, file, path),
     )
 
-    def opened_at(hidden, file, path):
+    def open_at(hidden, file, path):
         opened(file, hidden, path)
 
 

@@ -6,7 +6,7 @@ import json
 import re
 from pathlib import Path
 
-from handmade import gable_house, modelled, unmodelled
+from handmade import gable_house, make_building, make_lost_building
 from hiproof.cli.attributes import attributes as print_attributes
 from hiproof.evaluate.evaluation import BuildingFigures, Comparison
 from hiproof.frames import METRES, Units
@@ -55,7 +55,7 @@ def test_everything_is_explained():
 
 def test_buildings_have_the_attributes_declared():
     feet = Units(0.3048, 0.3048, "foot", "foot")
-    for building in (modelled(gable_house()), unmodelled()):
+    for building in (make_building(gable_house()), make_lost_building()):
         found = building_attributes(building, measure_figures(building), units=feet)
         own = set(found) - set(building.attributes)
         assert own == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
@@ -64,20 +64,20 @@ def test_buildings_have_the_attributes_declared():
         ):
             value = found[prefix + attribute.name]
             assert value is None or isinstance(value, KINDS[attribute.kind]), attribute.name
-    assert OWN + "units" not in building_attributes(unmodelled(), None, units=METRES)
+    assert OWN + "units" not in building_attributes(make_lost_building(), None, units=METRES)
 
 
 def test_validity_stands_under_our_own_name_only():
     attributes = building_attributes(
-        modelled(gable_house()), measure_figures(modelled(gable_house()))
+        make_building(gable_house()), measure_figures(make_building(gable_house()))
     )
     assert attributes["hiproof_iso19107_lod22"] == "[]"
-    assert building_attributes(unmodelled())["hiproof_iso19107_lod22"] is None
+    assert building_attributes(make_lost_building())["hiproof_iso19107_lod22"] is None
     assert not any("val3dity" in name for name in attributes)
 
 
 def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
-    write_all(tmp_path, [modelled(gable_house())])
+    write_all(tmp_path, [make_building(gable_house())])
     feature = json.loads((tmp_path / "buildings.city.jsonl").read_text().splitlines()[1])
     (city_object,) = feature["CityObjects"].values()
     surfaces = [
@@ -87,7 +87,7 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
         for s in g["semantics"]["surfaces"]
     ]
     assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
-    record = building_record(modelled(gable_house()))
+    record = building_record(make_building(gable_house()))
     assert list(record) == names(PARAMETERS)
     assert list(record["parts"][0]) == names(PART)
     assert list(head_record(FileHead())) == names(HEAD)

@@ -7,7 +7,7 @@ import pyogrio
 import pytest
 import shapely
 
-from handmade import courtyard, gable_house, modelled, unmodelled
+from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.errors import InputError
 from hiproof.write.tables.geopackage import LAYERS, write_attributes
 from hiproof.write.tables.geoparquet import GeoParquetWriter
@@ -15,9 +15,9 @@ from hiproof.write.tables.geoparquet import GeoParquetWriter
 
 def street():
     attributes = {"year": 1905, "name": "Oude Kerk", "listed": True}
-    yield modelled(gable_house(), attributes=attributes)
-    yield modelled(courtyard(), id="block", attributes={"year": 1999.5})
-    yield unmodelled()
+    yield make_building(gable_house(), attributes=attributes)
+    yield make_building(courtyard(), id="block", attributes={"year": 1999.5})
+    yield make_lost_building()
 
 
 @pytest.mark.parametrize("layer", LAYERS)
@@ -42,7 +42,7 @@ def test_the_same_rows_as_the_geopackage(tmp_path, layer):
 def test_an_attribute_called_geometry_stands_beside_the_outline(tmp_path):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
     with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415") as writer:
-        writer.add(modelled(gable_house(), attributes={"geometry": "poly", "Geometry": 1}))
+        writer.add(make_building(gable_house(), attributes={"geometry": "poly", "Geometry": 1}))
     (row,) = pq.read_table(tmp_path / "b.parquet").to_pylist()
     assert (row["geometry_2"], row["Geometry_3"]) == ("poly", 1)
     assert shapely.from_wkb(row["geometry"]).area == pytest.approx(96.0)

@@ -12,7 +12,7 @@ import pytest
 import shapely
 from lxml import etree
 
-from handmade import RD_ORIGIN, gable_house, modelled, unmodelled
+from handmade import RD_ORIGIN, gable_house, make_building, make_lost_building
 from hiproof.compose import check_solid, compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
@@ -78,7 +78,7 @@ def gml(tmp_path, buildings, write):
     return etree.parse(tmp_path / "a.gml").getroot()
 
 
-def found(root, path):
+def find(root, path):
     return root.xpath(path, namespaces=NAMESPACES)
 
 
@@ -97,7 +97,7 @@ def lods(city_object):
     "write", [WriteSettings(), WHOLE, IN_PARTS], ids=["default", "whole", "parts"]
 )
 def test_all_that_is_written_is_valid(tmp_path, write):
-    buildings = [terrace(), modelled(gable_house(), "house"), unmodelled()]
+    buildings = [terrace(), make_building(gable_house(), "house"), make_lost_building()]
     gml(tmp_path, buildings, write)
     for name in ("a.city.jsonl", "a.city.json"):
         write_cityjson(tmp_path / name, buildings, "EPSG:7415", write=write)
@@ -111,7 +111,7 @@ def test_all_that_is_written_is_valid(tmp_path, write):
 )
 def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, low, high):
     root = gml(tmp_path, [replace(terrace(), shift=shift)], WHOLE)
-    corners = [np.array(text.split(), float)[:2] for text in found(root, "//gml:Envelope/*/text()")]
+    corners = [np.array(text.split(), float)[:2] for text in find(root, "//gml:Envelope/*/text()")]
     np.testing.assert_allclose(corners, RD_ORIGIN[:2] + np.array([low, high]))
 
 
@@ -119,7 +119,7 @@ def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, low, hig
 def test_citygml_stays_within_its_schema(tmp_path, write):
     if not SCHEMA.exists():
         pytest.skip("needs the schemas of CityGML 2.0 in ../shared/schemas")
-    root = gml(tmp_path, [terrace(), unmodelled()], write)
+    root = gml(tmp_path, [terrace(), make_lost_building()], write)
     etree.XMLSchema(etree.parse(SCHEMA)).assertValid(root.getroottree())
 
 
@@ -145,9 +145,9 @@ def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):
 def test_citygml_has_each_level_in_its_property(tmp_path):
     root = gml(tmp_path, [terrace()], WHOLE)
     for name in ("lod0FootPrint", "lod0RoofEdge", "lod1Solid", "lod2Solid"):
-        assert len(found(root, f"//bldg:Building/bldg:{name}")) == 1
+        assert len(find(root, f"//bldg:Building/bldg:{name}")) == 1
     heights = [
-        found(root, f"//bldg:{name}//gml:posList/text()")[0].split()[2::3]
+        find(root, f"//bldg:{name}//gml:posList/text()")[0].split()[2::3]
         for name in ("lod0FootPrint", "lod0RoofEdge")
     ]
     assert set(heights[0]) == {"0.0000"} and set(heights[1]) == {
@@ -155,7 +155,7 @@ def test_citygml_has_each_level_in_its_property(tmp_path):
     }
     z = [
         float(z)
-        for text in found(root, "//bldg:lod1Solid//gml:posList/text()")
+        for text in find(root, "//bldg:lod1Solid//gml:posList/text()")
         for z in text.split()[2::3]
     ]
     # the finer LoD1: the two blocks' tops
@@ -189,7 +189,7 @@ def test_building_parts_have_solids_types_heights_and_parameters(tmp_path):
         4.0,
     )
     root = gml(tmp_path, [terrace()], IN_PARTS)
-    parts = found(root, "//bldg:consistsOfBuildingPart/bldg:BuildingPart")
+    parts = find(root, "//bldg:consistsOfBuildingPart/bldg:BuildingPart")
     assert [part.xpath("bldg:roofType/text()", namespaces=NAMESPACES) for part in parts] == [
         ["3100"],
         ["1000"],
@@ -198,18 +198,18 @@ def test_building_parts_have_solids_types_heights_and_parameters(tmp_path):
         ["6.0000"],
         ["3.0000"],
     ]
-    assert set(found(root, "//bldg:roofType/@codeSpace")) == {CODE_SPACES["adv"]}
-    assert found(
+    assert set(find(root, "//bldg:roofType/@codeSpace")) == {CODE_SPACES["adv"]}
+    assert find(
         parts[0], "gen:genericAttributeSet/gen:doubleAttribute[@name='width']/gen:value/text()"
     ) == ["8.0"]
-    ids = found(root, "//@gml:id")
+    ids = find(root, "//@gml:id")
     assert len(set(ids)) == len(ids)
 
 
 @pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])
 def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, write):
     building = terrace()
-    objects(tmp_path, [building, modelled(gable_house(), "house")], write)
+    objects(tmp_path, [building, make_building(gable_house(), "house")], write)
     model, house = read_models(tmp_path / "a.city.jsonl")
     assert (model.id, house.id) == ("terrace", "house")
     assert check_solid(model.solid, 0.01) == () and model.solid.volume == pytest.approx(
@@ -242,8 +242,8 @@ def test_a_files_head_says_how_it_is_drawn_and_a_build_obeys_it_or_options(tmp_p
 @pytest.mark.parametrize("write", [WriteSettings(), WHOLE], ids=["default", "all levels"])
 def test_gdal_reads_a_building_as_its_surfaces(tmp_path, write):
     building = terrace()
-    root = gml(tmp_path, [building, modelled(gable_house(), "house")], write)
-    assert len(found(root, "//bldg:lod1TerrainIntersection")) == 2
+    root = gml(tmp_path, [building, make_building(gable_house(), "house")], write)
+    assert len(find(root, "//bldg:lod1TerrainIntersection")) == 2
     assert pyogrio.read_info(tmp_path / "a.gml")["geometry_type"] == "MultiPolygon Z"
     _, _, shapes, _ = pyogrio.raw.read(tmp_path / "a.gml")
     faces = shapely.get_parts(shapely.from_wkb(shapes[0]))
@@ -256,16 +256,16 @@ def test_gdal_reads_a_building_as_its_surfaces(tmp_path, write):
 
 def test_without_surfaces_by_value_the_line_is_that_of_the_solids_level(tmp_path):
     root = gml(tmp_path, [terrace()], WriteSettings(gml_surfaces=False))
-    assert len(found(root, "//bldg:lod2TerrainIntersection")) == 1
+    assert len(find(root, "//bldg:lod2TerrainIntersection")) == 1
     assert (
-        found(root, "//bldg:Building/bldg:lod2MultiSurface | //bldg:lod1TerrainIntersection") == []
+        find(root, "//bldg:Building/bldg:lod2MultiSurface | //bldg:lod1TerrainIntersection") == []
     )
     bare = gml(tmp_path, [terrace()], WriteSettings(terrain_intersection=False))
-    assert found(bare, "//bldg:lod1TerrainIntersection | //bldg:lod2TerrainIntersection") == []
+    assert find(bare, "//bldg:lod1TerrainIntersection | //bldg:lod2TerrainIntersection") == []
 
 
 def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp_path):
-    write_attributes(tmp_path / "a.gpkg", [terrace(), unmodelled()], "EPSG:7415")
+    write_attributes(tmp_path / "a.gpkg", [terrace(), make_lost_building()], "EPSG:7415")
     with sqlite3.connect(tmp_path / "a.gpkg") as file:
         assert file.execute("pragma user_version").fetchone() == (10200,)
         styles = file.execute(

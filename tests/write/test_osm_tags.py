@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 import hiproof
-from handmade import box, modelled, unmodelled
+from handmade import box, make_building, make_lost_building
 from hiproof.model import ROOF
 from hiproof.primitives import CATALOGUE
 from hiproof.write.attribute_list import Attribute
@@ -41,11 +41,11 @@ DOCUMENTED = {
 NO_TAGS = dict.fromkeys((tag.name for tag in OSM), None)
 
 
-def tags_of(building):
+def make_tags(building):
     return osm_tags(building, roof_figures(building.solid))
 
 
-def turned_house(degrees, type="gable"):
+def make_turned_house(degrees, type="gable"):
     """A house of 12 by 8 m whose length lies `degrees` from east."""
     ring = shapely.affinity.rotate(shapely.box(-6, -4, 6, 4), degrees, origin=(0, 0)).exterior
     part = {
@@ -62,7 +62,7 @@ def turned_house(degrees, type="gable"):
     return house if type == "gable" else house.with_part(0, type=type)
 
 
-def apart(first, second):
+def measure_angle(first, second):
     """The angle between two compass directions."""
     return abs((first - second + 180) % 360 - 180)
 
@@ -74,7 +74,7 @@ def test_every_roof_type_has_a_documented_shape():
 
 @pytest.mark.parametrize("degrees", [0, 35, 90, 200])
 def test_a_gable_is_told_in_degrees_and_metres(degrees):
-    tags = tags_of(turned_house(degrees))
+    tags = make_tags(make_turned_house(degrees))
     assert tags["roof:shape"] == "gabled" and tags["roof:angle"] == pytest.approx(
         math.degrees(math.atan(0.75)), abs=0.01
     )
@@ -83,7 +83,10 @@ def test_a_gable_is_told_in_degrees_and_metres(degrees):
     )
     across = 0 - degrees  # the compass direction across a ridge that lies `degrees` from east
     assert (
-        min(apart(tags["roof:direction"], across), apart(tags["roof:direction"], across + 180))
+        min(
+            measure_angle(tags["roof:direction"], across),
+            measure_angle(tags["roof:direction"], across + 180),
+        )
         < 0.01
     )
 
@@ -91,15 +94,15 @@ def test_a_gable_is_told_in_degrees_and_metres(degrees):
 @pytest.mark.parametrize("name", ONE_ENDED)
 @pytest.mark.parametrize("degrees", [0, 35, 200])
 def test_a_roof_with_one_hipped_end_looks_that_way(name, degrees):
-    house = turned_house(degrees, name)
+    house = make_turned_house(degrees, name)
     figures = roof_figures(house.solid)
     roofs = [i for i, face in enumerate(house.solid.faces) if face.kind == ROOF]
     end = min(roofs, key=lambda i: figures.face_area_m2[i])
-    assert apart(tags_of(house)["roof:direction"], figures.face_azimuth_deg[end]) < 0.01
+    assert measure_angle(make_tags(house)["roof:direction"], figures.face_azimuth_deg[end]) < 0.01
 
 
 def test_a_flat_roof_looks_nowhere():
-    tags = tags_of(modelled(box(), kinds=("flat",)))
+    tags = make_tags(make_building(box(), kinds=("flat",)))
     assert tags == {
         "roof:shape": "flat",
         "roof:height": 0.0,
@@ -111,17 +114,17 @@ def test_a_flat_roof_looks_nowhere():
 
 def test_of_several_parts_the_largest_counts():
     lean_to = {"width": 3, "length": 3, "height": 1}
-    house = turned_house(0).with_part(1, type="monopitch", position=[-4.5, 2.5, 2], **lean_to)
-    assert tags_of(house)["roof:shape"] == "gabled"
+    house = make_turned_house(0).with_part(1, type="monopitch", position=[-4.5, 2.5, 2], **lean_to)
+    assert make_tags(house)["roof:shape"] == "gabled"
 
 
 def test_without_a_model_there_are_no_tags():
-    assert osm_tags(unmodelled(), None) == NO_TAGS
-    assert tags_of(modelled(box(), kinds=("free",)))["roof:shape"] is None
+    assert osm_tags(make_lost_building(), None) == NO_TAGS
+    assert make_tags(make_building(box(), kinds=("free",)))["roof:shape"] is None
 
 
 def test_tags_stand_among_the_attributes_only_where_asked_for():
-    house = modelled(box(), kinds=("flat",), attributes={"height": "tall", "name": "x"})
+    house = make_building(box(), kinds=("flat",), attributes={"height": "tall", "name": "x"})
     figures = roof_figures(house.solid)
     assert building_attributes(house, figures)["height"] == "tall"
     tagged = building_attributes(house, figures, osm=True)

@@ -92,7 +92,7 @@ def test_percentiles_match_a_fine_grid(seed):
     solid = gable_house(width, length, eave, eave + rng.uniform(0.1, 9))
     solid = [solid, hip_house()][seed % 2].move(rng.uniform(-1e6, 1e6, 3) * [1, 1, 1e-3])
     figures = roof_figures(solid)
-    z, area = sampled_roof(solid, 200)
+    z, area = sample_roof(solid, 200)
     order = np.argsort(z)
     share = np.cumsum(area[order]) / area.sum()
     for level, want in ((figures.h_50p, 0.5), (figures.h_70p, 0.7)):
@@ -100,7 +100,7 @@ def test_percentiles_match_a_fine_grid(seed):
     assert figures.plan_area_m2 == pytest.approx(area.sum(), rel=1e-6)
 
 
-def sampled_roof(solid, steps):
+def sample_roof(solid, steps):
     """Slow oracle: heights and areas of many small cells of every roof face."""
     heights, areas = [], []
     for face in solid.select_faces(ROOF):

@@ -8,7 +8,7 @@ import re
 import pytest
 from lxml import etree
 
-from handmade import box, courtyard, gable_house, modelled, unmodelled
+from handmade import box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.write import write_all
 
 CORE = "{http://www.opengis.net/citygml/2.0}"
@@ -54,9 +54,11 @@ def folder(tmp_path_factory):
     """
     place = tmp_path_factory.mktemp("schema")
     solids = {"a": gable_house(), "yard": courtyard(), "1 b/<c>": box()}
-    buildings = [modelled(solid, id) for id, solid in solids.items()]
+    buildings = [make_building(solid, id) for id, solid in solids.items()]
     write_all(
-        place, [*buildings, modelled(box(), "yard"), unmodelled(), unmodelled("ü")], "EPSG:7415"
+        place,
+        [*buildings, make_building(box(), "yard"), make_lost_building(), make_lost_building("ü")],
+        "EPSG:7415",
     )
     return place
 

@@ -58,17 +58,17 @@ def globe():
 
 
 @pytest.fixture(scope="module")
-def tiled(tmp_path_factory):
+def tiled_town(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tiles") / "town.3dtiles"
     assert write_models(folder, town(), "EPSG:7415", GEOID_M, most=120) == 60
     return folder, json.loads((folder / "tileset.json").read_text())
 
 
-def tiles_below(tile, above=()):
+def iterate_tiles(tile, above=()):
     """(tile, those above it) of all tiles."""
     yield tile, above
     for child in tile.get("children", ()):
-        yield from tiles_below(child, (*above, tile))
+        yield from iterate_tiles(child, (*above, tile))
 
 
 def is_inside(xyz, volume, slack=1e-6):
@@ -78,12 +78,12 @@ def is_inside(xyz, volume, slack=1e-6):
     return (np.abs(xyz - middle) <= np.diag(half) + slack).all()
 
 
-def corners_of(volume):
+def compute_corners(volume):
     middle, half = np.array(volume["box"][:3]), np.diag(np.array(volume["box"][3:]).reshape(3, 3))
     return np.array([middle - half, middle + half])
 
 
-def content_of(folder, tile):
+def read_content(folder, tile):
     """Places (n, 3) in the tileset's frame, z up, the building of each and the table's rows."""
     document, binary = parse_glb(folder / tile["content"]["uri"])
     (mesh,) = document["meshes"]
@@ -93,10 +93,10 @@ def content_of(folder, tile):
     places = np.column_stack([x + tx, -(z + tz), y + ty])
     ids = accessor_values(document, binary, primitive["attributes"]["_FEATURE_ID_0"]).astype(int)
     indices = accessor_values(document, binary, primitive["indices"])
-    return places[indices], ids[indices], rows_of(document, binary)
+    return places[indices], ids[indices], read_table_rows(document, binary)
 
 
-def rows_of(document, binary):
+def read_table_rows(document, binary):
     extension = document["extensions"]["EXT_structural_metadata"]
     (table,) = extension["propertyTables"]
     columns = {}
@@ -113,13 +113,13 @@ def rows_of(document, binary):
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def test_every_building_stands_in_one_tile_at_its_place_within_a_centimetre(tiled, globe):
-    folder, tileset = tiled
+def test_every_building_stands_in_one_tile_at_its_place_within_a_centimetre(tiled_town, globe):
+    folder, tileset = tiled_town
     transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
     expected = {model.id: model.solid for model in town()}
     found = []
-    for tile, _ in tiles_below(tileset["root"]):
-        places, ids, rows = content_of(folder, tile)
+    for tile, _ in iterate_tiles(tileset["root"]):
+        places, ids, rows = read_content(folder, tile)
         world = globe.from_earth(places @ transform[:3, :3].T + transform[:3, 3])
         for number, row in enumerate(rows):
             found.append(row["id"])
@@ -137,8 +137,8 @@ def boxes_on_earth(folder):
     """The least and the largest Earth-centred coordinates (2, 3) of every building."""
     tileset, found = json.loads((folder / "tileset.json").read_text()), {}
     transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
-    for tile, _ in tiles_below(tileset["root"]):
-        places, ids, rows = content_of(folder, tile)
+    for tile, _ in iterate_tiles(tileset["root"]):
+        places, ids, rows = read_content(folder, tile)
         earth = places @ transform[:3, :3].T + transform[:3, 3]
         found |= {
             row["id"]: np.array([f(earth[ids == k], axis=0) for f in (np.min, np.max)])
@@ -148,7 +148,7 @@ def boxes_on_earth(folder):
 
 
 @pytest.mark.parametrize("out", ["EPSG:25831", "EPSG:25832", "EPSG:3857"])
-def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled, tmp_path, out):
+def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled_town, tmp_path, out):
     """Whatever the frames of the tilesets, which may lie half a metre apart."""
     way = FileUnits.of("EPSG:7415", out_crs=out).gml
     moved = (
@@ -156,16 +156,16 @@ def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled, tmp_path, o
         for m in town()
     )
     write_models(tmp_path / "there.3dtiles", moved, f"{out}+5709", GEOID_M)
-    here, there = boxes_on_earth(tiled[0]), boxes_on_earth(tmp_path / "there.3dtiles")
+    here, there = boxes_on_earth(tiled_town[0]), boxes_on_earth(tmp_path / "there.3dtiles")
     assert here.keys() == there.keys()
     assert max(np.abs(here[id] - there[id]).max() for id in here) < 0.01
 
 
-def test_attributes_are_those_of_the_building(tiled):
-    folder, tileset = tiled
+def test_attributes_are_those_of_the_building(tiled_town):
+    folder, tileset = tiled_town
     expected = {model.id: (model.roof_type, model.attributes) for model in town()}
-    for tile, _ in tiles_below(tileset["root"]):
-        for row in content_of(folder, tile)[2]:
+    for tile, _ in iterate_tiles(tileset["root"]):
+        for row in read_content(folder, tile)[2]:
             roof_type, told = expected[row["id"]]
             assert row["type"] == roof_type and row["k"] == told["k"]
             assert row["half known"] == (
@@ -191,29 +191,29 @@ def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
     }
 
 
-def test_boxes_hold_what_is_drawn_in_them_and_below(tiled):
-    folder, tileset = tiled
-    for tile, above in tiles_below(tileset["root"]):
-        places, _, _ = content_of(folder, tile)
+def test_boxes_hold_what_is_drawn_in_them_and_below(tiled_town):
+    folder, tileset = tiled_town
+    for tile, above in iterate_tiles(tileset["root"]):
+        places, _, _ = read_content(folder, tile)
         assert is_inside(places, tile["content"]["boundingVolume"])
         for outer in (tile, *above):
             assert is_inside(places, outer["boundingVolume"])
-            assert is_inside(corners_of(tile["boundingVolume"]), outer["boundingVolume"])
+            assert is_inside(compute_corners(tile["boundingVolume"]), outer["boundingVolume"])
 
 
-def test_geometric_errors_decrease_to_nothing(tiled):
-    _, tileset = tiled
-    assert len(list(tiles_below(tileset["root"]))) > 5
-    for tile, above in tiles_below(tileset["root"]):
+def test_geometric_errors_decrease_to_nothing(tiled_town):
+    _, tileset = tiled_town
+    assert len(list(iterate_tiles(tileset["root"]))) > 5
+    for tile, above in iterate_tiles(tileset["root"]):
         assert tile["refine"] == "ADD"
         assert tile["geometricError"] <= (above[-1] if above else tileset)["geometricError"]
         assert (tile["geometricError"] > 0) == bool(tile.get("children"))
 
 
-def test_a_tile_is_one_draw_call_of_so_many_triangles(tiled):
-    folder, tileset = tiled
-    for tile, _ in tiles_below(tileset["root"]):
-        places, ids, _ = content_of(folder, tile)
+def test_a_tile_is_one_draw_call_of_so_many_triangles(tiled_town):
+    folder, tileset = tiled_town
+    for tile, _ in iterate_tiles(tileset["root"]):
+        places, ids, _ = read_content(folder, tile)
         assert len(places) // 3 <= 120 or len(set(ids.tolist())) == 1
 
 
@@ -279,7 +279,7 @@ def test_without_a_crs_tiles_keep_the_planes_own_axes(tmp_path):
         write_models(tmp_path / "a.3dtiles", town(3))
     tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
     assert "transform" not in tileset["root"]
-    places, ids, rows = content_of(tmp_path / "a.3dtiles", tileset["root"])
+    places, ids, rows = read_content(tmp_path / "a.3dtiles", tileset["root"])
     solid = {model.id: model.solid for model in town(3)}[rows[0]["id"]]
     world = places[ids == 0] + tileset["asset"]["extras"]["origin"]
     np.testing.assert_allclose(world.min(axis=0), solid.vertices.min(axis=0), atol=0.001)
@@ -368,7 +368,7 @@ def test_the_command_tells_id_type_and_parameters(tmp_path, capsys):
     assert "2 buildings" in capsys.readouterr().out
     tileset = json.loads((tmp_path / "city.3dtiles" / "tileset.json").read_text())
     assert "plus 43.2 m" in tileset["asset"]["extras"]["heights"]
-    rows = content_of(tmp_path / "city.3dtiles", tileset["root"])[2]
+    rows = read_content(tmp_path / "city.3dtiles", tileset["root"])[2]
     assert [(row["id"], row["type"]) for row in rows] == [("house-1", "gable"), ("block 2", "flat")]
     assert json.loads(rows[0]["parameters"])["parts"][0]["parameters"] == {"width": 8.0}
     assert rows[0]["rf_volume_lod22"] == 1.0 and rows[0]["note"] == ""
@@ -379,7 +379,7 @@ def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters
     model = ViewedModel("a", "gable", gable_solid().move(ORIGIN), told, {0: "gable"})
     write_models(tmp_path / "a.3dtiles", [model], "EPSG:7415", GEOID_M)
     tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
-    (row,) = content_of(tmp_path / "a.3dtiles", tileset["root"])[2]
+    (row,) = read_content(tmp_path / "a.3dtiles", tileset["root"])[2]
     assert row == {
         "id": "a",
         "type": "gable",
@@ -396,7 +396,7 @@ def test_parameters_of_another_run_are_refused(tmp_path):
         convert(tmp_path, tmp_path / "city.3dtiles")
 
 
-def node_has(package):
+def find_node_package(package):
     """Whether Node.js finds `package`, and where packages for everyone lie."""
     if not shutil.which("node") or not shutil.which("npm"):
         return False, ""
@@ -416,8 +416,8 @@ def node_environment(root):
     return os.environ | {"NODE_PATH": os.pathsep.join(paths)}
 
 
-def test_the_gltf_validator_finds_no_fault(tiled):
-    has, root = node_has("gltf-validator")
+def test_the_gltf_validator_finds_no_fault(tiled_town):
+    has, root = find_node_package("gltf-validator")
     if not has:
         pytest.skip("no gltf-validator here; npm install --global gltf-validator")
     script = """
@@ -426,7 +426,7 @@ def test_the_gltf_validator_finds_no_fault(tiled):
       console.log(JSON.stringify(
         [report.issues.numErrors, report.issues.numWarnings, report.info.drawCallCount])));
     """
-    folder, _ = tiled
+    folder, _ = tiled_town
     for file in sorted((folder / "tiles").iterdir())[:3]:
         done = subprocess.run(
             ["node", "-e", script, str(file)],

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
+from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter, write_citygml
 from hiproof.write.naming import gml_name
 from hiproof.write.xml_text import xml_attribute, xml_text
@@ -23,21 +23,23 @@ GML_ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"
 
 def street():
     return [
-        unmodelled(),
-        modelled(gable_house(), "0503100000012345"),
-        modelled(courtyard(), "a b/ä", ("flat", "hip")),
-        modelled(box(), "same"),
-        modelled(box(), "same", terrain_intersection=()),
-        modelled(box(), "same-1", quality=replace(modelled(box()).quality, psd_mean=float("inf"))),
+        make_lost_building(),
+        make_building(gable_house(), "0503100000012345"),
+        make_building(courtyard(), "a b/ä", ("flat", "hip")),
+        make_building(box(), "same"),
+        make_building(box(), "same", terrain_intersection=()),
+        make_building(
+            box(), "same-1", quality=replace(make_building(box()).quality, psd_mean=float("inf"))
+        ),
     ]
 
 
-def written(tmp_path, buildings, crs="EPSG:7415", **options):
+def write_and_read(tmp_path, buildings, crs="EPSG:7415", **options):
     write_citygml(tmp_path / "a.gml", buildings, crs, **options)
     return etree.parse(tmp_path / "a.gml").getroot()
 
 
-def found(root, path):
+def find(root, path):
     return root.xpath(path, namespaces=NAMESPACES)
 
 
@@ -50,11 +52,13 @@ def schema():
 
 @pytest.mark.parametrize("crs", ["EPSG:7415", "EPSG:28992", None])
 @pytest.mark.parametrize(
-    "buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"]
+    "buildings", [street(), [], [make_lost_building()]], ids=["street", "none", "no model"]
 )
 def test_valid_by_the_schema(tmp_path, schema, buildings, crs):
     schema.assertValid(
-        written(tmp_path, buildings, crs, creation_date=datetime.date(2020, 2, 3)).getroottree()
+        write_and_read(
+            tmp_path, buildings, crs, creation_date=datetime.date(2020, 2, 3)
+        ).getroottree()
     )
 
 
@@ -67,14 +71,16 @@ def test_strange_attributes_are_valid(tmp_path, schema):
         "list": [1],
         "": 0.5,
     }
-    root = written(tmp_path, [modelled(box(), "\x02", attributes=strange)])
+    root = write_and_read(tmp_path, [make_building(box(), "\x02", attributes=strange)])
     schema.assertValid(root.getroottree())
-    assert found(root, "//gen:stringAttribute[@name='flag']/gen:value/text()") == ["true"]
+    assert find(root, "//gen:stringAttribute[@name='flag']/gen:value/text()") == ["true"]
 
 
 def test_the_text_is_what_lxml_would_print(tmp_path):
     strange = {'a & <b> "c"': "\r\n\t & <ö> 'x'\u2028\x85", "ü": -0.5}
-    root = written(tmp_path, [*street(), modelled(courtyard(), "<&\"'>\x07ß", attributes=strange)])
+    root = write_and_read(
+        tmp_path, [*street(), make_building(courtyard(), "<&\"'>\x07ß", attributes=strange)]
+    )
     text = (tmp_path / "a.gml").read_bytes()
     assert etree.tostring(root, encoding="utf-8") == text.partition(b"\n")[2]
 
@@ -92,18 +98,18 @@ def test_any_text_comes_back_from_xml(text):
 
 
 def test_every_building_is_there(tmp_path):
-    root = written(tmp_path, street())
-    assert found(root, "//bldg:Building/gml:name/text()") == [b.id for b in street()]
-    assert len(found(root, "//bldg:lod2Solid")) == 5
+    root = write_and_read(tmp_path, street())
+    assert find(root, "//bldg:Building/gml:name/text()") == [b.id for b in street()]
+    assert len(find(root, "//bldg:lod2Solid")) == 5
 
 
 def test_ids_are_unique_and_links_lead_somewhere(tmp_path):
-    root = written(tmp_path, street())
+    root = write_and_read(tmp_path, street())
     ids = [element.get(GML_ID) for element in root.iter() if element.get(GML_ID)]
     assert len(ids) == len(set(ids))
     links = {element.get(HREF)[1:] for element in root.iter() if element.get(HREF)}
-    assert links == set(found(root, "//gml:Polygon/@gml:id"))
-    assert found(root, "//bldg:Building/@gml:id")[-3:] == [
+    assert links == set(find(root, "//gml:Polygon/@gml:id"))
+    assert find(root, "//bldg:Building/@gml:id")[-3:] == [
         "bldg-same",
         "bldg-same..2",
         "bldg-same-1",
@@ -122,35 +128,38 @@ def test_roof_type(tmp_path, kinds, code):
         replace(face, part=next(roof)) if face.kind == "RoofSurface" else face
         for face in house.faces
     )
-    (element,) = found(
-        written(tmp_path, [modelled(replace(house, faces=faces), kinds=kinds)]), "//bldg:roofType"
+    (element,) = find(
+        write_and_read(tmp_path, [make_building(replace(house, faces=faces), kinds=kinds)]),
+        "//bldg:roofType",
     )
     assert element.text == code
     assert element.get("codeSpace").endswith("_AbstractBuilding_roofType.xml")
 
 
 def test_heights_attributes_and_date(tmp_path):
-    root = written(tmp_path, [modelled(gable_house())], creation_date=datetime.date(2020, 2, 3))
-    assert found(root, "//bldg:measuredHeight[@uom='m']/text()") == ["7.0000"]
-    assert found(root, "//core:creationDate/text()") == ["2020-02-03"]
-    assert found(root, "//gen:doubleAttribute[@name='rf_h_roof_ridge']/gen:value/text()") == ["7.0"]
-    assert found(root, "//gen:stringAttribute[@name='naam']/gen:value/text()") == ["Café <&>"]
-    assert found(
+    root = write_and_read(
+        tmp_path, [make_building(gable_house())], creation_date=datetime.date(2020, 2, 3)
+    )
+    assert find(root, "//bldg:measuredHeight[@uom='m']/text()") == ["7.0000"]
+    assert find(root, "//core:creationDate/text()") == ["2020-02-03"]
+    assert find(root, "//gen:doubleAttribute[@name='rf_h_roof_ridge']/gen:value/text()") == ["7.0"]
+    assert find(root, "//gen:stringAttribute[@name='naam']/gen:value/text()") == ["Café <&>"]
+    assert find(
         root, "//bldg:RoofSurface/gen:doubleAttribute[@name='azimuth']/gen:value/text()"
     ) == ["270.0", "90.0"]
 
 
 def test_polygons_are_the_solid(tmp_path):
     solid = courtyard()
-    root = written(tmp_path, [modelled(solid)])
-    polygons = found(root, "//bldg:boundedBy//gml:Polygon")
+    root = write_and_read(tmp_path, [make_building(solid)])
+    polygons = find(root, "//bldg:boundedBy//gml:Polygon")
     assert len(polygons) == len(solid.faces)
     for polygon, face in zip(polygons, solid.faces, strict=True):
         rings = [
             np.array(text.split(), float).reshape(-1, 3)
-            for text in found(polygon, ".//gml:posList/text()")
+            for text in find(polygon, ".//gml:posList/text()")
         ]
-        assert len(rings) == len(face.rings) == len(found(polygon, "gml:exterior|gml:interior"))
+        assert len(rings) == len(face.rings) == len(find(polygon, "gml:exterior|gml:interior"))
         for ring, indices in zip(rings, face.rings, strict=True):
             np.testing.assert_allclose(
                 ring, solid.vertices[[*indices, indices[0]]] + RD_ORIGIN, atol=1e-9
@@ -161,28 +170,28 @@ def test_polygons_are_the_solid(tmp_path):
     "crs", ["EPSG:2193+7839", "EPSG:2193", "EPSG:3035", "EPSG:2154+5720", "EPSG:25832"]
 )
 def test_gdal_reads_the_place_also_where_the_crs_counts_north_first(tmp_path, crs):
-    written(tmp_path, [modelled(box(), terrain_intersection=())], crs)
+    write_and_read(tmp_path, [make_building(box(), terrain_intersection=())], crs)
     west, south, east, north = pyogrio.read_info(tmp_path / "a.gml")["total_bounds"]
     assert (west, south, east, north) == (85000.0, 446000.0, 85004.0, 446005.0)
 
 
 def test_envelope_holds_everything(tmp_path):
-    root = written(tmp_path, street())
-    (box_,) = found(root, "/core:CityModel/gml:boundedBy/gml:Envelope")
+    root = write_and_read(tmp_path, street())
+    (box_,) = find(root, "/core:CityModel/gml:boundedBy/gml:Envelope")
     assert box_.get("srsName") == "urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709"
     assert box_.get("srsDimension") == "3"
     low, high = (np.array(corner.text.split(), float) for corner in box_)
     xyz = np.concatenate(
-        [np.array(t.split(), float).reshape(-1, 3) for t in found(root, "//gml:posList/text()")]
+        [np.array(t.split(), float).reshape(-1, 3) for t in find(root, "//gml:posList/text()")]
     )
     np.testing.assert_allclose([low, high], [xyz.min(axis=0), xyz.max(axis=0)])
 
 
 @pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-1e7, 12345678.9, 8848.0)])
 def test_far_away_and_under_water(tmp_path, schema, origin):
-    root = written(tmp_path, [modelled(box(), origin=np.array(origin))])
+    root = write_and_read(tmp_path, [make_building(box(), origin=np.array(origin))])
     schema.assertValid(root.getroottree())
-    assert found(root, "//bldg:measuredHeight/text()") == ["3.0000"]
+    assert find(root, "//bldg:measuredHeight/text()") == ["3.0000"]
 
 
 def test_incremental_equals_whole(tmp_path):
@@ -205,6 +214,6 @@ def test_any_id_becomes_a_name(id):
 
 @pytest.mark.parametrize("line", [np.zeros((0, 3)), np.zeros((1, 3)), np.full((4, 3), np.nan)])
 def test_a_terrain_intersection_that_is_no_line_is_left_out(tmp_path, schema, line):
-    root = written(tmp_path, [modelled(box(), terrain_intersection=(line,))])
+    root = write_and_read(tmp_path, [make_building(box(), terrain_intersection=(line,))])
     schema.assertValid(root.getroottree())
-    assert found(root, "//bldg:lod1TerrainIntersection | //bldg:lod2TerrainIntersection") == []
+    assert find(root, "//bldg:lod1TerrainIntersection | //bldg:lod2TerrainIntersection") == []

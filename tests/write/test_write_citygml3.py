@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from handmade import box, courtyard, gable_house, modelled, unmodelled
+from handmade import box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.read.solids import read_solids
 from hiproof.write.citygml.version2 import NAMESPACES as OLD
 from hiproof.write.citygml.version2 import write_citygml
@@ -63,11 +63,11 @@ TWO_PARTS = """<core:cityObjectMember><bldg:Building gml:id="bldg-x"><gml:name>x
 def street():
     strange = {'a & <b> "c"': "\r\n <ö> 'x'", "flag": True, "n": 3, "x": -0.5, "unknown": None}
     return [
-        unmodelled(),
-        modelled(gable_house(), "0503100000012345", attributes=strange),
-        modelled(courtyard(), "a b/ä", ("flat", "hip")),
-        modelled(box(), "same"),
-        modelled(box(), "same", terrain_intersection=()),
+        make_lost_building(),
+        make_building(gable_house(), "0503100000012345", attributes=strange),
+        make_building(courtyard(), "a b/ä", ("flat", "hip")),
+        make_building(box(), "same"),
+        make_building(box(), "same", terrain_intersection=()),
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
+from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.model import GROUND, ROOF
 from hiproof.write.cityjson.features import CityJSONWriter, write_cityjson
 
@@ -20,11 +20,11 @@ FOOTPRINT = shapely.Polygon([(85000, 446000), (85000, 446009), (85009, 446009), 
 
 def street():
     return [
-        unmodelled("first"),
-        unmodelled("drawn", footprint=FOOTPRINT, z_ground=1.5),
-        modelled(gable_house(), "0503/1 ä"),
-        modelled(courtyard(), "yard", ("flat", "hip")),
-        modelled(box(), "yard"),
+        make_lost_building("first"),
+        make_lost_building("drawn", footprint=FOOTPRINT, z_ground=1.5),
+        make_building(gable_house(), "0503/1 ä"),
+        make_building(courtyard(), "yard", ("flat", "hip")),
+        make_building(box(), "yard"),
     ]
 
 
@@ -49,7 +49,7 @@ def validator(name):
 
 
 @pytest.mark.parametrize(
-    "buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"]
+    "buildings", [street(), [], [make_lost_building()]], ids=["street", "none", "no model"]
 )
 @pytest.mark.parametrize("crs", ["EPSG:7415", None])
 def test_valid_by_the_schema(tmp_path, buildings, crs):
@@ -67,17 +67,17 @@ def test_valid_by_the_schema(tmp_path, buildings, crs):
     ] == []
 
 
-def solid_of(city_object):
+def find_solid(city_object):
     return next(g for g in city_object["geometry"] if g["type"] == "Solid")
 
 
 def test_the_solid_comes_back(tmp_path):
-    head, *_, feature = sequence(tmp_path, [unmodelled(), modelled(courtyard())])
+    head, *_, feature = sequence(tmp_path, [make_lost_building(), make_building(courtyard())])
     transform = head["transform"]
     xyz = np.array(feature["vertices"]) * transform["scale"] + transform["translate"]
     assert len(np.unique(xyz, axis=0)) == len(xyz)
     want = courtyard().move(RD_ORIGIN)
-    geometry = solid_of(feature["CityObjects"]["a"])
+    geometry = find_solid(feature["CityObjects"]["a"])
     kinds = [
         geometry["semantics"]["surfaces"][v]["type"] for v in geometry["semantics"]["values"][0]
     ]
@@ -123,7 +123,7 @@ def test_metadata(tmp_path):
 
 
 def test_attributes_under_roofers_names(tmp_path):
-    _, feature = sequence(tmp_path, [modelled(gable_house())])
+    _, feature = sequence(tmp_path, [make_building(gable_house())])
     attributes = feature["CityObjects"]["a"]["attributes"]
     expected = {
         "rf_h_ground": 0,
@@ -148,10 +148,10 @@ def test_attributes_under_roofers_names(tmp_path):
 
 
 def test_the_prefix_is_the_callers(tmp_path):
-    _, feature = sequence(tmp_path, [modelled(gable_house())], prefix="b3_")
+    _, feature = sequence(tmp_path, [make_building(gable_house())], prefix="b3_")
     city_object = feature["CityObjects"]["a"]
     assert city_object["attributes"]["b3_volume_lod22"] == 480
-    roofs = [s for s in solid_of(city_object)["semantics"]["surfaces"] if s["type"] == ROOF]
+    roofs = [s for s in find_solid(city_object)["semantics"]["surfaces"] if s["type"] == ROOF]
     assert [(s["b3_slope"], s["b3_azimuth"]) for s in roofs] == [(45, 270), (45, 90)]
 
 
@@ -169,7 +169,7 @@ def test_footprint_looks_up(tmp_path):
 
 
 def test_a_building_without_model_has_its_status(tmp_path):
-    _, feature = sequence(tmp_path, [unmodelled()])
+    _, feature = sequence(tmp_path, [make_lost_building()])
     assert "geometry" not in feature["CityObjects"]["lost"]
     assert feature["CityObjects"]["lost"]["attributes"]["hiproof_status"] == "no_points"
 
@@ -182,7 +182,9 @@ def test_not_a_number_never_reaches_the_file(tmp_path):
         "d": {1: 2},
         "e": b"\xff",
     }
-    _, feature = sequence(tmp_path, [modelled(box(), attributes=strange, z_ground=float("nan"))])
+    _, feature = sequence(
+        tmp_path, [make_building(box(), attributes=strange, z_ground=float("nan"))]
+    )
     attributes = feature["CityObjects"]["a"]["attributes"]
     assert [attributes[name] for name in "abcde"] == [None, None, None, '{"1": 2}', "\ufffd"]
     assert attributes["rf_h_ground"] == 0.0
@@ -190,7 +192,7 @@ def test_not_a_number_never_reaches_the_file(tmp_path):
 
 @pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-12345678.9, 1e7, 8848.0)])
 def test_far_away_and_under_water(tmp_path, origin):
-    head, feature = sequence(tmp_path, [modelled(box(), origin=np.array(origin))])
+    head, feature = sequence(tmp_path, [make_building(box(), origin=np.array(origin))])
     xyz = (
         np.array(feature["vertices"]) * head["transform"]["scale"] + head["transform"]["translate"]
     )
@@ -200,7 +202,8 @@ def test_far_away_and_under_water(tmp_path, origin):
 def test_an_added_building_leaves_the_others_as_they_were(tmp_path):
     before = sequence(tmp_path, street()[2:])
     after = sequence(
-        tmp_path, [*street()[2:], modelled(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))]
+        tmp_path,
+        [*street()[2:], make_building(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))],
     )
     assert after[1:-1] == before[1:]
 
@@ -231,4 +234,4 @@ def test_a_measuring_tool_reads_it(tmp_path):
 def test_every_solid_has_its_ground(tmp_path):
     for feature in sequence(tmp_path, street())[3:]:
         (city_object,) = feature["CityObjects"].values()
-        assert GROUND in [s["type"] for s in solid_of(city_object)["semantics"]["surfaces"]]
+        assert GROUND in [s["type"] for s in find_solid(city_object)["semantics"]["surfaces"]]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hiproof.write as write
-from handmade import gable_house, modelled, unmodelled
+from handmade import gable_house, make_building, make_lost_building
 from hiproof import read_parameters
 from hiproof.errors import InputError, OutputError
 from hiproof.model import ROOF
@@ -27,7 +27,9 @@ each_format = pytest.mark.parametrize("name", WRITERS)
 
 
 def street(count=3):
-    return [modelled(gable_house(), f"house {n}") for n in range(count)] + [unmodelled()]
+    return [make_building(gable_house(), f"house {n}") for n in range(count)] + [
+        make_lost_building()
+    ]
 
 
 def no_roof(solid):
@@ -55,13 +57,13 @@ def test_only_the_finished_file_is_left(tmp_path, name):
 @each_format
 @pytest.mark.parametrize("problem", [ValueError, KeyboardInterrupt])
 def test_an_interrupted_run_keeps_the_old_file(tmp_path, name, problem):
-    def interrupted():
+    def interrupt():
         yield from street()
         raise problem
 
     (tmp_path / name).write_text("old")
     with pytest.raises(problem):
-        WRITERS[name](tmp_path / name, interrupted())
+        WRITERS[name](tmp_path / name, interrupt())
     assert names_in(tmp_path) == [name]
     assert (tmp_path / name).read_text() == "old"
 
@@ -149,7 +151,7 @@ def test_a_run_writes_its_files_together_or_not_at_all(tmp_path):
 
 @pytest.mark.parametrize("break_it", [no_roof, no_number, no_vertex])
 def test_a_broken_solid_does_not_stop_the_others(tmp_path, break_it):
-    buildings = [*street(), modelled(break_it(gable_house()), "broken"), *street()]
+    buildings = [*street(), make_building(break_it(gable_house()), "broken"), *street()]
     assert write.write_all(tmp_path, buildings) == ["broken"]
     records = read_parameters(tmp_path / "parameters.jsonl")
     assert [r["status"] for r in records if r["id"] == "broken"] == ["internal_error"]
@@ -169,7 +171,7 @@ def test_strange_ids_and_attributes_go_through(tmp_path, name):
         "a:b": 1,
     }
     buildings = [
-        modelled(gable_house(), id, attributes=strange)
+        make_building(gable_house(), id, attributes=strange)
         for id in ("\0", "", "\ud800", "<&>", "x" * 300, "é")
     ]
     WRITERS[name](tmp_path / name, buildings)

@@ -19,7 +19,7 @@ from hiproof.write import roof_figures, write_all
 from hiproof.write.citygml.version2 import NAMESPACES
 
 
-def generated(seed):
+def generate_buildings(seed):
     """A building of each type and of each kind of compound, in world coordinates, as reconstruction
     would give them.
     """
@@ -44,7 +44,7 @@ def generated(seed):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    buildings = list(generated(7))
+    buildings = list(generate_buildings(7))
     assert write_all(folder, iter(buildings), "EPSG:7415") == []
     return folder, buildings
 

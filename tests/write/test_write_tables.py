@@ -11,7 +11,7 @@ import pyogrio
 import pytest
 import shapely
 
-from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
+from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
 from hiproof import read_parameters
 from hiproof.errors import InputError
 from hiproof.parametric.run import build_file
@@ -27,8 +27,8 @@ def table(tmp_path, buildings, crs="EPSG:7415"):
 
 
 def test_parameters_come_back(tmp_path):
-    building = modelled(gable_house(), kinds=("gable", "flat"), objective=-12.3456789)
-    write_parameters(tmp_path / "p.jsonl", [unmodelled(), building])
+    building = make_building(gable_house(), kinds=("gable", "flat"), objective=-12.3456789)
+    write_parameters(tmp_path / "p.jsonl", [make_lost_building(), building])
     lost, record = read_parameters(tmp_path / "p.jsonl")
     assert (lost["id"], lost["status"], lost["type"], lost["parts"]) == (
         "lost",
@@ -51,7 +51,7 @@ def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(t
     """SQLite has 2,000 columns at most: the table failed when all work was done, as if the disk
     were full.
     """
-    building = modelled(box())
+    building = make_building(box())
     many = {f"a{i}": i for i in range(2500)}
     few, _, _ = table(tmp_path, [building])
     columns, _, _ = table(tmp_path, [replace(building, attributes={**building.attributes, **many})])
@@ -61,7 +61,7 @@ def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(t
 
 
 def test_outlines_come_back(tmp_path):
-    building = modelled(courtyard())
+    building = make_building(courtyard())
     write_parameters(tmp_path / "p.jsonl", [building])
     (record,) = read_parameters(tmp_path / "p.jsonl")
     ((outer, *holes),) = record["parts"][0]["outlines"]
@@ -70,11 +70,11 @@ def test_outlines_come_back(tmp_path):
 
 def test_parameters_are_strict_json(tmp_path):
     part = replace(
-        modelled(box()).parts[0],
+        make_building(box()).parts[0],
         parameters={"width": float("nan")},
         translation=np.array([0, -0.0, np.inf]),
     )
-    building = modelled(box(), objective=float("nan"))
+    building = make_building(box(), objective=float("nan"))
     building = replace(
         building, built=replace(building.model, roof=replace(building.roof, parts=(part,)))
     )
@@ -104,10 +104,10 @@ def test_a_parameters_file_that_is_not_there(tmp_path):
 def test_the_table_has_every_building(tmp_path):
     square = shapely.box(85000, 446000, 85001, 446001)
     buildings = [
-        unmodelled(),
-        unmodelled("asked", footprint=square),
-        modelled(gable_house()),
-        modelled(courtyard()),
+        make_lost_building(),
+        make_lost_building("asked", footprint=square),
+        make_building(gable_house()),
+        make_building(courtyard()),
     ]
     columns, outlines, meta = table(tmp_path, buildings)
     assert columns["id"].tolist() == ["lost", "asked", "a", "a"]
@@ -119,7 +119,7 @@ def test_the_table_has_every_building(tmp_path):
 
 
 def test_a_footprint_without_area_is_no_geometry_as_in_what_is_built_of_its_parameters(tmp_path):
-    void = unmodelled("void", footprint=shapely.Polygon())
+    void = make_lost_building("void", footprint=shapely.Polygon())
     write_attributes(tmp_path / "a.gpkg", [void], "EPSG:7415")
     write_parameters(tmp_path / "p.jsonl", [void], "EPSG:7415")
     build_file(tmp_path / "p.jsonl", tmp_path / "built")
@@ -142,13 +142,15 @@ def test_a_footprint_without_area_is_no_geometry_as_in_what_is_built_of_its_para
     ],
 )
 def test_a_column_has_one_type(tmp_path, values, dtype, want):
-    columns, _, _ = table(tmp_path, [unmodelled(attributes={"v": value}) for value in values])
+    columns, _, _ = table(
+        tmp_path, [make_lost_building(attributes={"v": value}) for value in values]
+    )
     assert columns["v"].dtype == dtype
     np.testing.assert_array_equal(columns["v"], np.array(want, dtype=columns["v"].dtype))
 
 
 def test_unknown_figures_stay_numbers(tmp_path):
-    _, _, meta = table(tmp_path, [unmodelled()])
+    _, _, meta = table(tmp_path, [make_lost_building()])
     kinds = dict(zip(meta["fields"], meta["dtypes"], strict=True))
     assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["hiproof_iso19107_lod22"]) == (
         "float64",
@@ -156,7 +158,7 @@ def test_unknown_figures_stay_numbers(tmp_path):
 
 
 def test_counts_are_counts_where_all_are_unknown(tmp_path):
-    table(tmp_path, [unmodelled()])
+    table(tmp_path, [make_lost_building()])
     for layer, names in (
         ("buildings", ["rf_roof_n_surfaces"]),
         ("parts", ["part"]),
@@ -169,7 +171,7 @@ def test_counts_are_counts_where_all_are_unknown(tmp_path):
 
 def test_names_that_clash(tmp_path):
     clashing = {"fid": 7, "geom": "x", "ID": 3, "Name": 1, "name": 2, "hiproof_status": "theirs"}
-    columns, _, _ = table(tmp_path, [modelled(box(), attributes=clashing)])
+    columns, _, _ = table(tmp_path, [make_building(box(), attributes=clashing)])
     assert columns["id"].tolist() == ["a"]
     assert columns["hiproof_status"].tolist() == ["modelled"]
     assert (
@@ -182,12 +184,14 @@ def test_names_that_clash(tmp_path):
 
 def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):
     monkeypatch.setattr(attributes, "ROWS_AT_ONCE", 4)
-    columns, _, _ = table(tmp_path, [unmodelled(str(n), attributes={"n": n}) for n in range(11)])
+    columns, _, _ = table(
+        tmp_path, [make_lost_building(str(n), attributes={"n": n}) for n in range(11)]
+    )
     assert columns["n"].tolist() == list(range(11))
 
 
 def test_nothing_is_said_where_no_crs_is_known(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        _, _, meta = table(tmp_path, [modelled(box())], crs=None)
+        _, _, meta = table(tmp_path, [make_building(box())], crs=None)
     assert meta["fields"][0] == "id"
