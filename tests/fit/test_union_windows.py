@@ -147,7 +147,7 @@ def test_a_roof_drawn_in_groups_is_drawn_as_all_at_once():
         column, row = np.clip(np.array([x, y]) // 4.0, 0, 11).astype(int)
         return levels[12 * column + row]
 
-    plan = lay_out_plan(sampled(height, outline, 3.0, 0.02), outline)
+    plan = lay_out_plan(sample_heights(height, outline, 3.0, 0.02), outline)
     volumes[1:, [U0, U1]] -= plan.frame.origin[0]
     volumes[1:, [V0, V1]] -= plan.frame.origin[1]
     volumes[:, OFFSET + LEVEL] -= plan.frame.origin[2]
