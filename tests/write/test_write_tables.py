@@ -10,6 +10,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
+from pyproj import CRS
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
 from hiproof import read_parameters
@@ -195,3 +196,45 @@ def test_nothing_is_said_where_no_crs_is_known(tmp_path):
         warnings.simplefilter("error")
         _, _, meta = table(tmp_path, [make_building(box())], crs=None)
     assert meta["fields"][0] == "id"
+
+
+def test_other_programs_find_features_by_their_place_and_keep_the_index(tmp_path):
+    """GDAL finds features by the spatial index, and the triggers keep up with what it adds."""
+    squares = [shapely.box(x, 0, x + 1, 1) for x in range(0, 100, 10)]
+    buildings = [unmodelled(str(n), footprint=square) for n, square in enumerate(squares)]
+    write_attributes(tmp_path / "a.gpkg", buildings, "EPSG:28992")
+
+    def find(box):
+        meta, _, _, columns = pyogrio.raw.read(tmp_path / "a.gpkg", layer="buildings", bbox=box)
+        return columns[meta["fields"].tolist().index("id")].tolist()
+
+    assert find((19, 0, 41, 1)) == ["2", "3", "4"]
+    added = np.array([shapely.to_wkb(shapely.box(200, 0, 201, 1))], dtype=object)
+    names = [np.array(["new"], dtype=object)]
+    options = {"layer": "buildings", "driver": "GPKG", "promote_to_multi": True}
+    pyogrio.raw.write(
+        tmp_path / "a.gpkg", added, names, ["id"], append=True, crs="EPSG:28992", **options
+    )
+    assert find((199, 0, 210, 1)) == ["new"]
+    bounds = pyogrio.read_info(tmp_path / "a.gpkg", layer="buildings")["total_bounds"]
+    assert bounds == (0.0, 0.0, 201.0, 1.0)
+
+
+DERIVED = CRS.from_wkt(
+    'DERIVEDPROJCRS["site",BASEPROJCRS["UTM 31N",BASEGEOGCRS["WGS 84",DATUM["World Geodetic '
+    'System 1984",ELLIPSOID["WGS 84",6378137,298.257223563]]],CONVERSION["UTM zone 31N",METHOD['
+    '"Transverse Mercator",ID["EPSG",9807]],PARAMETER["Longitude of natural origin",3,ANGLEUNIT['
+    '"degree",0.0174532925199433]],PARAMETER["Scale factor at natural origin",0.9996]]],'
+    'DERIVINGCONVERSION["turned",METHOD["Affine parametric transformation",ID["EPSG",9624]],'
+    'PARAMETER["A0",1,LENGTHUNIT["metre",1]],PARAMETER["A1",1],PARAMETER["A2",0],PARAMETER["B0",0,'
+    'LENGTHUNIT["metre",1]],PARAMETER["B1",0],PARAMETER["B2",1]],CS[Cartesian,2],AXIS["(E)",east],'
+    'AXIS["(N)",north],LENGTHUNIT["metre",1]]'
+)
+
+
+@pytest.mark.parametrize(
+    "crs", [CRS("EPSG:28992"), CRS("+proj=tmerc +lat_0=52 +lon_0=5 +ellps=bessel"), DERIVED]
+)
+def test_the_crs_comes_back_whether_it_has_a_code_or_not(tmp_path, crs):
+    _, _, meta = table(tmp_path, [modelled(box())], crs)
+    assert CRS(meta["crs"]) == crs

@@ -10,13 +10,11 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
+import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing
 from itertools import islice
 from typing import Any, BinaryIO
-
-import numpy as np
 
 from ...errors import OutputError
 from ...model import Building
@@ -29,21 +27,19 @@ from ..head import FileHead
 from ..naming import plan_wkt
 from ..roof_figures import RoofFigures
 from ..writer import BuildingWriter
+from .geopackage_file import GeometryType, GeoPackage
 from .rows import Row, split_lines, table_rows
 from .styles import TABLE, style_rows
 
 BUILDINGS = "buildings"
-LAYERS = {BUILDINGS: "MultiPolygon", "parts": "MultiPolygon", "roof_surfaces": "Polygon Z"}
+MULTI_POLYGON, POLYGON_Z = GeometryType("MULTIPOLYGON"), GeometryType("POLYGON", has_z=True)
+LAYERS = {BUILDINGS: MULTI_POLYGON, "parts": MULTI_POLYGON, "roof_surfaces": POLYGON_Z}
 """Tables and the geometry of their rows."""
 
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
-ROWS_AT_ONCE = 1000  # rows handed to GDAL at once: its overhead is a call's, its memory a row's
-GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more
-# of a table in SQLite as GDAL's wheels come, less the number and the geometry of a row
+ROWS_AT_ONCE = 1000  # rows handed to SQLite at once: its overhead is a call's, its memory a row's
+# of a table in SQLite as it comes, less the number and the geometry of a row
 MOST_COLUMNS = 1998
-# GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same
-# file.
-FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
 
 def write_attributes(
@@ -157,62 +153,40 @@ class AttributesWriter(BuildingWriter):
             waiting.put(lines[layer])
 
     def finish(self) -> None:
-        for waiting in self.waiting.values():
-            kinds = waiting.kinds(self.prefix, MOST_COLUMNS)
-            for number, rows in enumerate(waiting.batches()):
-                self.write_rows(waiting.layer, rows, kinds, append=number > 0)
-        self.write_styles()
-
-    def write_rows(self, layer: str, rows: list[Row], kinds: dict[str, type], append: bool) -> None:
-        self.write_table(
-            layer,
-            [row for _, row in rows],
-            kinds,
-            objects([wkb for wkb, _ in rows]),
-            geometry_type=LAYERS[layer],
-            promote_to_multi=LAYERS[layer] == "MultiPolygon",
-            crs=self.plan_wkt,
-            append=append,
-        )
-
-    def write_styles(self) -> None:
-        """The table by which QGIS draws the layers."""
-        rows = style_rows()
-        kinds: dict[str, type] = {name: bool if name == "useAsDefault" else str for name in rows[0]}
-        self.write_table(TABLE, rows, kinds, None, layer_options={"FID": "id"})
-
-    def write_table(
-        self,
-        layer: str,
-        rows: list[dict[str, Any]],
-        kinds: dict[str, type],
-        geometry: np.ndarray | None,
-        **options: Any,
-    ) -> None:
-        """Write `rows` by columns of `kinds`, with `geometry` (n,) as WKB or without any."""
-        import pyogrio
-        from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
-
-        columns = [column([row.get(name) for row in rows], kind) for name, kind in kinds.items()]
-        version = {} if self.hidden.exists() else {"dataset_options": {"VERSION": GPKG_VERSION}}
         try:
-            with fixed_date():
-                pyogrio.raw.write(
-                    self.hidden,
-                    geometry,
-                    [values for values, _ in columns],
-                    column_names(kinds, self.reserved),
-                    [mask for _, mask in columns],
-                    layer=layer,
-                    driver="GPKG",
-                    **version,
-                    **options,
-                )
-        except (DataSourceError, DataLayerError, FeatureError, RuntimeError, OSError) as error:
+            with closing(GeoPackage(self.hidden, self.plan_wkt)) as file:
+                for waiting in self.waiting.values():
+                    write_layer(file, waiting, waiting.kinds(self.prefix, MOST_COLUMNS))
+                write_styles(file)
+                file.finish()
+        except sqlite3.Error as error:
             raise OutputError(
                 f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions "
                 "and the space left"
             ) from error
+
+
+def write_layer(file: GeoPackage, waiting: WaitingRows, kinds: dict[str, type]) -> None:
+    """Write the rows of a table, by columns of `kinds`."""
+    names = column_names(kinds, AttributesWriter.reserved)
+    columns = dict(zip(names, kinds.values(), strict=True))
+    file.create_table(waiting.layer, columns, LAYERS[waiting.layer])
+    first = 1
+    for rows in waiting.batches():
+        values = [
+            tuple(None if (v := row.get(name)) is None else kind(v) for name, kind in kinds.items())
+            for _, row in rows
+        ]
+        file.insert_features(waiting.layer, first, [wkb for wkb, _ in rows], values)
+        first += len(rows)
+
+
+def write_styles(file: GeoPackage) -> None:
+    """Write the table by which QGIS draws the layers."""
+    rows = style_rows()
+    kinds: dict[str, type] = {name: bool if name == "useAsDefault" else str for name in rows[0]}
+    file.create_table(TABLE, kinds, None, key="id")
+    file.insert(TABLE, [(number, *row.values()) for number, row in enumerate(rows, 1)])
 
 
 def writer(path: str | os.PathLike, head: FileHead) -> AttributesWriter:
@@ -227,21 +201,6 @@ def fragment(sheet: Sheet) -> Fragment:
             sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table
         ).to_text()
     )
-
-
-@contextmanager
-def fixed_date() -> Iterator[None]:
-    """GDAL writes FIXED_DATE as the date of change, and an unknown CRS is no warning."""
-    import pyogrio
-
-    previous = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
-    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": FIXED_DATE})
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "'crs' was not provided")
-            yield
-    finally:
-        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": previous})
 
 
 def classify_value(value: Any) -> type:
@@ -259,22 +218,6 @@ def column_kind(result: set[type], declared: str) -> type:
     if len(kinds) == 1:
         return kinds.pop()
     return str if str in kinds else float if float in kinds else int
-
-
-def column(values: list[Any], kind: type) -> tuple[np.ndarray, np.ndarray]:
-    """Values (n,) of one type, and where they are unknown (n,)."""
-    mask = np.array([value is None for value in values], dtype=bool)
-    if kind is str:
-        return objects([None if v is None else str(v) for v in values]), mask
-    dtype = {bool: np.bool_, int: np.int64, float: np.float64}[kind]
-    return np.array([kind(0) if v is None else kind(v) for v in values], dtype=dtype), mask
-
-
-def objects(values: list[Any]) -> np.ndarray:
-    """An array (n,) of the values themselves, whatever their types and lengths."""
-    array = np.empty(len(values), dtype=object)
-    array[:] = values
-    return array
 
 
 def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str]:
