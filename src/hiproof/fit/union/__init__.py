@@ -70,6 +70,7 @@ from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
 from .regions import Site, besides, places_of, polygons_of
+from .repeats import repeat_volumes
 from .scene import Scene
 from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
 from .shown import find_highest, that_show
@@ -107,7 +108,7 @@ def fit_building(
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
     site, ends = Site(outline, plan, scene, {}), ends_of(outline, plan, scene)
     known: Known = {}
-    volumes = tidy_volumes(volumes, ends, site, known)
+    volumes = repeat_volumes(tidy_volumes(volumes, ends, site, known), scene)
     unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
     roof, agreement = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, site, known)
     volumes, base = roof.volumes, bool(base_shows(roof.volumes, scene))

@@ -1,0 +1,76 @@
+"""Equal dormers in a row are found from one of them, and nothing is repeated where nothing stands."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.repeats import move_volume, repeat_volumes
+from hiproof.fit.union.scene import scene_of
+from hiproof.fit.union.volumes import (
+    DIRECTION,
+    LEVEL,
+    OFFSET,
+    SLOPE,
+    U0,
+    V1,
+    base_only,
+    roof_heights,
+)
+from points_of_roofs import sampled
+from union_scenes import random_volume
+
+OUTLINE = shapely.box(-12, -5, 12, 5)
+WIDE_M, DORMERS = 1.6, (-9.0, -5.6, -2.2, 1.2, 4.6, 8.0)  # m: where each begins along the eave
+
+
+def height_with(dormers):
+    """The heights of a monopitch with flat dormers at its lower side."""
+
+    def height(x, y):
+        z = 4.0 + 0.6 * (y + 5.0)
+        for x0 in dormers:
+            z = np.where((x0 < x) & (x < x0 + WIDE_M) & (y < -2.0), np.maximum(z, 6.5), z)
+        return z
+
+    return height
+
+
+def volumes_with_one(base_m):
+    """The monopitch and the first dormer over a base far below, heights over `base_m`.
+
+    The plan's u is y, its v is -x: the longer side of the outline lies along v.
+    """
+    volumes = np.repeat(base_only(-50.0), 3, axis=0)
+    volumes[1, U0 : V1 + 1] = -5.0, 5.0, -12.0, 12.0
+    volumes[1, OFFSET + LEVEL] = np.inf
+    volumes[1, [OFFSET, SLOPE]] = 7.0 - base_m, 0.6
+    volumes[2, U0 : V1 + 1] = -5.0, -2.0, -DORMERS[0] - WIDE_M, -DORMERS[0]
+    volumes[2, OFFSET + LEVEL] = 6.5 - base_m
+    return volumes
+
+
+@pytest.mark.parametrize("dormers", [DORMERS, DORMERS[:1], (DORMERS[0], DORMERS[4])])
+def test_each_dormer_of_a_row_is_found_from_one_of_them(dormers):
+    points = sampled(height_with(dormers), OUTLINE, 4.0, 0.02)
+    plan = lay_out_plan(points, OUTLINE)
+    scene = scene_of(plan, OUTLINE, [0.0], 3.0, 0.2, allowed_shapes(()))
+    found = repeat_volumes(volumes_with_one(plan.frame.origin[2]), scene)
+    begins = np.sort(-found[2:, V1])
+    assert begins == pytest.approx(dormers, abs=0.5)  # points are half a metre apart
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0, 1]), st.floats(-20.0, 20.0))
+def test_a_moved_volume_is_as_high_at_moved_places(seed, axis, step_m):
+    rng = np.random.default_rng(seed)
+    volume = random_volume(rng, replacing=0.0)
+    volume[DIRECTION] = 0.0
+    u, v = rng.uniform(-9.0, 9.0, (2, 1, 200))
+    moved = move_volume(volume, axis, step_m)[None]
+    shifted = (u + step_m, v) if axis == 0 else (u, v + step_m)
+    before, after = roof_heights(volume[None], u, v)[0], roof_heights(moved, *shifted)[0]
+    assert after == pytest.approx(before, abs=1e-6)
