@@ -29,16 +29,16 @@ def find_shifts(density: float, seeds: range) -> dict[float, list[tuple[float, b
     """By distance (m): how far the shift found is from the true one (m), and whether it is clear
     enough to move the footprint.
     """
-    found: dict[float, list[tuple[float, bool]]] = {distance: [] for distance in DISTANCES_M}
+    outcomes: dict[float, list[tuple[float, bool]]] = {distance: [] for distance in DISTANCES_M}
     for kind in KINDS:
         for seed in seeds:
             points, truth = simulate_house(kind, density, seed)
             azimuth = np.random.default_rng([seed, KINDS.index(kind), 7]).uniform(-math.pi, math.pi)
-            for distance, rows in found.items():
-                off = distance * np.array([math.cos(azimuth), math.sin(azimuth)])
-                shift = find_shift(points[:, :2], shapely.affinity.translate(truth, *off))
-                rows.append((float(np.hypot(*(shift.xy + off))), shift.is_clear))
-    return found
+            for distance, rows in outcomes.items():
+                offset = distance * np.array([math.cos(azimuth), math.sin(azimuth)])
+                shift = find_shift(points[:, :2], shapely.affinity.translate(truth, *offset))
+                rows.append((float(np.hypot(*(shift.xy + offset))), shift.is_clear))
+    return outcomes
 
 
 def main() -> None:

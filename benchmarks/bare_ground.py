@@ -93,8 +93,8 @@ def make_yard_site(rng: np.random.Generator, place: str) -> Site:
         size - (4.5 if place == "court" else 3.0),
     )
     inner = rng.uniform(2.0, np.maximum(size - yard - 2.0, 2.0))
-    low = inner * {"court": (1.0, 1.0), "side": (1.0, 0.0), "corner": (0.0, 0.0)}[place]
-    (a, b), (c, d), (w, h) = low, low + yard, size
+    corner = inner * {"court": (1.0, 1.0), "side": (1.0, 0.0), "corner": (0.0, 0.0)}[place]
+    (a, b), (c, d), (w, h) = corner, corner + yard, size
     blocks = [(0, d, w, h), (0, 0, a, d), (c, 0, w, d), (a, 0, c, b)]
     ground = draw_slope(rng)
     bodies = [
@@ -139,9 +139,9 @@ def make_dormer_site(rng: np.random.Generator) -> Site:
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     for _ in range(rng.integers(1, 4)):
-        at = rng.uniform((x0 + 2, y0 + 2), (x1 - 2, y1 - 2))
-        top = float(site.bodies[0].piece.height_at(at[None])[0]) + rng.uniform(0.5, 1.8)
-        site.bodies.append(Body(box(at, tuple(rng.uniform(1.0, 3.0, 2)), top, 0.0)))
+        corner = rng.uniform((x0 + 2, y0 + 2), (x1 - 2, y1 - 2))
+        top = float(site.bodies[0].piece.height_at(corner[None])[0]) + rng.uniform(0.5, 1.8)
+        site.bodies.append(Body(box(corner, tuple(rng.uniform(1.0, 3.0, 2)), top, 0.0)))
     return site
 
 
@@ -152,12 +152,12 @@ def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         inside = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
-        through = inside & (rng.random(len(scan)) < share)
+        is_through = inside & (rng.random(len(scan)) < share)
         points, source = scan.points.copy(), scan.source.copy()
-        points[through, 2] = site.slope.height_at(points[through, :2]) + rng.normal(
-            0, 0.03, through.sum()
+        points[is_through, 2] = site.slope.height_at(points[is_through, :2]) + rng.normal(
+            0, 0.03, is_through.sum()
         )
-        source[through] = SOURCE_GROUND
+        source[is_through] = SOURCE_GROUND
         return Scan(points, scan.label, source)
 
     site.change = change
@@ -171,8 +171,8 @@ def make_glass_site(rng: np.random.Generator) -> Site:
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     size = rng.uniform(3.0, 7.0, 2)
-    low = rng.uniform((x0 + 1, y0 + 1), np.maximum((x1, y1) - size - 1, (x0 + 1.1, y0 + 1.1)))
-    return sink_points(site, shapely.box(*low, *(low + size)), rng.uniform(0.3, 0.85))
+    corner = rng.uniform((x0 + 1, y0 + 1), np.maximum((x1, y1) - size - 1, (x0 + 1.1, y0 + 1.1)))
+    return sink_points(site, shapely.box(*corner, *(corner + size)), rng.uniform(0.3, 0.85))
 
 
 def make_passage_site(rng: np.random.Generator) -> Site:
@@ -181,9 +181,10 @@ def make_passage_site(rng: np.random.Generator) -> Site:
     """
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
-    at, width, deep = rng.uniform(x0 + 2, x1 - 5), rng.uniform(2.5, 4.0), rng.uniform(1.0, 2.5)
+    start, width, deep = rng.uniform(x0 + 2, x1 - 5), rng.uniform(2.5, 4.0), rng.uniform(1.0, 2.5)
     ends = shapely.union(
-        shapely.box(at, y0, at + width, y0 + deep), shapely.box(at, y1 - deep, at + width, y1)
+        shapely.box(start, y0, start + width, y0 + deep),
+        shapely.box(start, y1 - deep, start + width, y1),
     )
     return add_ground(site, ends, rng.uniform(0.3, 0.8))
 
@@ -203,13 +204,15 @@ def add_ground(site: Site, area: shapely.Geometry, share: float) -> Site:
     """The site with ground points under its roof over `area`, a `share` of the roof's density."""
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
-        above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
-        seen = scan.select(above & (rng.random(len(scan)) < share))
-        xy = seen.points[:, :2] + rng.normal(0, 0.3, (len(seen), 2))
+        is_above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
+        ground = scan.select(is_above & (rng.random(len(scan)) < share))
+        xy = ground.points[:, :2] + rng.normal(0, 0.3, (len(ground), 2))
         points = np.column_stack([xy, site.slope.height_at(xy) + rng.normal(0, 0.03, len(xy))])
-        source = np.concatenate([scan.source, np.full(len(seen), SOURCE_GROUND, np.int8)])
+        source = np.concatenate([scan.source, np.full(len(ground), SOURCE_GROUND, np.int8)])
         return Scan(
-            np.concatenate([scan.points, points]), np.concatenate([scan.label, seen.label]), source
+            np.concatenate([scan.points, points]),
+            np.concatenate([scan.label, ground.label]),
+            source,
         )
 
     site.change = change
@@ -222,13 +225,13 @@ def draw_crowns(
     x0, y0, x1, y1 = footprint.bounds
     rows = []
     for _ in range(count):
-        at = (
+        places = (
             rng.uniform((x0, y0), (x1, y1))
             if inside
             else rng.choice([(x0, y0), (x1, y1), (x0, y1), (x1, y0)])
         )
         radius, half = rng.uniform(1.0, 3.5), rng.uniform(1.0, 4.0)
-        rows.append((*(at + rng.normal(0, 1, 2)), rng.uniform(0.5, 4.0) + half, radius, half))
+        rows.append((*(places + rng.normal(0, 1, 2)), rng.uniform(0.5, 4.0) + half, radius, half))
     return np.array(rows).reshape(-1, 5)
 
 
@@ -258,9 +261,11 @@ def remove_house(rng: np.random.Generator, steep: float = 0.06) -> Site:
     x0, y0, x1, y1 = site.footprint.bounds
     bodies = []
     for _ in range(rng.integers(0, 6)):
-        at, size = rng.uniform((x0, y0), (x1, y1)), rng.uniform(1.0, 4.0, 2)
-        z = float(site.slope.height_at(at)) + rng.uniform(0.3, 2.5)
-        bodies.append(Body(box(at, tuple(size), z, rng.uniform(0, 3)), SOURCE_WALL, SOURCE_WALL))
+        corner, size = rng.uniform((x0, y0), (x1, y1)), rng.uniform(1.0, 4.0, 2)
+        z = float(site.slope.height_at(corner)) + rng.uniform(0.3, 2.5)
+        bodies.append(
+            Body(box(corner, tuple(size), z, rng.uniform(0, 3)), SOURCE_WALL, SOURCE_WALL)
+        )
     trees = draw_crowns(rng, site.footprint, int(rng.integers(0, 3)), True)
     return Site(site.footprint, shapely.Polygon(), bodies, trees, site.slope)
 
@@ -319,7 +324,7 @@ def make_block_site(rng: np.random.Generator) -> Site:
         (w - deep, deep, w, h - deep),
     ]
     footprint = shapely.box(0, 0, w, h)
-    bodies = [make_house_body(one, eave, rng.choice([0.0, 2.0]), ground) for one in rows]
+    bodies = [make_house_body(rect, eave, rng.choice([0.0, 2.0]), ground) for rect in rows]
     return Site(
         footprint, footprint - shapely.box(deep, deep, w - deep, h - deep), bodies, slope=ground
     )
@@ -373,10 +378,10 @@ def judge_classified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_si
 def judge_unclassified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
     """As of a cloud without classes, whose roofs are found by shape."""
     height = scan.points[:, 2] - site.slope.height_at(scan.points[:, :2])
-    found = found_roof(scan.points, site.footprint, height, True)
-    if not found.is_seen:
-        return fit_site.Site(found.points, site.footprint, found.remark, found.is_ground)
-    return judge_roof(site, found.points, found.ground)
+    is_roof = found_roof(scan.points, site.footprint, height, True)
+    if not is_roof.is_seen:
+        return fit_site.Site(is_roof.points, site.footprint, is_roof.remark, is_roof.is_ground)
+    return judge_roof(site, is_roof.points, is_roof.ground)
 
 
 def judge_one_class(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
@@ -415,24 +420,26 @@ def make_row(make: Callable, key: int, density: float, seeds: range) -> str:
     """Of a kind of site by each way: share without a building, share with bare ground cut, error of
     the area left.
     """
-    found: dict[str, list] = {way: [] for way in WAYS}
+    outcomes: dict[str, list] = {way: [] for way in WAYS}
     for seed in seeds:
         rng = np.random.default_rng([seed, key, round(10 * density)])
         site = make(rng)
         scan = scan_site(site, density, rng)
         for way, look in WAYS.items():
-            seen = look(site, scan, rng)
-            is_cut = not seen.is_empty and seen.outline.area < 0.999 * site.footprint.area
-            off = (
+            verdict = look(site, scan, rng)
+            is_cut = not verdict.is_empty and verdict.outline.area < 0.999 * site.footprint.area
+            shifted = (
                 0.0
-                if seen.is_empty or site.true.is_empty
-                else abs(seen.outline.area / site.true.area - 1)
+                if verdict.is_empty or site.true.is_empty
+                else abs(verdict.outline.area / site.true.area - 1)
             )
-            found[way].append((seen.is_empty or seen.remark == "no points", is_cut, off))
+            outcomes[way].append(
+                (verdict.is_empty or verdict.remark == "no points", is_cut, shifted)
+            )
     text = []
-    for rows in found.values():
-        empty, cut, off = np.array(rows, float).T
-        errors = f"{100 * np.median(off):4.1f} {100 * np.quantile(off, 0.9):4.1f}"
+    for rows in outcomes.values():
+        empty, cut, shifted = np.array(rows, float).T
+        errors = f"{100 * np.median(shifted):4.1f} {100 * np.quantile(shifted, 0.9):4.1f}"
         text.append(f"{100 * empty.mean():5.1f} {100 * cut.mean():5.1f} {errors}")
     return " | ".join(text)
 

@@ -58,13 +58,13 @@ class Clock:
 
         @functools.wraps(function)
         def run(*args: Any, **kwargs: Any) -> Any:
-            before, self.inside, start = self.inside, 0.0, self.read()
+            outer, self.inside, start = self.inside, 0.0, self.read()
             try:
                 return function(*args, **kwargs)
             finally:
                 spent = self.read() - start
                 self.seconds[stage] += spent - self.inside
-                self.inside = before + spent
+                self.inside = outer + spent
 
         return run
 

@@ -97,26 +97,26 @@ MUST_BE_NONE = (INTERNAL, INVALID, INVALID_WRITTEN, NOT_ALIKE, ENDED)
 
 def judge_run(name: str, request: Request) -> Findings:
     """Run `request`, rebuild its parameters and count what is wrong."""
-    found = Findings()
+    findings = Findings()
     shutil.rmtree(request.out, ignore_errors=True)
     try:
         with warnings.catch_warnings(), collect_tracebacks() as errors:
             warnings.simplefilter("ignore")
             summary = reconstruct_area(request)
     except Exception:
-        found.add(ENDED, f"{name}\n{traceback.format_exc()}")
-        return found
+        findings.add(ENDED, f"{name}\n{traceback.format_exc()}")
+        return findings
     for id, text in errors.items():
-        found.add(INTERNAL, f"{name}, building {id}\n{text}")
-    found.counts.update({"buildings": summary.buildings, **summary.by_status})
+        findings.add(INTERNAL, f"{name}, building {id}\n{text}")
+    findings.counts.update({"buildings": summary.buildings, **summary.by_status})
     missed = summary.by_status.get(Status.INTERNAL_ERROR.code, 0) - len(errors)
     if missed:
-        found.counts[INTERNAL] += missed
+        findings.counts[INTERNAL] += missed
     try:
-        judge_files(name, request.out, found)
+        judge_files(name, request.out, findings)
     except Exception:
-        found.add(NOT_ALIKE, f"{name}: the run's own file is refused\n{traceback.format_exc()}")
-    return found
+        findings.add(NOT_ALIKE, f"{name}: the run's own file is refused\n{traceback.format_exc()}")
+    return findings
 
 
 @contextlib.contextmanager
@@ -132,30 +132,30 @@ def collect_tracebacks() -> Iterator[dict[str, str]]:
         yield errors
 
 
-def judge_files(name: str, out: Path, found: Findings) -> None:
+def judge_files(name: str, out: Path, findings: Findings) -> None:
     """Count invalid solids and buildings whose parameters give other bytes."""
-    again = out.with_name(f"{out.name}-again")
-    shutil.rmtree(again, ignore_errors=True)
-    build_file(out / "parameters.jsonl", again)
-    for id in find_refused(again / "parameters.jsonl"):
-        found.add(NOT_ALIKE, f"{name}, building {id}: its own record is refused")
+    second_folder = out.with_name(f"{out.name}-again")
+    shutil.rmtree(second_folder, ignore_errors=True)
+    build_file(out / "parameters.jsonl", second_folder)
+    for id in find_refused(second_folder / "parameters.jsonl"):
+        findings.add(NOT_ALIKE, f"{name}, building {id}: its own record is refused")
     for file in ("parameters.jsonl", "buildings.city.jsonl"):
-        for id in compare_lines(out / file, again / file):
-            found.add(NOT_ALIKE, f"{name}, building {id}: {file} differs")
+        for id in compare_lines(out / file, second_folder / file):
+            findings.add(NOT_ALIKE, f"{name}, building {id}: {file} differs")
     for path in sorted([*out.glob("buildings*.gml"), out / "buildings.gpkg"]):
-        if path.read_bytes() != (again / path.name).read_bytes():
-            found.add(NOT_ALIKE, f"{name}: {path.name} differs")
+        if path.read_bytes() != (second_folder / path.name).read_bytes():
+            findings.add(NOT_ALIKE, f"{name}: {path.name} differs")
     with opened_parameters(out / "parameters.jsonl") as (head, records):
         for record in records:
-            judge_solid(name, record, head.compose, found)
+            judge_solid(name, record, head.compose, findings)
     for path in (*sorted(out.glob("buildings*.gml")), out / "buildings.city.jsonl"):
         with contextlib.redirect_stdout(io.StringIO()) as printed:
             invalid = count_invalid([path], planarity_m=0.01)
-        found.counts[CHECKED] += int(re.findall(r": (\d+) solids?,", printed.getvalue())[-1])
+        findings.counts[CHECKED] += int(re.findall(r": (\d+) solids?,", printed.getvalue())[-1])
         if invalid:
-            found.counts[INVALID_WRITTEN] += invalid - 1
-            found.add(INVALID_WRITTEN, f"{name}\n{printed.getvalue()}")
-    shutil.rmtree(again)
+            findings.counts[INVALID_WRITTEN] += invalid - 1
+            findings.add(INVALID_WRITTEN, f"{name}\n{printed.getvalue()}")
+    shutil.rmtree(second_folder)
 
 
 def find_refused(path: Path) -> list[str]:
@@ -163,26 +163,26 @@ def find_refused(path: Path) -> list[str]:
     return [row["id"] for row in read_parameters(path) if row["status"] == Status.NOT_BUILT.code]
 
 
-def judge_solid(name: str, record: dict, compose, found: Findings) -> None:
+def judge_solid(name: str, record: dict, compose, result: Findings) -> None:
     """Build one record and check its solid."""
     if not record["parts"]:
         return
     try:
         building = build(record, compose)
     except Exception as error:
-        found.add(NOT_ALIKE, f"{name}, building {record['id']}: {error}")
+        result.add(NOT_ALIKE, f"{name}, building {record['id']}: {error}")
         return
     findings = check_solid(building.solid, planarity_m=compose.planarity_m)
     if findings:
-        found.add(INVALID, f"{name}, building {record['id']}: {findings[0].message}")
+        result.add(INVALID, f"{name}, building {record['id']}: {findings[0].message}")
 
 
-def compare_lines(one: Path, other: Path) -> list[str]:
+def compare_lines(first_path: Path, other: Path) -> list[str]:
     """List the ids of buildings whose lines differ between two files."""
     differing = []
-    with one.open(encoding="utf-8") as first, other.open(encoding="utf-8") as second:
-        for number, (line, again) in enumerate(zip(first, second, strict=True)):
-            if line != again:
+    with first_path.open(encoding="utf-8") as first, other.open(encoding="utf-8") as second:
+        for number, (line, second_line) in enumerate(zip(first, second, strict=True)):
+            if line != second_line:
                 differing.append(str(json.loads(line).get("id", f"on line {number + 1}")))
     return differing
 
@@ -192,12 +192,12 @@ def judge_scene(task: tuple[int, int, Path]) -> Findings:
     seed, count, work = task
     folder = work / f"scene-{seed}"
     try:
-        found = judge_run(f"seed {seed}", write_scene(seed, count, folder))
+        findings = judge_run(f"seed {seed}", write_scene(seed, count, folder))
         if (folder / "run" / "failures").exists():  # `hiproof repro` runs them again
             shutil.copytree(
                 folder / "run" / "failures", work / "failures" / f"seed-{seed}", dirs_exist_ok=True
             )
-        return found
+        return findings
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -225,8 +225,8 @@ def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
     for folder, footprints, settings in sets:
         for share in SHARES if any((data / folder).glob("*.laz")) else ():
             for outlines in dict.fromkeys([footprints and str(data / footprints), None]):
-                told = "with" if outlines else "without"
-                name = f"{folder}, {share:g} of the points, {told} footprints"
+                suffix = "with" if outlines else "without"
+                name = f"{folder}, {share:g} of the points, {suffix} footprints"
                 yield (
                     name,
                     partial(
@@ -325,48 +325,51 @@ def main() -> int:
     )
     parser.add_argument("--work", type=Path)
     parser.add_argument("--data", type=Path, default=SHARED / "data")
-    asked = parser.parse_args()
-    work = asked.work or Path(tempfile.mkdtemp(prefix="hiproof-campaign-"))
-    wanted = asked.only or ("simulated", "real", "roofs")
+    request = parser.parse_args()
+    work = request.work or Path(tempfile.mkdtemp(prefix="hiproof-campaign-"))
+    expected = request.only or ("simulated", "real", "roofs")
     total = Findings()
-    with ProcessPoolExecutor(asked.processes, mp_context=get_context("spawn")) as pool:
-        if "simulated" in wanted:
-            full, rest = divmod(asked.count, BUILDINGS_A_SCENE)
-            sizes = [BUILDINGS_A_SCENE] * full + [rest] * (rest > 0)
-            tasks = [(asked.first_seed + k, size, work) for k, size in enumerate(sizes)]
+    with ProcessPoolExecutor(request.processes, mp_context=get_context("spawn")) as pool:
+        if "simulated" in expected:
+            full, remainder = divmod(request.count, BUILDINGS_A_SCENE)
+            sizes = [BUILDINGS_A_SCENE] * full + [remainder] * (remainder > 0)
+            tasks = [(request.first_seed + k, size, work) for k, size in enumerate(sizes)]
             report("simulated", pool.map(judge_scene, tasks), total)
-        if "real" in wanted:
-            report("real clouds", pool.map(judge_real, list_real_runs(asked.data, work)), total)
-        if "roofs" in wanted:
+        if "real" in expected:
+            report("real clouds", pool.map(judge_real, list_real_runs(request.data, work)), total)
+        if "roofs" in expected:
             report(
                 "real roofs and towns",
-                pool.map(judge_real, list_roof_runs(asked.data, work)),
+                pool.map(judge_real, list_roof_runs(request.data, work)),
                 total,
             )
     print_counts("all", total)
     return 0 if total.is_clean else 1
 
 
-def report(name: str, several: Iterator[Findings], total: Findings) -> None:
+def report(name: str, all_findings: Iterator[Findings], total: Findings) -> None:
     """Print findings as they come and the counts at the end; add the counts to `total`."""
-    own = Findings()
-    for found in several:
-        for text in found.texts[:MOST_TOLD]:
+    own_findings = Findings()
+    for findings in all_findings:
+        for text in findings.texts[:MOST_TOLD]:
             print(text, flush=True)
-        own.counts.update(found.counts)
-    total.counts.update(own.counts)
-    print_counts(name, own)
+        own_findings.counts.update(findings.counts)
+    total.counts.update(own_findings.counts)
+    print_counts(name, own_findings)
 
 
-def print_counts(name: str, found: Findings) -> None:
+def print_counts(name: str, findings: Findings) -> None:
     """Print one line a count, first those that must be zero."""
-    print(f"{name}: {found.counts['buildings']} buildings, {found.counts[CHECKED]} solids in files")
+    print(
+        f"{name}: {findings.counts['buildings']} buildings, "
+        f"{findings.counts[CHECKED]} solids in files"
+    )
     for kind in (*MUST_BE_NONE, Status.FLAT_FALLBACK.code, Status.SIMPLIFIED.code):
-        print(f"  {kind:32} {found.counts[kind]}")
-    others = {k: n for k, n in found.counts.items() if k in {s.code for s in Status}}
+        print(f"  {kind:32} {findings.counts[kind]}")
+    statuses = {k: n for k, n in findings.counts.items() if k in {s.code for s in Status}}
     print(
         "  statuses: "
-        + ", ".join(f"{n} {k}" for k, n in sorted(others.items(), key=lambda pair: -pair[1])),
+        + ", ".join(f"{n} {k}" for k, n in sorted(statuses.items(), key=lambda pair: -pair[1])),
         flush=True,
     )
 

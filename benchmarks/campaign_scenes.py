@@ -153,10 +153,10 @@ def draw_city_block(rng: np.random.Generator, place: np.ndarray) -> SimBuilding:
             parts.append(make_part(part.type, part.parameters, kappa + turn, translation))
     block = assemble(tuple(parts), "block", place)
     outline = max(shapely.get_parts(block.outline), key=lambda polygon: polygon.area)
-    kept = tuple(
+    houses = tuple(
         part for part in parts if shapely.intersects(part.pieces[0].outline.buffer(-0.5), outline)
     )
-    return block if len(kept) == len(parts) else assemble(kept, "block", place)
+    return block if len(houses) == len(parts) else assemble(houses, "block", place)
 
 
 def damage_points(
@@ -169,8 +169,8 @@ def damage_points(
         hole = np.hypot(points[keep, 0] - x, points[keep, 1] - y) < rng.uniform(1.0, 6.0)
         keep = keep[~hole]
     if rng.random() < 0.5 * damage:
-        beyond = points[keep, 0] > np.median(points[keep, 0]) if len(keep) else np.zeros(0, bool)
-        keep = keep[~beyond | (rng.random(len(keep)) < rng.uniform(0.0, 0.3))]
+        is_beyond = points[keep, 0] > np.median(points[keep, 0]) if len(keep) else np.zeros(0, bool)
+        keep = keep[~is_beyond | (rng.random(len(keep)) < rng.uniform(0.0, 0.3))]
     if rng.random() < 0.5 * damage:
         keep = np.concatenate([keep, keep[: len(keep) // 3]])
     return keep

@@ -105,28 +105,30 @@ def run_warm(clouds: list[str], footprints: str, out: Path, jobs: int, settings:
             (str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True
         )
     )
-    before, started = measure_cpu(), time.perf_counter()
+    cpu_start, started = measure_cpu(), time.perf_counter()
     summary = reconstruct_area(
         Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True)
     )
-    wall, after = time.perf_counter() - started, measure_cpu()
+    wall, cpu_end = time.perf_counter() - started, measure_cpu()
     peak = (
         max(
-            resource.getrusage(who).ru_maxrss
-            for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+            resource.getrusage(target).ru_maxrss
+            for target in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
         )
         / 1024
     )
-    return Cost(summary.buildings, after[0] - before[0], after[1] - before[1], wall, peak)
+    return Cost(summary.buildings, cpu_end[0] - cpu_start[0], cpu_end[1] - cpu_start[1], wall, peak)
 
 
 def measure_cpu() -> tuple[float, float]:
     """CPU seconds of this process and of its ended children."""
-    usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    usages = (
+        resource.getrusage(process) for process in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     return tuple(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
-def describe_outcomes(out: Path, asked: int) -> str:
+def describe_outcomes(out: Path, n_requested: int) -> str:
     """How many solids are valid, and how many buildings have no outcome."""
     rows = read_parameters(out / "parameters.jsonl")
     solids = [solid for _, solid in read_solids(out / "buildings.city.jsonl")]
@@ -134,7 +136,8 @@ def describe_outcomes(out: Path, asked: int) -> str:
     statuses = ", ".join(
         f"{sum(r['status'] == s for r in rows)} {s}" for s in sorted({r["status"] for r in rows})
     )
-    return f"{valid} of {len(solids)} solids valid; {asked - len(rows)} without outcome; {statuses}"
+    lost = n_requested - len(rows)
+    return f"{valid} of {len(solids)} solids valid; {lost} without outcome; {statuses}"
 
 
 def run_with_kills(
@@ -143,7 +146,7 @@ def run_with_kills(
     """Runs with two workers, killed at random moments and started again until they end; each is
     compared with `whole`.
     """
-    draw, done, of_main, runs, different = random.Random(seed), 0, 0, 0, 0
+    draw, n_kills, of_main, runs, different = random.Random(seed), 0, 0, 0, 0
     command = [
         sys.executable,
         "-m",
@@ -155,27 +158,27 @@ def run_with_kills(
         "--out",
         str(out),
     ]
-    while done < kills:
+    while n_kills < kills:
         shutil.rmtree(out, ignore_errors=True)
         ended = False
         while not ended:
             main = subprocess.Popen(
                 [*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
             )
-            while done < kills and main.poll() is None:
+            while n_kills < kills and main.poll() is None:
                 time.sleep(draw.uniform(0.3, 5.0))
                 victim = draw.choice([main.pid, *list_children(main.pid)])
                 if main.poll() is None:
                     os.kill(victim, signal.SIGKILL)
-                    done, of_main = done + 1, of_main + (victim == main.pid)
+                    n_kills, of_main = n_kills + 1, of_main + (victim == main.pid)
             ended = main.wait() >= 0
         runs += 1
         different += any(
             (out / name).read_bytes() != (whole / name).read_bytes() for name in RECORDS
         )
     return (
-        f"{done} kills ({of_main} of the main process) over {runs} runs, all gone on to the end; "
-        f"{different} differ in a byte"
+        f"{n_kills} kills ({of_main} of the main process) over {runs} runs, all gone on to the "
+        f"end; {different} differ in a byte"
     )
 
 
@@ -202,14 +205,17 @@ def run_on_damage(clouds: list[str], footprints: str, work: Path, whole: Path) -
     cut.write_bytes(bad.read_bytes()[: bad.stat().st_size // 2])
     xmin, ymin, _, xmax, ymax, _ = read_header(bad).bounds
     lost = shapely.box(xmin - 15, ymin - 15, xmax + 15, ymax + 15)
-    asked = read_footprints(footprints)
-    broken = set(range(0, len(asked), 100))
-    shapes = [cross_corners(f.polygon) if i in broken else f.polygon for i, f in enumerate(asked)]
+    footprints_read = read_footprints(footprints)
+    broken = set(range(0, len(footprints_read), 100))
+    shapes = [
+        cross_corners(f.polygon) if i in broken else f.polygon
+        for i, f in enumerate(footprints_read)
+    ]
     empty = [
         shapely.box(xmax + 1e4 + 20 * i, ymax, xmax + 1e4 + 20 * i + 10, ymax + 10)
         for i in range(len(broken))
     ]
-    ids = [f.id for f in asked] + [f"empty-{i}" for i in range(len(empty))]
+    ids = [f.id for f in footprints_read] + [f"empty-{i}" for i in range(len(empty))]
     layer = folder / "footprints.gpkg"
     meta = pyogrio.read_info(footprints)
     pyogrio.raw.write(
@@ -217,16 +223,18 @@ def run_on_damage(clouds: list[str], footprints: str, work: Path, whole: Path) -
         geometry_type="Polygon", crs=meta["crs"], driver="GPKG",
     )  # fmt: skip
     summary = reconstruct_area(Request((*clouds[:-1], str(cut)), out, str(layer), restart=True))
-    rows, before = ({r["id"]: r for r in read_rows(folder)} for folder in (out, whole))
+    rows, old_rows = ({r["id"]: r for r in read_rows(folder)} for folder in (out, whole))
     unharmed = [
-        f.id for i, f in enumerate(asked) if i not in broken and not lost.intersects(f.polygon)
+        f.id
+        for i, f in enumerate(footprints_read)
+        if i not in broken and not lost.intersects(f.polygon)
     ]
-    different = sum(rows.get(id) != before[id] for id in unharmed)
-    named = [Path(name).name for name, _ in summary.broken_inputs]
+    different = sum(rows.get(id) != old_rows[id] for id in unharmed)
+    broken_names = [Path(name).name for name, _ in summary.broken_inputs]
     return (
-        f"exit code {summary.exit_code}, named {named}; {len(unharmed)} buildings away from the "
-        f"damage, {different} of them "
-        f"changed; {len(empty)} planted without points, {summary.by_status.get('no_points', 0)} "
+        f"exit code {summary.exit_code}, named {broken_names}; {len(unharmed)} buildings away from "
+        f"the damage, {different} of them changed; "
+        f"{len(empty)} planted without points, {summary.by_status.get('no_points', 0)} "
         "found (with those of the lost tile)"
     )
 
@@ -269,23 +277,24 @@ def main() -> None:
         show("Delft, one process", measure_run(*delft, args.work / "out-delft").format_cost())
     clouds, footprints = make_city(args.work, args.buildings)
     out = args.work / "out-one"
-    one = measure_run(clouds, footprints, out)
-    show("simulated city, one process", one.format_cost())
+    one_process = measure_run(clouds, footprints, out)
+    show("simulated city, one process", one_process.format_cost())
     show("outcomes", describe_outcomes(out, len(read_footprints(footprints))))
-    two = measure_run(clouds, footprints, args.work / "out-two", jobs=2)
-    show("the same, two workers", two.format_cost())
-    same = all(
+    two_processes = measure_run(clouds, footprints, args.work / "out-two", jobs=2)
+    show("the same, two workers", two_processes.format_cost())
+    is_same = all(
         (out / name).read_bytes() == (args.work / "out-two" / name).read_bytes() for name in RECORDS
     )
-    bound = one.cpu_s / (two.main_s + two.workers_s / 2)
+    bound = one_process.cpu_s / (two_processes.main_s + two_processes.workers_s / 2)
     show(
         "two workers against one",
-        f"wall {one.wall_s / two.wall_s:.2f}, by CPU time {bound:.2f}; same bytes: {same}",
+        f"wall {one_process.wall_s / two_processes.wall_s:.2f}, by CPU time {bound:.2f}; "
+        f"same bytes: {is_same}",
     )
     show("damaged input", run_on_damage(clouds, footprints, args.work, out))
     if args.large:
         large = measure_run(*make_city(args.work, args.large), args.work / "out-large")
-        ratio = large.cpu_s / large.buildings / (one.cpu_s / one.buildings)
+        ratio = large.cpu_s / large.buildings / (one_process.cpu_s / one_process.buildings)
         show(
             f"{args.large} buildings",
             f"{large.format_cost()}; cost a building against {args.buildings}: {ratio:.2f}",

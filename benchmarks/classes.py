@@ -57,12 +57,12 @@ def select_points(cloud: PointCloud, keep: np.ndarray) -> PointCloud:
     )
 
 
-def describe_agreement(found: np.ndarray, truth: np.ndarray) -> str:
+def describe_agreement(is_found: np.ndarray, truth: np.ndarray) -> str:
     """Precision, recall and F1 of points (n,) `found` against the `truth`."""
-    hits = (found & truth).sum()
-    precision, recall = hits / max(found.sum(), 1), hits / max(truth.sum(), 1)
+    hits = (is_found & truth).sum()
+    precision, recall = hits / max(is_found.sum(), 1), hits / max(truth.sum(), 1)
     return (
-        f"F1 {2 * hits / (found.sum() + truth.sum()):.4f} precision {precision:.4f} recall "
+        f"F1 {2 * hits / (is_found.sum() + truth.sum()):.4f} precision {precision:.4f} recall "
         f"{recall:.4f}"
     )
 
@@ -78,37 +78,37 @@ def compare_ground(cloud: PointCloud) -> np.ndarray:
     )
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     true = GroundGrid(np.array(cells.first, float), fill_gaps(mean), 1.0)
-    under = (
+    inside = (
         np.argwhere(cells.count(cloud.classification == BUILDING) > 0) + np.array(cells.first) + 0.5
     )
-    return ground_grid(cloud.xyz).height_at(under) - true.height_at(under)
+    return ground_grid(cloud.xyz).height_at(inside) - true.height_at(inside)
 
 
 def report(name: str, pictures: Path | None) -> None:
-    clouds, found, seconds = read_clouds(name), [], time.process_time()
-    found = [classify(cloud.xyz) == BUILDING for cloud in clouds]
+    clouds, findings, seconds = read_clouds(name), [], time.process_time()
+    findings = [classify(cloud.xyz) == BUILDING for cloud in clouds]
     seconds = time.process_time() - seconds
     truth = [cloud.classification == BUILDING for cloud in clouds]
     ground = np.concatenate([compare_ground(cloud) for cloud in clouds])
     print(
-        f"{name}: {describe_agreement(np.concatenate(found), np.concatenate(truth))}; "
+        f"{name}: {describe_agreement(np.concatenate(findings), np.concatenate(truth))}; "
         f"{seconds:.1f} s of {sum(map(len, clouds)):,} points"
     )
     if name == "delft":
         west = clouds[0].xyz[:, 0] < HALVES_X
-        for half, here in (("west (chosen on)", west), ("east", ~west)):
-            print(f"  {half}: {describe_agreement(found[0][here], truth[0][here])}")
+        for half, half_mask in (("west (chosen on)", west), ("east", ~west)):
+            print(f"  {half}: {describe_agreement(findings[0][half_mask], truth[0][half_mask])}")
     print(
         f"  terrain under buildings: mean |dz| {np.abs(ground).mean():.3f} m, mean "
         f"{ground.mean():+.3f} m",
         flush=True,
     )
-    for number, (cloud, guess, true) in enumerate(zip(clouds, found, truth, strict=True)):
+    for number, (cloud, guess, true) in enumerate(zip(clouds, findings, truth, strict=True)):
         if pictures:
             draw(pictures / f"{name}_{number}.png", cloud, guess, true)
 
 
-def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) -> None:
+def draw(path: Path, cloud: PointCloud, is_found: np.ndarray, truth: np.ndarray) -> None:
     """Half-metre cells: grey by height, green where found and true agree, red false alarms, blue
     misses.
     """
@@ -120,12 +120,12 @@ def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) ->
     )
     shade = 0.25 + 0.5 * np.clip(np.nan_to_num(height, neginf=0.0) / 12, 0, 1)
     picture = np.repeat(shade[..., None], 3, axis=2)
-    both, only, missed = (
-        cells.count(which) for which in (found & truth, found & ~truth, truth & ~found)
+    axes, only, missed = (
+        cells.count(mask) for mask in (is_found & truth, is_found & ~truth, truth & ~is_found)
     )
-    picture[both > 0] *= (0.7, 1.1, 0.7)
-    picture[only > both] = (1.0, 0.2, 0.2)
-    picture[(missed > both) & (missed > only)] = (0.2, 0.4, 1.0)
+    picture[axes > 0] *= (0.7, 1.1, 0.7)
+    picture[only > axes] = (1.0, 0.2, 0.2)
+    picture[(missed > axes) & (missed > only)] = (0.2, 0.4, 1.0)
     path.parent.mkdir(parents=True, exist_ok=True)
     image.imsave(path, np.kron(np.clip(picture, 0, 1).transpose(1, 0, 2)[::-1], np.ones((3, 3, 1))))
 

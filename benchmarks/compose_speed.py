@@ -47,7 +47,7 @@ def main() -> None:
         f"{'check ms, median':>17}"
     )
     for kind, roofs in cases.items():
-        composed = [time_call(lambda made: compose(made, 0.0), made) for made in roofs]
+        composed = [time_call(lambda product: compose(product, 0.0), product) for product in roofs]
         checked = [time_call(check_solid, solid)[0] for _, solid in composed]
         times, faces = [ms for ms, _ in composed], [len(solid.faces) for _, solid in composed]
         print(

@@ -75,10 +75,12 @@ def measure_errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
     for axis in range(2):
         jump = np.abs(np.diff(z_true, axis=axis)) > STEP_M
         jumps |= np.pad(jump, [(0, 1) if a == axis else (0, 0) for a in range(2)])
-    away = ~ndimage.binary_dilation(jumps, iterations=NEAR_STEP_CELLS)
+    height_error = ~ndimage.binary_dilation(jumps, iterations=NEAR_STEP_CELLS)
     gap = z_fit - z_true
-    known = np.isfinite(gap)
-    return float(np.sqrt(np.mean(gap[known] ** 2))), float(np.sqrt(np.mean(gap[known & away] ** 2)))
+    is_known = np.isfinite(gap)
+    return float(np.sqrt(np.mean(gap[is_known] ** 2))), float(
+        np.sqrt(np.mean(gap[is_known & height_error] ** 2))
+    )
 
 
 def draw_compound(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray]:
@@ -109,27 +111,27 @@ def compare_parts(
 def judge_compound(kind: str, density: float, seed: int) -> Outcome:
     building, points = draw_compound(kind, density, seed)
     fit = fit_roof_parts(points, building.outline)
-    wanted, right, ratios = compare_parts(building.roof, fit.roof_parts)
+    n_true, right, ratios = compare_parts(building.roof, fit.roof_parts)
     return Outcome(
-        *measure_errors(building.roof, fit), len(fit.roof_parts), wanted, right, tuple(ratios)
+        *measure_errors(building.roof, fit), len(fit.roof_parts), n_true, right, tuple(ratios)
     )
 
 
-def report(name: str, found: list[Outcome]) -> str:
-    whole, away, parts, wanted, types = np.array(
-        [(o.rmse, o.rmse_away_from_steps, o.parts, o.wanted, o.types_right) for o in found]
+def report(name: str, findings: list[Outcome]) -> str:
+    whole, plain, parts, n_true, types = np.array(
+        [(o.rmse, o.rmse_away_from_steps, o.parts, o.wanted, o.types_right) for o in findings]
     ).T
     return (
-        f"{name:24s} volumes {np.mean(parts == wanted):6.1%}  types {types.mean():6.1%}"
+        f"{name:24s} volumes {np.mean(parts == n_true):6.1%}  types {types.mean():6.1%}"
         f"  RMSE {np.median(whole):.3f} m, {np.mean(whole < NEAR_M):6.1%} under {NEAR_M}"
-        f"  without steps {np.median(away):.3f}, {np.mean(away < NEAR_M):6.1%}"
-        f"  parts {parts.mean():.2f} of {wanted.mean():.2f}"
+        f"  without steps {np.median(plain):.3f}, {np.mean(plain < NEAR_M):6.1%}"
+        f"  parts {parts.mean():.2f} of {n_true.mean():.2f}"
     )
 
 
-def report_sigmas(found: Iterable[Outcome]) -> str:
+def report_sigmas(outcomes: Iterable[Outcome]) -> str:
     ratios = defaultdict(list)
-    for name, ratio in (pair for outcome in found for pair in outcome.ratios):
+    for name, ratio in (pair for outcome in outcomes for pair in outcome.ratios):
         ratios[name].append(ratio)
     columns = []
     for name, values in sorted(ratios.items()):
@@ -153,13 +155,13 @@ def main() -> None:
     arguments = parser.parse_args()
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.each)
     for density in arguments.densities:
-        every = []
+        total = []
         for kind in arguments.kinds:
-            found = [judge_compound(kind, density, seed) for seed in seeds]
-            every += found
-            print(report(f"{density:g}/m2 {kind}", found), flush=True)
-        print(report(f"{density:g}/m2 all", every))
-        print(f"{density:g}/m2 {report_sigmas(every)}", flush=True)
+            name = [judge_compound(kind, density, seed) for seed in seeds]
+            total += name
+            print(report(f"{density:g}/m2 {kind}", name), flush=True)
+        print(report(f"{density:g}/m2 all", total))
+        print(f"{density:g}/m2 {report_sigmas(total)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -31,12 +31,12 @@ def find_value(text: str, name: str) -> ast.Constant:
     for statement in ast.parse(text).body:
         if isinstance(statement, ast.Assign):
             target, value = statement.targets[0], statement.value
-            both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
-            names, values = (target.elts, value.elts) if both else ([target], [value])
-            for one, number in zip(names, values, strict=True):
+            is_pair = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            names, values = (target.elts, value.elts) if is_pair else ([target], [value])
+            for target_name, number in zip(names, values, strict=True):
                 if (
-                    isinstance(one, ast.Name)
-                    and one.id == name
+                    isinstance(target_name, ast.Name)
+                    and target_name.id == name
                     and isinstance(number, ast.Constant)
                 ):
                     return number
@@ -86,7 +86,7 @@ def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> s
             *shares,
         ]
         path = os.pathsep.join([folder, *filter(None, [os.environ.get("PYTHONPATH")])])
-        done = subprocess.run(
+        process = subprocess.run(
             command,
             cwd=ROOT,
             env={**os.environ, "PYTHONPATH": path},
@@ -94,7 +94,7 @@ def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> s
             text=True,
             check=False,
         )
-        return done.stdout or done.stderr
+        return process.stdout or process.stderr
 
 
 def tell() -> None:

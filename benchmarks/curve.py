@@ -53,9 +53,9 @@ def set_price(price: float) -> Settings:
     )
 
 
-def stop_at(price: float, asked: Asked) -> Stop:
-    buildings, columns = model_buildings(asked, set_price(price))
-    share = measure(buildings, asked)["share_within_20cm"]
+def stop_at(price: float, data_set: Asked) -> Stop:
+    buildings, columns = model_buildings(data_set, set_price(price))
+    share = measure(buildings, data_set)["share_within_20cm"]
     return Stop(
         price,
         share,
@@ -112,9 +112,9 @@ def main() -> None:
     arguments = parser.parse_args()
     curves = {}
     for name in arguments.set:
-        asked, curves[name] = read_set(name, parity=arguments.parity), []
+        request, curves[name] = read_set(name, parity=arguments.parity), []
         for price in arguments.prices:
-            stop = stop_at(price, asked)
+            stop = stop_at(price, request)
             curves[name].append(stop)
             print(
                 f"{name} price {price:<5g} share {stop.share:.4f}  parts {stop.parts:.2f}  faces "

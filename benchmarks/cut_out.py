@@ -52,20 +52,20 @@ def cut_clouds(building: TrueBuilding, density: float) -> dict[str, np.ndarray]:
 
 def count_cut_out(clouds: list[np.ndarray]) -> str:
     """How many of the clouds that may be one building are taken for roofs cut out."""
-    found = [
+    results = [
         is_cut_out(xyz) is not False
         for xyz in clouds
         if len(xyz) >= LEAST_POINTS and is_single(xyz[:, :2])
     ]
-    return f"{sum(found)} of {len(found)}"
+    return f"{sum(results)} of {len(results)}"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--every", type=int, default=1)
-    every = parser.parse_args().every
+    total = parser.parse_args().every
     for town, path in TOWNS.items():
-        buildings = read_town(path)[::every]
+        buildings = read_town(path)[::total]
         for density in DENSITIES:
             clouds = [cut_clouds(building, density) for building in buildings]
             print(
@@ -80,14 +80,14 @@ def main() -> None:
         for f in read_footprints(str(folder / "footprints.gpkg"))
         if f.polygon.area >= LEAST_M2
     ]
-    for kept in 1.0, 0.1:
-        some = xyz[np.random.default_rng(0).random(len(xyz)) < kept]
-        grid = PointGrid(some)
-        for kind, around in AROUND.items():
-            areas = [around(footprint) for footprint in footprints[::every]]
+    for selection in 1.0, 0.1:
+        street = xyz[np.random.default_rng(0).random(len(xyz)) < selection]
+        grid = PointGrid(street)
+        for kind, context_lines in AROUND.items():
+            areas = [context_lines(footprint) for footprint in footprints[::total]]
             print(
-                f"delft, {kept:g} of the points, {kind}: "
-                f"{count_cut_out([some[grid.inside(area)] for area in areas])}"
+                f"delft, {selection:g} of the points, {kind}: "
+                f"{count_cut_out([street[grid.inside(area)] for area in areas])}"
             )
 
 

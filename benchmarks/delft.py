@@ -59,12 +59,12 @@ WALL_M = 3.0
 def thin_points(paths: list[Path], share: float) -> np.ndarray:
     """Building points (n, 3) of the files after the draw that `thin_cloud.py` makes."""
     rng = np.random.default_rng(0)
-    kept = []
+    chunks = []
     for path in paths:
         cloud = read_points(path)
         draw = rng.random(len(cloud)) < share
-        kept.append(cloud.xyz[draw & (cloud.classification == BUILDING_CLASS)])
-    return np.concatenate(kept)
+        chunks.append(cloud.xyz[draw & (cloud.classification == BUILDING_CLASS)])
+    return np.concatenate(chunks)
 
 
 def model(
@@ -77,20 +77,20 @@ def model(
     local, outline = frame.to_local(points), shapely.transform(footprint.polygon, frame.to_local)
     started = time.process_time()
     fit = fit_roof_parts(local, outline, settings)
-    done = time.process_time()
+    result = time.process_time()
     roof = Roof(fit.roof_parts, fit.outline, frame)
-    figures = {"fit": done - started, "parts": len(fit.roof_parts)}
+    figures = {"fit": result - started, "parts": len(fit.roof_parts)}
     try:
         solid = compose(roof, float(local[:, 2].min()) - WALL_M, settings)
     except HiproofError as error:
         print(f"{footprint.id}: {error}")
         return None, figures | {
-            "compose": time.process_time() - done,
+            "compose": time.process_time() - result,
             "faces": 0,
             "beyond": 0.0,
             "bad": 1.0,
         }
-    figures["compose"] = time.process_time() - done
+    figures["compose"] = time.process_time() - result
     top = np.unique(
         np.concatenate([np.concatenate(face.rings) for face in solid.select_faces(ROOF)]).astype(
             int
@@ -141,45 +141,45 @@ def read_set(
 
 
 def model_buildings(
-    asked: Asked, settings: Settings
+    data_set: Asked, settings: Settings
 ) -> tuple[list[Building], dict[str, np.ndarray]]:
     """All buildings that could be composed, and the figures of `model` for every building asked
     for.
     """
-    model(*asked.own_points[0], settings)  # compiles or loads what is compiled
-    outcomes = [model(points, footprint, settings) for points, footprint in asked.own_points]
+    model(*data_set.own_points[0], settings)  # compiles or loads what is compiled
+    outcomes = [model(points, footprint, settings) for points, footprint in data_set.own_points]
     columns = {
         name: np.array([figures[name] for _, figures in outcomes]) for name in outcomes[0][1]
     }
     return [building for building, _ in outcomes if building is not None], columns
 
 
-def measure(buildings: list[Building], asked: Asked, tools: Path = SHARED / "tools") -> dict:
+def measure(buildings: list[Building], data_set: Asked, tools: Path = SHARED / "tools") -> dict:
     """What roof_residuals.py says of the written models within the footprints, on all points of the
     cloud.
     """
     with tempfile.TemporaryDirectory() as folder:
         models, footprints = Path(folder) / "models.city.jsonl", Path(folder) / "asked.gpkg"
         write_cityjson(models, buildings)
-        outlines = shapely.to_wkb([footprint.polygon for footprint in asked.footprints])
+        outlines = shapely.to_wkb([footprint.polygon for footprint in data_set.footprints])
         pyogrio.raw.write(footprints, outlines, [], [], geometry_type="Polygon", crs="EPSG:28992")
-        return load_tool("roof_residuals", tools).measure(models, footprints, asked.clouds)
+        return load_tool("roof_residuals", tools).measure(models, footprints, data_set.clouds)
 
 
-def make_row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
-    buildings, columns = model_buildings(asked, settings)
-    figures = measure(buildings, asked, tools)
+def make_row(share: float, data_set: Asked, tools: Path, settings: Settings) -> str:
+    buildings, columns = model_buildings(data_set, settings)
+    figures = measure(buildings, data_set, tools)
     narrow, standing = np.sum([count_narrow_parts(building.roof) for building in buildings], axis=0)
-    both, areas = 1e3 * (columns["fit"] + columns["compose"]), sum_area_by_type(buildings)
+    durations, areas = 1e3 * (columns["fit"] + columns["compose"]), sum_area_by_type(buildings)
     return (
-        f"{share:<6g} {len(asked.footprints)} footprints  share {figures['share_within_20cm']:.4f} "
-        f" modelled {figures['modelled']}"
+        f"{share:<6g} {len(data_set.footprints)} footprints  "
+        f"share {figures['share_within_20cm']:.4f}  modelled {figures['modelled']}"
         f"  faces median {figures['median_roof_faces']:.0f} ({np.median(columns['faces']):.0f}) "
         f"mean {columns['faces'].mean():.2f}"
         f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named "
         f"{measure_named_share(buildings):.3f}"
-        f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(both):.1f} mean "
-        f"{both.mean():.1f} max {both.max():.0f}"
+        f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(durations):.1f} mean "
+        f"{durations.mean():.1f} max {durations.max():.0f}"
         f" (fit {1e3 * np.median(columns['fit']):.1f})  beyond {columns['beyond'].max():.2f}  bad "
         f"{columns['bad'].sum():.0f}"
         f"  narrow {narrow} (standing {standing})"
@@ -199,8 +199,8 @@ def main() -> None:
     )
     arguments = parser.parse_args()
     for share in arguments.shares:
-        asked = read_set(arguments.set, share, arguments.parity, arguments.data)
-        print(make_row(share, asked, arguments.tools, Settings()), flush=True)
+        request = read_set(arguments.set, share, arguments.parity, arguments.data)
+        print(make_row(share, request, arguments.tools, Settings()), flush=True)
 
 
 if __name__ == "__main__":

@@ -39,8 +39,8 @@ def make_raise(by_m: float) -> Callable[[Case], np.ndarray]:
 
     def raise_points(case: Case) -> np.ndarray:
         id, points, _ = case
-        drawn = np.random.default_rng(zlib.crc32(id.encode())).random(len(points)) < 0.5
-        return points + np.outer(drawn, (0.0, 0.0, by_m))
+        is_raised = np.random.default_rng(zlib.crc32(id.encode())).random(len(points)) < 0.5
+        return points + np.outer(is_raised, (0.0, 0.0, by_m))
 
     return raise_points
 
@@ -60,7 +60,7 @@ CHANGES: dict[str, Callable[[Case], np.ndarray]] = {
 
 def describe_doubts(cases: Iterable[Case], change: Callable[[Case], np.ndarray]) -> str:
     """What is said of all cases once changed."""
-    surfaces, apart, unseen, count = 0, [], 0, 0
+    surfaces, distances, unseen, count = 0, [], 0, 0
     for case in cases:
         points = change(case)
         building = reconstruct(points, case[2], settings=SETTINGS)
@@ -70,10 +70,10 @@ def describe_doubts(cases: Iterable[Case], change: Callable[[Case], np.ndarray])
         local = building.roof.frame.to_local(inside)
         share, apart_m = find_second_surface(local, building.roof)
         count, surfaces = count + 1, surfaces + (share > 0)
-        apart += [apart_m] if share else []
+        distances += [apart_m] if share else []
         unseen += unseen_share(local, building.roof.outline) > MOST_UNSEEN
-    far = f", {np.median(apart):.2f} m apart" if apart else ""
-    return f"{count} buildings, two surfaces {surfaces}{far}, without points {unseen}"
+    distance_text = f", {np.median(distances):.2f} m apart" if distances else ""
+    return f"{count} buildings, two surfaces {surfaces}{distance_text}, without points {unseen}"
 
 
 def main() -> None:

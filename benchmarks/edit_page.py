@@ -78,8 +78,8 @@ class Window:
 
     def change(self, id: str, parts: list, **asked: Any) -> dict[str, Any] | None:
         """The model after an edit, None where it makes none."""
-        code, found = self.ask("POST", "change", {"id": id, "parts": parts, "asked": asked})
-        return found if code == 200 else None
+        code, response = self.ask("POST", "change", {"id": id, "parts": parts, "asked": asked})
+        return response if code == 200 else None
 
 
 def measure_times(window: Window, ids: list[str]) -> None:
@@ -90,18 +90,18 @@ def measure_times(window: Window, ids: list[str]) -> None:
         window.ask("GET", f"points?id={id}")
         window.change(id, model["parts"], action="show")
         height = model["origin"][2] + model["handles"][0]["ridge"] + 0.3
-        for name, asked in {
+        for name, change in {
             "ridge raised": {"action": "change", "part": 0, "change": {"ridge_height": height}},
             "refit": {"action": "refit"},
         }.items():
-            start, used = time.perf_counter(), time.process_time()
-            window.change(id, model["parts"], **asked)
+            start, cpu_start = time.perf_counter(), time.process_time()
+            window.change(id, model["parts"], **change)
             wall[name].append(1e3 * (time.perf_counter() - start))
-            cpu[name].append(1e3 * (time.process_time() - used))
-    for name, taken in wall.items():
+            cpu[name].append(1e3 * (time.process_time() - cpu_start))
+    for name, durations in wall.items():
         print(
-            f"{name}: median {statistics.median(taken):.0f} ms, 95 % "
-            f"{np.percentile(taken, 95):.0f} ms over {len(taken)} buildings "
+            f"{name}: median {statistics.median(durations):.0f} ms, 95 % "
+            f"{np.percentile(durations, 95):.0f} ms over {len(durations)} buildings "
             f"(CPU {statistics.median(cpu[name]):.0f} and {np.percentile(cpu[name], 95):.0f} ms; "
             f"load {os.getloadavg()[0]:.0f})",
             flush=True,
@@ -118,7 +118,7 @@ def measure_in_browser(window: Window, ids: list[str]) -> None:
         "--disable-background-networking",
         "--enable-unsafe-swiftshader",
     ]
-    taken = []
+    durations = []
     with Server(window.service) as server, sync_playwright() as driver:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
@@ -130,13 +130,13 @@ def measure_in_browser(window: Window, ids: list[str]) -> None:
             for _ in range(2):  # the first also composes what the second starts from
                 page.keyboard.press("r")
                 page.evaluate("() => queue")
-            taken.append(float(page.evaluate("Number($('say').dataset.ms)")))
+            durations.append(float(page.evaluate("Number($('say').dataset.ms)")))
         browser.close()
         server.shutdown()
     window.service.port = 8000
     print(
-        f"refit in the page: median {statistics.median(taken):.0f} ms, 95 % "
-        f"{np.percentile(taken, 95):.0f} ms, {len(taken)} buildings"
+        f"refit in the page: median {statistics.median(durations):.0f} ms, 95 % "
+        f"{np.percentile(durations, 95):.0f} ms, {len(durations)} buildings"
     )
 
 
@@ -175,8 +175,8 @@ def try_models(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[
     for action, heights in (("dormer", ABOVE_M), ("recess", BELOW_M)):
         for crowd in find_crowds(window, id, model, heights):
             yield from draw_parts(window, id, model, crowd, action)
-    for asked in list_tries(model):
-        yield from refit(window, id, window.change(id, model["parts"], **asked))
+    for change in list_tries(model):
+        yield from refit(window, id, window.change(id, model["parts"], **change))
 
 
 def refit(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dict[str, Any]]:
@@ -199,16 +199,16 @@ def find_crowds(
     outlines = [shapely.Polygon(o[0]) for part in model["parts"] for o in part["outlines"]]
     roofed = shapely.union_all(shapely.make_valid(outlines), grid_size=OVERLAY_GRID_M)
     counts = shapely.intersects_xy(shapely.buffer(roofed, -FACADE_M), *places[:, :2].T)
-    off = places[(gaps > heights[0]) & (gaps < heights[1]) & counts]
-    if not len(off):
+    outliers = places[(gaps > heights[0]) & (gaps < heights[1]) & counts]
+    if not len(outliers):
         return []
-    tree, found = cKDTree(off), {}
+    tree, crowds = cKDTree(outliers), {}
     for reach in CROWDS_M:
         crowd = connected_components(tree.sparse_distance_matrix(tree, reach))[1]
         members = (np.flatnonzero(crowd == k) for k in range(crowd.max() + 1))
         largest = sorted((m for m in members if len(m) >= CROWD), key=len, reverse=True)[:CROWDS]
-        found |= {m.tobytes(): off[m] for m in largest}
-    return list(found.values())
+        crowds |= {m.tobytes(): outliers[m] for m in largest}
+    return list(crowds.values())
 
 
 def draw_parts(
@@ -219,15 +219,21 @@ def draw_parts(
     """
     middle = crowd.mean(axis=0)
     for part in list_owners(model, middle)[:PARTS]:
-        made = window.change(id, model["parts"], action=action, part=part, place=middle.tolist())
-        if made is None:
+        drawn_model = window.change(
+            id, model["parts"], action=action, part=part, place=middle.tolist()
+        )
+        if drawn_model is None:
             continue
-        last = len(made["parts"]) - 1
-        for kind in dict.fromkeys((made["parts"][last]["type"], "flat")):
+        last = len(drawn_model["parts"]) - 1
+        for kind in dict.fromkeys((drawn_model["parts"][last]["type"], "flat")):
             change = {"type": kind} | fit_box(
-                crowd, made["handles"][last]["turn"], made["parts"][last]["position"][2]
+                crowd,
+                drawn_model["handles"][last]["turn"],
+                drawn_model["parts"][last]["position"][2],
             )
-            best = window.change(id, made["parts"], action="change", part=last, change=change)
+            best = window.change(
+                id, drawn_model["parts"], action="change", part=last, change=change
+            )
             best = next(refit(window, id, best), None)
             yield from () if best is None else drag_edges(window, id, best, last)
 
@@ -246,10 +252,10 @@ def drag_edges(
 ) -> Iterator[dict[str, Any]]:
     """The model, and whatever dragging edges of a part makes better."""
     yield model
-    for asked in list_drags(model, part):
-        for found in refit(window, id, window.change(id, model["parts"], **asked)):
-            if read_share(found) > read_share(model):
-                yield from drag_edges(window, id, found, part)
+    for change in list_drags(model, part):
+        for candidate in refit(window, id, window.change(id, model["parts"], **change)):
+            if read_share(candidate) > read_share(model):
+                yield from drag_edges(window, id, candidate, part)
                 return
 
 
@@ -270,12 +276,12 @@ def read_share(model: dict[str, Any] | None) -> float:
 
 def choose_better(models: Iterator[dict[str, Any]], best: dict[str, Any]) -> dict[str, Any]:
     """The first model whose share is higher by ENOUGH, else the best of all, `best` among them."""
-    found = best
+    best_model = best
     for model in models:
-        found = max(found, model, key=read_share)
-        if read_share(found) >= read_share(best) + ENOUGH:
+        best_model = max(best_model, model, key=read_share)
+        if read_share(best_model) >= read_share(best) + ENOUGH:
             break
-    return found
+    return best_model
 
 
 def mend_building(window: Window, id: str, rounds: int) -> tuple[float, float, int, int]:
@@ -285,10 +291,10 @@ def mend_building(window: Window, id: str, rounds: int) -> tuple[float, float, i
     refitted = window.change(id, start["parts"], action="refit")
     best = max(best, refitted or best, key=read_share)
     for _ in range(rounds):
-        better = choose_better(try_models(window, id, best), best)
-        if better is best:
+        improved = choose_better(try_models(window, id, best), best)
+        if improved is best:
             break
-        best = better
+        best = improved
     note = f"share {read_share(first):.3f} to {read_share(best):.3f}"
     code, answer = window.ask(
         "POST",
@@ -303,7 +309,7 @@ def run_again(folder: Path) -> None:
     """The run of the folder with the edits accepted in it."""
     record = run_record(folder)
     inputs, settings = record["inputs"], Settings.from_dict(record["settings"])
-    again = Request(
+    request = Request(
         tuple(inputs["clouds"]),
         folder,
         inputs["footprints"],
@@ -311,7 +317,7 @@ def run_again(folder: Path) -> None:
         settings=settings,
         overrides=str(folder / EDITS_FILE),
     )
-    reconstruct_area(again)
+    reconstruct_area(request)
 
 
 def mend_doubtful(window: Window, folder: Path, count: int, rounds: int) -> None:
@@ -319,22 +325,22 @@ def mend_doubtful(window: Window, folder: Path, count: int, rounds: int) -> None
     ids = [
         row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
     ][:count]
-    before = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
+    old_rows = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
     for id in ids:
         start = time.perf_counter()
-        was, now, parts_was, parts_now = mend_building(window, id, rounds)
-        told = f"{id}: share {was:.3f} -> {now:.3f}, parts {parts_was} -> {parts_now}"
-        print(f"{told} ({time.perf_counter() - start:.0f} s)", flush=True)
+        old_share, new_share, parts_was, parts_now = mend_building(window, id, rounds)
+        line = f"{id}: share {old_share:.3f} -> {new_share:.3f}, parts {parts_was} -> {parts_now}"
+        print(f"{line} ({time.perf_counter() - start:.0f} s)", flush=True)
     run_again(folder)
-    after = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
-    up = sum(read_record_share(after[id]) > read_record_share(before[id]) for id in ids)
+    new_rows = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
+    n_better = sum(read_record_share(new_rows[id]) > read_record_share(old_rows[id]) for id in ids)
     solids = dict(read_solids(folder / "buildings.city.jsonl"))
     valid = sum(not check_solid(solids[id], planarity_m=0.01) for id in ids)
-    others = [id for id in before if id not in ids]
-    same = sum(after[id] == before[id] for id in others)
+    other_ids = [id for id in old_rows if id not in ids]
+    n_same = sum(new_rows[id] == old_rows[id] for id in other_ids)
     print(
-        f"after the next run: share up of {up} of {len(ids)}, {valid} valid, {same} of "
-        f"{len(others)} others unchanged"
+        f"after the next run: share up of {n_better} of {len(ids)}, {valid} valid, {n_same} of "
+        f"{len(other_ids)} others unchanged"
     )
 
 
@@ -351,18 +357,18 @@ def main() -> None:
     parser.add_argument("--mend", type=int, default=12)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--browser", action="store_true")
-    asked = parser.parse_args()
-    (asked.run / EDITS_FILE).unlink(missing_ok=True)
-    window = Window(asked.run)
+    request = parser.parse_args()
+    (request.run / EDITS_FILE).unlink(missing_ok=True)
+    window = Window(request.run)
     rows = [
         row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
     ]
-    ids = rows[:: max(1, len(rows) // asked.buildings)][: asked.buildings]
+    ids = rows[:: max(1, len(rows) // request.buildings)][: request.buildings]
     measure_times(window, ids)
-    if asked.browser:
+    if request.browser:
         measure_in_browser(window, ids)
-    if asked.mend:
-        mend_doubtful(window, asked.run, asked.mend, asked.rounds)
+    if request.mend:
+        mend_doubtful(window, request.run, request.mend, request.rounds)
 
 
 if __name__ == "__main__":

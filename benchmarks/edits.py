@@ -45,7 +45,7 @@ def draw_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
     part, other = (int(k) for k in rng.integers(len(building.parts), size=2))
     x0, y0, x1, y1 = building.roof.outline.bounds
     place = [rng.uniform(x0 - 1.0, x1 + 1.0), rng.uniform(y0 - 1.0, y1 + 1.0), 0.0]
-    asked: list[dict[str, Any]] = [
+    changes: list[dict[str, Any]] = [
         {
             "action": "split",
             "side": str(rng.choice(["length", "width"])),
@@ -55,15 +55,15 @@ def draw_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
         {"action": "dormer", "place": place if rng.random() < 0.9 else None},
         {"action": "recess", "place": place if rng.random() < 0.9 else None},
     ]
-    return {"part": part, **asked[rng.integers(len(asked))]}
+    return {"part": part, **changes[rng.integers(len(changes))]}
 
 
 def draw_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[], Building]]:
     """A random edit's kind, and what does it."""
     if rng.random() < PRESSED:
-        asked = draw_press(rng, house)
-        return asked["action"], lambda: apply_edit(
-            building_record(house), asked, np.zeros((0, 3)), Settings(), False
+        request = draw_press(rng, house)
+        return request["action"], lambda: apply_edit(
+            building_record(house), request, np.zeros((0, 3)), Settings(), False
         )
     kind, index, change = random_edit(rng, house)
     return (
@@ -85,10 +85,10 @@ def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, 
         kind, edit = draw_edit(rng, houses[place])
         start = time.perf_counter()
         try:
-            found = edit()
-            valid = not check_solid(found.solid, planarity_m=0.01)
+            name = edit()
+            valid = not check_solid(name.solid, planarity_m=0.01)
             outcomes[kind]["valid" if valid else "INVALID"] += 1
-            houses[place] = found if len(found.parts) < 12 else houses[place]
+            houses[place] = name if len(name.parts) < 12 else houses[place]
         except HiproofError as error:
             sentences[str(error)[:60]] += 1
             outcomes[kind]["one sentence" if "\n" not in str(error) else "SENTENCES"] += 1
@@ -96,7 +96,9 @@ def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, 
             outcomes[kind][f"CRASH {type(error).__name__}: {error}"[:120]] += 1
         seconds.append(time.perf_counter() - start)
     for kind, counts in outcomes.items():
-        print(f"{kind}: " + ", ".join(f"{number} {what}" for what, number in counts.most_common()))
+        print(
+            f"{kind}: " + ", ".join(f"{number} {label}" for label, number in counts.most_common())
+        )
     print(
         f"{edits} edits of {buildings} buildings, {1e3 * np.median(seconds):.1f} ms in the median"
     )

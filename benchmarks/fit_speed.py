@@ -41,24 +41,24 @@ def main() -> None:
     clouds = [rng.permutation(cloud)[:POINTS] for cloud in clouds]
     fit_roof(clouds[0])
     repetitions = 1 if quick else 7
-    ours = np.median(
+    model = np.median(
         [[measure_cpu_ms(cloud, "likelihood") for cloud in clouds] for _ in range(repetitions)],
         axis=0,
     )
     print(
-        f"likelihood: median {np.median(ours):.2f}, mean {ours.mean():.2f} ms a roof of {POINTS} "
+        f"likelihood: median {np.median(model):.2f}, mean {model.mean():.2f} ms a roof of {POINTS} "
         "points, all types"
     )
-    asked = slice(0, len(clouds), 10 if quick else 4)
+    request = slice(0, len(clouds), 10 if quick else 4)
     fit_roof(
         clouds[0], settings=Settings.from_dict({"fit": {"types": ["flat"], "objective": "paper"}})
     )
-    papers = np.array([measure_cpu_ms(cloud, "paper") for cloud in clouds[asked]])
+    papers = np.array([measure_cpu_ms(cloud, "paper") for cloud in clouds[request]])
     print(
         f"paper:      median {np.median(papers):.0f}, mean {papers.mean():.0f} ms on {len(papers)} "
         "of these roofs"
     )
-    print(f"ratio of the means on the same roofs: {papers.mean() / ours[asked].mean():.0f}")
+    print(f"ratio of the means on the same roofs: {papers.mean() / model[request].mean():.0f}")
 
 
 def measure_cpu_ms(cloud: np.ndarray, objective: str) -> float:

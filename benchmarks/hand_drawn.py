@@ -62,12 +62,16 @@ def compare_building(
     ones.
     """
     corners, edges = judge.model_wireframe(building)
-    near = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()
-    right, right_corners, found = judge.matched(corners, edges, true_corners, true_edges, near)
+    tolerance = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()
+    right, right_corners, height_errors = judge.matched(
+        corners, edges, true_corners, true_edges, tolerance
+    )
     ends = corners[edges.ravel()].reshape(-1, 2, 3)
     short = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) < SHORT_M
     right_edges = (int(right.sum()), len(edges), len(true_edges))
-    counts = WireframeCounts(*right_edges, right_corners, len(corners), len(true_corners), found)
+    counts = WireframeCounts(
+        *right_edges, right_corners, len(corners), len(true_corners), height_errors
+    )
     return counts, (int(short.sum()), int(right[short].sum()))
 
 

@@ -51,14 +51,18 @@ def scan_house(house: SimBuilding, rng: np.random.Generator, density: float) -> 
 def find_areas(points: np.ndarray) -> list[shapely.Geometry]:
     """The areas of the houses told apart among points (n, 3)."""
     box = shapely.box(*points[:, :2].min(axis=0) - 0.5, *points[:, :2].max(axis=0) + 0.5)
-    around = shapely.MultiPoint(points[:, :2]).buffer(GAP_M).buffer(0.5 - GAP_M)
-    return separate_houses(points, shapely.intersection(around, box), GAP_M)
+    surroundings = shapely.MultiPoint(points[:, :2]).buffer(GAP_M).buffer(0.5 - GAP_M)
+    return separate_houses(points, shapely.intersection(surroundings, box), GAP_M)
 
 
-def differs_from_neighbour(one: shapely.Polygon, other: shapely.Polygon, row: SimBuilding) -> bool:
+def differs_from_neighbour(
+    first: shapely.Polygon, other: shapely.Polygon, row: SimBuilding
+) -> bool:
     """Whether the roofs of neighbours in a `row` differ along most of the wall between them."""
-    parts = [next(p for p in row.roof.parts if p.pieces[0].outline.equals(o)) for o in (one, other)]
-    wall = shapely.intersection(shapely.buffer(one, 0.01), shapely.buffer(other, 0.01))
+    parts = [
+        next(p for p in row.roof.parts if p.pieces[0].outline.equals(o)) for o in (first, other)
+    ]
+    wall = shapely.intersection(shapely.buffer(first, 0.01), shapely.buffer(other, 0.01))
     xy = shapely.get_coordinates(
         shapely.line_interpolate_point(wall.exterior, np.linspace(0, 1, 60), normalized=True)
     )
@@ -68,12 +72,15 @@ def differs_from_neighbour(one: shapely.Polygon, other: shapely.Polygon, row: Si
 
 
 def is_apart(
-    one: shapely.Polygon, other: shapely.Polygon, areas: list[shapely.Geometry], points: np.ndarray
+    first: shapely.Polygon,
+    other: shapely.Polygon,
+    areas: list[shapely.Geometry],
+    points: np.ndarray,
 ) -> bool:
     """Whether most points beside the border of two outlines lie in areas of their own side."""
-    border = shapely.intersection(shapely.buffer(one, 0.3), shapely.buffer(other, 0.3))
+    border = shapely.intersection(shapely.buffer(first, 0.3), shapely.buffer(other, 0.3))
     xy = points[shapely.dwithin(border, shapely.points(points[:, :2]), NEAR_M), :2]
-    sides = [xy[shapely.contains_xy(outline, *xy.T)] for outline in (one, other)]
+    sides = [xy[shapely.contains_xy(outline, *xy.T)] for outline in (first, other)]
     if not all(map(len, sides)):
         return False
     shares = np.array(
@@ -90,9 +97,9 @@ def report_simulation(density: float, seeds: range) -> None:
         row = random_compound(rng, "row")
         points = scan_house(row, rng, density)
         areas, outlines = find_areas(points), [part.pieces[0].outline for part in row.roof.parts]
-        for one, other in pairwise(outlines):
-            count = counts[differs_from_neighbour(one, other, row)]
-            count[0] += is_apart(one, other, areas, points)
+        for first, other in pairwise(outlines):
+            count = counts[differs_from_neighbour(first, other, row)]
+            count[0] += is_apart(first, other, areas, points)
             count[1] += 1
     print(
         f"{density:g}/m2 rows: {counts[True][0]} of {counts[True][1]} walls that show found, "
@@ -109,8 +116,8 @@ def report_simulation(density: float, seeds: range) -> None:
             len(find_areas(scan_house(h, rng, density))) > 1
             for h, rng in zip(houses, rngs, strict=True)
         )
-    of = len(seeds) * len(FAMILIES)
-    print(f"{density:g}/m2 single houses cut: {sum(cut.values())} of {of}  {cut}", flush=True)
+    total = len(seeds) * len(FAMILIES)
+    print(f"{density:g}/m2 single houses cut: {sum(cut.values())} of {total}  {cut}", flush=True)
 
 
 def report_real(name: str) -> None:
@@ -119,13 +126,13 @@ def report_real(name: str) -> None:
     clouds = (
         [read_points(file) for file in files] if name == "amsterdam_west" else [read_points(*files)]
     )
-    found = []
+    results = []
     for cloud in clouds:
-        found += [(b.area, cloud.xyz[b.index]) for b in split_buildings(cloud)]
-    print(f"{name}: {len(found)} buildings", flush=True)
+        results += [(b.area, cloud.xyz[b.index]) for b in split_buildings(cloud)]
+    print(f"{name}: {len(results)} buildings", flush=True)
     if name not in SETS:
         return
-    areas, points = [area for area, _ in found], np.concatenate([xyz for _, xyz in found])
+    areas, points = [area for area, _ in results], np.concatenate([xyz for _, xyz in results])
     outlines = [
         f.polygon for f in read_footprints(folder / SETS[name]) if f.polygon.area >= LEAST_M2
     ]
@@ -136,14 +143,14 @@ def report_real(name: str) -> None:
     )
     cut = sum(max(shapely.intersects_xy(a, *xy.T).mean() for a in areas) < 1 - CUT for xy in inside)
     pairs = [
-        (one, other)
-        for one, other in combinations(outlines, 2)
-        if one.distance(other) < 0.1
-        and shapely.intersection(one.buffer(0.15), other.buffer(0.15)).area > 0.3 * LEAST_SHARED_M
+        (first, other)
+        for first, other in combinations(outlines, 2)
+        if first.distance(other) < 0.1
+        and shapely.intersection(first.buffer(0.15), other.buffer(0.15)).area > 0.3 * LEAST_SHARED_M
     ]
-    apart = sum(is_apart(one, other, areas, points) for one, other in pairs)
+    n_apart = sum(is_apart(first, other, areas, points) for first, other in pairs)
     print(
-        f"  {apart} of {len(pairs)} pairs of touching footprints told apart; {cut} of "
+        f"  {n_apart} of {len(pairs)} pairs of touching footprints told apart; {cut} of "
         f"{len(outlines)} footprints cut",
         flush=True,
     )

@@ -47,7 +47,7 @@ def make_raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarra
     none.
     """
     x0, y0, x1, y1 = outline.bounds
-    axes = (np.arange(low + 0.5 * step_m, high, step_m) for low, high in ((x0, x1), (y0, y1)))
+    axes = (np.arange(lower + 0.5 * step_m, upper, step_m) for lower, upper in ((x0, x1), (y0, y1)))
     xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
     xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
     return xy if len(xy) else shapely.get_coordinates(outline.representative_point())
@@ -71,7 +71,7 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
     xy = make_raster(roof.outline)
     heights = np.array([np.nan_to_num(part.height_at(xy), nan=-np.inf) for part in roof.parts])
     top, z = heights.argmax(axis=0), heights.max(axis=0)
-    beside = cKDTree(xy)
+    tree = cKDTree(xy)
     narrow = standing = 0
     for number, part in enumerate(roof.parts):
         outline = shapely.union_all([piece.outline for piece in part.pieces]).intersection(
@@ -83,14 +83,16 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
         if len(sides) < 4 or sides.min() >= NARROW_M:
             continue
         narrow += 1
-        own = np.flatnonzero(top == number)
-        around = {
+        indices = np.flatnonzero(top == number)
+        neighbourhoods = {
             i
-            for near in beside.query_ball_point(xy[own], 2.1 * RASTER_M)
-            for i in near
+            for nearby in tree.query_ball_point(xy[indices], 2.1 * RASTER_M)
+            for i in nearby
             if top[i] != number
         }
-        standing += bool(around) and z[own].min() > z[list(around)].max() + STANDING_M
+        standing += (
+            bool(neighbourhoods) and z[indices].min() > z[list(neighbourhoods)].max() + STANDING_M
+        )
     return narrow, standing
 
 

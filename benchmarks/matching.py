@@ -75,24 +75,24 @@ def match_parts(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> l
     common = np.zeros((len(truth), len(fit)))
     np.add.at(common, tuple(tops), 1.0)
     iou = common / np.maximum(common.sum(axis=1, keepdims=True) + common.sum(axis=0) - common, 1.0)
-    found = [-1] * len(truth)
+    matches = [-1] * len(truth)
     for i, j in zip(*linear_sum_assignment(-iou), strict=True):
         if iou[i, j] >= FOUND_IOU:
-            found[i] = int(j)
-    return found
+            matches[i] = int(j)
+    return matches
 
 
-def has_hidden_end(part: Part, others: Sequence[Part]) -> bool:
+def has_hidden_end(part: Part, other_parts: Sequence[Part]) -> bool:
     """Whether one of the two ends of `part`'s length lies under or in the roofs of `others`."""
-    if "length" not in part.parameters or len(part.pieces) > 1 or not others:
+    if "length" not in part.parameters or len(part.pieces) > 1 or not other_parts:
         return False
     along = np.array([math.cos(part.kappa), math.sin(part.kappa)])
     ring = shapely.get_coordinates(part.pieces[0].outline)[:-1]
     for sign in (-1, 1):
         corners = ring[np.argsort(-sign * (ring @ along))[:2]] - sign * 0.01 * along
         xy = corners[0] + np.linspace(0.02, 0.98, 9)[:, None] * (corners[1] - corners[0])
-        above = np.max([other.height_at(xy) for other in others], axis=0)
-        if (part.pieces[0].height_at(xy) <= above + HIDDEN_SLACK_M).all():
+        heights = np.max([other.height_at(xy) for other in other_parts], axis=0)
+        if (part.pieces[0].height_at(xy) <= heights + HIDDEN_SLACK_M).all():
             return True
     return False
 

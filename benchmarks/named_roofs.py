@@ -44,8 +44,8 @@ def read_demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
         record["id"]: read_truth(record)
         for record in json.loads(files["truth"].read_text())["buildings"]
     }
-    own = assign_points(points, footprints)
-    return [(truth[f.id], points[index], f) for index, f in zip(own, footprints, strict=True)]
+    indices = assign_points(points, footprints)
+    return [(truth[f.id], points[index], f) for index, f in zip(indices, footprints, strict=True)]
 
 
 def move_parts(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
@@ -69,8 +69,8 @@ def judge_types(truth: SimBuilding, model: Building) -> tuple[bool, bool]:
     """Whether the largest part has its true type, and whether all parts are there with theirs."""
     largest = max(truth.roof.parts, key=lambda part: part.area)
     main = model.type in list_right_types(largest, hidden=False)
-    _, every, _ = compare_parts(truth.roof, move_parts(model.roof, truth.roof.frame.origin))
-    return main, every
+    _, all_right, _ = compare_parts(truth.roof, move_parts(model.roof, truth.roof.frame.origin))
+    return main, all_right
 
 
 def report_demo() -> str:
@@ -83,8 +83,8 @@ def report_demo() -> str:
                 f"  {footprint.id} ({truth.kind}): {name_parts(truth.roof.parts)} taken for "
                 f"{name_parts(model.parts)}"
             )
-    main, every = np.sum(right, axis=0)
-    return "\n".join([f"demo: main type {main}, all parts {every} of {len(right)}", *lines])
+    main, n_all_right = np.sum(right, axis=0)
+    return "\n".join([f"demo: main type {main}, all parts {n_all_right} of {len(right)}", *lines])
 
 
 def report_labelled(folder: Path) -> str:

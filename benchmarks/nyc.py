@@ -46,10 +46,10 @@ def main() -> None:
     arguments = parser.parse_args()
     with np.load(arguments.data) as data:
         points, face, offset = data["points"].astype(float), data["face"], data["offset"]
-    chosen = np.arange(0, len(offset) - 1, 8 if arguments.quick else 1)
-    distance, overlap, parts = np.zeros((3, len(chosen)))
+    indices = np.arange(0, len(offset) - 1, 8 if arguments.quick else 1)
+    distance, overlap, parts = np.zeros((3, len(indices)))
     types = Counter()
-    for k, i in enumerate(chosen):
+    for k, i in enumerate(indices):
         roof = slice(offset[i], offset[i + 1])
         fit, type, parts[k] = fit_points(points[roof], arguments.compounds)
         judged = points[roof][face[roof] > 0]
@@ -57,7 +57,7 @@ def main() -> None:
         overlap[k] = iou(plan_outline(fit), alpha_shape(judged[:, :2]))
         types[type] += 1
     print(
-        f"PSD over {len(chosen)} roofs: mean {distance.mean():.4f}, median "
+        f"PSD over {len(indices)} roofs: mean {distance.mean():.4f}, median "
         f"{np.median(distance):.4f}, ",
         end="",
     )
@@ -69,7 +69,7 @@ def main() -> None:
     print(f"parts a roof: {parts.mean():.2f}")
     print("types: " + ", ".join(f"{name} {count}" for name, count in types.most_common()))
     worst = np.argsort(-distance)[:10]
-    print("worst ten: " + ", ".join(f"{chosen[k]} ({distance[k]:.2f})" for k in worst))
+    print("worst ten: " + ", ".join(f"{indices[k]} ({distance[k]:.2f})" for k in worst))
 
 
 if __name__ == "__main__":

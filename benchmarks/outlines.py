@@ -65,15 +65,15 @@ def make_row(name: str, outcomes: list[tuple[float, bool]]) -> str:
 
 
 def report_simulation(density: float, seeds: range) -> None:
-    every = []
+    total = []
     for kind in KINDS:
         outcomes = []
         for points, truth in (simulate_house(kind, density, seed) for seed in seeds):
             outline = outline_of_points(points)
             outcomes.append((iou(outline, truth), count_corners(outline) == count_corners(truth)))
         print(make_row(f"{density:g}/m2 {kind}", outcomes), flush=True)
-        every += outcomes
-    print(make_row(f"{density:g}/m2 all", every), flush=True)
+        total += outcomes
+    print(make_row(f"{density:g}/m2 all", total), flush=True)
 
 
 def outline_points(points: np.ndarray) -> shapely.Polygon:
@@ -115,27 +115,37 @@ def measure_overlaps(
     cloud = read_points(*files)
     box = shapely.box(*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))
     joined = shapely.union_all([polygon.buffer(TOUCH_M) for polygon in footprints]).buffer(-TOUCH_M)
-    found = split_buildings(cloud)
+    buildings = split_buildings(cloud)
     outlines = np.array(
-        [shapely.intersection(outline_points(cloud.xyz[building.index]), box) for building in found]
+        [
+            shapely.intersection(outline_points(cloud.xyz[building.index]), box)
+            for building in buildings
+        ]
     )
-    cells = np.array([cell_area(cloud.xyz[building.index, :2], CELL_M) for building in found])
+    cells = np.array([cell_area(cloud.xyz[building.index, :2], CELL_M) for building in buildings])
     touching = shapely.get_parts(shapely.intersection(joined, box))
     shapely.prepare(touching)
-    points = [shapely.points(cloud.xyz[building.index, :2]) for building in found]
+    points = [shapely.points(cloud.xyz[building.index, :2]) for building in buildings]
     inside = np.array(
-        [[int(shapely.contains(union, own).sum()) for own in points] for union in touching]
+        [
+            [int(shapely.contains(union, point_set).sum()) for point_set in points]
+            for union in touching
+        ]
     )
-    count, overlaps = np.array([len(own) for own in points]), []
+    count, overlaps = np.array([len(point_set) for point_set in points]), []
     _, label = connected_components(
         csr_array((inside > REACHES_IN * count).astype(int) @ (inside > REACHES_IN * count).T)
     )
     for k in np.unique(label):
-        union, held = shapely.union_all(touching[label == k]), inside[label == k].sum(axis=0)
-        mine = held > 0.5 * count
-        if held[mine].sum() >= LEAST_POINTS_A_M2 * union.area:
-            both = [iou(shapely.union_all(drawn[mine]), union) for drawn in (outlines, cells)]
-            overlaps.append((*both, union.area, 1.0 - held[mine].sum() / count[mine].sum()))
+        union, n_held = shapely.union_all(touching[label == k]), inside[label == k].sum(axis=0)
+        is_matching = n_held > 0.5 * count
+        if n_held[is_matching].sum() >= LEAST_POINTS_A_M2 * union.area:
+            ious = [
+                iou(shapely.union_all(shapes[is_matching]), union) for shapes in (outlines, cells)
+            ]
+            overlaps.append(
+                (*ious, union.area, 1.0 - n_held[is_matching].sum() / count[is_matching].sum())
+            )
     return overlaps
 
 

@@ -67,10 +67,10 @@ def measure_process(script: str, inputs: tuple[list[str], str, str]) -> list[flo
         "OMP_NUM_THREADS": "1",
     }
     command = [sys.executable, "-W", "ignore", "-c", USED + script, json.dumps(inputs)]
-    said = subprocess.run(
+    output = subprocess.run(
         command, check=True, env=environment, capture_output=True, text=True
     ).stdout
-    return json.loads(said.splitlines()[-1])
+    return json.loads(output.splitlines()[-1])
 
 
 def main() -> None:
@@ -105,9 +105,9 @@ def main() -> None:
         units = statistics.median(run[place][0] / run[0][0] for run in runs)
         wall, peak = (statistics.median(run[place][k] for run in runs) for k in (1, 2))
         print(f"| {name} | {units:.1f} | {cpu:.2f} | {wall:.2f} | {peak:.0f} |")
-    there = ROOFER["cpu_s"] / ROOFER["decode_s"]
+    speed_ratio = ROOFER["cpu_s"] / ROOFER["decode_s"]
     print(
-        f"| roofer 1.1, measured elsewhere | {there:.1f} | {ROOFER['cpu_s']:.2f} there | | "
+        f"| roofer 1.1, measured elsewhere | {speed_ratio:.1f} | {ROOFER['cpu_s']:.2f} there | | "
         f"{ROOFER['peak_mb']:.0f} |"
     )
 

@@ -65,22 +65,24 @@ def list_requests(
 def rebuild_run(name: str, request: Request) -> str:
     """Run, build again, compare byte by byte."""
     reconstruct_area(request)
-    again = request.out.with_name(f"{request.out.name}-again")
-    built = build_file(request.out / "parameters.jsonl", again)
+    second_folder = request.out.with_name(f"{request.out.name}-again")
+    built = build_file(request.out / "parameters.jsonl", second_folder)
     other = [
-        file for file in FILES if (again / file).read_bytes() != (request.out / file).read_bytes()
+        file
+        for file in FILES
+        if (second_folder / file).read_bytes() != (request.out / file).read_bytes()
     ]
-    refused = len(find_refused(again / "parameters.jsonl"))
-    told = f"DIFFERENT: {', '.join(other)}" if other else "byte-identical"
-    return f"{name}: {built.buildings} buildings, {refused} refused, {told}"
+    refused = len(find_refused(second_folder / "parameters.jsonl"))
+    verdict = f"DIFFERENT: {', '.join(other)}" if other else "byte-identical"
+    return f"{name}: {built.buildings} buildings, {refused} refused, {verdict}"
 
 
 def run_with_overrides(request: Request, work: Path) -> str:
     """The city done again with overrides of every so-many-th building."""
-    before = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
-    chosen = list(before)[:: max(1, len(before) // OVERRIDES)][:OVERRIDES]
+    old_rows = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
+    ids = list(old_rows)[:: max(1, len(old_rows) // OVERRIDES)][:OVERRIDES]
     path = work / "known.jsonl"
-    path.write_text("".join(json.dumps({"id": id, "block_height": 7.5}) + "\n" for id in chosen))
+    path.write_text("".join(json.dumps({"id": id, "block_height": 7.5}) + "\n" for id in ids))
     solved, solve_one = [], solve.solve_one
 
     def counting(plan, job, *rest):
@@ -91,13 +93,13 @@ def run_with_overrides(request: Request, work: Path) -> str:
     with patch.object(solve, "solve_one", counting):
         reconstruct_area(replace(request, overrides=str(path)))
     seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
-    after = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
-    same = sum(after[id] == before[id] for id in before if id not in chosen)
-    obeyed = sum("overridden: block_height" in after[id]["detail"] for id in chosen)
+    new_rows = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
+    n_same = sum(new_rows[id] == old_rows[id] for id in old_rows if id not in ids)
+    obeyed = sum("overridden: block_height" in new_rows[id]["detail"] for id in ids)
     return (
-        f"{len(chosen)} overrides: {len(solved)} buildings solved in a run of {seconds:.1f} s "
+        f"{len(ids)} overrides: {len(solved)} buildings solved in a run of {seconds:.1f} s "
         f"({cpu:.1f} s of CPU), {obeyed} obeyed, "
-        f"{same} of {len(before) - len(chosen)} others unchanged"
+        f"{n_same} of {len(old_rows) - len(ids)} others unchanged"
     )
 
 
@@ -109,10 +111,10 @@ def read_many_lines(work: Path, lines: int) -> str:
             f'{{"id": "building-{k}", "ridge_height": {8.0 + k % 7}}}\n' for k in range(lines)
         )
     start, cpu = time.perf_counter(), time.process_time()
-    found = sum(1 for _ in read_overrides(str(path)))
+    n_read = sum(1 for _ in read_overrides(str(path)))
     took, cpu = time.perf_counter() - start, time.process_time() - cpu
     return (
-        f"{found} lines of overrides, {path.stat().st_size / 1e6:.0f} MB: read in {took:.1f} s "
+        f"{n_read} lines of overrides, {path.stat().st_size / 1e6:.0f} MB: read in {took:.1f} s "
         f"({cpu:.1f} s of CPU)"
     )
 
@@ -131,25 +133,25 @@ def main() -> None:
         nargs="*",
         help="beginnings of names, such as demo, delft, city, lines [default: all]",
     )
-    asked = parser.parse_args()
-    work = asked.work or Path(tempfile.mkdtemp(prefix="hiproof-rebuild-"))
+    requested = parser.parse_args()
+    work = requested.work or Path(tempfile.mkdtemp(prefix="hiproof-rebuild-"))
     work.mkdir(parents=True, exist_ok=True)
-    wanted = tuple(asked.only or [""])
-    settings = FLAT if asked.flat else Settings()
-    for name, make in list_requests(work, asked.data, asked.buildings, settings):
-        if name.startswith(wanted):
+    expected = tuple(requested.only or [""])
+    settings = FLAT if requested.flat else Settings()
+    for name, make in list_requests(work, requested.data, requested.buildings, settings):
+        if name.startswith(expected):
             request = make()
             start, cpu = time.perf_counter(), time.process_time()
-            told = rebuild_run(name, request)
+            message = rebuild_run(name, request)
             print(
-                f"{told} ({time.perf_counter() - start:.0f} s, {time.process_time() - cpu:.0f} s "
-                "of CPU)",
+                f"{message} ({time.perf_counter() - start:.0f} s, "
+                f"{time.process_time() - cpu:.0f} s of CPU)",
                 flush=True,
             )
             if name.startswith("city"):
                 print(run_with_overrides(request, work), flush=True)
-    if "lines".startswith(wanted):
-        print(read_many_lines(work, asked.lines), flush=True)
+    if "lines".startswith(expected):
+        print(read_many_lines(work, requested.lines), flush=True)
 
 
 if __name__ == "__main__":

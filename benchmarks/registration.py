@@ -79,16 +79,16 @@ def draw_vector(distance: float, number: int) -> np.ndarray:
     return distance * np.array([math.cos(azimuth), math.sin(azimuth)])
 
 
-def shift_polygons(polygons: Polygons, off: np.ndarray) -> Polygons:
-    return list(shapely.transform(np.array(polygons), lambda xy: xy + off))
+def shift_polygons(polygons: Polygons, vector: np.ndarray) -> Polygons:
+    return list(shapely.transform(np.array(polygons), lambda xy: xy + vector))
 
 
 def find_row_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarray:
     """What a run moves a row by (2,): nothing where the evidence is not clear."""
     outline = row_outline(row)
     origin = np.floor(outline.bounds[:2])
-    near = distinct(points[grid.find_within(outline, AROUND_M)])
-    shift = find_shift(near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin))
+    nearby = distinct(points[grid.find_within(outline, AROUND_M)])
+    shift = find_shift(nearby[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin))
     return shift.xy if shift.is_clear else np.zeros(2)
 
 
@@ -101,24 +101,24 @@ def iterate_trials(
     for number, members in enumerate(rows):
         if parity is not None and number % 2 != (parity == "odd"):
             continue
-        off = draw_vector(distance, number)
+        offset = draw_vector(distance, number)
         if kind == "row":
-            yield shift_polygons([polygons[i] for i in members], off), off
+            yield shift_polygons([polygons[i] for i in members], offset), offset
         elif kind == "each":
-            yield from ((shift_polygons([polygons[i]], off), off) for i in members)
+            yield from ((shift_polygons([polygons[i]], offset), offset) for i in members)
         elif kind in ("one alone", "one of a row") and (len(members) == 1) == (kind == "one alone"):
             house = members[len(members) // 2]
-            beside = [
-                shift_polygons([p], off)[0] if i == house else p for i, p in enumerate(polygons)
+            moved_row = [
+                shift_polygons([p], offset)[0] if i == house else p for i, p in enumerate(polygons)
             ]
-            yield Outlines(beside).row(house), off
+            yield Outlines(moved_row).row(house), offset
 
 
 def make_row(kind: str, outcomes: list[tuple[np.ndarray, np.ndarray]], distance: float) -> str:
     """The figures of some trials: what was found (2,) and the vector (2,)."""
-    apart = np.array([np.hypot(*(found + off)) for found, off in outcomes])
-    moved = np.array([bool(found.any()) for found, _ in outcomes])
-    right, wrong = moved & (apart < FOUND_M), moved & (apart > WRONG_M)
+    distances = np.array([np.hypot(*(result + shifted)) for result, shifted in outcomes])
+    moved = np.array([bool(result.any()) for result, _ in outcomes])
+    right, wrong = moved & (distances < FOUND_M), moved & (distances > WRONG_M)
     return (
         f"{kind:13} {distance:3g} m: {len(outcomes):3} trials, moved {moved.mean():4.0%}, "
         f"within {FOUND_M:g} m {right.mean():4.0%}, moved wrongly {wrong.mean():4.0%}"
@@ -135,11 +135,12 @@ def main() -> None:
         grid = PointGrid(points)
         print(f"{name}: {len(polygons)} footprints, {len(Outlines(polygons).members)} rows")
         for number, distance in enumerate(DISTANCES_M):
-            off = draw_vector(distance, 100 + number)
-            found = register([(points[:, :2], shift_polygons(polygons, off))])
+            difference = draw_vector(distance, 100 + number)
+            result = register([(points[:, :2], shift_polygons(polygons, difference))])
             print(
-                f"{'all':13} {distance:3g} m: {np.hypot(*(found.xy + off)):.3f} m from the vector, "
-                f"sigma {max(found.sigma):.3f} m, {'moved' if found.is_clear else 'left'}",
+                f"{'all':13} {distance:3g} m: {np.hypot(*(result.xy + difference)):.3f} m from "
+                f"the vector, sigma {max(result.sigma):.3f} m, "
+                f"{'moved' if result.is_clear else 'left'}",
                 flush=True,
             )
         for kind in ("row", "one alone", "one of a row", "each"):
@@ -147,8 +148,8 @@ def main() -> None:
                 trials = list(iterate_trials(kind, polygons, distance, arguments.parity))
                 if trials:
                     outcomes = [
-                        (find_row_shift(row, grid, points) if row else np.zeros(2), off)
-                        for row, off in trials
+                        (find_row_shift(row, grid, points) if row else np.zeros(2), difference)
+                        for row, difference in trials
                     ]
                     print(make_row(kind, outcomes, distance), flush=True)
 

@@ -66,7 +66,11 @@ def draw_shape(
             "top_length": length - ends * run * rng.uniform(0.8, 1.2),
         }
         lengths["height"] = run * rng.uniform(0.7, 2.0)
-        return {own: lengths[own] for own in lengths if own in CATALOGUE[name].parameters}
+        return {
+            parameter: lengths[parameter]
+            for parameter in lengths
+            if parameter in CATALOGUE[name].parameters
+        }
     if name == "corner":
         slope = rng.uniform(0.3, 0.9)
         return {"height": slope * width, "end_height": slope * length * rng.uniform(0.8, 1.25)}
@@ -122,8 +126,8 @@ def scan(
     z = roof.primitive.height_at(theta, xy) + draw_paper_noise(count, rng) * noise_rmse_m
     points = np.column_stack([xy, z])
     outliers = rng.random(count) < outlier_share
-    low, high = points.min(axis=0) - (1, 1, 2), points.max(axis=0) + (1, 1, 1)
-    points[outliers] = rng.uniform(low, high, (outliers.sum(), 3))
+    lower, upper = points.min(axis=0) - (1, 1, 2), points.max(axis=0) + (1, 1, 1)
+    points[outliers] = rng.uniform(lower, upper, (outliers.sum(), 3))
     return points
 
 

@@ -58,8 +58,8 @@ def compute_heights(xy: np.ndarray) -> np.ndarray:
 def sample_points(outline: shapely.Polygon, density: float) -> np.ndarray:
     """Return points (n, 3) of the roof over `outline`, `density` a square metre."""
     rng = np.random.default_rng(0)
-    low, high = np.reshape(outline.bounds, (2, 2))
-    xy = rng.uniform(low, high, (int(density * outline.area), 2))
+    lower, upper = np.reshape(outline.bounds, (2, 2))
+    xy = rng.uniform(lower, upper, (int(density * outline.area), 2))
     return np.column_stack([xy, compute_heights(xy) + rng.normal(0.0, NOISE_M, len(xy))])
 
 
@@ -75,14 +75,14 @@ def measure(area_m2: float, density: float) -> str:
         outcome = "valid"
     except HiproofError as error:
         outcome = str(error)
-    done = time.process_time()
+    end = time.process_time()
     per_100_m2 = 1e5 / outline.area  # ms for a second
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     figures = (
         f"{outline.area:8.0f} m2",
         f"{len(points):8d} points",
         f"fit {per_100_m2 * (fitted - started):6.1f}",
-        f"compose {per_100_m2 * (done - fitted):5.1f} ms per 100 m2",
+        f"compose {per_100_m2 * (end - fitted):5.1f} ms per 100 m2",
         f"within {NEAR_M} m {1.0 - fit.unexplained:.4f}",
         f"parts {len(fit.roof_parts):5d}",
         f"{memory:5.0f} MB",

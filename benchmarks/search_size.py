@@ -50,7 +50,7 @@ def main() -> None:
     for path in sorted((PACKAGE / arguments.folder).rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         row = [len(text.splitlines()), count_compiled(text), count_constants(text)]
-        total = [sum(both) for both in zip(total, row, strict=True)]
+        total = [sum(totals) for totals in zip(total, row, strict=True)]
         if arguments.files:
             print(f"{row[0]:5d} lines {row[1]:3d} compiled {row[2]:3d} constants  {path.name}")
     lines, functions, constants = total

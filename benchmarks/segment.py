@@ -82,10 +82,10 @@ def collect_opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opini
     """Network alone, fit alone on all points, and the evidence of the fit to the network's roof
     points.
     """
-    found = segment(points, Settings().replace({"fit": {"types": types}}))
-    alone, informed = fit_or_none(points, types), fit_or_none(points, types, found.weights)
-    bics, used = (informed.bics, informed.points_used) if informed else ({}, 0)
-    return Opinion(found.types, bics, used, alone.type if alone else None)
+    recognition = segment(points, Settings().replace({"fit": {"types": types}}))
+    from_all, informed = fit_or_none(points, types), fit_or_none(points, types, recognition.weights)
+    bics, n_used = (informed.bics, informed.points_used) if informed else ({}, 0)
+    return Opinion(recognition.types, bics, n_used, from_all.type if from_all else None)
 
 
 def fit_or_none(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
@@ -105,11 +105,13 @@ def judge_three_types(count: int) -> tuple[str, Scores, Scores]:
     allowed = Settings().replace({"fit": {"types": THREE}})
     for index in range(count):
         points, labels, type = training_sample(np.random.default_rng([TEST_SEED, 3, index]), THREE)
-        found = segment(points, allowed)
-        tally.add(THREE[type], network=found.type)
+        recognition = segment(points, allowed)
+        tally.add(THREE[type], network=recognition.type)
         true_points.append(labels)
-        told = np.array([THREE.index(name) if name in THREE else 0 for name in TYPES])
-        told_points.append(np.where(found.is_roof, told[found.labels], len(THREE)))
+        allowed_index = np.array([THREE.index(name) if name in THREE else 0 for name in TYPES])
+        told_points.append(
+            np.where(recognition.is_roof, allowed_index[recognition.labels], len(THREE))
+        )
     types = tally.scores("network")
     of_points = Scores.of(
         np.concatenate(true_points), np.concatenate(told_points), (*THREE, "not_roof")
@@ -134,8 +136,13 @@ def judge_all_types(
     for density in densities:
         tally = Tally()
         for truth, points in simulate_samples(count, density):
-            said = collect_opinion(points)
-            tally.add(truth, network=said.network_alone, fit=said.fit_alone, combined=said.combined)
+            opinion = collect_opinion(points)
+            tally.add(
+                truth,
+                network=opinion.network_alone,
+                fit=opinion.fit_alone,
+                combined=opinion.combined,
+            )
         tallies[density] = tally
         figures = [
             format_percent(tally.scores(method).balanced_accuracy)
@@ -178,11 +185,11 @@ def judge_the_hague(scans: int) -> tuple[str, Tally] | None:
             cloud = scan_solids([shape.solid], rng, ScanSettings(density=5.0), [shape.type])
             if len(cloud) < POINTS[0] // 2:
                 continue
-            said = collect_opinion(as_sample(cloud, TYPES, TYPES.index(type), rng).xyz)
+            opinion = collect_opinion(as_sample(cloud, TYPES, TYPES.index(type), rng).xyz)
             answers = {
-                "network": said.network_alone,
-                "fit": said.fit_alone,
-                "combined": said.combined,
+                "network": opinion.network_alone,
+                "fit": opinion.fit_alone,
+                "combined": opinion.combined,
             }
             answers = {method: SAME_CODE.get(answer, answer) for method, answer in answers.items()}
             answers["perfect judge of shapes"] = type if is_true_to_code(shape) else None
@@ -199,11 +206,11 @@ def judge_the_hague(scans: int) -> tuple[str, Tally] | None:
         )
         for method in everything.told
     ]
-    kept = np.mean([is_true_to_code(shape) for shape in shapes])
+    share_kept = np.mean([is_true_to_code(shape) for shape in shapes])
     header = (
         "method",
         "balanced accuracy (combined: 93 to reach)",
-        f"on the {format_percent(kept)} % true to their code",
+        f"on the {format_percent(share_kept)} % true to their code",
     )
     return make_table(header, rows), everything
 
@@ -235,8 +242,8 @@ def judge_labelled_roofs() -> str | None:
         return None
     rows, right = [], np.zeros(3, int)
     for path in sorted(folder.glob("*/*.pts")):
-        said, truth = collect_opinion(np.loadtxt(path)[:, :3]), path.parent.name
-        answers = (said.network_alone, said.fit_alone, said.combined)
+        opinion, truth = collect_opinion(np.loadtxt(path)[:, :3]), path.parent.name
+        answers = (opinion.network_alone, opinion.fit_alone, opinion.combined)
         right += [SAME_CODE.get(answer, answer) == truth for answer in answers]
         rows.append((f"{truth}/{path.stem}", *answers))
     return make_table(
@@ -331,15 +338,17 @@ def calibrate(count: int) -> None:
     of another seed.
     """
     for density in (1.0, 2.0, 5.0, 10.0):
-        said = [
+        opinions = [
             (truth, collect_opinion(points))
             for truth, points in simulate_samples(count, density, TEST_SEED + 1)
         ]
-        truth = np.array([TYPES.index(name) for name, _ in said])
+        truth = np.array([TYPES.index(name) for name, _ in opinions])
         line = []
         for exponent in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 1.0):
-            told = [next(iter(combine(o.network, o.bics, o.points, exponent))) for _, o in said]
-            scores = Scores.of(truth, np.array([TYPES.index(name) for name in told]), TYPES)
+            types = [
+                next(iter(combine(o.network, o.bics, o.points, exponent))) for _, o in opinions
+            ]
+            scores = Scores.of(truth, np.array([TYPES.index(name) for name in types]), TYPES)
             line.append(f"{exponent:g}: {format_percent(scores.balanced_accuracy)}")
         print(f"{density:g} points/m2  " + "  ".join(line), flush=True)
 
@@ -361,11 +370,13 @@ def draw_confusion(scores: Scores, title: str, name: str) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    used = np.flatnonzero(scores.confusion.sum(axis=0) + scores.confusion.sum(axis=1))
-    names = [scores.names[i].replace("_", " ") for i in used]
-    counts = scores.confusion[np.ix_(used, used)]
+    used_types = np.flatnonzero(scores.confusion.sum(axis=0) + scores.confusion.sum(axis=1))
+    names = [scores.names[i].replace("_", " ") for i in used_types]
+    counts = scores.confusion[np.ix_(used_types, used_types)]
     shares = 100 * counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
-    figure = Figure(figsize=(1.8 + 0.62 * len(used), 1.6 + 0.56 * len(used)), layout="constrained")
+    figure = Figure(
+        figsize=(1.8 + 0.62 * len(used_types), 1.6 + 0.56 * len(used_types)), layout="constrained"
+    )
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.imshow(shares, cmap="Blues", vmin=0, vmax=100)
@@ -423,15 +434,15 @@ def main() -> None:
         text,
     ]
     parts += [describe_recalls(tallies[5.0].scores("combined"))]
-    found = judge_the_hague(150 // scale)
-    if found:
+    name = judge_the_hague(150 // scale)
+    if name:
         draw_confusion(
-            found[1].scores("combined"), "The Hague, 5 points/m2: combined", "segment_the_hague"
+            name[1].scores("combined"), "The Hague, 5 points/m2: combined", "segment_the_hague"
         )
         parts += [
             "## The Hague's held-out shapes, 5 points/m2",
-            found[0],
-            describe_recalls(found[1].scores("combined")),
+            name[0],
+            describe_recalls(name[1].scores("combined")),
         ]
     for title, text in (
         (

@@ -37,12 +37,12 @@ def measure_cost(arguments: list[str]) -> tuple[float, float]:
     }
     # a user's Python compiles its modules once, not in every process
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
-    start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    start, start_usage = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(
         [sys.executable, *arguments], check=True, env=environment, stdout=subprocess.DEVNULL
     )
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = usage.ru_utime + usage.ru_stime - start_usage.ru_utime - start_usage.ru_stime
     return cpu, time.perf_counter() - start
 
 
@@ -50,8 +50,8 @@ def compare(name: str, arguments: list[str], runs: int) -> None:
     """Print the median of `runs` fresh processes after one warm-up, in turn with the reference."""
     measure_cost(arguments)
     pairs = [(measure_cost(arguments), measure_cost(REFERENCE)) for _ in range(runs)]
-    cpu, wall = (statistics.median(mine[k] for mine, _ in pairs) for k in (0, 1))
-    ratio = statistics.median(mine[1] / reference[1] for mine, reference in pairs)
+    cpu, wall = (statistics.median(own_cost[k] for own_cost, _ in pairs) for k in (0, 1))
+    ratio = statistics.median(own_cost[1] / reference[1] for own_cost, reference in pairs)
     print(
         f"{name:42s} CPU {cpu:6.2f} s, wall {wall:6.2f} s   {ratio:6.1f} times starting Python "
         "with NumPy"

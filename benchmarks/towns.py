@@ -92,8 +92,8 @@ def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding
     solids = defaultdict(dict)
     for name, solid in read_solids(path):
         solids[objects[name].get("parents", [name])[0]][name] = solid
-    found = [building for id in sorted(solids) for building in group_touching(id, solids[id])]
-    return [building for building in found if building.footprint.area >= smallest_m2]
+    buildings = [building for id in sorted(solids) for building in group_touching(id, solids[id])]
+    return [building for building in buildings if building.footprint.area >= smallest_m2]
 
 
 def group_touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
@@ -104,17 +104,17 @@ def group_touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
     )
     outlines = shapely.get_parts(joined.buffer(-TOUCH_M, join_style="mitre"))
     outlines = sorted((o for o in outlines if o.area > 0), key=lambda outline: -outline.area)
-    found = []
+    groups = []
     for k, outline in enumerate(outlines):
-        own = {
+        members = {
             name: solids[name]
             for name, ground in grounds.items()
             if find_nearest(ground, outlines) == k
         }
-        found.append(
-            TrueBuilding(id if k == 0 else f"{id}~{k + 1}", own, outline.simplify(TOUCH_M))
+        groups.append(
+            TrueBuilding(id if k == 0 else f"{id}~{k + 1}", members, outline.simplify(TOUCH_M))
         )
-    return found
+    return groups
 
 
 def find_nearest(ground: shapely.Geometry, outlines: list[shapely.Polygon]) -> int:
@@ -133,18 +133,18 @@ def find_ground(solid: Solid) -> shapely.Geometry:
 
 
 def choose_buildings(
-    buildings: list, every: int = 1, parity: str | None = None, most: int | None = None
+    buildings: list, step: int = 1, parity: str | None = None, limit: int | None = None
 ) -> list:
     """Every k-th of `buildings`, those at even or odd places, at most so many drawn by a fixed
     chance; in order.
     """
-    buildings = buildings[::every]
+    buildings = buildings[::step]
     buildings = buildings if parity is None else buildings[("even", "odd").index(parity) :: 2]
-    if most is None or most >= len(buildings):
+    if limit is None or limit >= len(buildings):
         return buildings
     return [
         buildings[k]
-        for k in sorted(np.random.default_rng(0).choice(len(buildings), most, replace=False))
+        for k in sorted(np.random.default_rng(0).choice(len(buildings), limit, replace=False))
     ]
 
 
@@ -213,10 +213,10 @@ def model_all(
 def describe_times(seconds: list[float]) -> str:
     """How long the buildings took, in words."""
     ms = 1e3 * np.array(seconds)
-    mean, most = ms.mean(), ms.max()
+    mean, longest = ms.mean(), ms.max()
     return (
-        f"{np.median(ms):.1f} ms a building in the median, {mean:.1f} in the mean, {most:.0f} at "
-        "most"
+        f"{np.median(ms):.1f} ms a building in the median, {mean:.1f} in the mean, "
+        f"{longest:.0f} at most"
     )
 
 
@@ -317,8 +317,8 @@ def main() -> None:
             models, seconds = list(map(compose_truth, buildings)), [float("nan")] * len(buildings)
         else:
             models, seconds = model_all(buildings, points, not a.without_footprints)
-        done = "their true roofs composed" if a.composed_truth else describe_times(seconds)
-        print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {done}")
+        description = "their true roofs composed" if a.composed_truth else describe_times(seconds)
+        print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {description}")
         with tempfile.TemporaryDirectory() as temporary:
             folder = (a.save or Path(temporary)) / town
             write_run(folder, models, points)

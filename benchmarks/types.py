@@ -28,17 +28,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="10 roofs a type instead of 100")
     parser.add_argument("--seed", type=int, default=21, help="of the roofs drawn")
-    given = parser.parse_args()
+    options = parser.parse_args()
     for density in DENSITIES:
-        taken = Counter(choose_types(density, 10 if given.quick else 100, given.seed))
-        right = sum(count for (truth, found), count in taken.items() if truth == found)
+        counts = Counter(choose_types(density, 10 if options.quick else 100, options.seed))
+        right = sum(count for (truth, name), count in counts.items() if truth == name)
         print(
-            f"{density:4.0f} points/m2: {100 * right / taken.total():.1f} % of {taken.total()}",
+            f"{density:4.0f} points/m2: {100 * right / counts.total():.1f} % of {counts.total()}",
             flush=True,
         )
-        for (truth, found), count in taken.most_common():
-            if truth != found:
-                print(f"       {truth} taken for {found}: {count}")
+        for (truth, name), count in counts.most_common():
+            if truth != name:
+                print(f"       {truth} taken for {name}: {count}")
 
 
 def choose_types(density: float, roofs: int, seed: int) -> Iterator[tuple[str, str]]:

@@ -68,12 +68,12 @@ class Block(NamedTuple):
 
     @property
     def file_name(self) -> str:
-        told = "with" if self.with_footprints else "without"
-        return f"{self.source}-{self.most}-{self.density:g}-{told}-{self.parity}.pickle"
+        suffix = "with" if self.with_footprints else "without"
+        return f"{self.source}-{self.most}-{self.density:g}-{suffix}-{self.parity}.pickle"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CaseOutcome:
     """A case with its model, and how wrong it is: RMSE (m) of the surface, number of wrong levels.
 
     `evidence` is what the verdict is found by: model, points (n, 3) and unused points (m, 3).
@@ -124,8 +124,8 @@ def compute_heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
         plan = plan_of(rings)
         shapely.prepare(plan)
         inside = shapely.contains_xy(plan, xy[:, 0], xy[:, 1])
-        own = centre[2] - (xy[inside] - centre[:2]) @ normal[:2] / normal[2]
-        z[inside] = np.maximum(z[inside], own)
+        plane_heights = centre[2] - (xy[inside] - centre[:2]) @ normal[:2] / normal[2]
+        z[inside] = np.maximum(z[inside], plane_heights)
     return np.where(np.isfinite(z), z, np.nan)
 
 
@@ -133,7 +133,9 @@ def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
     """RMSE (m) between the true and the model's surface; how many levels are missing or wrong."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.move(-origin) for solid in case.solids], [building.solid.move(-origin)]
-    area, seen = shapely.transform([case.truth_area, case.seen_area], lambda xy: xy - origin[:2])
+    area, seen_area = shapely.transform(
+        [case.truth_area, case.seen_area], lambda xy: xy - origin[:2]
+    )
     everywhere = shapely.union_all([area, *map(plan_of, list_polygons(model, (ROOF,)))])
     step = max(RASTER_M, float(np.sqrt(everywhere.area / MOST_PLACES)))
     west, south, east, north = everywhere.bounds
@@ -147,7 +149,7 @@ def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
         compute_heights(list_polygons(true, (ROOF,)), xy),
         compute_heights(list_polygons(model, (ROOF,)), xy),
     )
-    may_end = np.isnan(z_model) & ~shapely.contains_xy(seen, xy[:, 0], xy[:, 1])
+    may_end = np.isnan(z_model) & ~shapely.contains_xy(seen_area, xy[:, 0], xy[:, 1])
     z_true[may_end | ~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
     gaps = [
         point_surface_distances(
@@ -174,17 +176,17 @@ def find_patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
 @contextmanager
 def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
     """Collect what verdicts are asked by inside the block."""
-    judge, asked = verdict.judge_model, []
+    judge, cases_judged = verdict.judge_model, []
 
     def judge_model(model: Model, points: np.ndarray, unused: np.ndarray) -> verdict.Verdict:
-        asked.append((model, points, unused))
+        cases_judged.append((model, points, unused))
         return judge(model, points, unused)
 
     with patch.object(verdict, "judge_model", judge_model):
-        yield asked
+        yield cases_judged
 
 
-def judge_block(block: Block, folder: Path | None = None) -> list[Outcome]:
+def judge_block(block: Block, folder: Path | None = None) -> list[CaseOutcome]:
     """Reconstruct and compare the cases of a block, or read them from `folder`.
 
     A building without a model is left out.
@@ -192,52 +194,58 @@ def judge_block(block: Block, folder: Path | None = None) -> list[Outcome]:
     path = folder / block.file_name if folder else None
     if path and path.exists():
         return pickle.loads(path.read_bytes())
-    found = []
+    outcomes = []
     for case in iterate_cases(*block):
         with collect_evidence() as evidence:
             building = reconstruct(case.points, case.footprint, id=case.id)
         if building.built is not None:
             wrong = compare_surfaces(case, building)
-            found.append(Outcome(block, case.id, case.defect, case.area_m2, evidence[-1], *wrong))
+            outcomes.append(
+                CaseOutcome(block, case.id, case.defect, case.area_m2, evidence[-1], *wrong)
+            )
     if path:
-        path.write_bytes(pickle.dumps(found))
-    return found
+        path.write_bytes(pickle.dumps(outcomes))
+    return outcomes
 
 
-def make_line(name: str, found: list[Outcome]) -> str:
+def make_line(name: str, outcomes: list[CaseOutcome]) -> str:
     """A row of a table about some outcomes."""
-    sound = [outcome for outcome in found if outcome.is_sound]
-    cells = [f"{name:24}", f"{len(found):5d}", f"{len(sound) / len(found):6.3f}"]
+    sound = [outcome for outcome in outcomes if outcome.is_sound]
+    cells = [f"{name:24}", f"{len(outcomes):5d}", f"{len(sound) / len(outcomes):6.3f}"]
     for grade in Grade:
-        called = [outcome for outcome in found if outcome.grade is grade]
-        right = f"{np.mean([outcome.is_sound for outcome in called]):6.3f}" if called else "     -"
-        cells.append(f"{len(called) / len(found):6.3f} {right}")
-    kept = (
+        graded = [outcome for outcome in outcomes if outcome.grade is grade]
+        right = f"{np.mean([outcome.is_sound for outcome in graded]):6.3f}" if graded else "     -"
+        cells.append(f"{len(graded) / len(outcomes):6.3f} {right}")
+    good_shares = (
         f"{np.mean([outcome.grade is Grade.GOOD for outcome in sound]):6.3f}" if sound else "     -"
     )
-    return " | ".join([*cells, kept])
+    return " | ".join([*cells, good_shares])
 
 
-def make_table(found: list[Outcome]) -> str:
+def make_table(outcomes: list[CaseOutcome]) -> str:
     """Rows for all outcomes, and by density, area, source and defect."""
-    groups: dict[str, Callable[[Outcome], bool]] = {"all": lambda outcome: True}
+    groups: dict[str, Callable[[CaseOutcome], bool]] = {"all": lambda outcome: True}
     groups |= {
         f"{d:g} points/m2": lambda o, d=d: o.block.density == d
-        for d in sorted({o.block.density for o in found})
+        for d in sorted({o.block.density for o in outcomes})
     }
-    for low, high in pairwise(AREAS_M2):
-        groups[f"{low:g} to {high:g} m2"] = lambda o, low=low, high=high: low <= o.area_m2 < high
+    for lower, upper in pairwise(AREAS_M2):
+        groups[f"{lower:g} to {upper:g} m2"] = lambda o, lower=lower, upper=upper: (
+            lower <= o.area_m2 < upper
+        )
     groups |= {
-        s: lambda o, s=s: o.block.source == s for s in dict.fromkeys(o.block.source for o in found)
+        s: lambda o, s=s: o.block.source == s
+        for s in dict.fromkeys(o.block.source for o in outcomes)
     }
     groups |= {
-        f"defect: {d}": lambda o, d=d: o.defect == d for d in dict.fromkeys(o.defect for o in found)
+        f"defect: {d}": lambda o, d=d: o.defect == d
+        for d in dict.fromkeys(o.defect for o in outcomes)
     }
     head = (
         f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
     )
-    rows = ((name, [o for o in found if belongs(o)]) for name, belongs in groups.items())
-    return "\n".join([head, *(make_line(name, own) for name, own in rows if own)])
+    rows = ((name, [o for o in outcomes if belongs(o)]) for name, belongs in groups.items())
+    return "\n".join([head, *(make_line(name, subset) for name, subset in rows if subset)])
 
 
 def main() -> None:
@@ -278,19 +286,19 @@ def main() -> None:
     if a.keep:
         a.keep.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(a.processes, mp_context=get_context("spawn")) as pool:
-        found = [
+        name = [
             outcome
             for block in pool.map(judge_block, blocks, [a.keep] * len(blocks))
             for outcome in block
         ]
     for with_footprints in footprints:
-        own = [outcome for outcome in found if outcome.block.with_footprints == with_footprints]
-        known = "with" if with_footprints else "without"
-        print(f"{a.parity} buildings, {known} footprints\n{make_table(own)}\n", flush=True)
-    wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
+        members = [outcome for outcome in name if outcome.block.with_footprints == with_footprints]
+        reference = "with" if with_footprints else "without"
+        print(f"{a.parity} buildings, {reference} footprints\n{make_table(members)}\n", flush=True)
+    wrong = [outcome for outcome in name if outcome.grade is Grade.GOOD and not outcome.is_sound]
     for o in wrong[: a.wrong]:
-        known = "with" if o.block.with_footprints else "without"
-        case = f"{o.block.source} {o.id} {o.block.density:g}/m2 {known} footprint, {o.defect}"
+        reference = "with" if o.block.with_footprints else "without"
+        case = f"{o.block.source} {o.id} {o.block.density:g}/m2 {reference} footprint, {o.defect}"
         print(f"{case}: RMSE {o.rmse:.2f} m, wrong levels {o.wrong_levels}")
 
 

@@ -89,8 +89,10 @@ def cut_hole(scene: Scene, rng: np.random.Generator) -> Scene:
 def cover_with_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
     """A crown over a tenth to a half of the roof: seven points in ten lie in its leaves."""
     middle = shapely.get_coordinates(scene.footprint)[rng.integers(4)]
-    away = np.hypot(*(scene.points[:, :2] - middle).T)
-    caught = (away < np.quantile(away, rng.uniform(0.1, 0.5))) & (rng.random(len(away)) < 0.7)
+    distance = np.hypot(*(scene.points[:, :2] - middle).T)
+    caught = (distance < np.quantile(distance, rng.uniform(0.1, 0.5))) & (
+        rng.random(len(distance)) < 0.7
+    )
     points = scene.points.copy()
     points[caught, 2] += rng.uniform(0.3, 6.0, int(caught.sum()))
     return replace(scene, points=points)
@@ -214,16 +216,16 @@ def take_from_town(
     return scan_house
 
 
-def iterate_buildings(source: str, most: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
+def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
     """Number, truth and scanner of at most so many buildings of a source, evenly chosen, as many
     even as odd ones.
     """
     if source == "compounds":
-        yield from ((seed, *simulate_compound(seed)) for seed in range(most))
+        yield from ((seed, *simulate_compound(seed)) for seed in range(limit))
         return
     town = read_town(Path(PLACES[source]))
-    step = max(1, len(town) // most)
-    for number, building in enumerate(town[::step][:most]):
+    step = max(1, len(town) // limit)
+    for number, building in enumerate(town[::step][:limit]):
         yield number, building, take_from_town(building)
 
 
@@ -231,35 +233,35 @@ def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
     """The true area as far as it has points: half a distance between points around them, gaps
     between them closed.
     """
-    apart, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
-    apart = max(apart, (scene.asked.area / max(len(points), 1)) ** 0.5)
-    seen = (
+    spacing, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
+    spacing = max(spacing, (scene.asked.area / max(len(points), 1)) ** 0.5)
+    seen_area = (
         shapely.multipoints(points[:, :2])
-        .buffer(1.5 * apart, quad_segs=3)
-        .buffer(-apart, quad_segs=3)
+        .buffer(1.5 * spacing, quad_segs=3)
+        .buffer(-spacing, quad_segs=3)
     )
-    found = shapely.intersection(scene.asked, seen)
-    return scene.asked if found.is_empty else found
+    area = shapely.intersection(scene.asked, seen_area)
+    return scene.asked if area.is_empty else area
 
 
 def iterate_cases(
-    source: str, most: int, density: float, with_footprints: bool, parity: str
+    source: str, limit: int, density: float, with_footprints: bool, parity: str
 ) -> Iterator[Case]:
     """The cases of even or odd buildings of a source at one density.
 
     Of four buildings one has no defect, one those of the scanner, two have others.
     """
-    others = list(DEFECTS if with_footprints else OF_POINTS)
-    for number, building, scanned in iterate_buildings(source, most):
+    other_defects = list(DEFECTS if with_footprints else OF_POINTS)
+    for number, building, scanned in iterate_buildings(source, limit):
         if number % 2 != ("even", "odd").index(parity):
             continue
         rng = make_generator(building.id, density, with_footprints)
         kind = number // 2 % 4
-        defect = SOUND[kind] if kind < 2 else others[int(rng.integers(len(others)))]
-        own = (
+        defect = SOUND[kind] if kind < 2 else other_defects[int(rng.integers(len(other_defects)))]
+        defects = (
             Defects.none() if defect == "none" else CLUTTERED if source == "compounds" else SCANNER
         )
-        points = scanned(rng, ScanSettings(density=density, defects=own))
+        points = scanned(rng, ScanSettings(density=density, defects=defects))
         z_ground = min(float(solid.vertices[:, 2].min()) for solid in building.solids.values())
         scene = Scene(points, building.footprint, building.footprint, z_ground)
         if len(points) >= 10 and defect in DEFECTS:

@@ -72,29 +72,37 @@ class Score:
     share: float = 0.0
 
 
-def compute_f1(right: int, drawn: int, true: int, found: int | None = None) -> float:
+def compute_f1(right: int, n_drawn: int, true: int, n_found: int | None = None) -> float:
     """Return F1 (%) of `right` among `drawn` and of `found` (by default `right`) among `true`."""
-    precision, recall = right / max(drawn, 1), (right if found is None else found) / max(true, 1)
+    precision, recall = (
+        right / max(n_drawn, 1),
+        (right if n_found is None else n_found) / max(true, 1),
+    )
     return 200.0 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 
 def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
     """Compare each building of `truth` with its model; a missing one counts as all missed."""
     judge = load_tool("wireframe")
-    drawn, counts = judge.solids(models), {}
+    solids, counts = judge.solids(models), {}
     for name, parts in judge.solids(truth).items():
-        reference, model = judge.wireframe(parts), drawn.get(name, [])
+        reference, model = judge.wireframe(parts), solids.get(name, [])
         if len(reference[1]):
-            found = judge.compare(judge.wireframe(model), reference)
+            comparison = judge.compare(judge.wireframe(model), reference)
             rmse = judge.height_rmse(model, parts) if model else NAN
-            numbers = (*found["edges"], *found["corners"], found["found"], *found["faces"])
-            counts[name] = WireframeCounts(*numbers, found["offset"], rmse)
+            numbers = (
+                *comparison["edges"],
+                *comparison["corners"],
+                comparison["found"],
+                *comparison["faces"],
+            )
+            counts[name] = WireframeCounts(*numbers, comparison["offset"], rmse)
     return counts
 
 
 def sum_counts(counts: Iterable[WireframeCounts]) -> WireframeCounts:
     """Return the counts of all buildings together, with the mean of the known height errors."""
-    rows = np.array([list(vars(one).values()) for one in counts], float)
+    rows = np.array([list(vars(counts_of_one).values()) for counts_of_one in counts], float)
     *numbers, offset, _ = rows.sum(axis=0)
     rmse = measure_finite(np.mean, rows[:, -1])
     return WireframeCounts(*(int(number) for number in numbers), offset, rmse)
@@ -108,9 +116,9 @@ def measure_finite(figure, values: np.ndarray) -> float:
 
 def summarise(scores: list[Score]) -> list[str]:
     """Return the sentences on all `scores` together: edges, corners, faces and heights."""
-    total, each = sum_counts(score.counts for score in scores), [score.counts for score in scores]
-    rmse = measure_finite(np.median, np.array([one.height_rmse_m for one in each]))
-    same = np.mean([one.faces == one.true_faces for one in each])
+    total, counts = sum_counts(score.counts for score in scores), [score.counts for score in scores]
+    rmse = measure_finite(np.median, np.array([item.height_rmse_m for item in counts]))
+    share_same = np.mean([item.faces == item.true_faces for item in counts])
     precision, recall = compute_shares(total)
     offset = total.offset_m / max(total.right_corners, 1)
     times = total.corners / total.true_corners
@@ -123,7 +131,7 @@ def summarise(scores: list[Score]) -> list[str]:
     if total.true_faces:
         rows += [
             f"faces    {total.faces / total.true_faces:.2f} times the truth's;"
-            f" a share of {same:.3f} of the buildings has as many",
+            f" a share of {share_same:.3f} of the buildings has as many",
             f"heights  RMSE {total.height_rmse_m:.3f} m in the mean, {rmse:.3f} in the median",
         ]
     return rows
@@ -136,9 +144,9 @@ def make_size_table(scores: list[Score]) -> list[str]:
     the true number.
     """
     rows = [align_cells(COLUMNS), make_row("all", scores)]
-    for low, high in pairwise(SIZES_M2):
-        found = [score for score in scores if low <= score.area_m2 < high]
-        rows += [make_row(name_class(low, high), found)] if found else []
+    for lower, upper in pairwise(SIZES_M2):
+        group = [score for score in scores if lower <= score.area_m2 < upper]
+        rows += [make_row(name_class(lower, upper), group)] if group else []
     return rows
 
 
@@ -179,13 +187,15 @@ def make_row(name: str, scores: list[Score]) -> str:
 
 def align_cells(cells: Iterable[str]) -> str:
     """Return the cells of a row in columns, the first one to the left."""
-    first, *rest = zip(cells, COLUMNS, strict=True)
-    return first[0].ljust(12) + "".join(cell.rjust(max(len(head), 5) + 2) for cell, head in rest)
+    first, *remainder = zip(cells, COLUMNS, strict=True)
+    return first[0].ljust(12) + "".join(
+        cell.rjust(max(len(head), 5) + 2) for cell, head in remainder
+    )
 
 
-def list_worst(scores: list[Score], most: int) -> list[str]:
+def list_worst(scores: list[Score], limit: int) -> list[str]:
     """Return a line for each of the `most` buildings with the worst edges."""
-    worst = sorted(scores, key=lambda score: score.counts.edge_f1)[:most]
+    worst = sorted(scores, key=lambda score: score.counts.edge_f1)[:limit]
     return [
         f"{s.id}: edge F1 {s.counts.edge_f1:.0f}, {s.counts.right_edges} of {s.counts.edges} edges"
         f" right, {s.counts.true_edges} true, {s.parts} parts, {s.area_m2:.0f} m2"

@@ -36,10 +36,13 @@ def model_found(name: str) -> tuple[list[tuple[Building, float]], float]:
     outcomes, started = [], time.process_time()
     buildings = split_buildings(cloud)
     splitting = time.process_time() - started
-    for found in buildings:
+    for candidate in buildings:
         started = time.process_time()
         outcomes.append(
-            (reconstruct(cloud.xyz[found.index], id=found.id), time.process_time() - started)
+            (
+                reconstruct(cloud.xyz[candidate.index], id=candidate.id),
+                time.process_time() - started,
+            )
         )
     return outcomes, splitting
 

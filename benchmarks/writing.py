@@ -43,15 +43,15 @@ def generate_buildings(seed=0):
     """One building of each roof type, in world coordinates."""
     rng = np.random.default_rng(seed)
     for type in ROOF_TYPES:
-        made = random_building(rng, type)
-        origin = made.roof.frame.origin
-        solid = compose(made.roof, 0.0).move(origin)
+        building = random_building(rng, type)
+        origin = building.roof.frame.origin
+        solid = compose(building.roof, 0.0).move(origin)
         quality = Quality(300, 5.0, 0.05, 0.04, 0.06, 0.1, 0.99, 0.95, 0.02, 0.0)
         yield Building(
             type,
             Status.MODELLED,
             "",
-            Model(made.roof, solid),
+            Model(building.roof, solid),
             quality,
             float(origin[2]),
             "simulated",
@@ -90,16 +90,16 @@ def main(count):
         for size in (count // 10, count):
             write_all(folder, iterate_street(buildings, size), "EPSG:7415")
             print(f"peak memory after {size} buildings: {measure_peak_mb():.0f} MB")
-        some = list(iterate_street(buildings, 500))
-        figures = [roof_figures(building.solid) for building in some]
+        street = list(iterate_street(buildings, 500))
+        figures = [roof_figures(building.solid) for building in street]
         total = measure_cpu_ms(
-            lambda: [roof_figures(building.solid) for building in some], len(some)
+            lambda: [roof_figures(building.solid) for building in street], len(street)
         )
         print(f"{'figures of the solid':22} {total:.3f} ms")
         for name, writer in WRITERS.items():
-            pairs = list(zip(some, figures, strict=True))
+            pairs = list(zip(street, figures, strict=True))
             spent = measure_cpu_ms(
-                lambda w=writer, n=name, p=pairs: write_with(w, Path(folder, n), p), len(some)
+                lambda w=writer, n=name, p=pairs: write_with(w, Path(folder, n), p), len(street)
             )
             total += spent if name != "buildings.gpkg" else 0.0
             print(f"{name:22} {spent:.3f} ms")

@@ -132,19 +132,19 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
     # a true model with an invalid solid is not drawn; the others are
     true_models = read_models(truth, damaged=SkippedBuildings()) if truth else ()
     true_solids = {model.id: model.solid for model in true_models}
-    found = []
+    buildings = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
         if model.solid is not None and len(points):
             roof = roofs[model.id]
             parts = tuple(make_part(part, roof.frame.origin) for part in roof.parts)
             gap = measure_gaps(model.solid, points)
             true_solid = true_solids.get(model.id)
-            found.append(
+            buildings.append(
                 Drawn(
                     model.id, model.status, model.solid, parts, points, footprint, gap, true_solid
                 )
             )
-    return found
+    return buildings
 
 
 def make_part(part: Part, shift: np.ndarray) -> DrawnPart:
@@ -236,8 +236,8 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
         linewidths=0,
         alpha=0.9,
     )
-    for off, shade in ((~(gap < NEAR_M), "black"), (gap <= -NEAR_M, "#999999")):
-        axes.scatter(*xy[off].T, s=size + 7, c=shade, marker="x", linewidths=0.7)
+    for is_off, shade in ((~(gap < NEAR_M), "black"), (gap <= -NEAR_M, "#999999")):
+        axes.scatter(*xy[is_off].T, s=size + 7, c=shade, marker="x", linewidths=0.7)
     if building.footprint is not None:
         for polygon in shapely.get_parts(building.footprint):
             axes.plot(
@@ -253,11 +253,13 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
     for kind, ends in list_roof_lines(building.solid):
         axes.plot(*(ends - origin).T, **LINES[kind], solid_capstyle="round", zorder=3)
     draw_parts(axes, building, origin)
-    low, high = shapely.bounds(shapely.MultiPoint(building.solid.vertices[:, :2] - origin)).reshape(
-        2, 2
+    lower, upper = shapely.bounds(
+        shapely.MultiPoint(building.solid.vertices[:, :2] - origin)
+    ).reshape(2, 2)
+    draw_scale(axes, lower - 0.6)
+    axes.set(
+        xlim=(lower[0] - 1.0, upper[0] + 1.0), ylim=(lower[1] - 1.6, upper[1] + 1.0), aspect="equal"
     )
-    draw_scale(axes, low - 0.6)
-    axes.set(xlim=(low[0] - 1.0, high[0] + 1.0), ylim=(low[1] - 1.6, high[1] + 1.0), aspect="equal")
     axes.set_axis_off()
 
 
@@ -279,9 +281,11 @@ def draw_parts(axes: plt.Axes, building: Drawn, origin: np.ndarray) -> None:
             for polygon in shapely.get_parts(inner)[shapely.area(shapely.get_parts(inner)) > 0]:
                 ring = shapely.get_coordinates(polygon.exterior) - origin
                 axes.plot(*ring.T, color=part.colour, linewidth=2.6, alpha=0.8, zorder=2)
-        seen = grid[top == k]
-        if len(seen) > LABELLED_CELLS:
-            place = seen[np.argmin(((seen - np.median(seen, axis=0)) ** 2).sum(axis=1))] - origin
+        values = grid[top == k]
+        if len(values) > LABELLED_CELLS:
+            place = (
+                values[np.argmin(((values - np.median(values, axis=0)) ** 2).sum(axis=1))] - origin
+            )
             label = part.type.replace("asymmetric_", "asym. ").replace("_", " ")
             axes.text(
                 *place, label, fontsize=8, ha="center", va="center", zorder=5, path_effects=HALO
@@ -298,13 +302,13 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
     """The solid from the south-south-west, hidden surfaces removed, roofs in the colours of their
     parts' types.
     """
-    solid, (right, up, back) = lower_walls(building.solid), compute_view_axes()
-    seen = solid.vertices @ np.column_stack([right, up])
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    step = (high - low).max() / VIEW_PIXELS
+    solid, (right, upward, back) = lower_walls(building.solid), compute_view_axes()
+    projected = solid.vertices @ np.column_stack([right, upward])
+    lower, upper = projected.min(axis=0), projected.max(axis=0)
+    step = (upper - lower).max() / VIEW_PIXELS
     x, y = (
-        np.arange(low[0] - 2 * step, high[0] + 2 * step, step),
-        np.arange(low[1] - 2 * step, high[1] + 2 * step, step),
+        np.arange(lower[0] - 2 * step, upper[0] + 2 * step, step),
+        np.arange(lower[1] - 2 * step, upper[1] + 2 * step, step),
     )
     pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     depth, owner = np.full(len(pixels), -np.inf), np.full(len(pixels), -1)
@@ -314,16 +318,16 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
         colours.append(apply_light(choose_colour(building, face, normal), normal))
         if normal @ back < 1e-6:
             continue
-        outer, *holes = (seen[list(ring)] for ring in face.rings)
+        outer, *holes = (projected[list(ring)] for ring in face.rings)
         inside = np.flatnonzero(
             shapely.intersects_xy(shapely.make_valid(shapely.Polygon(outer, holes)), *pixels.T)
         )
         # A pixel is the line right x + up y + back t: where it meets the face's plane is how near
         # it is.
         distance = normal @ solid.vertices[face.rings[0][0]]
-        near = (distance - pixels[inside] @ (normal @ right, normal @ up)) / (normal @ back)
-        nearer = near > depth[inside] + 1e-6
-        depth[inside[nearer]], owner[inside[nearer]] = near[nearer], k
+        nearby = (distance - pixels[inside] @ (normal @ right, normal @ upward)) / (normal @ back)
+        nearer = nearby > depth[inside] + 1e-6
+        depth[inside[nearer]], owner[inside[nearer]] = nearby[nearer], k
     image = np.array(colours)[owner + 1].reshape(len(y), len(x), 3)
     image[find_contours(owner.reshape(len(y), len(x)))] = 0.15
     axes.imshow(image, origin="lower", interpolation="antialiased")
@@ -444,11 +448,11 @@ def main(words: list[str]) -> None:
         )
     except HiproofError as error:
         sys.exit(str(error))
-    drawn = np.random.default_rng(a.seed).permutation(len(buildings))[: a.chance]
+    order = np.random.default_rng(a.seed).permutation(len(buildings))[: a.chance]
     draw_sheets(
         a.out, "worst", sorted(buildings, key=lambda building: building.share)[: a.worst], a.colour
     )
-    draw_sheets(a.out, "chance", [buildings[k] for k in drawn], a.colour)
+    draw_sheets(a.out, "chance", [buildings[k] for k in order], a.colour)
     draw_sheets(
         a.out, "asked", [b for b in buildings if any(b.id.endswith(id) for id in a.ids)], a.colour
     )

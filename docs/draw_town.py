@@ -39,10 +39,10 @@ def project(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Project points (n, 3) onto the picture: their places (n, 2) and how near they are (n,)."""
     a, e = np.radians(AZIMUTH_DEG), np.radians(ELEVATION_DEG)
     right = np.array([np.cos(a), np.sin(a), 0.0])
-    away = np.array([-np.sin(a), np.cos(a), 0.0])
-    up = np.array([*(np.sin(e) * away[:2]), np.cos(e)])
-    towards = np.array([*(-np.cos(e) * away[:2]), np.sin(e)])
-    return np.column_stack([xyz @ right, xyz @ up]), xyz @ towards
+    forward = np.array([-np.sin(a), np.cos(a), 0.0])
+    upward = np.array([*(np.sin(e) * forward[:2]), np.cos(e)])
+    toward = np.array([*(-np.cos(e) * forward[:2]), np.sin(e)])
+    return np.column_stack([xyz @ right, xyz @ upward]), xyz @ toward
 
 
 def shade(colour: str, brightness: np.ndarray) -> np.ndarray:
@@ -53,11 +53,13 @@ def shade(colour: str, brightness: np.ndarray) -> np.ndarray:
 
 def draw_points(axes, xyz: np.ndarray, is_roof: np.ndarray) -> None:
     """Draw points (n, 3), far ones first; roofs are lighter the higher they are."""
-    places, near = project(xyz)
-    order = np.argsort(near)
+    places, depth = project(xyz)
+    order = np.argsort(depth)
     height = (xyz[:, 2] - xyz[:, 2].min()) / 12.0
-    roofs, rest = (shade(c, np.clip(height, 0.0, 1.0)) for c in (ROOF_COLOUR, GROUND_COLOUR))
-    colours = np.where(is_roof[:, None], roofs, rest)
+    roofs, others_colour = (
+        shade(c, np.clip(height, 0.0, 1.0)) for c in (ROOF_COLOUR, GROUND_COLOUR)
+    )
+    colours = np.where(is_roof[:, None], roofs, others_colour)
     axes.scatter(*places[order].T, s=0.7, c=colours[order], linewidths=0)
 
 
@@ -70,11 +72,11 @@ def draw_models(axes, models: Path, origin: np.ndarray) -> None:
             ring = vertices[list(face.rings[0])]
             normal = np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0)
             normal /= np.linalg.norm(normal) or 1.0
-            places, near = project(ring)
+            places, depth = project(ring)
             colour = ROOF_COLOUR if face.kind == ROOF else WALL_COLOUR
             polygons.append(places)
             colours.append(shade(colour, np.clip(normal @ LIGHT, 0.0, 1.0)[None])[0])
-            nearness.append(near.mean())
+            nearness.append(depth.mean())
     order = np.argsort(nearness)
     faces = [polygons[k] for k in order]
     shades = [colours[k] for k in order]
@@ -99,17 +101,17 @@ def draw(
     corners = np.concatenate(
         [model.solid.vertices for model in read_models(run / "buildings.city.jsonl")]
     )
-    low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
-    shown = ((xyz[:, :2] >= low[:2]) & (xyz[:, :2] <= high[:2])).all(axis=1)
-    shown &= np.isin(classes, (1, 2, 6)) & (xyz[:, 2] < high[2])
+    lower, upper = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
+    is_shown = ((xyz[:, :2] >= lower[:2]) & (xyz[:, :2] <= upper[:2])).all(axis=1)
+    is_shown &= np.isin(classes, (1, 2, 6)) & (xyz[:, 2] < upper[2])
     origin = np.array([*corners[:, :2].mean(axis=0), corners[:, 2].min()])
-    figure, both = plt.subplots(1, 2, figsize=(16, 7.2))
-    draw_points(both[0], xyz[shown] - origin, classes[shown] == 6)
-    draw_models(both[1], run / "buildings.city.jsonl", origin)
+    figure, pair = plt.subplots(1, 2, figsize=(16, 7.2))
+    draw_points(pair[0], xyz[is_shown] - origin, classes[is_shown] == 6)
+    draw_models(pair[1], run / "buildings.city.jsonl", origin)
     places, _ = project(corners - origin)
     start, size = places.min(axis=0), np.ptp(places, axis=0)
     limits = [start[k // 2] + share * size[k // 2] for k, share in enumerate(shown_part)]
-    for axes in both:
+    for axes in pair:
         left, right, bottom, top = limits
         axes.set(xlim=(left, right), ylim=(bottom, top))
         axes.set_aspect("equal")

@@ -47,7 +47,7 @@ def describe_command(name: str, command: Any) -> str:
         for p in command.params
         if p not in arguments
     ]
-    table = "".join(f"| {what} | {make_cell(help)} |\n" for what, help in rows)
+    table = "".join(f"| {kind} | {make_cell(help)} |\n" for kind, help in rows)
     head = "| argument or option | meaning |\n| --- | --- |\n"
     return f"\n## hiproof {name}\n\n{command.help}\n\n{head if rows else ''}{table}"
 
@@ -74,13 +74,13 @@ def describe_settings() -> str:
 
 
 def make_setting_row(field: dataclasses.Field) -> str:
-    told = field.metadata
-    bounds = f"{told['low']} to {told['high']}" if told["low"] is not None else ""
-    values = ", ".join(f"`{choice}`" for choice in told["choices"]) or bounds
-    option = f"`{told['option']}`" if told["option"] else ""
+    metadata = field.metadata
+    bounds = f"{metadata['low']} to {metadata['high']}" if metadata["low"] is not None else ""
+    values = ", ".join(f"`{choice}`" for choice in metadata["choices"]) or bounds
+    option = f"`{metadata['option']}`" if metadata["option"] else ""
     return (
-        f"| `{field.name}` | `{toml_value(field.default)}` | {told['unit']} | {values} | "
-        f"{make_cell(told['help'])} | {option} |\n"
+        f"| `{field.name}` | `{toml_value(field.default)}` | {metadata['unit']} | {values} | "
+        f"{make_cell(metadata['help'])} | {option} |\n"
     )
 
 
@@ -118,33 +118,34 @@ def list_constants_in(file: Path) -> Iterator[Constant]:
     tokens = takewhile(
         lambda token: token.start[0] <= last, tokenize.generate_tokens(io.StringIO(text).readline)
     )
-    said = {
+    texts = {
         token.start[0]: token.string.lstrip("# ")
         for token in tokens
         if token.type == tokenize.COMMENT
     }
     lines = text.splitlines()
-    whole = {line for line in said if lines[line - 1].startswith("#")}
-    for statement, after in zip_longest(statements, statements[1:]):
+    whole = {line for line in texts if lines[line - 1].startswith("#")}
+    for statement, next_statement in zip_longest(statements, statements[1:]):
         if statement not in numbers:
             continue
-        above, first = [], statement.lineno - 1
+        comments_above, first = [], statement.lineno - 1
         while first in whole:
-            above.insert(0, said[first])
+            comments_above.insert(0, texts[first])
             first -= 1
-        behind = [
-            said[line]
+        comments_behind = [
+            texts[line]
             for line in range(statement.lineno, (statement.end_lineno or 0) + 1)
-            if line in said
+            if line in texts
         ]
-        below = (
-            [after.value.value]
-            if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        comments_below = (
+            [next_statement.value.value]
+            if isinstance(next_statement, ast.Expr)
+            and isinstance(next_statement.value, ast.Constant)
             else []
         )
         place = file.relative_to(PACKAGE).as_posix()
-        why = " ".join(map(str, [*above, *behind, *below]))
-        yield Constant(place, list_names(statement), ast.unparse(statement.value), why)
+        reason = " ".join(map(str, [*comments_above, *comments_behind, *comments_below]))
+        yield Constant(place, list_names(statement), ast.unparse(statement.value), reason)
 
 
 def list_names(statement: ast.stmt) -> tuple[str, ...]:
@@ -179,13 +180,13 @@ def describe_constants() -> str:
         "[setting](settings.md) instead. `python -m benchmarks.constants NAME` tells what half and "
         "double of one do to Delft.\n"
     )
-    for room, own in groupby(list_constants(), lambda constant: constant.room):
+    for room, room_constants in groupby(list_constants(), lambda constant: constant.room):
         text += f"\n## {room}\n\n"
         text += "| names | value | file | unit, what it does, why |\n| --- | --- | --- | --- |\n"
         text += "".join(
             f"| {', '.join(f'`{name}`' for name in c.names)} | `{make_cell(c.value)}` | {c.file} | "
             f"{make_cell(c.why)} |\n"
-            for c in own
+            for c in room_constants
         )
     return text
 

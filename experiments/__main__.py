@@ -39,19 +39,23 @@ def main(arguments: list[str] | None = None) -> None:
         default=1.0,
         help="share of the fits made with the paper's objective",
     )
-    given = parser.parse_args(arguments)
+    values = parser.parse_args(arguments)
     options = Options(
-        given.quick, given.data, given.seed, 1 if given.quick else given.jobs, given.paper_share
+        values.quick,
+        values.data,
+        values.seed,
+        1 if values.quick else values.jobs,
+        values.paper_share,
     )
     # One thread a process: the work is shared out by processes, and small matrices only lose by
     # more threads. NumPy reads this when it is first imported, with the experiment.
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    for name in NAMES if "all" in given.names else given.names:
+    for name in NAMES if "all" in values.names else values.names:
         start = time.perf_counter()
         result = importlib.import_module(f"experiments.{name}").run(options)
         print(
-            write_result(name, result, given.out, options, time.perf_counter() - start).read_text()
+            write_result(name, result, values.out, options, time.perf_counter() - start).read_text()
         )
 
 

@@ -48,10 +48,12 @@ def compute_best_covariance(
     information = compute_height_information(
         primitive, theta, density, sigma_m
     ) + compute_edge_information(primitive, theta, density)
-    known = np.diag(information) > 1e-9
+    is_informed = np.diag(information) > 1e-9
     covariance = np.full_like(information, 0.0)
-    covariance[np.ix_(known, known)] = np.linalg.inv(information[np.ix_(known, known)])
-    covariance[~known, ~known] = np.inf
+    covariance[np.ix_(is_informed, is_informed)] = np.linalg.inv(
+        information[np.ix_(is_informed, is_informed)]
+    )
+    covariance[~is_informed, ~is_informed] = np.inf
     return covariance
 
 
@@ -73,10 +75,12 @@ def compute_height_gradient(primitive: Primitive, theta: np.ndarray, xy: np.ndar
     """Central differences (n, k) of the height at `xy` (n, 2) by the used entries of theta."""
     columns = []
     for i in range(primitive.theta_size):
-        high, low = theta.copy(), theta.copy()
-        high[i] += STEP
-        low[i] -= STEP
-        columns.append((primitive.height_at(high, xy) - primitive.height_at(low, xy)) / (2 * STEP))
+        upper, lower = theta.copy(), theta.copy()
+        upper[i] += STEP
+        lower[i] -= STEP
+        columns.append(
+            (primitive.height_at(upper, xy) - primitive.height_at(lower, xy)) / (2 * STEP)
+        )
     return np.stack(columns, axis=1)
 
 
@@ -122,12 +126,12 @@ def compute_parameter_gradient(primitive: Primitive, theta: np.ndarray, name: st
     """Derivative (k,) of one of theta_p by the used entries of theta."""
     gradient = np.zeros(primitive.theta_size)
     for i in range(HALF_WIDTH, primitive.theta_size):
-        high, low = theta.copy(), theta.copy()
-        high[i] += STEP
-        low[i] -= STEP
-        gradient[i] = (primitive.from_theta(high)[0][name] - primitive.from_theta(low)[0][name]) / (
-            2 * STEP
-        )
+        upper, lower = theta.copy(), theta.copy()
+        upper[i] += STEP
+        lower[i] -= STEP
+        gradient[i] = (
+            primitive.from_theta(upper)[0][name] - primitive.from_theta(lower)[0][name]
+        ) / (2 * STEP)
     return gradient
 
 

@@ -43,12 +43,12 @@ class RoofSample:
 
 def collect_samples(options: Options) -> dict[str, list[RoofSample]]:
     """Every data set at hand by name: New York or the csv given, and simulated roofs."""
-    found = {}
+    samples = {}
     path = options.data or SHARED
     if path.is_file():
-        found["RoofN3D csv"] = list(read_roofn3d_roofs(path, 3 if options.quick else MOST_ROWS))
+        samples["RoofN3D csv"] = list(read_roofn3d_roofs(path, 3 if options.quick else MOST_ROWS))
     elif (path / "roofn3d" / "nyc_roofs.npz").is_file():
-        found["New York roofs"] = list(
+        samples["New York roofs"] = list(
             read_new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 1 if options.quick else None)
         )
     elif options.data is not None:
@@ -56,23 +56,23 @@ def collect_samples(options: Options) -> dict[str, list[RoofSample]]:
             f"expected a RoofN3D csv or a folder with roofn3d/nyc_roofs.npz, got {path}; check "
             "--data"
         )
-    found["simulated"] = list(
+    samples["simulated"] = list(
         simulate_roofs(options.seed, 1 if options.quick else 20, options.quick)
     )
-    return found
+    return samples
 
 
-def read_new_york_roofs(path: Path, most: int | None = None) -> Iterator[RoofSample]:
+def read_new_york_roofs(path: Path, limit: int | None = None) -> Iterator[RoofSample]:
     """The roofs of `nyc_roofs.npz`; what a published network took for roof (face > 0) is what
     counts.
     """
     content = np.load(path)
-    for start, end in islice(pairwise(content["offset"]), most):
+    for start, end in islice(pairwise(content["offset"]), limit):
         points, is_roof = content["points"][start:end].astype(float), content["face"][start:end] > 0
         yield RoofSample(points, is_roof, alpha_shape(points[is_roof, :2]))
 
 
-def read_roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
+def read_roofn3d_roofs(path: Path, limit: int) -> Iterator[RoofSample]:
     """The first buildings of a RoofN3D csv of a class we know, in its order, with at least ten
     points.
     """
@@ -81,7 +81,7 @@ def read_roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
         for record in read_roofn3d(path)
         if record.type is not None and len(record.points) >= 10
     )
-    for record in islice(records, most):
+    for record in islice(records, limit):
         try:
             outline = (
                 record.outline if not record.outline.is_empty else alpha_shape(record.points[:, :2])

@@ -35,10 +35,10 @@ def run(options: Options) -> Result:
 
 
 def compute_percentiles(title: str, values: dict[str, np.ndarray]) -> Table:
-    known = {method: numbers[np.isfinite(numbers)] for method, numbers in values.items()}
+    finite = {method: numbers[np.isfinite(numbers)] for method, numbers in values.items()}
     rows = [
         (method, *map(float, np.percentile(numbers, SHARES)))
-        for method, numbers in known.items()
+        for method, numbers in finite.items()
         if len(numbers)
     ]
     return Table(title, ("method", *(f"p{share}" for share in SHARES)), rows)

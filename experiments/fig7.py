@@ -28,12 +28,12 @@ def run(options: Options) -> Result:
     rows = []
     for method in OBJECTIVES:
         for primitive in PRIMITIVES:
-            chosen = [roof for roof in range(roofs) if options.covers(method, roof)]
-            if not chosen:
+            roof_indices = [roof for roof in range(roofs) if options.covers(method, roof)]
+            if not roof_indices:
                 continue
-            work = [(method, primitive, options.seed, roof) for roof in chosen]
-            found = np.array(run_in_parallel(measure_errors, work, options.jobs))
-            psd, height = found.T
+            work = [(method, primitive, options.seed, roof) for roof in roof_indices]
+            errors = np.array(run_in_parallel(measure_errors, work, options.jobs))
+            psd, height = errors.T
             row = (
                 method,
                 primitive,
@@ -66,8 +66,8 @@ def measure_errors(method: str, primitive: str, seed: int, roof: int) -> tuple[f
     building, points = draw_roof_and_points(seed, roof)
     model = fit_model(method, points, (primitive,))
     xy = uniform_points(building, np.random.default_rng(roof), 5.0, 0.0)
-    away = model.fit.height_at(xy[:, :2]) - xy[:, 2]
-    return float(model.psd(points).mean()), float(np.sqrt(np.nanmean(away**2)))
+    height_error = model.fit.height_at(xy[:, :2]) - xy[:, 2]
+    return float(model.psd(points).mean()), float(np.sqrt(np.nanmean(height_error**2)))
 
 
 def has_unequal_slopes(building) -> bool:
@@ -82,9 +82,9 @@ def draw_section(seed: int):
     from .charts import make_figure
 
     building, points = next(
-        drawn
-        for drawn in (draw_roof_and_points(seed, roof) for roof in range(100))
-        if has_unequal_slopes(drawn[0])
+        candidate
+        for candidate in (draw_roof_and_points(seed, roof) for roof in range(100))
+        if has_unequal_slopes(candidate[0])
     )
     part = building.roof.parts[0]
     across = np.array([-np.sin(part.kappa), np.cos(part.kappa)])

@@ -47,19 +47,19 @@ def run(options: Options) -> Result:
         return Result("against RANSAC plane detection", "none", (), remarks=remark)
     roofs = 1 if options.quick else 40
     rows = []
-    for what, levels in LEVELS.items():
+    for kind, levels in LEVELS.items():
         for level in levels[-2:] if options.quick else levels:
             for method in ("ransac", "likelihood"):
-                work = [(method, what, level, options.seed, roof) for roof in range(roofs)]
-                found, wrong, closed = np.array(
+                work = [(method, kind, level, options.seed, roof) for roof in range(roofs)]
+                errors, wrong, closed = np.array(
                     run_in_parallel(match_planes, work, options.jobs), float
                 ).T
                 rows.append(
                     (
-                        what,
+                        kind,
                         level,
                         method,
-                        float(found.mean()),
+                        float(errors.mean()),
                         float(wrong.mean()),
                         float(closed.mean()),
                     )
@@ -86,8 +86,8 @@ class Trouble:
     missing_share: float = 0.0
 
     @classmethod
-    def of(cls, what: str, level: float) -> Trouble:
-        name = {"density, points/m2": "density", "noise, m": "noise_m"}.get(what, "missing_share")
+    def of(cls, kind: str, level: float) -> Trouble:
+        name = {"density, points/m2": "density", "noise, m": "noise_m"}.get(kind, "missing_share")
         return cls(**{name: level})
 
     def points(self, building: SimBuilding, rng: np.random.Generator) -> np.ndarray:
@@ -118,17 +118,17 @@ def turn_back(xy: np.ndarray, kappa: float) -> np.ndarray:
 
 
 def match_planes(
-    method: str, what: str, level: float, seed: int, roof: int
+    method: str, kind: str, level: float, seed: int, roof: int
 ) -> tuple[int, int, bool]:
     """(true faces found, wrong planes, whether exactly the true faces came out)."""
     rng = np.random.default_rng([seed, roof, 88])
     building = random_building(rng, "hip")
-    points = Trouble.of(what, level).points(building, rng)
+    points = Trouble.of(kind, level).points(building, rng)
     if len(points) < 4:
         return 0, 0, False
     planes = detect_planes(points) if method == "ransac" else fit_planes(points)
-    found, wrong = match_faces(planes, list_true_faces(building))
-    return found, wrong, found == 4 and wrong == 0
+    n_found, wrong = match_faces(planes, list_true_faces(building))
+    return n_found, wrong, n_found == 4 and wrong == 0
 
 
 def fit_planes(points: np.ndarray) -> list[DetectedPlane]:
@@ -156,9 +156,11 @@ def draw_picture(rows: list[tuple]):
     from .charts import draw_curves
 
     panels = {}
-    for what in dict.fromkeys(row[0] for row in rows):
-        mine = [row for row in rows if row[0] == what]
-        levels = list(dict.fromkeys(row[1] for row in mine))
-        series = {m: [row[5] for row in mine if row[2] == m] for m in ("ransac", "likelihood")}
-        panels[what] = (levels, series)
+    for kind in dict.fromkeys(row[0] for row in rows):
+        panel_rows = [row for row in rows if row[0] == kind]
+        levels = list(dict.fromkeys(row[1] for row in panel_rows))
+        series = {
+            m: [row[5] for row in panel_rows if row[2] == m] for m in ("ransac", "likelihood")
+        }
+        panels[kind] = (levels, series)
     return draw_curves(panels, "closed and right")

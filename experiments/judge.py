@@ -63,9 +63,9 @@ def judge_samples(
     verdicts: dict = {name: {} for name in samples}
     for name, roofs in samples.items():
         for method in METHODS:
-            chosen = [i for i in range(len(roofs)) if options.covers(method, i)]
-            found = run_in_parallel(judge, [(method, roofs[i]) for i in chosen], options.jobs)
-            verdicts[name][method] = dict(zip(chosen, found, strict=True))
+            indices = [i for i in range(len(roofs)) if options.covers(method, i)]
+            result = run_in_parallel(judge, [(method, roofs[i]) for i in indices], options.jobs)
+            verdicts[name][method] = dict(zip(indices, result, strict=True))
     return samples, verdicts
 
 

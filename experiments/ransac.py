@@ -68,19 +68,19 @@ def detect_planes(
     import pyransac3d
 
     random.seed(seed)
-    least = max(MIN_POINTS, int(MIN_SHARE * len(points)))
-    left, planes = np.arange(len(points)), []
+    min_points = max(MIN_POINTS, int(MIN_SHARE * len(points)))
+    remaining, planes = np.arange(len(points)), []
     for _ in range(MOST_PLANES):
-        if len(left) < max(least, 3):
+        if len(remaining) < max(min_points, 3):
             break
-        _, chosen = pyransac3d.Plane().fit(
-            points[left], thresh=threshold_m, maxIteration=ITERATIONS
+        _, selection = pyransac3d.Plane().fit(
+            points[remaining], thresh=threshold_m, maxIteration=ITERATIONS
         )
-        inliers = left[chosen]
-        if len(inliers) < least:
+        inliers = remaining[selection]
+        if len(inliers) < min_points:
             break
         normal, offset = fit_least_squares_plane(points[inliers])
-        left = np.setdiff1d(left, inliers)
+        remaining = np.setdiff1d(remaining, inliers)
         if normal[2] > STEEPEST:
             planes.append(DetectedPlane(normal, offset, inliers))
     return planes
@@ -105,18 +105,18 @@ def match_faces(
 
     A plane that doubles a face already found is wrong too.
     """
-    found: set[int] = set()
+    matched: set[int] = set()
     wrong = 0
     for plane in planes:
         best = None
         for i, face in enumerate(faces):
             normal, _ = fit_least_squares_plane(face)
             angle = np.degrees(np.arccos(np.clip(normal @ plane.normal, -1, 1)))
-            away = abs(face.mean(axis=0) @ plane.normal + plane.offset)
-            if angle < angle_deg and away < distance_m and (best is None or angle < best[0]):
+            distance = abs(face.mean(axis=0) @ plane.normal + plane.offset)
+            if angle < angle_deg and distance < distance_m and (best is None or angle < best[0]):
                 best = (angle, i)
-        if best is None or best[1] in found:
+        if best is None or best[1] in matched:
             wrong += 1
         else:
-            found.add(best[1])
-    return len(found), wrong
+            matched.add(best[1])
+    return len(matched), wrong

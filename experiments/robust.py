@@ -40,11 +40,11 @@ def run(options: Options) -> Result:
     """One axis at a time; all methods see the same points."""
     roofs, kinds = (1, KINDS[:1]) if options.quick else (20, KINDS)
     rows = []
-    for what, levels in AXES.items():
+    for name, levels in AXES.items():
         for level in levels[-1:] if options.quick else levels:
             work = [
                 (
-                    what,
+                    name,
                     level,
                     kind,
                     options.seed,
@@ -55,7 +55,7 @@ def run(options: Options) -> Result:
                 for roof in range(roofs)
             ]
             outcomes = run_in_parallel(measure_errors, work, options.jobs)
-            rows.append((what, level, *compute_figures(outcomes)))
+            rows.append((name, level, *compute_figures(outcomes)))
     table = Table("Errors of width, length, height (and ridge length)", COLUMNS, rows, NOTE)
     roofs_a_level = " and ".join(f"{roofs} {kind}s" for kind in kinds)
     data = f"{roofs_a_level} a level, otherwise {BASE_DENSITY} points/m2, noise {BASE_NOISE_M} m"
@@ -93,12 +93,12 @@ def compute_figures(outcomes: list[dict]) -> tuple:
 
 
 def measure_errors(
-    what: str, level: float, kind: str, seed: int, roof: int, methods: tuple[str, ...] = METHODS
+    label: str, level: float, kind: str, seed: int, roof: int, methods: tuple[str, ...] = METHODS
 ) -> dict:
     """Dimension errors (k,) by method (NaN without a fit), and the share of faces RANSAC misses."""
     rng = np.random.default_rng([seed, roof, KINDS.index(kind), 99])
     building = random_building(rng, kind)
-    points, outline = add_trouble(building, what, level, rng)
+    points, outline = add_trouble(building, label, level, rng)
     truth = building.roof.parts[0].parameters
     outcome: dict = {}
     for method in methods:
@@ -112,26 +112,26 @@ def measure_errors(
 
 def measure_missed_share(points: np.ndarray, building: SimBuilding) -> float:
     faces = list_true_faces(building)
-    found, _ = match_faces(detect_planes(points), faces) if len(points) > 3 else (0, 0)
-    return 1 - found / len(faces)
+    n_found, _ = match_faces(detect_planes(points), faces) if len(points) > 3 else (0, 0)
+    return 1 - n_found / len(faces)
 
 
 def add_trouble(
-    building: SimBuilding, what: str, level: float, rng: np.random.Generator
+    building: SimBuilding, kind: str, level: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, shapely.Polygon | None]:
     """Points of the building with one kind of trouble, and the footprint the fit is given,
     if any.
     """
-    density = level if what.startswith("density") else BASE_DENSITY
-    noise_m = level if what.startswith("noise") else BASE_NOISE_M
+    density = level if kind.startswith("density") else BASE_DENSITY
+    noise_m = level if kind.startswith("noise") else BASE_NOISE_M
     points = uniform_points(building, rng, density, noise_m)
-    if what == "missing at a corner":
+    if kind == "missing at a corner":
         return remove_corner(points, building, level), None
-    if what == "missing strip":
+    if kind == "missing strip":
         return remove_strip(points, building, level, rng), None
-    if what == "outliers":
+    if kind == "outliers":
         return add_outliers(points, level, rng), None
-    if what.startswith("footprint"):
+    if kind.startswith("footprint"):
         angle = rng.uniform(0, 2 * math.pi)
         shift = level * np.array([math.cos(angle), math.sin(angle)])
         return points, shapely.transform(building.footprint, lambda xy: xy + shift)
@@ -156,17 +156,20 @@ def remove_strip(
 def add_outliers(points: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
     """Points of which the given share is replaced by draws from their box, 2 m higher and lower."""
     points = points.copy()
-    chosen = rng.random(len(points)) < share
-    low, high = points.min(axis=0) - [0, 0, 2], points.max(axis=0) + [0, 0, 2]
-    points[chosen] = rng.uniform(low, high, (int(chosen.sum()), 3))
+    is_outlier = rng.random(len(points)) < share
+    lower, upper = points.min(axis=0) - [0, 0, 2], points.max(axis=0) + [0, 0, 2]
+    points[is_outlier] = rng.uniform(lower, upper, (int(is_outlier.sum()), 3))
     return points
 
 
 def draw_picture(rows: list[tuple]):
     """Dimension RMSE of both objectives, a panel an axis."""
     panels = {}
-    for what in AXES:
-        mine = [row for row in rows if row[0] == what]
-        series = {"paper": [row[2] for row in mine], "likelihood": [row[4] for row in mine]}
-        panels[what] = ([row[1] for row in mine], series)
+    for kind in AXES:
+        panel_rows = [row for row in rows if row[0] == kind]
+        series = {
+            "paper": [row[2] for row in panel_rows],
+            "likelihood": [row[4] for row in panel_rows],
+        }
+        panels[kind] = ([row[1] for row in panel_rows], series)
     return draw_curves(panels, "dimension RMSE, m", log=True)

@@ -51,8 +51,8 @@ def run(options: Options) -> Result:
     labelled = list(read_labelled_roofs(options))
     if labelled:
         truth = np.array([TYPES.index(kind) for kind, _ in labelled])
-        told = np.array([get_type_index(segment(points)) for _, points in labelled])
-        tables += make_type_tables("labelled RoofN3D roofs", Scores.of(truth, told, TYPES))
+        types_found = np.array([get_type_index(segment(points)) for _, points in labelled])
+        tables += make_type_tables("labelled RoofN3D roofs", Scores.of(truth, types_found, TYPES))
         data += f"; {len(labelled)} labelled RoofN3D roofs"
     return Result("segmentation and roof types", data, tuple(tables), remarks=REMARKS)
 
@@ -84,13 +84,13 @@ def get_type_index(answer: Segmentation) -> int:
 
 def make_label_table(scores: Scores) -> Table:
     """IoU of each label over all points, and the mean."""
-    truth, told, both = (
+    truth, answers, is_both = (
         scores.confusion.sum(axis=1),
         scores.confusion.sum(axis=0),
         np.diag(scores.confusion),
     )
     rows: list[Sequence] = []
-    for name, t, a, b in zip(scores.names, truth, told, both, strict=True):
+    for name, t, a, b in zip(scores.names, truth, answers, is_both, strict=True):
         rows.append((name, int(t), float(b / (t + a - b)) if t + a > b else None))
     rows.append(("mean", int(truth.sum()), scores.mean_iou))
     return Table("simulated: labels of points", ("label", "points", "IoU"), rows)
@@ -100,12 +100,14 @@ def make_type_tables(name: str, scores: Scores) -> list[Table]:
     """Accuracy, balanced accuracy and recalls, and the confusion matrix."""
     rows = [("accuracy", scores.accuracy), ("balanced accuracy", scores.balanced_accuracy)]
     rows += [(f"recall of {kind}", value) for kind, value in scores.recalls.items()]
-    used = [
+    used_types = [
         i
         for i in range(len(scores.names))
         if scores.confusion[i].any() or scores.confusion[:, i].any()
     ]
-    confusion = [(scores.names[i], *(int(scores.confusion[i, j]) for j in used)) for i in used]
-    columns = ("true", *(scores.names[j] for j in used))
+    confusion = [
+        (scores.names[i], *(int(scores.confusion[i, j]) for j in used_types)) for i in used_types
+    ]
+    columns = ("true", *(scores.names[j] for j in used_types))
     figures = Table(f"{name}: roof types", ("figure", "value"), rows)
     return [figures, Table(f"{name}: true types (rows) and answers (columns)", columns, confusion)]

@@ -70,25 +70,25 @@ def compute_figures(verdicts: Sequence[Verdict]) -> tuple:
     ious = np.array([verdict.iou for verdict in verdicts])
     if not np.isfinite(means).any():
         return len(verdicts), None, None, None, None, float(ious.mean())
-    middle, high = np.nanpercentile(means, (50, 90))
+    middle, upper = np.nanpercentile(means, (50, 90))
     return (
         len(verdicts),
         float(np.nanmean(means)),
         float(np.nanmean(stds)),
         float(middle),
-        float(high),
+        float(upper),
         float(ious.mean()),
     )
 
 
 def describe_unexplained(name: str, verdicts: dict[int, Verdict]) -> str:
     """Which roofs no single primitive fits."""
-    far = [i for i, verdict in verdicts.items() if not verdict.psd_mean <= UNEXPLAINED_M]
-    if not far:
+    unexplained = [i for i, verdict in verdicts.items() if not verdict.psd_mean <= UNEXPLAINED_M]
+    if not unexplained:
         return f"{name}: a single primitive fits every roof within {UNEXPLAINED_M} m in the mean."
-    listed = ", ".join(map(str, far[:40])) + (" ..." if len(far) > 40 else "")
+    listed = ", ".join(map(str, unexplained[:40])) + (" ..." if len(unexplained) > 40 else "")
     return (
-        f"{name}: no single primitive comes within {UNEXPLAINED_M} m in the mean of {len(far)} of "
-        f"{len(verdicts)} roofs "
+        f"{name}: no single primitive comes within {UNEXPLAINED_M} m in the mean of "
+        f"{len(unexplained)} of {len(verdicts)} roofs "
         f"(by their place in the data, from 0): {listed}."
     )

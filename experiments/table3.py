@@ -98,45 +98,54 @@ def measure_roof_errors(
         fit = fit_model(method, uniform_points(building, rng, DENSITY, NOISE_M), (kind,)).fit
         if fit is not None:
             place = fit.translation + fit.global_translation
-            found = (
+            theta = (
                 CATALOGUE[kind].variant(fit.parameters).to_theta(fit.parameters, fit.kappa, place)
             )
-            records.append(record_errors(primitive, truth, found, bounds))
+            records.append(record_errors(primitive, truth, theta, bounds))
     return records
 
 
 def record_errors(
-    primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds: dict[str, float]
+    primitive: Primitive, truth: np.ndarray, fitted_theta: np.ndarray, bounds: dict[str, float]
 ) -> dict[str, float]:
     """Errors of `found` against `truth` (theta (9,)), each name with its `bound:` beside it."""
-    twin = orient_truth(primitive, truth, found)
+    twin = orient_truth(primitive, truth, fitted_theta)
     if twin is not truth:
         truth, bounds = twin, bounds | {"q1": bounds["q2"], "q2": bounds["q1"]}
     names = THETA_NAMES[: primitive.theta_size]
-    errors = dict(zip(names, (found - truth)[: len(names)], strict=True))
+    errors = dict(zip(names, (fitted_theta - truth)[: len(names)], strict=True))
     period = math.pi if primitive.half_turn_symmetric else 2 * math.pi
     errors["kappa"] = (errors["kappa"] + period / 2) % period - period / 2
-    (given, _, place), (fitted, _, at) = primitive.from_theta(truth), primitive.from_theta(found)
+    (true_parameters, _, place), (fitted, _, fitted_place) = (
+        primitive.from_theta(truth),
+        primitive.from_theta(fitted_theta),
+    )
     errors |= {
         f"dimension:{name}": fitted[name] - value
-        for name, value in given.items()
+        for name, value in true_parameters.items()
         if name != "teeth"
     }
     errors |= {
         f"relative:{name}": (fitted[name] - v) / v
-        for name, v in given.items()
+        for name, v in true_parameters.items()
         if abs(v) > 0.5 and name != "teeth"
     }
-    top = (at[2] + fitted.get("height", 0.0)) - (place[2] + given.get("height", 0.0))
-    errors |= {"place:x": at[0] - place[0], "place:y": at[1] - place[1], "place:top": top}
+    top = (fitted_place[2] + fitted.get("height", 0.0)) - (
+        place[2] + true_parameters.get("height", 0.0)
+    )
+    errors |= {
+        "place:x": fitted_place[0] - place[0],
+        "place:y": fitted_place[1] - place[1],
+        "place:top": top,
+    }
     return errors | {f"bound:{name}": value for name, value in bounds.items()}
 
 
-def orient_truth(primitive: Primitive, truth: np.ndarray, found: np.ndarray) -> np.ndarray:
+def orient_truth(primitive: Primitive, truth: np.ndarray, fitted_theta: np.ndarray) -> np.ndarray:
     """`truth`, or its twin turned by half a turn: which eave of an asymmetric gable is the lower
     one may be chance.
     """
-    turn = abs((found[KAPPA] - truth[KAPPA] + math.pi) % (2 * math.pi) - math.pi)
+    turn = abs((fitted_theta[KAPPA] - truth[KAPPA] + math.pi) % (2 * math.pi) - math.pi)
     if primitive.name != "asymmetric_gable" or turn < math.pi / 2:
         return truth
     twin = truth.copy()
@@ -214,8 +223,8 @@ def make_bound_rows(kind: str, errors: dict) -> list[tuple]:
         if not 0 < bound < math.inf:
             continue
         ratios = [compute_ratio(errors[method, kind], name) for method in OBJECTIVES]
-        what = "Cramer-Rao" if name in HEIGHTS_AND_SLOPES or name == "kappa" else "sampling"
-        rows.append((kind, name, what, bound, *ratios))
+        source = "Cramer-Rao" if name in HEIGHTS_AND_SLOPES or name == "kappa" else "sampling"
+        rows.append((kind, name, source, bound, *ratios))
     return rows
 
 

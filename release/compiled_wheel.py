@@ -34,10 +34,10 @@ def compiled_wheel(wheel: Path, out: Path, command: Sequence[str] = WARM) -> Pat
         (root,) = Path(folder).iterdir()
         compile_in(root, command)
         describe(root)
-        before = set(out.glob("*.whl"))
+        old_wheels = set(out.glob("*.whl"))
         find_python("-m", "wheel", "pack", str(root), "--dest-dir", str(out))
-    (made,) = set(out.glob("*.whl")) - before
-    return made
+    (wheel_made,) = set(out.glob("*.whl")) - old_wheels
+    return wheel_made
 
 
 def compile_in(root: Path, command: Sequence[str]) -> None:
@@ -61,14 +61,14 @@ def describe(root: Path) -> None:
     """
     (info,) = root.glob("*.dist-info")
     kind = info / "WHEEL"
-    kept = [
+    code_files = [
         line
         for line in kind.read_text(encoding="utf-8").splitlines()
         if line and not line.startswith("Tag:")
     ]
     of_numba = (distribution("numba").read_text("WHEEL") or "").splitlines()
     tags = [line for line in of_numba if line.startswith("Tag:")]
-    kind.write_text("\n".join([*kept, *tags, ""]), encoding="utf-8")
+    kind.write_text("\n".join([*code_files, *tags, ""]), encoding="utf-8")
     described = info / "METADATA"
     head, _, text = described.read_text(encoding="utf-8").partition("\n\n")
     pins = [f"Requires-Dist: {name}=={version(name)}; extra == 'compiled'" for name in VERSIONS]

@@ -22,7 +22,7 @@ def pytest_configure(config):
 
 
 @pytest.fixture(autouse=True)
-def log_as_it_was():
+def restore_log():
     """What a test starts of the log ends with it."""
     handlers, level, show = log.LOGGER.handlers[:], log.LOGGER.level, warnings.showwarning
     yield

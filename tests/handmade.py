@@ -24,13 +24,13 @@ from hiproof.status import Grade, Status
 RD_ORIGIN = np.array([85000.0, 446000.0, 0.0])
 
 
-def prism(rings: list[list[tuple[float, float]]], low: float, high: float) -> Solid:
+def prism(rings: list[list[tuple[float, float]]], z_bottom: float, z_top: float) -> Solid:
     """A flat block over plan `rings` (outer counter-clockwise, holes clockwise) between two
     heights.
     """
     plan = [xy for ring in rings for xy in ring]
     n = len(plan)
-    vertices = np.array([(*xy, low) for xy in plan] + [(*xy, high) for xy in plan], float)
+    vertices = np.array([(*xy, z_bottom) for xy in plan] + [(*xy, z_top) for xy in plan], float)
     numbers, start = [], 0
     for ring in rings:
         numbers.append(tuple(range(start, start + len(ring))))
@@ -45,8 +45,10 @@ def prism(rings: list[list[tuple[float, float]]], low: float, high: float) -> So
     return Solid(vertices, tuple(faces))
 
 
-def box(width: float = 4.0, length: float = 5.0, low: float = 0.0, high: float = 3.0) -> Solid:
-    return prism([[(0, 0), (width, 0), (width, length), (0, length)]], low, high)
+def box(
+    width: float = 4.0, length: float = 5.0, z_bottom: float = 0.0, z_top: float = 3.0
+) -> Solid:
+    return prism([[(0, 0), (width, 0), (width, length), (0, length)]], z_bottom, z_top)
 
 
 def courtyard() -> Solid:

@@ -21,16 +21,16 @@ def town(density: float = 8.0, seed: int = 5) -> tuple[Scan, list]:
     """A street or two of the demo's neighbourhood, and its lots."""
     lots, terrain = neighbourhood(seed)
     corners = np.array([lot.building.footprint.bounds for lot in lots])
-    low = np.floor(corners[:, :2].min(axis=0)) - 5
-    patch = [(low, low + (90.0, 50.0))]
-    flight = Flight(heading=1.2, origin=low - 250.0)
+    corner = np.floor(corners[:, :2].min(axis=0)) - 5
+    patch = [(corner, corner + (90.0, 50.0))]
+    flight = Flight(heading=1.2, origin=corner - 250.0)
     (cloud,) = survey(patch, lots, terrain, flight, seed, ScanSettings(density=density))
-    own = [
+    members = [
         lot
         for lot in lots
-        if shapely.box(*low, *(low + (90.0, 50.0))).contains(lot.building.footprint)
+        if shapely.box(*corner, *(corner + (90.0, 50.0))).contains(lot.building.footprint)
     ]
-    return cloud, own
+    return cloud, members
 
 
 def draw_crowns(rng: np.random.Generator, side_m: float, apart_m: float = 5.0) -> np.ndarray:
@@ -59,13 +59,13 @@ def make_house_under_tree(rng: np.random.Generator, share: float, density: float
     crowns = draw_crowns(rng, 60.0, 3.0)
     crowns[:, 2] += 6.0
     covered = x0 + share * (x1 - x0) - 1.0
-    near = (
+    is_near = (
         (crowns[:, 0] > x0 - 6)
         & (crowns[:, 0] < covered - 2)
         & (crowns[:, 1] > y0 - 5)
         & (crowns[:, 1] < y1 + 5)
     )
-    scene = make_scene(building_bodies(building), crowns[near])
+    scene = make_scene(building_bodies(building), crowns[is_near])
     area = shapely.box(x0 - 20, y0 - 20, x1 + 20, y1 + 20)
     cloud = scan_scene(scene, area, 6.0, rng, ScanSettings(density=density, defects=Defects.none()))
     return cloud.move(building.roof.frame.origin), building

@@ -46,7 +46,7 @@ def row_table(rows):
         "is_underground": pyarrow.bool_(),
         "building_id": pyarrow.string(),
     }
-    known = [
+    is_known = [
         {
             **row,
             "geometry": shapely.to_wkb(row["outline"]),
@@ -62,32 +62,34 @@ def row_table(rows):
     }
     geo = {"version": "1.1.0", "primary_column": "geometry", "columns": {"geometry": geometry}}
     schema = pyarrow.schema(list(columns.items()), {"geo": json.dumps(geo)})
-    return pyarrow.Table.from_pylist(known, schema=schema)
+    return pyarrow.Table.from_pylist(is_known, schema=schema)
 
 
 def write_release(folder, address, files, row_group_size=4):
     """Write a catalogue of two releases, of which the older one is gone, into `folder`, served at
     `address`; `files` are lists of rows by type.
     """
-    at = f"{address}/{RELEASE}"
+    base_address = f"{address}/{RELEASE}"
     older = links("child", f"{address}/2026-08-19.0/catalog.json")
     write_json(
         folder / "catalog.json",
         id="Overture Releases",
         latest=RELEASE,
-        links=[*older, *links("child", f"{at}/catalog.json")],
+        links=[*older, *links("child", f"{base_address}/catalog.json")],
     )
     write_json(
         folder / RELEASE / "catalog.json",
         **{"id": RELEASE, "release:version": RELEASE},
-        links=links("child", f"{at}/base/catalog.json", f"{at}/buildings/catalog.json"),
+        links=links(
+            "child", f"{base_address}/base/catalog.json", f"{base_address}/buildings/catalog.json"
+        ),
     )
     theme = folder / RELEASE / "buildings"
-    kinds = [f"{at}/buildings/{kind}/collection.json" for kind in files]
+    kinds = [f"{base_address}/buildings/{kind}/collection.json" for kind in files]
     write_json(theme / "catalog.json", id="buildings", links=links("child", *kinds))
     for kind, lists in files.items():
         numbers = [f"{number:05}" for number in range(len(lists))]
-        ways = [f"{at}/buildings/{kind}/{number}/{number}.json" for number in numbers]
+        ways = [f"{base_address}/buildings/{kind}/{number}/{number}.json" for number in numbers]
         write_json(
             theme / kind / "collection.json",
             id=kind,

@@ -95,7 +95,7 @@ def read_jobs_from(path):
 def solve_without_compiling(folder, tile, terrain=None, avoid=()):
     """The real work, refusing to compile anything."""
 
-    def refuse(done, total):
+    def refuse(finished, total):
         raise AssertionError("a worker had to compile")
 
     news.listener = refuse

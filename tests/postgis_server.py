@@ -13,11 +13,11 @@ from pathlib import Path
 def programs() -> Path | None:
     """Folder of initdb and postgres, None where PostgreSQL is not installed."""
     folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
-    found = shutil.which("initdb")
+    result = shutil.which("initdb")
     return next(
         (
             f
-            for f in [*folders, *([Path(found).parent] if found else [])]
+            for f in [*folders, *([Path(result).parent] if result else [])]
             if (f / "postgres").exists()
         ),
         None,

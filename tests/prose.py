@@ -34,8 +34,10 @@ def split_sentences(text: str) -> list[str]:
     """The sentences of a page. A list item ends one, with or without a full stop."""
     blocks = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", extract_prose(text))
     joined = [" ".join(block.split()) for block in blocks]
-    found = [part for block in joined for part in re.split(r"(?<=[.!?:])\s+(?=[A-Z`*\[(])", block)]
-    return [part for part in found if len(part.split()) > 1]
+    results = [
+        part for block in joined for part in re.split(r"(?<=[.!?:])\s+(?=[A-Z`*\[(])", block)
+    ]
+    return [part for part in results if len(part.split()) > 1]
 
 
 def count_words(text: str) -> np.ndarray:

@@ -207,11 +207,11 @@ def draw_planes(rng, x, y, length, width, degrees, z):
         end = slope if rng.random() < 0.5 else rng.uniform(0.2, 2.5)
         return np.vstack((sides, gable_planes(x, y, z + end * length / 2, end, degrees + 90)))
     if kind == 4:
-        low, high = (
+        lower, upper = (
             gable_planes(x, y, z + rise, s, degrees)
             for rise, s in ((1.25 * width, 2.5), (1 + width / 10, 0.2))
         )
-        return np.vstack((low, high))
+        return np.vstack((lower, upper))
     if kind == 5:
         return np.vstack((sides, [[0.0, 0.0, off_by_little(rng, z + slope * width / 4)]]))
     return sides[:kind]
@@ -251,11 +251,11 @@ KINDS = {
 def generate_roof(kind, seed):
     """The roof of that kind and seed, turned and shifted by the seed as well."""
     rng = np.random.default_rng([seed, list(KINDS).index(kind)])
-    made = KINDS[kind](rng)
-    return move_roof(made, rng.choice([0, rng.uniform(0, 90)]), rng.uniform(-5, 5, 2))
+    roof = KINDS[kind](rng)
+    return move_roof(roof, rng.choice([0, rng.uniform(0, 90)]), rng.uniform(-5, 5, 2))
 
 
-def move_roof(made, degrees, shift):
+def move_roof(roof, degrees, shift):
     """The roof turned about the origin, then shifted in the plan."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     turn = np.array([[c, -s], [s, c]])
@@ -270,8 +270,8 @@ def move_roof(made, degrees, shift):
             np.column_stack((slopes, piece.planes[:, 2] - slopes @ shift)),
         )
 
-    parts = tuple(Part(part.type, tuple(map(move_piece, part.pieces))) for part in made.parts)
-    return Roof(parts, move_polygon(made.outline), made.frame)
+    parts = tuple(Part(part.type, tuple(map(move_piece, part.pieces))) for part in roof.parts)
+    return Roof(parts, move_polygon(roof.outline), roof.frame)
 
 
 def flat_block(outline, z_roof, z_ground, frame=FRAME):

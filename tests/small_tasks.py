@@ -10,7 +10,7 @@ def double(x):
     return 2 * x
 
 
-def die_at_number_two(x):
+def die_at_second_task(x):
     if x == 2:
         os.kill(os.getpid(), signal.SIGKILL)
     return x

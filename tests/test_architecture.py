@@ -54,15 +54,15 @@ def list_import_statements(module):
 def list_imported_modules(module):
     """Return the modules of hiproof that a module imports, inside functions too."""
     folder = MODULES[module].parent.relative_to(SOURCES).parts
-    found = set()
+    modules = set()
     for node in list_import_statements(module):
         if isinstance(node, ast.ImportFrom) and node.level:
             names = node.module.split(".") if node.module else []
             base = (*folder[: len(folder) - node.level + 1], *names)
             for imported in node.names:
                 submodule = (*base, imported.name)
-                found.add(submodule if submodule in MODULES else base)
-    return found - {module}
+                modules.add(submodule if submodule in MODULES else base)
+    return modules - {module}
 
 
 def list_other_packages(module):

@@ -21,7 +21,7 @@ from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
 
-OPTIONED = [one for one in declared_settings() if one.field.metadata["option"]]
+OPTIONED = [option for option in declared_settings() if option.field.metadata["option"]]
 PARAMETERS = {p.name: p for p in typer.main.get_command(app).commands["reconstruct"].params}
 HOUSES = {f"house-{i}": shapely.box(20 * i, 0, 20 * i + 10, 8) for i in range(5)}
 
@@ -38,16 +38,18 @@ def houses(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("one", OPTIONED, ids=[f"{o.section}.{o.field.name}" for o in OPTIONED])
-def test_an_option_tells_what_its_setting_tells(one):
-    parameter = PARAMETERS[one.parameter]
-    assert one.field.metadata["option"] in parameter.opts
-    assert one.field.metadata["help"] in parameter.help
+@pytest.mark.parametrize("option", OPTIONED, ids=[f"{o.section}.{o.field.name}" for o in OPTIONED])
+def test_an_option_tells_what_its_setting_tells(option):
+    parameter = PARAMETERS[option.parameter]
+    assert option.field.metadata["option"] in parameter.opts
+    assert option.field.metadata["help"] in parameter.help
 
 
 def test_options_and_settings_are_told_once():
-    own = {p.name for p in PARAMETERS.values()} - {one.parameter for one in OPTIONED}
-    assert own.isdisjoint(
+    own_parameters = {p.name for p in PARAMETERS.values()} - {
+        option.parameter for option in OPTIONED
+    }
+    assert own_parameters.isdisjoint(
         field.name
         for section in dataclasses.fields(Settings)
         for field in dataclasses.fields(section.default_factory)
@@ -73,7 +75,7 @@ def test_two_settings_files_beside_the_data_are_one_too_many(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("chosen", "expected"),
+    ("options", "expected"),
     [
         ({"where": "year < 1920"}, [0, 1]),
         ({"where": "id = 'house-3'"}, [3]),
@@ -82,14 +84,14 @@ def test_two_settings_files_beside_the_data_are_one_too_many(tmp_path):
         ({"bbox": (0.0, 0.0, 41.0, 8.0), "where": "year > 1905"}, [1, 2]),
     ],
 )
-def test_footprints_are_those_that_condition_and_box_let_through(chosen, expected, houses):
-    assert [f.id for f in read_footprints(houses, **chosen)] == [f"house-{i}" for i in expected]
+def test_footprints_are_those_that_condition_and_box_let_through(options, expected, houses):
+    assert [f.id for f in read_footprints(houses, **options)] == [f"house-{i}" for i in expected]
 
 
 def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
     """Whatever the footprints are in: the same houses, though their coordinates are others."""
-    far = (155000.0, 463000.0)
-    moved = shapely.transform(list(HOUSES.values()), lambda xy: xy + far)
+    distant_corner = (155000.0, 463000.0)
+    moved = shapely.transform(list(HOUSES.values()), lambda xy: xy + distant_corner)
     path = houses.with_name("moved.gpkg")
     pyogrio.raw.write(
         path,
@@ -99,13 +101,13 @@ def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
         geometry_type="Polygon",
         crs="EPSG:28992",
     )
-    here = read_footprints(path, target_crs="EPSG:32631")
-    box = tuple(here[2].polygon.buffer(1.0).bounds)
+    footprints = read_footprints(path, target_crs="EPSG:32631")
+    box = tuple(footprints[2].polygon.buffer(1.0).bounds)
     assert [f.id for f in read_footprints(path, target_crs="EPSG:32631", bbox=box)] == ["house-2"]
 
 
 @pytest.mark.parametrize(
-    ("chosen", "message"),
+    ("options", "message"),
     [
         (
             {"where": "height > 3"},
@@ -116,9 +118,9 @@ def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
         ({"bbox": (500.0, 500.0, 501.0, 501.0)}, "that --bbox let through, got none"),
     ],
 )
-def test_a_choice_that_leaves_nothing_gets_a_sentence(chosen, message, houses):
+def test_a_choice_that_leaves_nothing_gets_a_sentence(options, message, houses):
     with pytest.raises(InputError, match=message):
-        read_footprints(houses, **chosen)
+        read_footprints(houses, **options)
 
 
 @pytest.mark.parametrize("ending", ["geojson", "shp", "fgb"])
@@ -141,11 +143,11 @@ def test_a_condition_that_no_database_reads_gets_the_same_sentence(ending, house
 
 @pytest.mark.parametrize("text", ["1,2,3", "3,2,1,4", "a,b,c,d", "1,2,nan,4", ""])
 def test_a_box_that_is_none_gets_a_sentence(text, tmp_path):
-    done = CliRunner().invoke(
+    result = CliRunner().invoke(
         app, ["reconstruct", "a.laz", "--out", str(tmp_path), f"--bbox={text}"]
     )
-    assert isinstance(done.exception, SettingsError) and "--bbox as xmin,ymin,xmax,ymax" in str(
-        done.exception
+    assert isinstance(result.exception, SettingsError) and "--bbox as xmin,ymin,xmax,ymax" in str(
+        result.exception
     )
 
 

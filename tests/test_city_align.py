@@ -88,12 +88,12 @@ def test_the_common_shift_is_found_and_areas_are_moved(shifted_request):
     assert np.abs(plan.registration.xy - SHIFT).max() < 0.1
     assert plan.registration.footprints == 25 and max(plan.registration.sigma) < 0.1
     for job in plan.jobs:
-        apart = np.subtract(job.area.bounds, job.footprint.polygon.bounds)
-        assert np.allclose(apart, np.tile(plan.registration.xy, 2), atol=1e-6)
+        distance = np.subtract(job.area.bounds, job.footprint.polygon.bounds)
+        assert np.allclose(distance, np.tile(plan.registration.xy, 2), atol=1e-6)
 
 
 def test_the_common_shift_depends_on_the_files_alone(shifted_request, tmp_path):
-    known = plan_of(shifted_request).registration
+    registration = plan_of(shifted_request).registration
     box = (*(ORIGIN[:2] + 40), *(ORIGIN[:2] + 120))
     for other in (
         replace(shifted_request, bbox=box),
@@ -101,18 +101,18 @@ def test_the_common_shift_depends_on_the_files_alone(shifted_request, tmp_path):
         make_request(tmp_path / "cut", move_town(scattered_houses(), -SHIFT), pieces=3),
     ):
         plan = plan_of(other)
-        assert plan.registration == known
+        assert plan.registration == registration
     reordered = dict(reversed(list(move_town(scattered_houses(), -SHIFT).footprints.items())))
     town = replace(scattered_houses(), footprints=reordered)
-    assert plan_of(make_request(tmp_path / "reordered", town)).registration == known
+    assert plan_of(make_request(tmp_path / "reordered", town)).registration == registration
 
 
 def test_the_plan_keeps_what_was_moved(shifted_request, tmp_path):
     plan = plan_of(replace(shifted_request, where="id in ('house-7', 'house-8')"))
     plan.save(tmp_path / "plan.jsonl")
-    again = WorkPlan.load(tmp_path / "plan.jsonl")
-    assert again.registration == plan.registration and len(again.others) == len(plan.others) > 0
-    for job, other in zip(plan.jobs, again.jobs, strict=True):
+    loaded = WorkPlan.load(tmp_path / "plan.jsonl")
+    assert loaded.registration == plan.registration and len(loaded.others) == len(plan.others) > 0
+    for job, other in zip(plan.jobs, loaded.jobs, strict=True):
         assert (
             job.area.wkb == other.area.wkb
             and job.footprint.polygon.wkb == other.footprint.polygon.wkb
@@ -133,12 +133,12 @@ def read_records(out) -> dict[str, dict]:
 
 
 def test_a_run_builds_on_the_roofs_and_says_so(shifted_request, tmp_path):
-    asked = replace(shifted_request, out=tmp_path / "out", where="id in ('house-7', 'house-8')")
+    request = replace(shifted_request, out=tmp_path / "out", where="id in ('house-7', 'house-8')")
     with pytest.warns(InputWarning, match="all footprints lie beside their roofs"):
-        reconstruct_area(asked)
-    record = json.loads((asked.out / "run.json").read_text())
+        reconstruct_area(request)
+    record = json.loads((request.out / "run.json").read_text())
     assert record["registration"]["applied"] and record["registration"]["squares"] >= 15
-    for id, building in read_records(asked.out).items():
+    for id, building in read_records(request.out).items():
         assert building["shift"] == record["registration"]["shift_m"]
         truth = scattered_houses().footprints[id]
         outline = shapely.Polygon(np.array(building["outline"][0]) + building["origin"][:2])
@@ -155,15 +155,15 @@ def test_a_row_moves_as_one_whichever_of_its_houses_are_asked_for(tmp_path):
         "was moved with the 4 of its row by (0.7" in building["detail"]
         for building in whole.values()
     )
-    one = replace(request, out=tmp_path / "one", where="id = 'house-2'")
-    reconstruct_area(one)
-    assert read_records(one.out)["house-2"] == whole["house-2"]
+    single_request = replace(request, out=tmp_path / "one", where="id = 'house-2'")
+    reconstruct_area(single_request)
+    assert read_records(single_request.out)["house-2"] == whole["house-2"]
 
 
 def test_one_house_of_a_row_is_not_moved_away_from_the_others(tmp_path):
     town = row_of_houses()
-    alone = {**town.footprints, "house-1": move_town(town, (0.0, 1.0)).footprints["house-1"]}
-    request = make_request(tmp_path, replace(town, footprints=alone))
+    footprints = {**town.footprints, "house-1": move_town(town, (0.0, 1.0)).footprints["house-1"]}
+    request = make_request(tmp_path, replace(town, footprints=footprints))
     reconstruct_area(request)
     assert {tuple(building["shift"]) for building in read_records(request.out).values()} == {
         (0.0, 0.0)

@@ -38,9 +38,9 @@ def run(folder, xyz, classes, **settings):
     folder.mkdir(exist_ok=True)
     cloud = write_cloud(folder / "cloud.laz", xyz, classes)
     footprints = write_footprints(folder / "footprints.geojson", {"a": HOUSE})
-    chosen = Settings.from_dict({"reconstruct": settings})
+    roof_indices = Settings.from_dict({"reconstruct": settings})
     summary = reconstruct_area(
-        Request((str(cloud),), folder / "out", str(footprints), settings=chosen)
+        Request((str(cloud),), folder / "out", str(footprints), settings=roof_indices)
     )
     return by_id(folder / "out")["a"], summary
 
@@ -74,13 +74,13 @@ def test_a_footprint_that_is_trusted_is_roofed_over_and_that_is_said(tmp_path):
 
 def test_leaves_over_a_yard_leave_it_to_the_footprint(tmp_path):
     xyz, classes = scan()
-    over = shapely.intersects_xy(YARD, *xyz[:, :2].T)
-    leaves = xyz[over] + [0.2, 0.1, 6.0]
-    both = (
+    is_over_yard = shapely.intersects_xy(YARD, *xyz[:, :2].T)
+    leaves = xyz[is_over_yard] + [0.2, 0.1, 6.0]
+    is_leaf = (
         np.concatenate([xyz, leaves]),
         np.concatenate([classes, np.full(len(leaves), 5, np.uint8)]),
     )
-    record, _ = run(tmp_path, *both)
+    record, _ = run(tmp_path, *is_leaf)
     assert "bare ground" not in record["detail"] and record["status"] == "modelled"
 
 
@@ -97,12 +97,12 @@ def test_where_a_cloud_without_classes_holds_ground_alone_there_is_no_building(t
     amount, reasons = vars(measure_doubt(record)).values()
     assert amount >= 0.5 and reasons == ("nothing stands on the footprint",)
     with pytest.warns(InputWarning):
-        asked, _ = run(
+        rows, _ = run(
             tmp_path / "asked", xyz, np.ones(len(xyz), np.uint8), empty_footprints="model"
         )
     assert (
-        asked["parts"]
-        and "perhaps nothing stands there: 100 % of its points lie on the ground" in asked["detail"]
+        rows["parts"]
+        and "perhaps nothing stands there: 100 % of its points lie on the ground" in rows["detail"]
     )
 
 
@@ -114,10 +114,10 @@ def add_heaps(xyz, classes, class_of_heaps):
         shapely.buffer(shapely.points([(X + 3, Y + 8), (X + 9, Y + 4), (X + 14, Y + 9)]), 2.3)
     )
     heap = shapely.intersects_xy(heaps, *xyz[:, :2].T)
-    high = np.random.default_rng(1).uniform(0.2, 2.0, len(xyz))
-    return xyz + np.outer(heap * high, (0, 0, 1)), np.where(heap, class_of_heaps, classes).astype(
-        np.uint8
-    )
+    heap_height = np.random.default_rng(1).uniform(0.2, 2.0, len(xyz))
+    return xyz + np.outer(heap * heap_height, (0, 0, 1)), np.where(
+        heap, class_of_heaps, classes
+    ).astype(np.uint8)
 
 
 def test_heaps_of_the_building_class_on_bare_ground_are_no_building(tmp_path):
@@ -146,8 +146,8 @@ def test_from_python_ground_points_cut_and_a_terrain_tells_what_is_gone():
     assert hiproof.reconstruct(roof, HOUSE, Level()).volume == pytest.approx(
         HOUSE.area * WALLS_M, rel=0.02
     )
-    gone = hiproof.reconstruct(scan(has_house=False)[0], HOUSE, Level())
-    assert gone.status is Status.NO_BUILDING and gone.built is None
+    building = hiproof.reconstruct(scan(has_house=False)[0], HOUSE, Level())
+    assert building.status is Status.NO_BUILDING and building.built is None
 
 
 @pytest.mark.parametrize("height", [1.0, 2.2])

@@ -81,9 +81,9 @@ def test_a_bundle_repeats_the_failure_to_the_last_digit(
     assert summary.bundles == tmp_path / "out" / "failures"
     (bundle,) = bundles.bundles_in(request.out)
     failure = by_id(request.out)[victim]["detail"]
-    again = repeat(bundle, tmp_path / "again")
-    assert again.exit_code == 1
-    assert failure in again.output
+    repeated = repeat(bundle, tmp_path / "again")
+    assert repeated.exit_code == 1
+    assert failure in repeated.output
     assert read_solved_rows(tmp_path / "again") == {victim: read_solved_rows(request.out)[victim]}
     assert failure.removesuffix(")").split(" (")[0] in (bundle / "traceback.txt").read_text()
     set_failing_ids()
@@ -155,10 +155,10 @@ def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, set_fa
     }
     assert not [name for name, content in files.items() if SECRET.encode() in content]
     las = laspy.read(bundle / "points.laz")
-    near = shapely.intersects_xy(outline, np.asarray(las.x), np.asarray(las.y)) & (
+    is_near = shapely.intersects_xy(outline, np.asarray(las.x), np.asarray(las.y)) & (
         np.asarray(las.classification) == 6
     )
-    assert near.sum() == (town.classification == 6).sum()
+    assert is_near.sum() == (town.classification == 6).sum()
     _, _, geometry, _ = pyogrio.raw.read(bundle / "footprint.geojson")
     assert shapely.from_wkb(geometry[0]).equals(outline)
     assert Settings.from_toml(bundle / "settings.toml") == Settings()
@@ -173,15 +173,16 @@ def test_ids_may_be_anything(tmp_path, set_failing_ids):
     set_failing_ids(*ids)
     summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert summary.by_status == {"internal_error": len(ids)}
-    kept = {
+    selection = {
         json.loads((b / "failure.json").read_text())["id"]: b.name
         for b in bundles.bundles_in(tmp_path / "out")
     }
-    assert set(kept) == set(ids)
+    assert set(selection) == set(ids)
     assert all(
-        re.fullmatch(r"[a-z0-9][a-z0-9_-]*", name) and len(name) <= 60 for name in kept.values()
+        re.fullmatch(r"[a-z0-9][a-z0-9_-]*", name) and len(name) <= 60
+        for name in selection.values()
     )
-    assert len(set(kept.values()) - {"con", "nul"}) == len(ids)
+    assert len(set(selection.values()) - {"con", "nul"}) == len(ids)
     assert {path.name for path in tmp_path.iterdir()} == {"cloud.laz", "footprints.geojson", "out"}
 
 
@@ -193,8 +194,8 @@ def test_a_run_keeps_few_bundles_or_none(tmp_path, set_failing_ids, monkeypatch)
     request = Request((cloud,), tmp_path / "out", footprints)
     assert reconstruct_area(request).by_status == {"internal_error": 4}
     assert len(bundles.bundles_in(request.out)) == 2
-    off = Settings.from_dict({"city": {"keep_failures": False}})
-    summary = reconstruct_area(Request((cloud,), tmp_path / "off", footprints, settings=off))
+    settings = Settings.from_dict({"city": {"keep_failures": False}})
+    summary = reconstruct_area(Request((cloud,), tmp_path / "off", footprints, settings=settings))
     assert summary.by_status == {"internal_error": 4}
     assert summary.bundles is None
     assert not (tmp_path / "off" / "failures").exists()
@@ -206,9 +207,9 @@ def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, set_f
     out = tmp_path / "out"
     set_failing_ids("house-0", "house-1")
     reconstruct_area(Request((cloud,), out, footprints))
-    mine = out / "failures" / "mine"
-    mine.mkdir()
-    (mine / "notes.txt").touch()
+    own_folder = out / "failures" / "mine"
+    own_folder.mkdir()
+    (own_folder / "notes.txt").touch()
     set_failing_ids("house-1")
     # it is finished: nothing is solved, and nothing goes
     reconstruct_area(Request((cloud,), out, footprints))
@@ -219,7 +220,7 @@ def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, set_f
     set_failing_ids()
     assert reconstruct_area(Request((cloud,), out, footprints, restart=True)).exit_code == 0
     assert bundles.bundles_in(out) == []
-    assert (mine / "notes.txt").exists()
+    assert (own_folder / "notes.txt").exists()
 
 
 @pytest.mark.parametrize(
@@ -246,11 +247,11 @@ def test_the_traceback_is_in_the_log(town_files, tmp_path, set_failing_ids, capl
     set_failing_ids("house-2")
     with caplog.at_level("INFO", logger="hiproof"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
-    (told,) = [
+    (message,) = [
         record for record in caplog.records if "building house-2 failed" in record.getMessage()
     ]
-    assert "Traceback (most recent call last)" in told.getMessage()
-    assert "raise KeyError" in told.getMessage()
+    assert "Traceback (most recent call last)" in message.getMessage()
+    assert "raise KeyError" in message.getMessage()
 
 
 @pytest.mark.parametrize(

@@ -55,12 +55,12 @@ def move(polygon, shift):
 def changes(houses):
     """Name: (footprints, ids of those that have to be done)."""
     first, second, *_ = houses
-    far = move(houses["house-0"], (0.0, 600.0))
+    distant_house = move(houses["house-0"], (0.0, 600.0))
     return {
         "the same again": (houses, []),
         "one is gone": ({id: houses[id] for id in list(houses)[1:]}, []),
         "one moved": ({**houses, second: move(houses[second], (0.3, 0.0))}, [second]),
-        "one is new, far away": ({**houses, "new": far}, ["new"]),
+        "one is new, far away": ({**houses, "new": distant_house}, ["new"]),
         "another order": (dict(reversed(houses.items())), []),
         "two swap their names": (
             {**houses, first: houses[second], second: houses[first]},
@@ -83,9 +83,9 @@ def test_changed_footprints_redo_what_changed_and_end_as_a_run_from_the_start(
     solved_ids.clear()
     assert run(footprints).buildings == len(footprints)
     assert sorted(solved_ids) == sorted(expected)
-    fresh = dataclasses.replace(request, out=tmp_path / "fresh")
-    reconstruct_area(fresh)
-    assert records(request.out) == records(fresh.out)
+    new_request = dataclasses.replace(request, out=tmp_path / "fresh")
+    reconstruct_area(new_request)
+    assert records(request.out) == records(new_request.out)
     solved_ids.clear()
     reconstruct_area(request)
     assert solved_ids == []

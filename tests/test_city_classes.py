@@ -71,9 +71,9 @@ def test_the_first_look_at_the_classes_leaves_the_news_of_a_file_to_the_one_that
     cloud.withheld = np.arange(len(town.xyz)) % 2
     cloud.write(tmp_path / "cloud.laz")
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
-    with pytest.warns(InputWarning, match="withheld") as told:
+    with pytest.warns(InputWarning, match="withheld") as remarks:
         reconstruct_area(Request((str(tmp_path / "cloud.laz"),), tmp_path / "out", str(footprints)))
-    assert len(told) == 1
+    assert len(remarks) == 1
 
 
 def test_how_points_are_cut_into_files_changes_no_building(tmp_path):
@@ -131,8 +131,10 @@ def test_a_tree_beside_a_roof_that_was_cut_out_is_no_part_of_it(tmp_path, roofs)
         (row,) = run(
             tmp_path, points[cut], np.ones(cut.sum()), settings=make_settings(roofs)
         ).values()
-    found = shapely.transform(shapely.Polygon(row["outline"][0]), lambda xy: xy + row["origin"][:2])
-    assert found.intersection(outline).area / found.union(outline).area > 0.9
+    result = shapely.transform(
+        shapely.Polygon(row["outline"][0]), lambda xy: xy + row["origin"][:2]
+    )
+    assert result.intersection(outline).area / result.union(outline).area > 0.9
 
 
 def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path):
@@ -142,24 +144,24 @@ def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path
     roof = cloud.points[cloud.source == SOURCES.index("roof")]
     with pytest.warns(InputWarning, match="no building class"):
         rows = run(tmp_path, roof, np.ones(len(roof)), {"house": building.footprint})
-    off = roof[:, 2] - measure_height(rows["house"], roof[:, :2])
-    assert np.mean(np.abs(off) < 0.2) > 0.97
+    gap = roof[:, 2] - measure_height(rows["house"], roof[:, :2])
+    assert np.mean(np.abs(gap) < 0.2) > 0.97
 
 
 def test_sparse_points_of_a_shed_are_its_roof_where_a_footprint_is_and_none_is_lost_by_that():
-    area, more = shapely.box(0, 0, 3.0, 2.7), 0
+    area, n_gained = shapely.box(0, 0, 3.0, 2.7), 0
     for seed in range(20):
         rng = np.random.default_rng(seed)
         points = rng.uniform((0, 0, 2.2), (3.0, 2.7, 2.6), (26, 3))
         points[:10, 1], points[:10, 2] = rng.normal(2.6, 0.1, 10), rng.uniform(0.5, 4.2, 10)
         unknown = np.full(len(points), np.nan)
-        found, asked_for = (
+        shed, asked_for = (
             found_roof(points, area, unknown, is_asked_for) for is_asked_for in (False, True)
         )
         assert asked_for.is_seen
-        assert not found.is_seen or len(found.points) <= len(asked_for.points)
-        more += not found.is_seen
-    assert more > 0
+        assert not shed.is_seen or len(shed.points) <= len(asked_for.points)
+        n_gained += not shed.is_seen
+    assert n_gained > 0
 
 
 def test_a_footprint_in_a_forest_holds_no_roof_and_says_so(tmp_path):
@@ -193,10 +195,12 @@ def test_a_house_under_a_tree_is_its_roof_or_mostly_not_seen(tmp_path, share, re
         row = run(tmp_path, points, np.ones(len(points)), {"house": outline})["house"]
     assert row["status"] == "modelled"
     assert ("mostly not seen" in row["detail"]) == remarks
-    at = shapely.get_coordinates(building.outline.centroid)
-    truth = building.roof.height_at(at) + building.roof.frame.origin[2]
+    centroid = shapely.get_coordinates(building.outline.centroid)
+    truth = building.roof.height_at(centroid) + building.roof.frame.origin[2]
     assert (
-        abs(measure_height(row, at + building.roof.frame.origin[:2] + (85000, 446000)) - truth)[0]
+        abs(
+            measure_height(row, centroid + building.roof.frame.origin[:2] + (85000, 446000)) - truth
+        )[0]
         < 0.3
     )
 
@@ -212,15 +216,15 @@ def test_a_drones_cloud_is_as_good_as_it_is_dense(tmp_path):
     xy = rng.uniform(inner.bounds[:2], inner.bounds[2:], (500, 2))
     xy = xy[shapely.contains_xy(inner, *xy.T)]
     truth = building.roof.height_at(xy) + building.roof.frame.origin[2]
-    off = measure_height(row, xy + building.roof.frame.origin[:2] + (85000, 446000)) - truth
-    assert np.median(np.abs(off)) < 0.03
+    gap = measure_height(row, xy + building.roof.frame.origin[:2] + (85000, 446000)) - truth
+    assert np.median(np.abs(gap)) < 0.03
 
 
 def test_nothing_known_around_a_roof_leaves_all_of_it():
     x, y = np.meshgrid(np.arange(0, 8, 0.3), np.arange(0, 6, 0.3))
     roof = np.column_stack([x.ravel(), y.ravel(), 5 + 0.3 * x.ravel()])
-    found = found_roof(roof, shapely.box(0, 0, 8, 6), np.full(len(roof), np.nan))
-    assert len(found.points) == len(roof) and found.is_seen and not found.remark
+    is_roof = found_roof(roof, shapely.box(0, 0, 8, 6), np.full(len(roof), np.nan))
+    assert len(is_roof.points) == len(roof) and is_roof.is_seen and not is_roof.remark
     assert not len(found_roof(roof, shapely.box(20, 0, 28, 6), np.full(len(roof), np.nan)).points)
 
 

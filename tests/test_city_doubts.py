@@ -50,7 +50,7 @@ def run_over_terrain(folder, height):
 
 
 @pytest.mark.parametrize(
-    ("height", "told"),
+    ("height", "is_doubtful"),
     [
         (ORIGIN[2], ()),
         (
@@ -64,10 +64,10 @@ def run_over_terrain(folder, height):
         (ORIGIN[2] + 3.0, ("lies 2.", "m above the ground points around it")),
     ],
 )
-def test_a_terrain_whose_heights_are_others_is_told_of(tmp_path, height, told):
+def test_a_terrain_whose_heights_are_others_is_told_of(tmp_path, height, is_doubtful):
     row = run_over_terrain(tmp_path, height)
-    assert all(words in row["detail"] for words in told)
-    assert bool(told) == ("lies" in row["detail"])
+    assert all(words in row["detail"] for words in is_doubtful)
+    assert bool(is_doubtful) == ("lies" in row["detail"])
     is_used = abs(height - ORIGIN[2]) < 5.0
     assert row["z_ground"] == pytest.approx(height if is_used else ORIGIN[2] + 0.08, abs=0.05)
 
@@ -78,8 +78,8 @@ def row_over_half(folder, code, with_ground=True):
     """
     height = 40.0
     xyz = TOWN.xyz + [0, 0, height - ORIGIN[2]]
-    kept = slice(None) if with_ground else TOWN.classification == 6
-    cloud = write_cloud(folder / "cloud.laz", xyz[kept], TOWN.classification[kept])
+    selection = slice(None) if with_ground else TOWN.classification == 6
+    cloud = write_cloud(folder / "cloud.laz", xyz[selection], TOWN.classification[selection])
     footprints = write_footprints(folder / "footprints.geojson", TOWN.footprints)
     heights = np.full((80, 80), height, "float32")
     heights[:, :34] = code
@@ -111,9 +111,9 @@ def test_without_ground_points_the_rest_of_the_terrain_model_decides(tmp_path, c
 def test_a_terrain_model_without_any_height_is_told_of_once(tmp_path, nothing):
     with pytest.warns(
         InputWarning, match=r"dtm\.tif: has no height under any building, so the ground is taken"
-    ) as told:
+    ) as remarks:
         row = run_over_terrain(tmp_path, nothing)
-    assert len([w for w in told if issubclass(w.category, InputWarning)]) == 1
+    assert len([w for w in remarks if issubclass(w.category, InputWarning)]) == 1
     assert (
         row["z_ground"] == pytest.approx(ORIGIN[2] + 0.08, abs=0.05)
         and row["ground_source"] == "ground points"

@@ -104,16 +104,16 @@ def test_a_failure_in_any_stage_is_one_buildings_and_changes_no_other(
         for stage, victim in zip(failing, victims, strict=True):
             fail_in(stage, victim, patch)
         summary = run(town, tmp_path / "disturbed", with_footprints)
-    found = by_id(tmp_path / "disturbed")
+    rows = by_id(tmp_path / "disturbed")
     assert summary.exit_code == 1
     assert summary.by_status["internal_error"] == len(victims)
-    assert list(found) == list(expected)
-    assert {id: row for id, row in found.items() if id not in victims} == {
+    assert list(rows) == list(expected)
+    assert {id: row for id, row in rows.items() if id not in victims} == {
         id: row for id, row in expected.items() if id not in victims
     }
     for victim in victims:
-        assert found[victim]["status"] == "internal_error"
-        assert found[victim]["detail"].startswith("KeyError: (False, 0, 0)")
+        assert rows[victim]["status"] == "internal_error"
+        assert rows[victim]["detail"].startswith("KeyError: (False, 0, 0)")
 
 
 def test_a_failed_building_keeps_the_largest_polygon_of_its_area():
@@ -147,8 +147,8 @@ def fail_at(monkeypatch, owner, name, xy):
     original = getattr(owner, name)
 
     def raising(xyz, *rest):
-        low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
-        if (low <= xy).all() and (xy <= high).all():
+        lower, upper = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
+        if (lower <= xy).all() and (xy <= upper).all():
             raise ZeroDivisionError("division by zero")
         return original(xyz, *rest)
 
@@ -174,12 +174,12 @@ def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(
         fail_at(patch, split, stage, np.array(victim.split("_")[1:], float) + 0.5)
         summary = run(small_town, tmp_path / "disturbed", with_footprints=False)
         code, output = repeat_failure(tmp_path / "disturbed", victim)
-    found = by_id(tmp_path / "disturbed")
+    rows = by_id(tmp_path / "disturbed")
     assert summary.exit_code == 1
-    assert list(found) == list(expected)
-    assert {id for id in found if found[id] != expected[id]} == {victim}
-    assert found[victim]["status"] == "internal_error"
-    assert found[victim]["detail"].startswith(
+    assert list(rows) == list(expected)
+    assert {id for id in rows if rows[id] != expected[id]} == {victim}
+    assert rows[victim]["status"] == "internal_error"
+    assert rows[victim]["detail"].startswith(
         "ZeroDivisionError: division by zero (test_city_failures.py:"
     )
     trace = (tmp_path / "disturbed/failures" / folder_name(victim) / "traceback.txt").read_text()
@@ -206,11 +206,11 @@ def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkey
         np.array([border + 60.0, scene.xyz[:, 1].mean()]),
     )
     summary = run([cloud], tmp_path / "disturbed", with_footprints=False)
-    found = by_id(tmp_path / "disturbed")
-    failed = {id for id, row in found.items() if row["status"] == "internal_error"}
+    rows = by_id(tmp_path / "disturbed")
+    failed = {id for id, row in rows.items() if row["status"] == "internal_error"}
     assert summary.exit_code == 1
     assert len(failed) == 1
-    others = found.keys() - failed
-    assert others >= {id for id in expected if x[id] < border - 10.0}
-    assert all(float(id.split("_")[1]) < border for id in others)
+    other_ids = rows.keys() - failed
+    assert other_ids >= {id for id in expected if x[id] < border - 10.0}
+    assert all(float(id.split("_")[1]) < border for id in other_ids)
     assert repeat_failure(tmp_path / "disturbed", failed.pop())[0] == 1

@@ -21,7 +21,7 @@ from hiproof.city.ground import (
 from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
-from small_tasks import die_at_number_two, double
+from small_tasks import die_at_second_task, double
 
 
 def jobs_at(xy):
@@ -30,13 +30,13 @@ def jobs_at(xy):
     )
 
 
-@pytest.mark.parametrize("most", [1, 3, 1000])
-def test_each_building_is_owned_by_one_tile(most):
+@pytest.mark.parametrize("max_jobs", [1, 3, 1000])
+def test_each_building_is_owned_by_one_tile(max_jobs):
     jobs = jobs_at(np.random.default_rng(0).uniform(-500, 500, (60, 2)))
-    tiles = cut_into_tiles(jobs, 250.0, most)
+    tiles = cut_into_tiles(jobs, 250.0, max_jobs)
     owned = sorted(i for members in tiles.values() for i in members)
     assert owned == list(range(60))
-    assert max(len(members) for members in tiles.values()) <= most
+    assert max(len(members) for members in tiles.values()) <= max_jobs
 
 
 def test_a_building_without_area_is_still_owned():
@@ -53,10 +53,10 @@ def test_points_within_reach_equal_the_plain_test():
     def plain(boxes):
         return np.array([any((p >= b[:2]).all() and (p < b[2:]).all() for b in boxes) for p in xy])
 
-    some = rng.permutation(len(xy))[:1500]
-    bits = Reach(roof, terrain).bits(xy, some)
-    assert np.array_equal(bits & 1 > 0, plain(roof)[some])
-    assert np.array_equal(bits & 2 > 0, plain(terrain)[some])
+    indices = rng.permutation(len(xy))[:1500]
+    bits = Reach(roof, terrain).bits(xy, indices)
+    assert np.array_equal(bits & 1 > 0, plain(roof)[indices])
+    assert np.array_equal(bits & 2 > 0, plain(terrain)[indices])
 
 
 def sloped_ground(rng, n=20000, size=100.0):
@@ -74,16 +74,16 @@ def test_ground_around_a_building_follows_the_slope_under_it():
     assert np.isnan(terrain.height_at(np.array([[500.0, 0.0]]))).all()
 
 
-@pytest.mark.parametrize("around", [GroundAround, BareAround, LowestAround])
-def test_ground_of_a_building_ignores_what_lies_outside_its_box(around):
+@pytest.mark.parametrize("ground_class", [GroundAround, BareAround, LowestAround])
+def test_ground_of_a_building_ignores_what_lies_outside_its_box(ground_class):
     rng = np.random.default_rng(5)
     ground = sloped_ground(rng)
     box = np.array([20.0, 20.0, 50.0, 50.0])
     inside = ((ground[:, :2] >= box[:2]) & (ground[:, :2] < box[2:])).all(axis=1)
     xy = rng.uniform(31, 40, (50, 2))
-    whole = around(ground_cells(ground), box).height_at(xy)
+    whole = ground_class(ground_cells(ground), box).height_at(xy)
     twice = rng.permutation(np.concatenate([ground[inside], ground[inside][:500]]))
-    assert np.array_equal(whole, around(ground_cells(twice), box).height_at(xy))
+    assert np.array_equal(whole, ground_class(ground_cells(twice), box).height_at(xy))
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
@@ -93,34 +93,36 @@ def test_ground_heights_equal_plain_weighted_planes(share):
         ground_cells(sloped_ground(rng, int(4000 * share))),
         np.array([20.0, 25.0, 60.0, 70.0]),
     )
-    known = np.isfinite(cells.z)
-    xyz = np.column_stack([cells.x[known], cells.y[known], cells.z[known]])
+    is_known = np.isfinite(cells.z)
+    xyz = np.column_stack([cells.x[is_known], cells.y[is_known], cells.z[is_known]])
     xyz = xyz[((np.floor(xyz[:, :2]) >= box[:2]) & (np.floor(xyz[:, :2]) < box[2:])).all(axis=1)]
-    for at in rng.uniform(15, 75, (60, 2)):
-        steps = np.abs(np.floor(xyz[:, :2]) - np.floor(at)).max(axis=1)
-        low = np.sort(xyz[steps <= 9, 2])
-        lowest = low[1 if len(low) >= 10 else 0] if len(low) else np.nan
+    for place in rng.uniform(15, 75, (60, 2)):
+        steps = np.abs(np.floor(xyz[:, :2]) - np.floor(place)).max(axis=1)
+        lower = np.sort(xyz[steps <= 9, 2])
+        lowest = lower[1 if len(lower) >= 10 else 0] if len(lower) else np.nan
         assert np.array_equal(
-            LowestAround(cells, box).height_at(at[None]), [lowest], equal_nan=True
+            LowestAround(cells, box).height_at(place[None]), [lowest], equal_nan=True
         )
         reach = next((reach for reach in (2, 5) if (steps <= reach).sum() >= 3), 9)
-        near = xyz[steps <= reach]
-        weight = 1 / (((near[:, :2] - at) ** 2).sum(axis=1) + 0.25)
+        nearby = xyz[steps <= reach]
+        weight = 1 / (((nearby[:, :2] - place) ** 2).sum(axis=1) + 0.25)
         height = np.nan
-        if len(near):
-            mean = weight @ near / weight.sum()
-            offset, rise = near[:, :2] - mean[:2], near[:, 2] - mean[2]
+        if len(nearby):
+            mean = weight @ nearby / weight.sum()
+            offset, rise = nearby[:, :2] - mean[:2], nearby[:, 2] - mean[2]
             moments = (weight[:, None] * offset).T @ offset / weight.sum() + 0.1 * np.eye(2)
             slope = np.linalg.solve(moments, (weight * rise) @ offset / weight.sum())
-            height = mean[2] + (at - mean[:2]) @ slope
-        assert GroundAround(cells, box).height_at(at[None]) == pytest.approx([height], nan_ok=True)
+            height = mean[2] + (place - mean[:2]) @ slope
+        assert GroundAround(cells, box).height_at(place[None]) == pytest.approx(
+            [height], nan_ok=True
+        )
 
 
 def test_ground_without_points_is_unknown():
     box = np.array([0.0, 0.0, 10.0, 10.0])
-    for around in (GroundAround, BareAround, LowestAround):
+    for ground_class in (GroundAround, BareAround, LowestAround):
         assert np.isnan(
-            around(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))
+            ground_class(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))
         ).all()
 
 
@@ -150,10 +152,10 @@ def test_the_ledger_remembers_after_being_closed(tmp_path):
         "solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.05, 0.01)]
     )
     ledger.close()
-    again = Ledger(path)
-    again.add_tasks([Task("solve:a", "solve", 2)])
-    assert again.open_tasks("solve") == ["solve:b"]
-    assert again.counts("status") == {"modelled": 1}
+    reopened = Ledger(path)
+    reopened.add_tasks([Task("solve:a", "solve", 2)])
+    assert reopened.open_tasks("solve") == ["solve:b"]
+    assert reopened.counts("status") == {"modelled": 1}
     reader = Ledger(path, read_only=True)
     assert reader.counts("type") == {"gable": 1}
 
@@ -180,20 +182,20 @@ def test_executors_return_every_task_with_result_or_error(executor):
 
 def test_a_killed_worker_loses_its_tasks_but_not_the_others():
     executor = Processes(2)
-    seen, lost = set(), set()
+    visible, lost = set(), set()
     tasks = [(i,) for i in range(6)]
     while tasks:
-        again = []
-        for task, result, error in executor.run(die_at_number_two, tasks):
+        repeated = []
+        for task, result, error in executor.run(die_at_second_task, tasks):
             if error is None:
-                seen.add(result)
+                visible.add(result)
             else:
                 assert isinstance(error, WorkerLost)
                 lost.add(task[0])
-                again += [task] if task[0] != 2 else []
-        tasks = again
+                repeated += [task] if task[0] != 2 else []
+        tasks = repeated
     executor.close()
-    assert seen == {0, 1, 3, 4, 5}
+    assert visible == {0, 1, 3, 4, 5}
     assert 2 in lost
 
 
@@ -205,15 +207,15 @@ def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypat
     monkeypatch.setattr(
         quarantine, "load_plan", lambda folder: SimpleNamespace(tiles={"tile": members})
     )
-    tried = []
+    attempts = []
 
     def run(function, tasks):
         for task in tasks:
-            tried.append(task[3:])
-            died = None if tried[-1] and 2 in tried[-1][0] else WorkerLost("died")
+            attempts.append(task[3:])
+            died = None if attempts[-1] and 2 in attempts[-1][0] else WorkerLost("died")
             yield task, None if died else task[3], died
 
-    alone = SimpleNamespace(run=run)
-    assert quarantine.solve_in_quarantine(alone, None, ("folder", "tile", None)) == ((2,), None)
+    executor = SimpleNamespace(run=run)
+    assert quarantine.solve_in_quarantine(executor, None, ("folder", "tile", None)) == ((2,), None)
     by_one = [((2, 3),), *[((1, 3),)] * quarantine.TRIES, ((1, 2),)] if len(members) > 1 else []
-    assert tried == [*[()] * quarantine.TRIES, *by_one, ((2,),)]
+    assert attempts == [*[()] * quarantine.TRIES, *by_one, ((2,),)]

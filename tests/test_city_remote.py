@@ -31,8 +31,8 @@ def server(tmp_path):
 
 
 def write_terrain(path, town):
-    low, high = town.xyz.min(axis=0) - 20, town.xyz.max(axis=0) + 20
-    columns, rows = np.ceil(high[:2] - low[:2]).astype(int)
+    lower, upper = town.xyz.min(axis=0) - 20, town.xyz.max(axis=0) + 20
+    columns, rows = np.ceil(upper[:2] - lower[:2]).astype(int)
     heights = np.full((rows, columns), 1.5, np.float32)
     with rasterio.open(
         path,
@@ -43,7 +43,7 @@ def write_terrain(path, town):
         count=1,
         dtype="float32",
         crs="EPSG:28992",
-        transform=from_origin(low[0], high[1], 1, 1),
+        transform=from_origin(lower[0], upper[1], 1, 1),
     ) as file:
         file.write(heights, 1)
     return path
@@ -96,9 +96,9 @@ def test_text_and_ply_by_address_are_what_the_files_hold(server, name):
         )
     else:
         write_text(folder / name, xyz, classes)
-    here, there = read_points(folder / name), read_points(f"{address}/{name}?token=1")
-    assert np.array_equal(here.xyz, there.xyz) and np.array_equal(
-        here.classification, there.classification
+    local, remote = read_points(folder / name), read_points(f"{address}/{name}?token=1")
+    assert np.array_equal(local.xyz, remote.xyz) and np.array_equal(
+        local.classification, remote.classification
     )
 
 

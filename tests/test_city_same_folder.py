@@ -76,8 +76,8 @@ def mark(request):
 @pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(Request)])
 def test_every_field_of_a_request_is_in_its_mark_unless_declared_otherwise(name):
     changed = dataclasses.replace(REQUEST, **{name: other(getattr(REQUEST, name))})
-    same = [was == now for was, now in zip(mark(REQUEST), mark(changed), strict=True)]
-    assert same == [name in NO_MATTER | WHICH, name not in WHICH]
+    is_same = [old == new for old, new in zip(mark(REQUEST), mark(changed), strict=True)]
+    assert is_same == [name in NO_MATTER | WHICH, name not in WHICH]
 
 
 def test_a_field_added_later_is_in_the_mark():
@@ -101,11 +101,11 @@ def test_every_setting_is_in_the_mark(section):
 def leaves(value, name=""):
     """(name, declaration, value) of all that is declared in a dataclass and those in it."""
     for declared in dataclasses.fields(value):
-        inner, found = f"{name}{declared.name}", getattr(value, declared.name)
-        if dataclasses.is_dataclass(found):
-            yield from leaves(found, f"{inner}.")
+        inner, member = f"{name}{declared.name}", getattr(value, declared.name)
+        if dataclasses.is_dataclass(member):
+            yield from leaves(member, f"{inner}.")
         else:
-            yield inner, declared, found
+            yield inner, declared, member
 
 
 def test_every_text_is_known_to_name_files_or_not():
@@ -116,37 +116,37 @@ def test_every_text_is_known_to_name_files_or_not():
     }
     files = {name for name, declared in texts.items() if declared.metadata.get("names") == "files"}
     assert files == {"clouds", "footprints", "terrain", "settings.segment.weights"}
-    named = {
+    names = {
         "settings.read.crs",
         "settings.read.override_columns",
         "settings.read.overture_catalogue",
         "settings.fit.types",
         "settings.write.out_crs",
     }
-    assert set(texts) - files - NO_MATTER - WHICH == named
+    assert set(texts) - files - NO_MATTER - WHICH == names
 
 
 def test_a_folder_called_like_a_setting_is_none_of_the_inputs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     settings = Settings.from_dict({"fit": {"types": ["gable"]}})
     request = dataclasses.replace(REQUEST, layer="pand", id_attribute="id", settings=settings)
-    before = mark(request)
+    old_mark = mark(request)
     for name in ("full", "auto", "one", "merged", "2.2", "gable", "pand", "id"):
         Path(name).mkdir()
         (Path(name) / "file").write_text("anything")
-    assert mark(request) == before
+    assert mark(request) == old_mark
 
 
-@pytest.mark.parametrize("beside", ["a.shp", "a.dbf", "a.prj"])
-def test_the_mark_sees_the_files_that_make_up_an_input(tmp_path, beside):
+@pytest.mark.parametrize("companion", ["a.shp", "a.dbf", "a.prj"])
+def test_the_mark_sees_the_files_that_make_up_an_input(tmp_path, companion):
     for name in ("a.shp", "a.dbf", "a.prj", "b.dbf"):
         (tmp_path / name).write_text("before")
     request = dataclasses.replace(REQUEST, footprints=str(tmp_path / "a.shp"))
-    before = mark(request)
+    old_mark = mark(request)
     (tmp_path / "b.dbf").write_text("someone else's")
-    assert mark(request) == before
-    (tmp_path / beside).write_text("after, and longer")
-    assert mark(request) != before
+    assert mark(request) == old_mark
+    (tmp_path / companion).write_text("after, and longer")
+    assert mark(request) != old_mark
 
 
 def test_a_folder_is_stamped_by_its_files_and_no_text_by_accident(tmp_path):
@@ -162,9 +162,9 @@ def test_another_setting_is_refused_by_name_and_the_same_request_is_not(
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
     assert reconstruct_area(request).buildings == 4
-    one = Settings.from_dict({"fit": {"parts": "one"}})
+    settings = Settings.from_dict({"fit": {"parts": "one"}})
     with pytest.raises(OutputError, match=r"differs in settings\.fit\.parts; .*--restart"):
-        reconstruct_area(dataclasses.replace(request, settings=one))
+        reconstruct_area(dataclasses.replace(request, settings=settings))
 
 
 def test_a_replaced_tile_is_named(town_files, tmp_path, quick):
@@ -180,16 +180,16 @@ def test_a_replaced_tile_is_named(town_files, tmp_path, quick):
 
 
 def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tmp_path, quick):
-    request, told = Request((town_files[0],), tmp_path, town_files[1]), []
+    request, errors = Request((town_files[0],), tmp_path, town_files[1]), []
 
-    def second(step, done, total):
-        if step == "solve" and not told:
+    def second(step, finished, total):
+        if step == "solve" and not errors:
             with pytest.raises(OutputError, match="another run works in"):
                 reconstruct_area(dataclasses.replace(request, restart=True))
-            told.append(CliRunner().invoke(app, ["status", str(tmp_path)]).output)
+            errors.append(CliRunner().invoke(app, ["status", str(tmp_path)]).output)
 
     assert reconstruct_area(request, second).buildings == 4
-    assert "buildings done: 0 of 4" in told[0] and "not finished" in told[0]
+    assert "buildings done: 0 of 4" in errors[0] and "not finished" in errors[0]
 
 
 def test_a_lock_holds_across_processes_and_ends_with_kill_9(tmp_path):
@@ -239,12 +239,14 @@ def test_a_file_that_was_lost_or_damaged_is_made_again(
 
 
 @pytest.mark.parametrize(
-    "asked",
+    "settings",
     [{}, {"city": {"models": "tiles"}}, {"city": {"models": "both"}, "write": {"citygml": "3.0"}}],
     ids=["merged", "tiles", "both, CityGML 3.0"],
 )
-def test_models_stand_where_the_summary_says(town_files, tmp_path, quick, asked):
-    request = Request((town_files[0],), tmp_path, town_files[1], settings=Settings.from_dict(asked))
+def test_models_stand_where_the_summary_says(town_files, tmp_path, quick, settings):
+    request = Request(
+        (town_files[0],), tmp_path, town_files[1], settings=Settings.from_dict(settings)
+    )
     summary = reconstruct_area(request)
     assert summary.models and all(place.exists() for place in summary.models)
     built = build_file(tmp_path / "parameters.jsonl", tmp_path / "built")
@@ -259,28 +261,28 @@ def test_models_of_work_tiles_are_claimed_too(town_files, tmp_path, quick):
     request = Request((town_files[0],), tmp_path, town_files[1], settings=settings)
     reconstruct_area(request)
     lost = next((tmp_path / "models").glob("*.gml"))
-    before = lost.read_bytes()
+    content = lost.read_bytes()
     lost.unlink()
     with pytest.warns(UserWarning, match=lost.name):
         reconstruct_area(request)
-    assert lost.read_bytes() == before
+    assert lost.read_bytes() == content
 
 
 def test_a_table_that_was_only_looked_at_stands(town_files, tmp_path, quick):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
     table = tmp_path / "buildings.gpkg"
-    known, before = claims([table], tmp_path), table.read_bytes()
+    claimed, content = claims([table], tmp_path), table.read_bytes()
     viewer = sqlite3.connect(table)
     viewer.execute("pragma journal_mode=wal")
     assert viewer.execute("select count(*) from buildings").fetchone() == (4,)
     viewer.execute("pragma journal_mode=delete")
     viewer.close()
-    assert table.read_bytes() != before and broken_claims(known, tmp_path) == []
+    assert table.read_bytes() != content and broken_claims(claimed, tmp_path) == []
     with sqlite3.connect(table) as editor:
         editor.execute("update gpkg_contents set description = 'other'")
     editor.close()
-    assert broken_claims(known, tmp_path) == ["buildings.gpkg"]
+    assert broken_claims(claimed, tmp_path) == ["buildings.gpkg"]
 
 
 class Bomb:
@@ -299,7 +301,7 @@ def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, 
         tmp_path / "exploded",
     )
 
-    def stop(step, done, total):
+    def stop(step, finished, total):
         if step == "merge":
             raise KeyboardInterrupt
 
@@ -357,10 +359,10 @@ def test_a_plan_comes_back_as_it_was(tmp_path):
         np.array([1e5, 0.1, 0]),
     )
     plan.save(tmp_path / "plan.jsonl")
-    again = WorkPlan.load(tmp_path / "plan.jsonl")
-    assert np.array_equal(again.translate, plan.translate)
-    assert list(again.tiles) == list(plan.tiles)
-    assert dataclasses.replace(again, translate=plan.translate) == plan
+    loaded = WorkPlan.load(tmp_path / "plan.jsonl")
+    assert np.array_equal(loaded.translate, plan.translate)
+    assert list(loaded.tiles) == list(plan.tiles)
+    assert dataclasses.replace(loaded, translate=plan.translate) == plan
 
 
 def test_texts_of_buildings_come_back_as_they_were(tmp_path):

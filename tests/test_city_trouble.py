@@ -66,8 +66,8 @@ def test_losses_with_the_main_process_lead_to_quarantine(
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
-    def kill(step, done, total):
-        if step == "solve" and done == 1:
+    def kill(step, finished, total):
+        if step == "solve" and finished == 1:
             raise SystemExit
 
     with pytest.raises(SystemExit):
@@ -75,13 +75,13 @@ def test_losses_with_the_main_process_lead_to_quarantine(
     database = sqlite3.connect(tmp_path / ".hiproof" / "ledger.sqlite")
     database.execute("update task set losses = 3 where kind = 'solve' and state = 'open'")
     database.commit()
-    alone = []
+    quarantined = []
     original = city_run.solve_in_quarantine
     monkeypatch.setattr(
-        city_run, "solve_in_quarantine", lambda *a: alone.append(a[-1]) or original(*a)
+        city_run, "solve_in_quarantine", lambda *a: quarantined.append(a[-1]) or original(*a)
     )
     reconstruct_area(request)
-    assert len(alone) == 1
+    assert len(quarantined) == 1
     assert records(tmp_path) == records(reference_run)
 
 
@@ -91,8 +91,8 @@ def test_points_that_somebody_removed_are_sorted_again(
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
-    def kill(step, done, total):
-        if step == "solve" and done == 1:
+    def kill(step, finished, total):
+        if step == "solve" and finished == 1:
             raise SystemExit
 
     with pytest.raises(SystemExit):
@@ -139,8 +139,8 @@ def test_unfinished_files_of_a_killed_worker_are_not_read(
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
-    def litter(step, done, total):
-        if step == "solve" and done == 0:
+    def litter(step, finished, total):
+        if step == "solve" and finished == 0:
             for folder in (tmp_path / ".hiproof" / "points").iterdir():
                 (folder / ".0-0.npz-1-abcd.npz").write_bytes(b"cut off")
             (tmp_path / ".buildings.gml-1-abcd.gml").write_bytes(b"cut off")
@@ -198,8 +198,11 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_p
     town, rng = make_town(), np.random.default_rng(5)
     middle = np.median(town.xyz[:, 0])
     clouds = []
-    for name, wanted in (("b", town.xyz[:, 0] < middle + 15), ("a", town.xyz[:, 0] > middle - 15)):
-        members = rng.permutation(np.flatnonzero(wanted))
+    for name, is_in_tile in (
+        ("b", town.xyz[:, 0] < middle + 15),
+        ("a", town.xyz[:, 0] > middle - 15),
+    ):
+        members = rng.permutation(np.flatnonzero(is_in_tile))
         clouds.append(
             str(
                 write_cloud(
@@ -215,11 +218,11 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_p
 
 def test_points_in_several_files_count_once_where_a_footprint_is_moved(tmp_path):
     town = make_town(houses=1)
-    beside = {
+    neighbours = {
         id: shapely.transform(area, lambda xy: xy + [0.6, -0.5])
         for id, area in town.footprints.items()
     }
-    footprints = write_footprints(tmp_path / "footprints.geojson", beside)
+    footprints = write_footprints(tmp_path / "footprints.geojson", neighbours)
     east = town.xyz[:, 0] > np.median(town.xyz[:, 0])
     whole = str(write_cloud(tmp_path / "whole.laz", town.xyz, town.classification))
     part = str(write_cloud(tmp_path / "part.laz", town.xyz[east], town.classification[east]))
@@ -249,14 +252,14 @@ def test_a_building_with_too_many_points_is_thinned_and_says_so(town_files, tmp_
 def test_thinning_depends_on_the_set_of_points_alone():
     rng = np.random.default_rng(6)
     points = rng.uniform(0, 50, (5000, 3))
-    kept = thin_to_count(points, 700)
-    again = thin_to_count(
+    thinned = thin_to_count(points, 700)
+    shuffled = thin_to_count(
         without_repeats(np.concatenate([points, points[:900]])[rng.permutation(5900)]), 700
     )
-    assert {tuple(p) for p in kept} == {tuple(p) for p in again}
-    assert len(kept) == 700
+    assert {tuple(p) for p in thinned} == {tuple(p) for p in shuffled}
+    assert len(thinned) == 700
     # evenly: each quarter of the area keeps about a quarter
-    quarters = np.bincount((kept[:, 0] > 25) * 2 + (kept[:, 1] > 25))
+    quarters = np.bincount((thinned[:, 0] > 25) * 2 + (thinned[:, 1] > 25))
     assert (abs(quarters - 175) < 60).all()
 
 
@@ -297,8 +300,10 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert records(tmp_path / "out") == records(reference_run)
-    alone = write_footprints(tmp_path / "alone.geojson", dict(list(town.footprints.items())[:1]))
-    reconstruct_area(Request((str(cloud),), tmp_path / "alone", str(alone)))
+    single_footprint = write_footprints(
+        tmp_path / "alone.geojson", dict(list(town.footprints.items())[:1])
+    )
+    reconstruct_area(Request((str(cloud),), tmp_path / "alone", str(single_footprint)))
     assert by_id(tmp_path / "alone")["house-0"] == by_id(reference_run)["house-0"]
     tasks = Ledger(tmp_path / "alone" / ".hiproof" / "ledger.sqlite").tasks()
     (sort,) = [task for task in tasks if task.kind == "sort"]
@@ -332,8 +337,8 @@ def test_a_new_run_removes_the_models_of_old_work_tiles_and_nothing_else(
     town_files, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    both = Settings.from_dict({"city": {"models": "both"}})
-    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], settings=both))
+    settings = Settings.from_dict({"city": {"models": "both"}})
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], settings=settings))
     assert (tmp_path / "buildings.gml").exists() and len(list((tmp_path / "models").iterdir())) == 4
     (tmp_path / "models" / "mine.gml").touch()
     reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True))

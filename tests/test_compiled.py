@@ -101,11 +101,11 @@ def ask():
     cannot be kept).
     """
     forget()
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as remarks:
         warnings.simplefilter("always")
         answer = importlib.import_module("town.outer").answer
         got = answer(10)
-    return got, bool(answer._cache_hits), len([w for w in said if w.category is NotKeptWarning])
+    return got, bool(answer._cache_hits), len([w for w in remarks if w.category is NotKeptWarning])
 
 
 def files_in(folder):
@@ -155,15 +155,15 @@ def test_kept_code_is_loaded_by_the_next_process(town):
 def test_a_function_that_compiled_code_called_is_called_by_python_as_well(town):
     """Its wrapper is compiled when it is wanted, kept, and loaded by the next process."""
     ask()
-    asked = "from town.inner import number; print(number(10), bool(number._cache_hits))"
+    inner_code = "from town.inner import number; print(number(10), bool(number._cache_hits))"
     for _ in range(2):
-        assert run(town, "-c", asked).split() == ["30", "True"]
+        assert run(town, "-c", inner_code).split() == ["30", "True"]
         assert [name.split("-")[0] for name in files_in(town) if "-python." in name] == [
             "inner.number",
             "outer.answer",
         ]
-    both = "from town.inner import number; from town.outer import answer; "
-    printed = run(town, "-c", both + "print(answer(10), number(10), number(10))")
+    both_code = "from town.inner import number; from town.outer import answer; "
+    printed = run(town, "-c", both_code + "print(answer(10), number(10), number(10))")
     assert printed.split() == ["61", "30", "30"]
 
 
@@ -192,9 +192,11 @@ from hiproof.city.warm import mark, read_processor
 from town.outer import answer
 print(mark("solid", "stamp", read_processor()), answer(10), bool(answer._cache_hits))
 """
-    here, there = (run(town, "-c", script.format(host=host)).split() for host in ("here", "there"))
-    assert here[1:] == ["61", "False"] and there[1:] == ["61", "True"]
-    assert here[0] == there[0]
+    first_host, second_host = (
+        run(town, "-c", script.format(host=host)).split() for host in ("here", "there")
+    )
+    assert first_host[1:] == ["61", "False"] and second_host[1:] == ["61", "True"]
+    assert first_host[0] == second_host[0]
 
 
 def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):
@@ -208,7 +210,7 @@ def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):
 def run(packages, *command):
     """The output of a process that finds this hiproof and what is in `packages`."""
     environment = {**os.environ, "PYTHONPATH": f"{packages}:{PACKAGE.parent}"}
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, *command],
         capture_output=True,
         text=True,
@@ -216,8 +218,8 @@ def run(packages, *command):
         timeout=300,
         env=environment,
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert process.returncode == 0, process.stderr
+    return process.stdout
 
 
 def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path, monkeypatch):
@@ -256,7 +258,7 @@ OTHER_VERSIONS = "importlib.metadata.version = lambda name: '0'"
 
 @pytest.mark.skipif(not kinds.runs_kind(), reason=f"makes code for {kinds.KIND}")
 @pytest.mark.parametrize(
-    "name, features, more, is_loaded",
+    "name, features, extra, is_loaded",
     [
         ("haswell", HASWELL, "", True),
         ("nehalem", NEHALEM, "", False),
@@ -264,7 +266,7 @@ OTHER_VERSIONS = "importlib.metadata.version = lambda name: '0'"
     ],
 )
 def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_passed_over(
-    tmp_path, name, features, more, is_loaded
+    tmp_path, name, features, extra, is_loaded
 ):
     pytest.importorskip("wheel", reason="needs wheel, to pack wheels")
     from release.compiled_wheel import compiled_wheel
@@ -289,7 +291,7 @@ def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_pas
 import importlib.metadata, llvmlite.binding as binding
 binding.get_host_cpu_name = lambda: {name!r}
 binding.get_host_cpu_features = lambda: binding.targets.FeatureMap({features})
-{more}
+{extra}
 from town.outer import answer
 print(answer(10), bool(answer._cache_hits))
 """
@@ -391,7 +393,7 @@ def test_the_stamp_follows_every_import_at_the_top(source):
     """The regular expression of imports against Python's own parser: all but those inside functions
     and for types alone.
     """
-    found = set()
+    results = set()
     for node in outside_functions(ast.parse(source.read_text())):
         if isinstance(node, ast.ImportFrom):
             start = source.parents[node.level - 1] if node.level else PACKAGE.parent
@@ -401,11 +403,11 @@ def test_the_stamp_follows_every_import_at_the_top(source):
             modules = [PACKAGE.parent.joinpath(*alias.name.split(".")) for alias in node.names]
         else:
             continue
-        found |= {
+        results |= {
             file for module in modules for file in (Path(f"{module}.py"), module / "__init__.py")
         }
     assert {
-        file for file in found if file.is_file() and file.is_relative_to(PACKAGE)
+        file for file in results if file.is_file() and file.is_relative_to(PACKAGE)
     } <= stamp.list_imports(source)
 
 
@@ -430,13 +432,13 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
         forget()
         return {name: stamp.compute_stamp(file) for name, file in files.items()}
 
-    before = compute_stamps()
+    old = compute_stamps()
     files["middle"].write_text(MIDDLE + "\n# a word more\n")
-    after = compute_stamps()
-    assert after["inner"] == before["inner"]
-    assert after["middle"] != before["middle"] and after["outer"] != before["outer"]
+    new = compute_stamps()
+    assert new["inner"] == old["inner"]
+    assert new["middle"] != old["middle"] and new["outer"] != old["outer"]
     monkeypatch.setattr(stamp, "read_version", lambda library: "another")
-    assert not set(compute_stamps().values()) & set(after.values())
+    assert not set(compute_stamps().values()) & set(new.values())
 
 
 def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):
@@ -467,8 +469,8 @@ def test_a_mark_that_cannot_be_kept_or_read_ends_no_run(tmp_path, monkeypatch):
         warm.make_ready(["solid"])
     assert files_in(tmp_path) == []
     warm.make_ready(["solid"])
-    (made,) = tmp_path.glob("*.nbc")
-    made.write_bytes(b"\xff\xfe damaged")
+    (product,) = tmp_path.glob("*.nbc")
+    product.write_bytes(b"\xff\xfe damaged")
     warm.make_ready(["solid"])
 
 
@@ -476,9 +478,9 @@ def test_a_mark_that_cannot_be_kept_or_read_ends_no_run(tmp_path, monkeypatch):
 def test_what_came_in_a_wheel_is_compiled_only_when_asked_for_or_on_other_processors(
     tmp_path, monkeypatch, runs, compiles
 ):
-    asked = []
+    calls = []
     monkeypatch.setattr(
-        warm, "compiled_pieces", lambda left: (piece for piece in left if not asked.append(piece))
+        warm, "compiled_pieces", lambda left: (piece for piece in left if not calls.append(piece))
     )
     monkeypatch.setattr(warm, "runs_kind", lambda: runs)
     monkeypatch.setattr(warm, "read_processor", lambda: "mine")
@@ -486,30 +488,30 @@ def test_what_came_in_a_wheel_is_compiled_only_when_asked_for_or_on_other_proces
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path,))
     (tmp_path / warm.mark("solid", "stamp", kinds.KIND)).touch()
     warm.make_ready(["solid"])
-    assert asked == compiles
+    assert calls == compiles
     warm.make_ready(["solid"], own=True)
-    assert asked == ["solid"]
+    assert calls == ["solid"]
 
 
 def test_functions_of_pieces_compiled_before_are_not_announced_again(tmp_path, monkeypatch):
-    def compiled_pieces(left):
-        for piece in left:
+    def compiled_pieces(remaining):
+        for piece in remaining:
             news.ready.add(f"functions.of_{piece}")
             yield piece
 
-    told = []
+    messages = []
     monkeypatch.setattr(warm, "compiled_pieces", compiled_pieces)
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path,))
     monkeypatch.setattr(news, "ready", set())
-    monkeypatch.setattr(news, "listener", lambda done, total: told.append(done))
+    monkeypatch.setattr(news, "listener", lambda done, total: messages.append(done))
     warm.make_ready(["solid", "points"])
     news.ready.clear()  # another process, later
-    told.clear()
+    messages.clear()
     warm.make_ready(["solid", "points", "single"])
-    assert told == [2]
+    assert messages == [2]
     news.ready.clear()
     warm.make_ready(["single"])
-    assert told == [2] and "functions.of_single" in news.ready
+    assert messages == [2] and "functions.of_single" in news.ready
 
 
 def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
@@ -565,8 +567,8 @@ def test_a_large_function_is_called_and_not_copied(town):
         fast, slow = answers()
         assert fast == pytest.approx(slow, rel=1e-12)
     codes = [path for path in sorted(folder.rglob("*.nbc")) if "-python." not in path.name]
-    one, other = (pickle.loads(path.read_bytes()) for path in codes)
-    assert [callee.name for callee in other[2]] == ["number"] and one[3] == other[2][0]
+    first, other = (pickle.loads(path.read_bytes()) for path in codes)
+    assert [callee.name for callee in other[2]] == ["number"] and first[3] == other[2][0]
     kept_files = files_in(town)
     printed = run(town, "-c", "from town.outer import answer; print(answer(10.5))")
     assert float(printed) == fast
@@ -615,11 +617,11 @@ def test_code_of_two_processes_meets_in_a_third_without_mistaking_one_for_the_ot
     functions = ("nanmin", "nanmax")
     for function in functions:
         (town / "town" / f"{function}.py").write_text(LIBRARY.format(function=function))
-    alone = [run(town, "-c", ask.format(function)) for function in functions]
+    single_answers = [run(town, "-c", ask.format(function)) for function in functions]
     files = [path for path in town.rglob("*.nbc") if "-python." not in path.name]
     numbers = [set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes())) for path in files]
     assert len(numbers) == 2 and all(numbers) and not numbers[0] & numbers[1]
-    assert run(town, "-c", "\n".join(map(ask.format, functions))) == "".join(alone)
+    assert run(town, "-c", "\n".join(map(ask.format, functions))) == "".join(single_answers)
 
 
 def test_constants_in_a_call_compile_nothing_apart(town):
@@ -669,9 +671,9 @@ for given in (with_footprints, few, one):
 def test_the_news_of_compiling_is_a_headline_and_ten_lines_at_most(total):
     lines = []
     tell = news.Lines(lines.append)
-    for done in range(total):
-        tell(done, total)  # before a function is compiled
-        tell(done + 1, total)  # and after
+    for n_ready in range(total):
+        tell(n_ready, total)  # before a function is compiled
+        tell(n_ready + 1, total)  # and after
     assert f"up to {total} functions" in lines[0]
     assert min(total, 10) <= len(lines) <= 11
     assert all(line.startswith("compiled") for line in lines[1:])

@@ -11,7 +11,7 @@ from hiproof.city.request import Request
 
 
 @pytest.mark.parametrize(
-    "quota, there, expected",
+    "quota, n_cores, expected",
     [
         ("200000 100000\n", 8, 2),
         ("150000 100000", 8, 2),
@@ -20,11 +20,11 @@ from hiproof.city.request import Request
         ("800000 100000", 2, 2),
     ],
 )
-def test_a_container_has_the_cores_of_its_quota(tmp_path, monkeypatch, quota, there, expected):
+def test_a_container_has_the_cores_of_its_quota(tmp_path, monkeypatch, quota, n_cores, expected):
     file = tmp_path / "cpu.max"
     file.write_text(quota)
     monkeypatch.setattr(cores, "QUOTA", file)
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(there), raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(n_cores), raising=False)
     assert cores.cores() == expected
 
 
@@ -59,24 +59,24 @@ def test_where_there_are_no_semaphores_one_process_does_all(monkeypatch, error):
 def test_linear_algebra_of_workers_takes_one_thread_unless_the_user_said_otherwise(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    before = dict(os.environ)
+    environment = dict(os.environ)
     with limit_threads():
         assert (os.environ["OMP_NUM_THREADS"], os.environ["OPENBLAS_NUM_THREADS"]) == ("3", "1")
-    assert dict(os.environ) == before
+    assert dict(os.environ) == environment
 
 
 @pytest.mark.parametrize("pay, kind", [(1, InProcess), (2, Processes)])
 def test_a_run_takes_as_many_as_pay_for_what_is_left(tmp_path, town_files, monkeypatch, pay, kind):
     """And an outcome that does not depend on how many these are."""
-    asked, taken = [], []
-    monkeypatch.setattr(run, "as_many_as_pay", lambda *left: asked.append(left) or pay)
+    requests, counts = [], []
+    monkeypatch.setattr(run, "as_many_as_pay", lambda *left: requests.append(left) or pay)
     make = run.make_executor
     monkeypatch.setattr(
-        run, "make_executor", lambda *given: taken.append(make(*given)) or taken[-1]
+        run, "make_executor", lambda *given: counts.append(make(*given)) or counts[-1]
     )
     request = Request((town_files[0],), tmp_path / "out", town_files[1], processes=None)
     summary = run.reconstruct_area(request)
     run.reconstruct_area(request)
-    (buildings, tiles, footprints), again = asked
-    assert buildings == summary.buildings and tiles > 0 and footprints and again == (0, 0, True)
-    assert type(taken[1]) is kind
+    (buildings, tiles, footprints), repeat = requests
+    assert buildings == summary.buildings and tiles > 0 and footprints and repeat == (0, 0, True)
+    assert type(counts[1]) is kind

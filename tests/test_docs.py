@@ -82,9 +82,11 @@ def test_every_public_name_is_there_and_documented(name):
 
 def test_the_page_of_python_tells_of_every_public_name():
     page = (ROOT / "docs/api.md").read_text()
-    told = set(re.findall(r"^::: hiproof\.(?:[\w.]+\.)?(\w+)$", page, re.MULTILINE))
+    documented = set(re.findall(r"^::: hiproof\.(?:[\w.]+\.)?(\w+)$", page, re.MULTILINE))
     kinds = {name for name in hiproof.__all__ if hasattr(hiproof.errors, name)}
-    assert "errors" in told and told - {"errors"} == set(hiproof.__all__) - kinds - {"__version__"}
+    assert "errors" in documented and documented - {"errors"} == set(hiproof.__all__) - kinds - {
+        "__version__"
+    }
 
 
 @pytest.mark.parametrize("example", ["one_building.py", "one_tile.py"])
@@ -97,11 +99,11 @@ def test_examples_run(example, tmp_path, monkeypatch, capsys):
 def test_the_example_of_a_new_primitive_runs(tmp_path):
     """In a process of its own, where the shape stays in the catalogue."""
     command = [sys.executable, ROOT / "examples" / "new_primitive.py"]
-    done = subprocess.run(
+    process = subprocess.run(
         command, capture_output=True, text=True, env=ENVIRONMENT, cwd=tmp_path, check=False
     )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip()
+    assert process.returncode == 0, process.stderr
+    assert process.stdout.strip()
 
 
 def test_the_notebook_runs():
@@ -124,8 +126,8 @@ def at_hand(tmp_path_factory):
     footprint of one house.
     """
     folder, files = tmp_path_factory.mktemp("snippets"), demo_files()
-    some = {"footprints": str(files["footprints"]), "where": "id < 'house-04'"}
-    hiproof.reconstruct_area(hiproof.Request((str(files["cloud"]),), folder / "models", **some))
+    options = {"footprints": str(files["footprints"]), "where": "id < 'house-04'"}
+    hiproof.reconstruct_area(hiproof.Request((str(files["cloud"]),), folder / "models", **options))
     footprint = hiproof.read_footprints(files["footprints"])[0].polygon
     cloud = hiproof.read_points(files["cloud"])
     roof = (cloud.classification == 6) & shapely.intersects_xy(footprint, *cloud.xyz[:, :2].T)
@@ -137,14 +139,14 @@ def test_snippets_run(page, at_hand, monkeypatch):
     """The Python blocks of a page one after the other, on a run's folder, points and a
     footprint.
     """
-    folder, known = at_hand
+    folder, values = at_hand
     if "hiproof.plot" in PAGES[page][-1]:
         pytest.importorskip("matplotlib", reason="the snippet plots (extra `report`)").use("Agg")
     monkeypatch.chdir(folder)
-    names = dict(known)
+    names = dict(values)
     for number, block in enumerate(PAGES[page]):
         exec(compile(block, f"{page}, block {number}", "exec"), names)
-    assert names.keys() > known.keys(), "the page's blocks ran and left what they made"
+    assert names.keys() > values.keys(), "the page's blocks ran and left what they made"
 
 
 def test_the_sites_generated_pages_tell_every_command_option_and_setting():
@@ -169,13 +171,13 @@ def test_every_named_number_has_a_reason():
     """
     from docs.generated import list_constants
 
-    found = list_constants()
-    assert len(found) > 200
-    assert [f"{c.file}: {', '.join(c.names)}" for c in found if len(c.why) < 4] == []
+    result = list_constants()
+    assert len(result) > 200
+    assert [f"{c.file}: {', '.join(c.names)}" for c in result if len(c.why) < 4] == []
 
 
 @pytest.mark.parametrize(
-    ("modules", "left"),
+    ("modules", "absent"),
     [
         ("hiproof", "'torch', 'dask', 'numba', 'scipy', 'onnxruntime'"),
         (
@@ -186,9 +188,9 @@ def test_every_named_number_has_a_reason():
     ],
     ids=["the package", "a run"],
 )
-def test_nothing_is_imported_that_few_need(modules, left):
-    code = f"import sys, {modules}; print([m for m in ({left}) if m in sys.modules])"
-    done = subprocess.run(
+def test_nothing_is_imported_that_few_need(modules, absent):
+    code = f"import sys, {modules}; print([m for m in ({absent}) if m in sys.modules])"
+    process = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=ENVIRONMENT, check=True
     )
-    assert done.stdout.strip() == "[]"
+    assert process.stdout.strip() == "[]"

@@ -66,12 +66,12 @@ def read_sources():
 def find_module_file(name):
     """The file of a module that `python -m` may be given, None where there is none."""
     path = ROOT / name.replace(".", "/")
-    found = (
+    files = (
         path.with_suffix(".py"),
         path / "__main__.py",
         ROOT / "src" / name.replace(".", "/") / "__main__.py",
     )
-    return next((file for file in found if file.is_file()), None)
+    return next((file for file in files if file.is_file()), None)
 
 
 def is_path(span):
@@ -85,8 +85,8 @@ def is_path(span):
 @every_document
 def test_links_lead_somewhere(path):
     targets = re.findall(r"\]\(([^)#]+)\)", path.read_text())
-    ours = [target for target in targets if "://" not in target and target not in MADE]
-    assert [target for target in ours if not (path.parent / target).exists()] == []
+    local_targets = [target for target in targets if "://" not in target and target not in MADE]
+    assert [target for target in local_targets if not (path.parent / target).exists()] == []
 
 
 @every_document
@@ -107,12 +107,12 @@ def test_paths_exist(path):
 
 @every_document
 def test_commands_exist(path):
-    named = [
-        found for text in list_commands(path) for found in re.findall(r"^hiproof ([a-z]\w*)", text)
+    names = [
+        match for text in list_commands(path) for match in re.findall(r"^hiproof ([a-z]\w*)", text)
     ]
-    assert [name for name in named if name not in COMMANDS] == []
+    assert [name for name in names if name not in COMMANDS] == []
     modules = [
-        found for text in list_commands(path) for found in re.findall(r"^python -m ([\w.]+)", text)
+        match for text in list_commands(path) for match in re.findall(r"^python -m ([\w.]+)", text)
     ]
     assert [
         name
@@ -120,8 +120,10 @@ def test_commands_exist(path):
         if name not in ("pytest", "venv", "pip") and find_module_file(name) is None
     ] == []
     targets = re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    made = [found for text in list_commands(path) for found in re.findall(r"^make ([\w-]+)", text)]
-    assert [name for name in made if name not in targets] == []
+    product = [
+        match for text in list_commands(path) for match in re.findall(r"^make ([\w-]+)", text)
+    ]
+    assert [name for name in product if name not in targets] == []
 
 
 @every_document
@@ -131,21 +133,23 @@ def test_options_exist(path):
         if text.startswith(OTHER_PROGRAMS) or text.startswith("python -m pytest"):
             continue
         module = re.match(r"python -m ([\w.]+)", text)
-        known = (
+        options = (
             OPTIONS
             if module is None
             else set(re.findall(r"--[\w-]+", find_module_file(module[1]).read_text()))
         )
         missing += [
-            option for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text) if option not in known
+            option
+            for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text)
+            if option not in options
         ]
     assert missing == []
 
 
 @every_document
 def test_attributes_and_settings_exist(path):
-    named = re.findall(r"`((?:rf|hiproof)_[a-z]\w*)`", path.read_text())
-    assert [name for name in named if name not in ATTRIBUTES] == []
+    names = re.findall(r"`((?:rf|hiproof)_[a-z]\w*)`", path.read_text())
+    assert [name for name in names if name not in ATTRIBUTES] == []
     settings = Settings().to_dict()
     pairs = re.findall(r"`\[(\w+)\] (\w+)", path.read_text())
     assert [pair for pair in pairs if pair[1] not in settings.get(pair[0], {})] == []
@@ -156,7 +160,7 @@ def test_names_of_code_occur_in_it(path):
     """A word between backticks that looks like a name of code, such as `fit_roof` or
     `model.Part`.
     """
-    named = {
+    names = {
         span.split(".")[-1]
         for span in list_spans(path)
         if re.fullmatch(r"@?[a-z]\w*(_|\.[A-Za-z])\w*", span)
@@ -164,7 +168,7 @@ def test_names_of_code_occur_in_it(path):
     assert (
         sorted(
             name
-            for name in named - ATTRIBUTES
+            for name in names - ATTRIBUTES
             if not re.search(rf"\b{re.escape(name)}\b", read_sources())
         )
         == []

@@ -23,9 +23,9 @@ LEVEL = 1e-9
 
 @pytest.mark.parametrize("kind", CATALOGUE)
 def test_every_parameter_is_drawn_as_long_as_it_is(kind):
-    parameters, found = typical_parameters(kind), measures(kind)
-    assert [m.name for m in found] == list(list_parameters(kind)) == list(parameters)
-    for measure in found:
+    parameters, lengths = typical_parameters(kind), measures(kind)
+    assert [m.name for m in lengths] == list(list_parameters(kind)) == list(parameters)
+    for measure in lengths:
         if measure.end is not None:
             assert measure.length == pytest.approx(abs(parameters[measure.name]), abs=LEVEL), (
                 measure.name

@@ -162,9 +162,9 @@ def test_labelling_is_refused_before_it_reads_or_writes(hide_package, tmp_path, 
 
 def test_a_neighbourhood_is_refused_before_it_is_written(hide_package, tmp_path):
     hide_package("rasterio")
-    done = CliRunner().invoke(simulate, ["neighbourhood", str(tmp_path / "town")])
-    assert done.exit_code == 2 and re.match(
-        make_pattern("rasterio"), done.output.removeprefix("error: ")
+    result = CliRunner().invoke(simulate, ["neighbourhood", str(tmp_path / "town")])
+    assert result.exit_code == 2 and re.match(
+        make_pattern("rasterio"), result.output.removeprefix("error: ")
     )
     assert not (tmp_path / "town").exists()
 
@@ -179,11 +179,11 @@ def test_a_neighbourhood_is_refused_before_it_is_written(hide_package, tmp_path)
         *(
             (
                 "onnxruntime",
-                lambda given=given: hiproof.reconstruct(
-                    gable_points(), FOOTPRINT, settings=Settings.from_dict(given)
+                lambda arguments=arguments: hiproof.reconstruct(
+                    gable_points(), FOOTPRINT, settings=Settings.from_dict(arguments)
                 ),
             )
-            for given in (
+            for arguments in (
                 {"fit": {"parts": "one"}},
                 {"fit": {"objective": "paper"}},
                 {"segment": {"always": True}},
@@ -205,13 +205,15 @@ def test_training_names_its_extra(hide_package):
         hiproof.learn.train  # noqa: B018
 
 
-@pytest.mark.parametrize("given", [{}, {"fit": {"parts": "one"}, "segment": {"enabled": False}}])
-def test_a_roof_is_the_same_without_what_it_does_not_ask_for(given, hide_package):
-    settings = Settings.from_dict(given)
-    before = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
+@pytest.mark.parametrize(
+    "arguments", [{}, {"fit": {"parts": "one"}, "segment": {"enabled": False}}]
+)
+def test_a_roof_is_the_same_without_what_it_does_not_ask_for(arguments, hide_package):
+    settings = Settings.from_dict(arguments)
+    old = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
     hide_package("onnxruntime"), hide_package("rasterio")
-    after = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
-    assert after.type == "gable" and np.array_equal(after.solid.vertices, before.solid.vertices)
+    new = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
+    assert new.type == "gable" and np.array_equal(new.solid.vertices, old.solid.vertices)
 
 
 def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(
@@ -244,10 +246,10 @@ def test_the_demo_asks_for_no_extra(tmp_path):
             str(tmp_path / names[:7]),
             names,
         ]
-        done = subprocess.run(
+        process = subprocess.run(
             arguments, capture_output=True, text=True, env=ENVIRONMENT, check=True
         )
-        assert done.stdout.splitlines()[-1] == "0 []"
+        assert process.stdout.splitlines()[-1] == "0 []"
     models = [path.read_bytes() for path in tmp_path.glob("*/buildings.gml")]
     assert len(models) == 2 and models[0] == models[1]
 
@@ -263,15 +265,24 @@ def list_names(requirements):
 
 def test_each_sentence_names_the_extra_that_brings_the_package():
     sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
-    found = set(re.findall(r'(?<!>> )import_extra\("(\w+)[\w.]*", "(\w+)"', sources))
-    assert found == {*PACKAGES.items(), ("fsspec", "parquet")}
-    assert [pair for pair in found if pair[0] not in list_names(OPTIONAL[pair[1]])] == []
+    pairs = set(re.findall(r'(?<!>> )import_extra\("(\w+)[\w.]*", "(\w+)"', sources))
+    assert pairs == {*PACKAGES.items(), ("fsspec", "parquet")}
+    assert [pair for pair in pairs if pair[0] not in list_names(OPTIONAL[pair[1]])] == []
     assert list_names(PROJECT["dependencies"]).isdisjoint(PACKAGES)
     assert list_names(OPTIONAL["all"]) == {"hiproof", *PACKAGES.values()}
 
 
 def test_the_page_of_installing_tells_of_every_extra():
     text = (ROOT / "docs/install.md").read_text(encoding="utf-8")
-    ours = {"lint", "test", "experiments", "all"}  # those who develop hiproof have a Makefile
-    assert [extra for extra in OPTIONAL if extra not in ours and f"| `{extra}` |" not in text] == []
+    developer_extras = {
+        "lint",
+        "test",
+        "experiments",
+        "all",
+    }  # those who develop hiproof have a Makefile
+    assert [
+        extra
+        for extra in OPTIONAL
+        if extra not in developer_extras and f"| `{extra}` |" not in text
+    ] == []
     assert "hiproof[all]" in text

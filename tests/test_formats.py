@@ -43,11 +43,11 @@ def test_a_format_has_what_its_kind_needs(name):
 
 def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run():
     assert len({format.file for format in FORMATS.values()}) == len(FORMATS)
-    told = README.read_text()
+    readme = README.read_text()
     assert [
         file.name
         for file in requested_files(Settings(), Path()).values()
-        if f"`{file.name}`" not in told
+        if f"`{file.name}`" not in readme
     ] == []
 
 
@@ -102,15 +102,15 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
 )
 def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
     settings = Settings.from_dict({"write": {"citygml": version}, "city": {"models": "both"}})
-    asked = requested_files(settings, tmp_path)
-    assert [file.name for file in asked.values() if file.suffix == ".gml"] == files
+    request = requested_files(settings, tmp_path)
+    assert [file.name for file in request.values() if file.suffix == ".gml"] == files
     by_tile = requested_tile_files(settings, tmp_path, "0_0_0").values()
     assert [file.name for file in by_tile if file.suffix == ".gml"] == [
         name.replace("buildings", "0_0_0") for name in files
     ]
     head = FileHead("EPSG:7415", offset=np.array([85000.0, 446000.0, 0.0]), write=settings.write)
     building = make_building(gable_house(), "a")
-    join_fragments(asked, [fragments(building, ("a", "a"), head)[1]], head)
+    join_fragments(request, [fragments(building, ("a", "a"), head)[1]], head)
     if version == "both":
         write_citygml3(tmp_path / "alone.gml", [building], "EPSG:7415")
-        assert (tmp_path / "alone.gml").read_bytes() == asked["gml3"].read_bytes()
+        assert (tmp_path / "alone.gml").read_bytes() == request["gml3"].read_bytes()

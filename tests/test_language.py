@@ -38,8 +38,8 @@ def test_sentences_are_short_on_the_whole():
         for page in PAGES
         if page.parent.name == "docs"
     ]
-    every = sorted(n for page in docs for n in page)
-    assert every[int(0.9 * len(every))] <= DOCS_P90
+    counts = sorted(n for page in docs for n in page)
+    assert counts[int(0.9 * len(counts))] <= DOCS_P90
 
 
 def test_prose_is_told_from_code_and_tables():

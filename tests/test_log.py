@@ -47,20 +47,22 @@ def test_secrets_are_masked_in_messages_arguments_and_tracebacks(tmp_path, capsy
     except ValueError:
         log.LOGGER.error("at %s", "postgresql://u:s3cret@host", exc_info=True)
     warnings.warn("https://u:s3cret@host/a.laz is odd", InputWarning)
-    told = capsys.readouterr().err + (tmp_path / "run.log").read_text()
-    assert told.count("Traceback") == told.count("is odd") == 2 and "s3cret" not in told
+    output = capsys.readouterr().err + (tmp_path / "run.log").read_text()
+    assert output.count("Traceback") == output.count("is odd") == 2 and "s3cret" not in output
 
 
 def test_what_other_packages_say_is_for_debugging_alone(tmp_path, capsys):
     """NumPy's warnings and rasterio's remarks in their own words help nobody who did not write
     this.
     """
-    for level, shown in (("warning", 0), ("debug", 1)):
+    for level, n_lines in (("warning", 0), ("debug", 1)):
         log.start(log.Level(level), tmp_path / f"{level}.log")
         warnings.warn(f"invalid value encountered in {level}", RuntimeWarning)
         logging.getLogger("rasterio._env").warning("CPLE_AppDefined in a.tif")
-        told = capsys.readouterr().err
-        assert told.count("invalid value encountered") == told.count("CPLE_AppDefined") == shown
+        output = capsys.readouterr().err
+        assert (
+            output.count("invalid value encountered") == output.count("CPLE_AppDefined") == n_lines
+        )
 
 
 def test_starting_again_adds_to_the_file_and_repeats_nothing(tmp_path, capsys):
@@ -98,11 +100,12 @@ def test_the_file_tells_of_every_step_and_of_lost_workers(
     log.start(log.Level.debug, tmp_path / "run.log")
     reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], processes=2))
     lines = read_lines(tmp_path / "run.log")
-    told = "\n".join(f"{level} {text}" for level, text in lines)
-    assert "INFO version" in told and "4 buildings in 1 work tile\n" in told
-    assert "INFO sort:0 is done" in told and "is done: 4 buildings" in told
+    message = "\n".join(f"{level} {text}" for level, text in lines)
+    assert "INFO version" in message and "4 buildings in 1 work tile\n" in message
+    assert "INFO sort:0 is done" in message and "is done: 4 buildings" in message
     assert (
-        "WARNING solve:" in told and "was lost (a worker process died) and is tried again" in told
+        "WARNING solve:" in message
+        and "was lost (a worker process died) and is tried again" in message
     )
     assert (
         sum(level == "DEBUG" and text.startswith("building house-") for level, text in lines) == 4
@@ -116,11 +119,11 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
 
     monkeypatch.setattr("hiproof.cli.running.reconstruct_area", refuse)
     (tmp_path / "a.laz").write_bytes(b"LASF")
-    asked = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
+    arguments = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
     monkeypatch.setattr(
         sys,
         "argv",
-        ["hiproof", *asked, "--log-file", str(tmp_path / "run.log"), "--log-level", "error"],
+        ["hiproof", *arguments, "--log-file", str(tmp_path / "run.log"), "--log-level", "error"],
     )
     with pytest.raises(SystemExit) as ended:
         main()
@@ -152,12 +155,12 @@ def test_a_full_disk_ends_the_log_and_not_the_work(tmp_path, capsys):
     log.start(file=Path("/dev/full"))
     for number in range(3):
         log.LOGGER.warning("warning %d", number)
-    told = capsys.readouterr().err.splitlines()
+    output = capsys.readouterr().err.splitlines()
     full = (
         "hiproof: expected to write the log to /dev/full, got: No space left on device; the work "
         "goes on without the log"
     )
-    assert sorted(told) == sorted([full, *(f"hiproof: warning {number}" for number in range(3))])
+    assert sorted(output) == sorted([full, *(f"hiproof: warning {number}" for number in range(3))])
     log.start(file=tmp_path / "run.log")
     log.LOGGER.warning("kept")
     assert read_lines(tmp_path / "run.log") == [("WARNING", "kept")]

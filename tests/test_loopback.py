@@ -39,8 +39,8 @@ def page(request, tmp_path, monkeypatch, capfd):
         server, start = make_server(folder, "run"), "/"
     with serve(server):
         yield server.server_port, start
-    said = capfd.readouterr()
-    assert said.out + said.err == ""
+    output = capfd.readouterr()
+    assert output.out + output.err == ""
 
 
 @contextmanager
@@ -57,10 +57,10 @@ def send(port, text, wait_s=20.0):
     """What comes back for bytes sent, until the server closes the line."""
     with socket.create_connection(("127.0.0.1", port), timeout=wait_s) as line:
         line.sendall(text)
-        found = b""
-        while some := line.recv(65536):
-            found += some
-        return found
+        answer = b""
+        while chunk := line.recv(65536):
+            answer += chunk
+        return answer
 
 
 def request(port, target, method="GET", host=None, *more, body=b""):
@@ -106,7 +106,7 @@ def test_head_is_get_without_a_body(page):
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "POST"])
 @pytest.mark.parametrize(
-    "more",
+    "headers",
     [
         ("evil.example",),
         ("127.0.0.1:1",),
@@ -117,9 +117,9 @@ def test_head_is_get_without_a_body(page):
         (None, "Host: evil.example"),
     ],
 )
-def test_foreign_pages_and_names_are_refused(page, method, more):
+def test_foreign_pages_and_names_are_refused(page, method, headers):
     port, start = page
-    answer = send(port, request(port, start, method, *more, "Content-Length: 2", body=b"{}"))
+    answer = send(port, request(port, start, method, *headers, "Content-Length: 2", body=b"{}"))
     assert code(answer) == 403 and b"<html" not in answer
 
 
@@ -266,13 +266,13 @@ def test_many_connections_at_once_leave_room(page, monkeypatch):
 
 
 def test_closing_waits_for_an_answer_on_its_way():
-    begun, done = threading.Event(), []
+    begun, answers = threading.Event(), []
 
     class Slow(loopback.LoopbackHandler):
         def answer(self, method, body):
             begun.set()
             time.sleep(0.3)
-            done.append(method)
+            answers.append(method)
             return loopback.Answer(200, b"")
 
     with loopback.LoopbackServer(Slow) as server:
@@ -283,5 +283,5 @@ def test_closing_waits_for_an_answer_on_its_way():
         ).start()
         begun.wait(10)
         server.shutdown()
-        assert done == []
-    assert done == ["POST"]
+        assert answers == []
+    assert answers == ["POST"]

@@ -108,8 +108,8 @@ def test_an_error_of_our_own_shows_its_traceback_without_secrets(monkeypatch, ca
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 1
-    told = capsys.readouterr().err
-    assert "planted" in told and "Traceback" in told and "s3cret" not in told
+    output = capsys.readouterr().err
+    assert "planted" in output and "Traceback" in output and "s3cret" not in output
 
 
 def test_errors_that_cross_processes_stay_masked():

@@ -162,10 +162,10 @@ def test_a_configuration_begins_or_gets_one_sentence(
     )
     with pytest.raises(SystemExit) as ended:
         main()
-    told = capsys.readouterr().err
-    assert (ended.value.code, len(begun)) == ((0, 1) if expected is RUNS else (2, 0)), told
-    assert "Traceback" not in told
+    output = capsys.readouterr().err
+    assert (ended.value.code, len(begun)) == ((0, 1) if expected is RUNS else (2, 0)), output
+    assert "Traceback" not in output
     if expected is not RUNS:
-        assert expected in told and len(told) < 1000
-        assert told.startswith(("hiproof: expected ", "Usage: "))
+        assert expected in output and len(output) < 1000
+        assert output.startswith(("hiproof: expected ", "Usage: "))
     assert not (tmp_path / "out").exists()

@@ -68,9 +68,9 @@ def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(gable_
         def height_at(self, xy):
             return np.full(len(xy), 50.0)
 
-    for said, is_told in (({"type": "gable"}, True), ({"z_ground": 1.0}, False)):
+    for overrides, is_told in (({"type": "gable"}, True), ({"z_ground": 1.0}, False)):
         house = overridden(
-            read_override({"id": "a", **said}), *gable_scan, Above(), settings=PLAIN, id="a"
+            read_override({"id": "a", **overrides}), *gable_scan, Above(), settings=PLAIN, id="a"
         )
         assert ("above its eaves" in house.detail) == is_told
 
@@ -89,8 +89,8 @@ def test_no_more_parts_than_asked_for():
     z = np.where(xy[:, 0] < 10, 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0), 3.0)
     scan = np.column_stack([xy, z]), shapely.box(0, 0, 16, 8)
     assert len(hiproof.reconstruct(*scan, settings=PLAIN).parts) == 2
-    one = override(scan, parts=1)
-    assert len(one.parts) == 1 and not check_solid(one.solid)
+    single_part = override(scan, parts=1)
+    assert len(single_part.parts) == 1 and not check_solid(single_part.solid)
 
 
 def test_parts_given_stand_where_the_run_moved_the_footprint():
@@ -100,13 +100,17 @@ def test_parts_given_stand_where_the_run_moved_the_footprint():
     rng = np.random.default_rng(3)
     xy = rng.uniform((0, 0), (12, 8), (800, 2))
     scan = np.column_stack([xy, 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0) + rng.normal(0, 0.02, len(xy))])
-    beside = shapely.box(0.9, -1.1, 12.9, 6.9)
-    house = hiproof.reconstruct(scan, beside, settings=PLAIN, id="a")
+    moved_footprint = shapely.box(0.9, -1.1, 12.9, 6.9)
+    house = hiproof.reconstruct(scan, moved_footprint, settings=PLAIN, id="a")
     assert np.hypot(*house.shift) > 1.0
-    again = overridden(read_override(building_record(house)), scan, beside, settings=PLAIN, id="a")
-    assert again.shift == house.shift and np.array_equal(again.solid.vertices, house.solid.vertices)
-    assert again.quality == house.quality and "moved by" in again.detail
-    block = override((scan, beside), block_height=6.0, z_ground=1.0)
+    rebuilt = overridden(
+        read_override(building_record(house)), scan, moved_footprint, settings=PLAIN, id="a"
+    )
+    assert rebuilt.shift == house.shift and np.array_equal(
+        rebuilt.solid.vertices, house.solid.vertices
+    )
+    assert rebuilt.quality == house.quality and "moved by" in rebuilt.detail
+    block = override((scan, moved_footprint), block_height=6.0, z_ground=1.0)
     assert block.shift == house.shift and block.roof.outline.area == pytest.approx(96.0, abs=0.01)
 
 
@@ -114,8 +118,12 @@ def test_ground_block_and_leaving_out(gable_scan):
     assert override(gable_scan, z_ground=1.5).solid.vertices[:, 2].min() == pytest.approx(1.5)
     block = override(gable_scan, block_height=6.0, z_ground=1.0)
     assert block.type == "flat" and np.ptp(block.solid.vertices[:, 2]) == pytest.approx(6.0)
-    left = override(gable_scan, leave_out=True, note="torn down")
-    assert left.status is Status.LEFT_OUT and left.built is None and "torn down" in left.detail
+    omitted = override(gable_scan, leave_out=True, note="torn down")
+    assert (
+        omitted.status is Status.LEFT_OUT
+        and omitted.built is None
+        and "torn down" in omitted.detail
+    )
 
 
 def test_a_block_around_a_courtyard_needs_no_points(gable_scan):
@@ -149,7 +157,7 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(gable_scan):
 
 
 @pytest.mark.parametrize(
-    ("said", "message"),
+    ("overrides", "message"),
     [
         ({}, "expected the id"),
         ({"id": "a", "colour": "red"}, "got also colour"),
@@ -186,9 +194,9 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(gable_scan):
         ("hip", "an object as an override"),
     ],
 )
-def test_what_an_override_cannot_say_is_one_sentence(said, message):
+def test_what_an_override_cannot_say_is_one_sentence(overrides, message):
     with pytest.raises(InputError, match=message):
-        read_override(said)
+        read_override(overrides)
 
 
 @pytest.fixture
@@ -256,8 +264,8 @@ def points_read(out):
     )
 
 
-@pytest.mark.parametrize("kept", ["noted", "lost", "of another file"])
-def test_what_is_redone_reads_the_points_near_it_alone(kept, tmp_path, monkeypatch):
+@pytest.mark.parametrize("keeps_points", ["noted", "lost", "of another file"])
+def test_what_is_redone_reads_the_points_near_it_alone(keeps_points, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
     town, out, path = make_town(), tmp_path / "out", tmp_path / "o.jsonl"
     flown = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
@@ -266,14 +274,14 @@ def test_what_is_redone_reads_the_points_near_it_alone(kept, tmp_path, monkeypat
     city_run.reconstruct_area(request(files, out, None))
     assert points_read(out) == len(town.xyz)
     noted = noted_file(out / ".hiproof", 0)
-    if kept == "lost":
+    if keeps_points == "lost":
         noted.unlink()
-    elif kept == "of another file":
+    elif keeps_points == "of another file":
         save_run_boxes(noted, [np.zeros((3, 4))], 150)
     lines = ({"id": "house-0", "ridge_height": 8.0},)
     city_run.reconstruct_area(request(files, out, path, *lines))
-    again = points_read(out)
-    assert again < 0.7 * len(town.xyz) if kept == "noted" else again == len(town.xyz)
+    n_points = points_read(out)
+    assert n_points < 0.7 * len(town.xyz) if keeps_points == "noted" else n_points == len(town.xyz)
     city_run.reconstruct_area(request(files, tmp_path / "new", path, *lines))
     assert records(out) == records(tmp_path / "new")
 
@@ -310,10 +318,10 @@ def test_a_runs_own_parameters_are_overrides_that_change_nothing(
     city_run.reconstruct_area(
         hiproof.Request(**{**vars(ask), "overrides": str(first / "parameters.jsonl")})
     )
-    was, now = by_id(first), by_id(tmp_path / "again")
-    for id in was:
-        assert now[id]["parts"] == was[id]["parts"] and now[id]["z_ground"] == was[id]["z_ground"]
-        assert now[id]["residuals"] == was[id]["residuals"]
+    old, new = by_id(first), by_id(tmp_path / "again")
+    for id in old:
+        assert new[id]["parts"] == old[id]["parts"] and new[id]["z_ground"] == old[id]["z_ground"]
+        assert new[id]["residuals"] == old[id]["residuals"]
 
 
 def columns_request(town_files, tmp_path, pair):
@@ -379,8 +387,8 @@ def test_a_ground_of_0_counts_and_codes_are_left_out_and_told(tmp_path, kind):
 
 def test_a_ridge_at_0_counts(tmp_path):
     town = make_town(houses=1)
-    low = dataclasses.replace(town, xyz=town.xyz - [0, 0, 10.0])
-    (row,) = columns_run(tmp_path, "ridge_height", [0.0], low).values()
+    lowered = dataclasses.replace(town, xyz=town.xyz - [0, 0, 10.0])
+    (row,) = columns_run(tmp_path, "ridge_height", [0.0], lowered).values()
     assert "overridden: ridge_height 0.0" in row["detail"]
     (part,) = row["parts"]
     assert part["position"][2] + row["origin"][2] + part["parameters"]["height"] == pytest.approx(
@@ -407,9 +415,13 @@ def test_a_ground_given_far_from_the_ground_points_is_obeyed_and_told(tmp_path):
     )
 
 
-@pytest.mark.parametrize("said", [{"leave_out": True}, {"block_height": 5.0}, {"types": ["gable"]}])
-def test_where_a_file_says_something_else_than_columns_the_file_counts(town_files, tmp_path, said):
-    (tmp_path / "o.jsonl").write_text(json.dumps({"id": "house-0", "type": "", **said}))
+@pytest.mark.parametrize(
+    "overrides", [{"leave_out": True}, {"block_height": 5.0}, {"types": ["gable"]}]
+)
+def test_where_a_file_says_something_else_than_columns_the_file_counts(
+    town_files, tmp_path, overrides
+):
+    (tmp_path / "o.jsonl").write_text(json.dumps({"id": "house-0", "type": "", **overrides}))
     request = columns_request(town_files, tmp_path, "daktype=type")
     city_run.reconstruct_area(dataclasses.replace(request, overrides=str(tmp_path / "o.jsonl")))
     house = by_id(tmp_path / "out")["house-0"]
@@ -456,13 +468,13 @@ def test_a_table_of_typed_columns_says_what_it_says_where_rows_leave_gaps(tmp_pa
 
 
 @pytest.mark.parametrize(
-    "text, told",
+    "text, value",
     [("yes", True), ("Y", True), ("1.0", True), ("no", False), ("0", False), ("", None)],
 )
-def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, text, told):
+def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, text, value):
     (tmp_path / "o.csv").write_text(f"id,leave_out\na,{text}\n")
     (row,) = table_records(str(tmp_path / "o.csv"))
-    assert read_override(row).leave_out == bool(told)
+    assert read_override(row).leave_out == bool(value)
     (tmp_path / "o.csv").write_text("id,leave_out\na,perhaps\n")
     with pytest.raises(InputError, match="true or false as leave_out"):
         read_override(*table_records(str(tmp_path / "o.csv")))

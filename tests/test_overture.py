@@ -55,26 +55,26 @@ def town_rows():
     others far away.
     """
     houses = list(TOWN.footprints.items())
-    known = dict(height=8.5, num_floors=2, roof_shape="gabled", min_height=0.0)
-    near = [building(f"gers-{id}", convert_to_degrees(area)) for id, area in houses]
-    near[0] |= known
-    near[1]["sources"] = [OSM, GOOGLE]
+    attributes = dict(height=8.5, num_floors=2, roof_shape="gabled", min_height=0.0)
+    nearby = [building(f"gers-{id}", convert_to_degrees(area)) for id, area in houses]
+    nearby[0] |= attributes
+    nearby[1]["sources"] = [OSM, GOOGLE]
     cellar = building(
         "gers-cellar", convert_to_degrees(shift(houses[0][1], 2)), is_underground=True
     )
-    beside = building("gers-beside", convert_to_degrees(shift(houses[0][1], 0, 60)))
+    neighbour = building("gers-beside", convert_to_degrees(shift(houses[0][1], 0, 60)))
     # of so many vertices that a row group is larger than what readers take for a file's end
     detailed = shapely.segmentize(houses[0][1], 0.02)
-    far = [
+    distant = [
         building(f"gers-far-{i}", convert_to_degrees(shift(detailed, 3000 + 100 * i)))
         for i in range(40)
     ]
-    return near, [cellar, beside], far
+    return nearby, [cellar, neighbour], distant
 
 
-def first_byte(told, group):
+def first_byte(metadata, group):
     """Where a row group begins in its file."""
-    columns = [told.row_group(group).column(i) for i in range(told.num_columns)]
+    columns = [metadata.row_group(group).column(i) for i in range(metadata.num_columns)]
     return min(c.dictionary_page_offset or c.data_page_offset for c in columns)
 
 
@@ -90,11 +90,11 @@ def served_release(tmp_path, monkeypatch):
     folder, log = tmp_path / "served", tmp_path / "ranges"
     folder.mkdir()
     log.touch()
-    near, odd, far = town_rows()
+    nearby, odd, distant = town_rows()
     with serve(folder, log) as address:
         # the far ones of the first file stand in row groups of their own
-        parts = [building("gers-part", near[0]["outline"], building_id="gers-house-0")]
-        files = {"building": [near + far[:20], odd + far[20:30], far[30:]]}
+        parts = [building("gers-part", nearby[0]["outline"], building_id="gers-house-0")]
+        files = {"building": [nearby + distant[:20], odd + distant[20:30], distant[30:]]}
         catalogue = write_release(folder, address, files | {"building_part": [parts]})
         settings = Settings.from_dict(
             {"read": {"overture_catalogue": catalogue}, "reconstruct": {"align": "off"}}
@@ -116,11 +116,11 @@ def test_a_run_takes_the_buildings_of_the_clouds_extent(served_release, tmp_path
     out = tmp_path / "out"
     summary = reconstruct_area(Request((str(cloud),), out, "overture", settings=settings))
     assert summary.buildings == len(TOWN.footprints)
-    known = {f.id: f for f in read_footprints(out / ".hiproof/overture.gpkg", target_crs=CRS)}
-    assert sorted(known) == sorted(f"gers-{id}" for id in TOWN.footprints)
+    footprints = {f.id: f for f in read_footprints(out / ".hiproof/overture.gpkg", target_crs=CRS)}
+    assert sorted(footprints) == sorted(f"gers-{id}" for id in TOWN.footprints)
     for id, area in TOWN.footprints.items():
-        assert shapely.hausdorff_distance(known[f"gers-{id}"].polygon, area) < 1e-3
-    assert known["gers-house-0"].attributes == {
+        assert shapely.hausdorff_distance(footprints[f"gers-{id}"].polygon, area) < 1e-3
+    assert footprints["gers-house-0"].attributes == {
         "id": "gers-house-0",
         "height": 8.5,
         "min_height": 0.0,
@@ -164,23 +164,27 @@ def test_settings_beside_are_not_looked_for_where_overture_is(
 
 def test_a_kept_file_gives_the_same_models(served_release, tmp_path, monkeypatch, capsys):
     cloud, settings, _ = served_release
-    config, kept = tmp_path / "settings.toml", tmp_path / "kept.gpkg"
+    config, stored = tmp_path / "settings.toml", tmp_path / "kept.gpkg"
     config.write_text(settings.to_toml())
-    assert command(monkeypatch, "footprints", cloud, "--out", kept, "--config", config) == 0
-    told = capsys.readouterr().out
+    assert command(monkeypatch, "footprints", cloud, "--out", stored, "--config", config) == 0
+    output = capsys.readouterr().out
     other = tmp_path / "kept.geojson"
     assert command(monkeypatch, "footprints", cloud, "--out", other, "--config", config) == 2
     assert "expected --out to name a GeoPackage" in capsys.readouterr().err
-    assert f"{kept}: 4 footprints of Overture Maps {RELEASE} (ODbL-1.0" in told
-    _, _, _, columns = pyogrio.raw.read(kept, columns=["id", "height", "num_floors", "roof_shape"])
+    assert f"{stored}: 4 footprints of Overture Maps {RELEASE} (ODbL-1.0" in output
+    _, _, _, columns = pyogrio.raw.read(
+        stored, columns=["id", "height", "num_floors", "roof_shape"]
+    )
     first = [column[0] for column in columns]
     assert first == ["gers-house-0", 8.5, 2, "gabled"]
-    for name, footprints in (("direct", "overture"), ("kept", str(kept))):
+    for name, footprints in (("direct", "overture"), ("kept", str(stored))):
         request = Request((str(cloud),), tmp_path / name, footprints, settings=settings)
         reconstruct_area(request)
     for name in RECORDS:
-        direct, again = ((tmp_path / folder / name).read_bytes() for folder in ("direct", "kept"))
-        assert direct == again
+        direct, from_file = (
+            (tmp_path / folder / name).read_bytes() for folder in ("direct", "kept")
+        )
+        assert direct == from_file
     notes = [
         json.loads((tmp_path / folder / "run.json").read_text())["footprints_source"]
         for folder in ("direct", "kept")
@@ -195,18 +199,19 @@ def test_only_the_row_groups_that_meet_the_extent_are_fetched(
     config = tmp_path / "settings.toml"
     config.write_text(settings.to_toml())
     command(monkeypatch, "footprints", cloud, "--out", tmp_path / "a.gpkg", "--config", config)
-    asked = {}
+    request = {}
     for line in log.read_text().splitlines():
         path, start, stop = line.split()
-        asked.setdefault(path.lstrip("/"), []).append((int(start), int(stop)))
-    assert sorted(path.rpartition("/")[2][:10] for path in asked) == ["part-00000", "part-00001"]
-    for path, ranges in asked.items():
-        told = pyarrow.ParquetFile(tmp_path / "served" / path).metadata
+        request.setdefault(path.lstrip("/"), []).append((int(start), int(stop)))
+    assert sorted(path.rpartition("/")[2][:10] for path in request) == ["part-00000", "part-00001"]
+    for path, ranges in request.items():
+        metadata = pyarrow.ParquetFile(tmp_path / "served" / path).metadata
         size = (tmp_path / "served" / path).stat().st_size
-        assert told.num_row_groups > 2
+        assert metadata.num_row_groups > 2
         # the row group that holds the town with what is buffered, and the file's end
         assert all(
-            stop <= first_byte(told, 2) or start >= size - FOOTER_BYTES for start, stop in ranges
+            stop <= first_byte(metadata, 2) or start >= size - FOOTER_BYTES
+            for start, stop in ranges
         )
 
 
@@ -245,6 +250,8 @@ def test_clouds_across_the_180th_meridian_are_refused(served_release, tmp_path):
 
 def test_a_run_without_a_network_is_refused_in_one_sentence(served_release, tmp_path):
     cloud, _, _ = served_release
-    gone = Settings.from_dict({"read": {"overture_catalogue": "http://127.0.0.1:9/catalog.json"}})
+    settings = Settings.from_dict(
+        {"read": {"overture_catalogue": "http://127.0.0.1:9/catalog.json"}}
+    )
     with pytest.raises(InputError, match=r"^expected a STAC catalogue at http://127.+network$"):
-        reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=gone))
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=settings))

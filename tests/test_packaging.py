@@ -21,11 +21,11 @@ OURS = {name for name in OURS if "__pycache__" not in name}
 
 
 def run(*command, **options):
-    done = subprocess.run(
+    process = subprocess.run(
         list(map(str, command)), capture_output=True, text=True, check=False, **options
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert process.returncode == 0, process.stderr
+    return process.stdout
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +82,10 @@ def installed_python(archive_and_wheel, tmp_path_factory):
     ]
     (site / "dependencies.pth").write_text("\n".join(dependencies), encoding="utf-8")
     # compiled code belongs to its sources, and these are the same
-    for kept in PACKAGE.rglob("*.nbc"):
-        place = site / "hiproof" / kept.relative_to(PACKAGE)
+    for file in PACKAGE.rglob("*.nbc"):
+        place = site / "hiproof" / file.relative_to(PACKAGE)
         place.parent.mkdir(exist_ok=True)
-        shutil.copy2(kept, place)
+        shutil.copy2(file, place)
     return python
 
 
@@ -113,8 +113,8 @@ def test_the_installed_wheel_is_imported_and_models_the_demo(installed_python, t
     assert Path(place).is_relative_to(installed_python.parents[1])
     command = installed_python.with_name("hiproof.exe" if os.name == "nt" else "hiproof")
     assert run(command, "--version", env=environment).split() == ["hiproof", version]
-    said = run(command, "demo", tmp_path / "demo", env=environment)
-    assert "26 buildings" in said and (tmp_path / "demo/buildings.gml").stat().st_size > 10_000
+    output = run(command, "demo", tmp_path / "demo", env=environment)
+    assert "26 buildings" in output and (tmp_path / "demo/buildings.gml").stat().st_size > 10_000
 
 
 def test_a_citation_names_the_version_that_is_there():

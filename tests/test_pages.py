@@ -58,8 +58,8 @@ def view(folder):
 
 def is_whole(places):
     """Whether a scene lies in the canvas and fills it."""
-    low, high = np.min(places, axis=0), np.max(places, axis=0)
-    return bool((low >= 0).all() and (high <= 1).all() and (high - low).max() >= FILLED)
+    lower, upper = np.min(places, axis=0), np.max(places, axis=0)
+    return bool((lower >= 0).all() and (upper <= 1).all() and (upper - lower).max() >= FILLED)
 
 
 @at_every_size
@@ -70,16 +70,16 @@ def test_the_viewer_shows_the_whole_scene(browser, view, size):
         for shape in (size, size[::-1]):
             page.set_viewport_size({"width": shape[0], "height": shape[1]})
             page.wait_for_timeout(200)
-            for seen in ("scene.home()", "scene.turn(2, 0)", "scene.turn(0, 1.5)"):
-                page.evaluate(f"() => {{ {seen}; }}")
+            for action in ("scene.home()", "scene.turn(2, 0)", "scene.turn(0, 1.5)"):
+                page.evaluate(f"() => {{ {action}; }}")
                 assert is_whole(project_on_canvas(page, "scene", "scene.layers[0].tile.corners"))
 
 
 @at_every_size
 def test_the_report_shows_the_whole_scene_and_a_whole_building(browser, report, size):
     with open_page(browser, report, size) as page:
-        for seen in ("viewer.home()", "viewer.turn(2, 0)", "viewer.turn(0, 1.5)"):
-            page.evaluate(f"() => {{ {seen}; }}")
+        for action in ("viewer.home()", "viewer.turn(2, 0)", "viewer.turn(0, 1.5)"):
+            page.evaluate(f"() => {{ {action}; }}")
             assert is_whole(project_on_canvas(page, "viewer", "mesh.corners"))
         page.fill("#find", "house-1")
         page.keyboard.press("Enter")
@@ -115,15 +115,15 @@ def test_the_viewer_works_by_keys(browser, view):
         page.evaluate(READY)
         assert list_tab_stops(page, 2) == ["scene", "details-of"]
         page.focus("#scene")
-        before = page.evaluate("() => [scene.azimuth, scene.elevation, scene.distance]")
+        old_view = page.evaluate("() => [scene.azimuth, scene.elevation, scene.distance]")
         for key in ("ArrowRight", "ArrowDown", "+"):
             page.keyboard.press(key)
         azimuth, elevation, distance = page.evaluate(
             "() => [scene.azimuth, scene.elevation, scene.distance]"
         )
-        assert azimuth < before[0] and elevation > before[1] and distance < before[2]
+        assert azimuth < old_view[0] and elevation > old_view[1] and distance < old_view[2]
         page.keyboard.press("Home")
-        assert page.evaluate("() => scene.distance") == pytest.approx(before[2])
+        assert page.evaluate("() => scene.distance") == pytest.approx(old_view[2])
         first = "scene.layers[0].tile.corners.subarray(0, 9)"
         page.evaluate(f"() => {{ scene.target = sphereOf({first}).middle; }}")
         page.keyboard.press("Enter")
@@ -135,9 +135,9 @@ def test_the_viewer_works_by_keys(browser, view):
 def test_the_report_works_by_keys(browser, report):
     with open_page(browser, report, SIZES["laptop"]) as page:
         stops = ["mode", "find", "map", "bare: unknown, no model", "scene", "show-points", "panel"]
-        found = list_tab_stops(page, 9)
-        assert [name.split(":")[0] for name in found[:7]] == [name.split(":")[0] for name in stops]
-        assert found[7:] == ["figures by roof type", "block 2"]
+        result = list_tab_stops(page, 9)
+        assert [name.split(":")[0] for name in result[:7]] == [name.split(":")[0] for name in stops]
+        assert result[7:] == ["figures by roof type", "block 2"]
         page.keyboard.press("Enter")
         assert "block 2" in page.inner_text("#details")
         page.focus("#map")
@@ -161,10 +161,10 @@ def test_a_notebook_shows_whole_houses_whichever_way_they_turn(browser, tmp_path
         assert all(name.startswith("hiproof-") for name in list_tab_stops(page, 2))
         for key in ("ArrowRight", "ArrowDown") * 8:
             page.keyboard.press(key)
-            over = page.evaluate(
+            overflow = page.evaluate(
                 "() => [...document.querySelectorAll('svg')].map(svg => {"
                 "const { x, y, width, height } = svg.getBBox(), box = svg.viewBox.baseVal;"
                 "return Math.max(box.x - x, box.y - y, x + width - box.x - box.width,"
                 "y + height - box.y - box.height); })"
             )
-            assert max(over) <= 0
+            assert max(overflow) <= 0

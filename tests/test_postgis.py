@@ -206,18 +206,18 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
     folder, buildings = run_of_two
     load_postgis(folder, database, "told")
     with psycopg.connect(database) as connection:
-        told = connection.execute(
+        rows = connection.execute(
             "select id, status, roof_type from told_buildings order by id"
         ).fetchall()
-        assert told == sorted((b.id, b.status.code, b.type) for b in buildings)
+        assert rows == sorted((b.id, b.status.code, b.type) for b in buildings)
         types = connection.execute(
             "select distinct building_id, type from told_roofs order by 1"
         ).fetchall()
         assert types == [("house", "gable"), ("yard", "flat")]
-        told = connection.execute(
+        rows = connection.execute(
             "select building_id, part, type, width, ridge_length from told_parts order by 1"
         )
-        assert told.fetchall() == [("house", 0, "gable", 8.0, None), ("yard", 0, "flat", 8.0, None)]
+        assert rows.fetchall() == [("house", 0, "gable", 8.0, None), ("yard", 0, "flat", 8.0, None)]
         sql = (
             "select GeometryType(geom), ST_Area(geom), area_m2 from told_parts where building_id = "
             "'house'"
@@ -242,8 +242,8 @@ def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
     )
     with psycopg.connect(database) as connection:
         sql = f"select {', '.join(meta['fields'])} from map_roofs order by building_id desc, number"
-        found = np.array(connection.execute(sql).fetchall(), float)
-    np.testing.assert_allclose(found, np.array(columns).T, rtol=1e-4)
+        rows = np.array(connection.execute(sql).fetchall(), float)
+    np.testing.assert_allclose(rows, np.array(columns).T, rtol=1e-4)
 
 
 def read_documented_query(number, prefix):
@@ -276,11 +276,11 @@ def test_the_documented_question_of_rectangles(database, tmp_path):
     load_postgis(tmp_path / "run", database, "whole")
     with psycopg.connect(database) as connection:
         ((_, _, rectangle),) = connection.execute(read_documented_query(0, "whole")).fetchall()
-        (shown,) = connection.execute("select ST_AsBinary(geom) from whole_parts").fetchone()
+        (geometry,) = connection.execute("select ST_AsBinary(geom) from whole_parts").fetchone()
     expected = affinity.translate(affinity.rotate(shapely.box(-6, -4, 6, 4), 30.0), 85000, 446000)
     assert shapely.from_wkb(rectangle).symmetric_difference(expected).area < 0.01
     outline = shapely.box(84994, 445996, 85006, 446004)
-    assert shapely.from_wkb(shown).symmetric_difference(outline).area < 0.01
+    assert shapely.from_wkb(geometry).symmetric_difference(outline).area < 0.01
 
 
 def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_two):
@@ -306,10 +306,10 @@ def test_loading_again_replaces_the_run_whatever_its_reference_system(database, 
     write_attributes(folder / "buildings.gpkg", buildings[1:], "EPSG:25832")
     load_postgis(folder, database, "again")
     with psycopg.connect(database) as connection:
-        left = connection.execute(
+        tables = connection.execute(
             "select distinct id, ST_SRID(geom) from again_buildings order by 1"
         ).fetchall()
-        assert left == [("lost", None), ("yard", 25832)]
+        assert tables == [("lost", None), ("yard", 25832)]
         assert connection.execute("select distinct building_id from again_roofs").fetchall() == [
             ("yard",)
         ]
@@ -364,12 +364,12 @@ def test_the_longest_prefix_keeps_every_index_apart(database, tmp_path):
     longest = "p" * 48
     load_postgis(tmp_path / "run", database, longest)
     with psycopg.connect(database) as connection:
-        found = connection.execute(
+        indexes = connection.execute(
             "select count(*) from pg_indexes where indexname like %s and indexname not like "
             "'%%pkey'",
             (longest + "%",),
         )
-        assert found.fetchone() == (4,)
+        assert indexes.fetchone() == (4,)
 
 
 @pytest.mark.parametrize("prefix", ["p" * 49, "größe", "a-b", "1st", "", "a b", "a\n"])
@@ -386,9 +386,11 @@ def test_a_damaged_building_is_left_out_of_the_tables(database, run_of_two):
     del lines[0]["CityObjects"]["house"]["geometry"][-1]["semantics"]  # which may be missing
     lines[1]["vertices"][0][2] += 30_000
     path.write_text("\n".join(map(json.dumps, [head, *lines])) + "\n")
-    told = []
-    assert load_postgis(folder, database, "damaged", told.append) == 2
-    assert len(told) == 1 and "building yard" in str(told[0]) and "not planar" in str(told[0])
+    remarks = []
+    assert load_postgis(folder, database, "damaged", remarks.append) == 2
+    assert (
+        len(remarks) == 1 and "building yard" in str(remarks[0]) and "not planar" in str(remarks[0])
+    )
     with psycopg.connect(database) as connection:
         ids = connection.execute("select id from damaged_buildings order by id").fetchall()
         assert ids == [("house",), ("lost",)]

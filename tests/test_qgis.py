@@ -24,8 +24,10 @@ QGIS = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
 def plugin(monkeypatch):
     """The modules of the plugin that need no QGIS."""
     monkeypatch.syspath_prepend(str(PLUGINS))
-    kept = {name: module for name, module in sys.modules.items() if name.split(".")[0] == "hiproof"}
-    for name in kept:
+    modules = {
+        name: module for name, module in sys.modules.items() if name.split(".")[0] == "hiproof"
+    }
+    for name in modules:
         del sys.modules[name]
     # the plugin's folder has the package's name, as QGIS shows it
     from hiproof import commands, process
@@ -33,7 +35,7 @@ def plugin(monkeypatch):
     yield commands, process
     for name in [name for name in sys.modules if name.split(".")[0] == "hiproof"]:
         del sys.modules[name]
-    sys.modules.update(kept)
+    sys.modules.update(modules)
 
 
 def is_taken(command):
@@ -57,16 +59,16 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
         4,
         "--types 'gable,hip'",
     )
-    taken = is_taken(everything)
+    is_taken_all = is_taken(everything)
     assert (
-        taken["clouds"] == ["a.laz", "b.laz"]
-        and taken["jobs"] == 4
-        and taken["types"] == "gable,hip"
+        is_taken_all["clouds"] == ["a.laz", "b.laz"]
+        and is_taken_all["jobs"] == 4
+        and is_taken_all["types"] == "gable,hip"
     )
     assert (
-        taken["bbox"] == "-1.5,2,3,4"
-        and taken["where"] == "year < 1950"
-        and taken["layer"] == "pand"
+        is_taken_all["bbox"] == "-1.5,2,3,4"
+        and is_taken_all["where"] == "year < 1950"
+        and is_taken_all["layer"] == "pand"
     )
     assert is_taken(commands.reconstruct("hiproof", ["a.laz"], "out"))["footprints"] is None
     assert (
@@ -78,24 +80,24 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
 
 def test_what_a_command_says_is_handed_on_and_its_end_told(plugin):
     _, process = plugin
-    said = []
+    lines = []
     code = (
         "import sys; print('first'); print('second', file=sys.stderr); sys.exit(int(sys.argv[1]))"
     )
-    assert process.run([sys.executable, "-c", code, "1"], said.append, lambda: False) == 1
-    assert sorted(said) == ["first", "second"]
+    assert process.run([sys.executable, "-c", code, "1"], lines.append, lambda: False) == 1
+    assert sorted(lines) == ["first", "second"]
     with pytest.raises(process.Failed, match="second"):
-        process.run([sys.executable, "-c", code, "2"], said.append, lambda: False)
+        process.run([sys.executable, "-c", code, "2"], lines.append, lambda: False)
     with pytest.raises(process.Failed, match=r"expected the program hiproof.*pip install"):
-        process.run(["no-such-program"], said.append, lambda: False)
+        process.run(["no-such-program"], lines.append, lambda: False)
 
 
 def test_a_cancelled_command_ends(plugin):
     _, process = plugin
-    said = []
+    lines = []
     slow = [sys.executable, "-c", "import time; print('begun', flush=True); time.sleep(600)"]
     with pytest.raises(process.Failed, match=r"stopped; .*goes on from there"):
-        process.run(slow, said.append, lambda: bool(said))
+        process.run(slow, lines.append, lambda: bool(lines))
 
 
 def test_the_share_done_is_that_of_the_run(plugin, reference_run, tmp_path):
@@ -118,7 +120,7 @@ def test_qgis_runs_it(tmp_path):
         name: shutil.copy(file, tmp_path) for name, file in demo_files().items() if name != "truth"
     }
     out = tmp_path / "out"
-    given = {
+    parameters = {
         "CLOUDS": files["cloud"],
         "FOOTPRINTS": files["footprints"],
         "TERRAIN": files["terrain"],
@@ -131,7 +133,7 @@ def test_qgis_runs_it(tmp_path):
         "run",
         "hiproof:reconstruct",
         "--",
-        *(f"{name}={value}" for name, value in given.items()),
+        *(f"{name}={value}" for name, value in parameters.items()),
     ]
     surroundings = {
         "HOME": str(tmp_path),
@@ -139,8 +141,10 @@ def test_qgis_runs_it(tmp_path):
         "QGIS_PLUGINPATH": str(PLUGINS),
         "XDG_RUNTIME_DIR": str(tmp_path),
     }
-    done = subprocess.run(
+    process = subprocess.run(
         command, capture_output=True, text=True, env={**os.environ, **surroundings}, check=False
     )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert (out / "buildings.gml").exists() and "buildings" in done.stdout.partition("Results")[2]
+    assert process.returncode == 0, process.stdout + process.stderr
+    assert (out / "buildings.gml").exists() and "buildings" in process.stdout.partition("Results")[
+        2
+    ]

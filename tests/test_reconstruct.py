@@ -56,20 +56,20 @@ def test_a_gable_becomes_a_valid_gable():
 def test_the_answer_does_not_depend_on_the_order_or_repetition_of_points(footprint):
     points = gable_points()
     shuffled = np.random.default_rng(1).permutation(np.concatenate([points, points[:50]]))
-    one, other = (hiproof.reconstruct(p, footprint, settings=PLAIN) for p in (points, shuffled))
-    assert np.array_equal(one.solid.vertices, other.solid.vertices)
+    first, other = (hiproof.reconstruct(p, footprint, settings=PLAIN) for p in (points, shuffled))
+    assert np.array_equal(first.solid.vertices, other.solid.vertices)
 
 
 def test_the_answer_moves_with_the_points():
     shift = np.array([251_000.0, 6_700_000.0, -250.0])
-    here = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
-    there = hiproof.reconstruct(
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
+    moved = hiproof.reconstruct(
         gable_points() + shift,
         shapely.transform(FOOTPRINT, lambda xy: xy + shift[:2]),
         settings=PLAIN,
     )
-    assert there.type == here.type
-    assert there.solid.vertices - shift == pytest.approx(here.solid.vertices, abs=2e-3)
+    assert moved.type == building.type
+    assert moved.solid.vertices - shift == pytest.approx(building.solid.vertices, abs=2e-3)
 
 
 def test_a_turned_building_is_the_same_building():
@@ -78,45 +78,47 @@ def test_a_turned_building_is_the_same_building():
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     points = gable_points()
     turned = np.column_stack([points[:, :2] @ np.array([[c, s], [-s, c]]), points[:, 2]])
-    here = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
-    there = hiproof.reconstruct(turned, turn(FOOTPRINT, angle, origin=(0, 0)), settings=PLAIN)
-    assert there.type == here.type
-    assert list_heights(there) == pytest.approx(list_heights(here), abs=0.05)
+    building = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
+    turned_building = hiproof.reconstruct(
+        turned, turn(FOOTPRINT, angle, origin=(0, 0)), settings=PLAIN
+    )
+    assert turned_building.type == building.type
+    assert list_heights(turned_building) == pytest.approx(list_heights(building), abs=0.05)
 
 
 def test_without_terrain_the_assumption_is_named():
     assert "assumed" in hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).ground_source
 
 
-@pytest.mark.parametrize(("seen_m", "wanted"), [(4.0, 4.0), (2.0, 3.0), (0.0, 3.0)])
-def test_without_terrain_the_ground_is_at_the_foot_of_walls_that_are_seen(seen_m, wanted):
+@pytest.mark.parametrize(("seen_m", "expected"), [(4.0, 4.0), (2.0, 3.0), (0.0, 3.0)])
+def test_without_terrain_the_ground_is_at_the_foot_of_walls_that_are_seen(seen_m, expected):
     roof = gable_points()
     eave = roof[:, 2].min()
-    down = np.linspace(0.0, seen_m, 30)
+    depths = np.linspace(0.0, seen_m, 30)
     x = np.full(30, roof[:, 0].min())
-    wall = np.column_stack([x, np.linspace(roof[:, 1].min(), roof[:, 1].max(), 30), eave - down])
+    wall = np.column_stack([x, np.linspace(roof[:, 1].min(), roof[:, 1].max(), 30), eave - depths])
     noise = [[roof[:, 0].mean(), roof[:, 1].mean(), eave - 30.0]]
     for points in (np.concatenate([roof, wall]), np.concatenate([roof, wall, noise])):
         building = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
         assert building.ground_source.startswith("assumed")
-        assert building.solid.vertices[:, 2].min() == pytest.approx(eave - wanted, abs=0.3)
+        assert building.solid.vertices[:, 2].min() == pytest.approx(eave - expected, abs=0.3)
 
 
 def test_terrain_that_does_not_cover_the_building_is_an_assumption_too():
-    far = shapely.affinity.translate(FOOTPRINT, 100, 0)
-    building = hiproof.reconstruct(gable_points() + (100, 0, 0), far, Slope(), PLAIN)
+    distant = shapely.affinity.translate(FOOTPRINT, 100, 0)
+    building = hiproof.reconstruct(gable_points() + (100, 0, 0), distant, Slope(), PLAIN)
     assert building.status is Status.MODELLED
     assert "assumed" in building.ground_source
 
 
 def test_terrain_above_the_eaves_still_gives_a_valid_solid():
-    class Above:
+    class HighTerrain:
         source = "a wrong terrain model"
 
         def height_at(self, xy):
             return np.full(len(xy), 50.0)
 
-    building = hiproof.reconstruct(gable_points(), FOOTPRINT, Above(), PLAIN)
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT, HighTerrain(), PLAIN)
     assert building.built is not None
     assert check_solid(building.solid) == ()
     assert "the ground (a wrong terrain model) lies 45.0 m above its eaves" in building.detail
@@ -166,8 +168,8 @@ def test_few_or_degenerate_points_in_a_footprint_become_a_simple_valid_model(poi
 def test_not_finite_points_are_left_out():
     points = gable_points()
     dirty = np.concatenate([points, [[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf]]])
-    one, other = (hiproof.reconstruct(p, FOOTPRINT, settings=PLAIN) for p in (points, dirty))
-    assert np.array_equal(one.solid.vertices, other.solid.vertices)
+    first, other = (hiproof.reconstruct(p, FOOTPRINT, settings=PLAIN) for p in (points, dirty))
+    assert np.array_equal(first.solid.vertices, other.solid.vertices)
 
 
 @pytest.mark.parametrize(
@@ -176,11 +178,11 @@ def test_not_finite_points_are_left_out():
 @pytest.mark.parametrize("footprint", [FOOTPRINT, None])
 def test_points_that_are_nowhere_on_earth_are_left_out(nowhere, footprint):
     points = gable_points()
-    one, other = (
+    first, other = (
         hiproof.reconstruct(p, footprint, settings=PLAIN)
         for p in (points, np.vstack([points, nowhere]))
     )
-    assert np.array_equal(one.solid.vertices, other.solid.vertices)
+    assert np.array_equal(first.solid.vertices, other.solid.vertices)
 
 
 def test_a_stray_point_far_away_makes_no_cells_up_to_it():
@@ -274,22 +276,22 @@ def test_the_network_adds_its_opinion_where_it_is_heeded_or_asked():
     unasked = hiproof.reconstruct(gable_points(), FOOTPRINT)
     assert unasked.recognised == {}
     assert unasked.parts[0].parameters == building.parts[0].parameters
-    alone = hiproof.reconstruct(
+    without_network = hiproof.reconstruct(
         gable_points(), FOOTPRINT, settings=Settings.from_dict({"fit": {"parts": "one"}})
     )
-    assert sum(alone.types.values()) == pytest.approx(1.0)
+    assert sum(without_network.types.values()) == pytest.approx(1.0)
 
 
 def test_parts_that_became_flat_although_not_asked_for_are_told():
-    asked = Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["hip"]}})
+    settings = Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["hip"]}})
     points = np.column_stack([gable_points()[:, :2], np.full(len(gable_points()), 6.0)])
-    building = hiproof.reconstruct(points, FOOTPRINT, settings=asked)
+    building = hiproof.reconstruct(points, FOOTPRINT, settings=settings)
     assert {part.type for part in building.parts} <= {"flat", "hip"}
     assert (
         building.detail
         == "1 of 1 part made flat: none of the types asked for (hip) explains the points there"
     )
-    poor = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=asked)
+    poor = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
     assert poor.grade is Grade.POOR
     assert "(hip) explains the points there; only " in poor.detail
     good = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
@@ -304,11 +306,11 @@ def test_a_footprint_with_attributes_keeps_them():
 
 def test_the_papers_objective_fits_only_what_is_asked_for_or_seen():
     paper = Settings.from_dict({"fit": {"objective": "paper"}})
-    seen = {"gable": 0.6, "hip": 0.3, "mansard": 0.09, "shed": 0.01}
-    assert candidates(seen, paper) == ("gable", "hip", "mansard")
-    assert candidates(seen, paper.replace({"fit": {"types": ["hip", "flat"]}})) == ("hip",)
-    assert candidates(seen, paper.replace({"fit": {"types": ["flat"]}})) == ("flat",)
-    assert candidates({}, paper) == candidates(seen, Settings()) == ()
+    probabilities = {"gable": 0.6, "hip": 0.3, "mansard": 0.09, "shed": 0.01}
+    assert candidates(probabilities, paper) == ("gable", "hip", "mansard")
+    assert candidates(probabilities, paper.replace({"fit": {"types": ["hip", "flat"]}})) == ("hip",)
+    assert candidates(probabilities, paper.replace({"fit": {"types": ["flat"]}})) == ("flat",)
+    assert candidates({}, paper) == candidates(probabilities, Settings()) == ()
 
 
 @pytest.mark.parametrize(

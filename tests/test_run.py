@@ -103,9 +103,9 @@ def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
 
 def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp_path):
     def run(**settings):
-        told = Settings.from_dict(settings)
+        types_found = Settings.from_dict(settings)
         reconstruct_area(
-            Request((str(files[0]),), tmp_path, str(files[1]), settings=told, restart=True)
+            Request((str(files[0]),), tmp_path, str(files[1]), settings=types_found, restart=True)
         )
 
     run(write={"citygml": "both"})
@@ -120,11 +120,11 @@ def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp
 
 def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path):
     reconstruct_area(Request((str(files[0]),), tmp_path / "own", str(files[1])))
-    before = records(tmp_path / "own")
+    old_records = records(tmp_path / "own")
     refused = CliRunner().invoke(app, ["demo", str(tmp_path / "own")])
     assert (
         "expected a folder for the demo" in str(refused.exception)
-        and records(tmp_path / "own") == before
+        and records(tmp_path / "own") == old_records
     )
     for _ in range(2):
         assert CliRunner().invoke(app, ["demo", str(tmp_path / "demo")]).exit_code == 0
@@ -134,32 +134,33 @@ def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_para
     files, tmp_path
 ):
     cloud, footprints = map(str, files)
-    asked = ["--citygml", "both", "--osm-tags", "--lods", "0,2.2"]
+    request = ["--citygml", "both", "--osm-tags", "--lods", "0,2.2"]
     run = CliRunner().invoke(
-        app, ["reconstruct", cloud, "--footprints", footprints, "--out", f"{tmp_path}/run", *asked]
+        app,
+        ["reconstruct", cloud, "--footprints", footprints, "--out", f"{tmp_path}/run", *request],
     )
     assert run.exit_code == 0, run.output
     for name, options in (("as told", []), ("asked", ["--citygml", "3.0", "--no-osm-tags"])):
-        made = CliRunner().invoke(
+        result = CliRunner().invoke(
             app,
             ["build", f"{tmp_path}/run/parameters.jsonl", "--out", f"{tmp_path}/{name}", *options],
         )
-        assert made.exit_code == 0, made.output
-    ours = {
+        assert result.exit_code == 0, result.output
+    built_files = {
         path.name
         for path in (tmp_path / "run").iterdir()
         if path.is_file() and path.name != "run.json"
     }
-    assert ours == {*RECORDS, "buildings.citygml3.gml", "buildings.gpkg"}
-    for name in ours:
+    assert built_files == {*RECORDS, "buildings.citygml3.gml", "buildings.gpkg"}
+    for name in built_files:
         text = (tmp_path / "run" / name).read_bytes()
         assert (tmp_path / "as told" / name).read_bytes() == text, name
         assert (b"roof:shape" in text) == (name != "parameters.jsonl"), name
-    left = {
+    run_files = {
         path.name: path.read_bytes() for path in (tmp_path / "asked").iterdir() if path.is_file()
     }
-    assert ours - left.keys() == {"buildings.gml"} and not any(
-        b"roof:shape" in text for text in left.values()
+    assert built_files - run_files.keys() == {"buildings.gml"} and not any(
+        b"roof:shape" in text for text in run_files.values()
     )
 
 
@@ -175,10 +176,10 @@ def test_heights_are_the_towns(finished_run):
 
 def test_running_again_redoes_nothing_and_changes_nothing(finished_run, files):
     out, summary = finished_run
-    before = {name: (out / name).stat().st_mtime_ns for name in RECORDS}
-    again = reconstruct_area(Request((str(files[0]),), out, str(files[1])))
-    assert again.by_status == summary.by_status
-    assert {name: (out / name).stat().st_mtime_ns for name in RECORDS} == before
+    times = {name: (out / name).stat().st_mtime_ns for name in RECORDS}
+    repeat = reconstruct_area(Request((str(files[0]),), out, str(files[1])))
+    assert repeat.by_status == summary.by_status
+    assert {name: (out / name).stat().st_mtime_ns for name in RECORDS} == times
 
 
 def test_other_settings_on_the_same_folder_are_refused_unless_restarted(files, tmp_path):
@@ -192,10 +193,10 @@ def test_other_settings_on_the_same_folder_are_refused_unless_restarted(files, t
     )
     with pytest.raises(OutputError, match="--restart"):
         reconstruct_area(other)
-    anew = Request(
+    redrawn = Request(
         request.clouds, tmp_path, request.footprints, settings=other.settings, restart=True
     )
-    assert reconstruct_area(anew).buildings == 4
+    assert reconstruct_area(redrawn).buildings == 4
 
 
 def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
@@ -224,10 +225,10 @@ def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
 
 def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    paper, seen = Settings.from_dict({"fit": {"objective": "paper"}}), []
+    paper, steps = Settings.from_dict({"fit": {"objective": "paper"}}), []
     request = Request((town_files[0],), tmp_path, town_files[1], settings=paper)
-    reconstruct_area(request, lambda *progress: seen.append(progress))
-    assert [progress for progress in seen if progress[0] == "solve"][-4:] == [
+    reconstruct_area(request, lambda *progress: steps.append(progress))
+    assert [progress for progress in steps if progress[0] == "solve"][-4:] == [
         ("solve", n, 4) for n in (1, 2, 3, 4)
     ]
 
@@ -244,8 +245,8 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_p
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
     request = Request((str(files[0]),), tmp_path, str(files[1]))
 
-    def interrupt(step, done, total):
-        if step == "solve" and done == 2:
+    def interrupt(step, finished, total):
+        if step == "solve" and finished == 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

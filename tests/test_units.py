@@ -121,18 +121,18 @@ def test_feet_give_the_same_buildings_as_metres(
     in_metres, tmp_path, units, cloud_crs, plan_crs, options
 ):
     out = run(tmp_path / "feet", units, cloud_crs, plan_crs, **options)
-    for here, there in zip(parameters(out), parameters(in_metres), strict=True):
-        assert (here["id"], here["type"], len(here["parts"])) == (
-            there["id"],
-            there["type"],
-            len(there["parts"]),
+    for first, metre_record in zip(parameters(out), parameters(in_metres), strict=True):
+        assert (first["id"], first["type"], len(first["parts"])) == (
+            metre_record["id"],
+            metre_record["type"],
+            len(metre_record["parts"]),
         )
-        assert np.abs(lengths(here) - lengths(there)).max() < 0.005
-    ours, theirs = attributes(out), attributes(in_metres)
-    for id, told in ours.items():
+        assert np.abs(lengths(first) - lengths(metre_record)).max() < 0.005
+    in_feet, theirs = attributes(out), attributes(in_metres)
+    for id, values in in_feet.items():
         for name in ("rf_volume_lod22", "rf_h_ground", "rf_h_roof_max", "rf_pt_density"):
-            assert told[name] == pytest.approx(theirs[id][name], rel=2e-3)
-        assert "US survey foot" in told["hiproof_units"] and "hiproof_units" not in theirs[id]
+            assert values[name] == pytest.approx(theirs[id][name], rel=2e-3)
+        assert "US survey foot" in values["hiproof_units"] and "hiproof_units" not in theirs[id]
     record = json.loads((out / "run.json").read_text())["units"]
     assert (record["metres_in_plan_unit"], record["metres_in_height_unit"]) == pytest.approx(
         (units.plan, units.height)
@@ -179,11 +179,11 @@ def areas_to_load(out):
 def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
     out = run(tmp_path / "feet", FEET, "EPSG:2263+6360", "EPSG:2263")
     for name in ("buildings.gml", "buildings.city.jsonl"):
-        for (_, ours), (_, theirs) in zip(
+        for (_, solid), (_, theirs) in zip(
             read_solids(out / name), read_solids(in_metres / name), strict=True
         ):
             assert np.allclose(
-                np.ptp(ours.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02
+                np.ptp(solid.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02
             )
     assert areas_to_load(out) == pytest.approx(areas_to_load(in_metres), rel=2e-3)
     cloud, footprints = tmp_path / "feet/cloud.laz", tmp_path / "feet/footprints.gpkg"
@@ -246,8 +246,8 @@ def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, size, height, 
         warnings.simplefilter("ignore")
         terrain = read_terrain(path, "EPSG:2263", FEET)
     # the raster ends 45 feet, not metres, from its middle
-    here, beyond = [0.0, 0.0], [44 * 0.3048 + 5.0, 0.0]
-    heights = terrain.height_at(np.array([here, beyond]))
+    inside, outside = [0.0, 0.0], [44 * 0.3048 + 5.0, 0.0]
+    heights = terrain.height_at(np.array([inside, outside]))
     assert heights[0] == pytest.approx(expected) and np.isnan(heights[1])
 
 
@@ -287,19 +287,19 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
         TOWN.classification[along],
         FEET.from_metres(ORIGIN),
     )
-    alone = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}
-    footprints = str(write_footprints(tmp_path / "alone.gpkg", alone, "EPSG:2263"))
+    single = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}
+    footprints = str(write_footprints(tmp_path / "alone.gpkg", single, "EPSG:2263"))
     clouds = [
         write_cloud(tmp_path / "plain.laz", xyz, classes, None, origin),
         write_cloud(tmp_path / "indexed.laz", xyz, classes, None, origin),
         write_copc(tmp_path / "cloud.copc.laz", xyz, classes),
     ]
     write_lax(tmp_path / "indexed.lax", xyz)
-    settings, found = Settings.from_dict({"read": {"crs": "EPSG:2263"}}), []
+    settings, result = Settings.from_dict({"read": {"crs": "EPSG:2263"}}), []
     for number, cloud in enumerate(clouds):
         out = tmp_path / str(number)
         reconstruct_area(Request((str(cloud),), out, footprints, settings=settings))
-        found.append(
+        result.append(
             (
                 parameters(out),
                 [
@@ -309,9 +309,9 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
                 ],
             )
         )
-    (plain, (all_points,)), (indexed, (some,)), (copc, (of_copc,)) = found
+    (plain, (all_points,)), (indexed, (some_points,)), (copc, (of_copc,)) = result
     assert plain[0]["points"] == indexed[0]["points"] == copc[0]["points"] > 100
-    assert plain == indexed and some < all_points and of_copc < all_points
+    assert plain == indexed and some_points < all_points and of_copc < all_points
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ print(cores.cores() > 0)
 
 
 def test_no_module_is_imported_that_windows_lacks():
-    found = {
+    modules = {
         name.split(".")[0]
         for file in PACKAGE.rglob("*.py")
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
@@ -38,29 +38,29 @@ def test_no_module_is_imported_that_windows_lacks():
         )
         if isinstance(node, (ast.Import, ast.ImportFrom))
     }
-    assert found & NOT_ON_WINDOWS == set() and "numpy" in found
+    assert modules & NOT_ON_WINDOWS == set() and "numpy" in modules
 
 
 def test_names_that_windows_lacks_are_not_needed():
     environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
     code = [sys.executable, "-c", WITHOUT_POSIX]
-    done = subprocess.run(code, capture_output=True, text=True, env=environment, check=False)
-    assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
+    process = subprocess.run(code, capture_output=True, text=True, env=environment, check=False)
+    assert (process.returncode, process.stdout.strip()) == (0, "True"), process.stderr
 
 
 def test_files_are_synced_through_descriptors_that_may_write(tmp_path, monkeypatch):
     """Windows refuses the others."""
     fcntl = pytest.importorskip("fcntl", reason="Windows itself tells nothing of a descriptor")
-    asked = []
+    descriptors = []
 
     def fsync(descriptor):
         if not os.path.isdir(f"/proc/self/fd/{descriptor}"):
-            asked.append(fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE)
+            descriptors.append(fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE)
 
     monkeypatch.setattr(os, "fsync", fsync)
     with atomic_file(tmp_path / "a.txt") as file:
         file.write(b"whole")
-    assert asked and all(mode != os.O_RDONLY for mode in asked)
+    assert descriptors and all(mode != os.O_RDONLY for mode in descriptors)
 
 
 def test_no_more_processes_are_started_than_windows_can_wait_for(monkeypatch):

@@ -71,10 +71,12 @@ class Algorithm(QgsProcessingAlgorithm):
         layer = self.parameterAsVectorLayer(parameters, name, context)
         if layer is None:
             return None, None, None
-        told = QgsProviderRegistry.instance().decodeUri(layer.dataProvider().name(), layer.source())
+        uri_parts = QgsProviderRegistry.instance().decodeUri(
+            layer.dataProvider().name(), layer.source()
+        )
         return (
-            told.get("path") or layer.source(),
-            told.get("layerName") or None,
+            uri_parts.get("path") or layer.source(),
+            uri_parts.get("layerName") or None,
             layer.subsetString() or None,
         )
 
@@ -144,7 +146,7 @@ class Reconstruct(Algorithm):
         }
 
     def command(self, parameters, context, program, folder):
-        footprints, layer, where = self.get_source(parameters, "FOOTPRINTS", context)
+        footprints, layer, condition = self.get_source(parameters, "FOOTPRINTS", context)
         terrain = self.parameterAsRasterLayer(parameters, "TERRAIN", context)
         crs = self.parameterAsCrs(parameters, "CRS", context)
         extent = self.parameterAsExtent(parameters, "EXTENT", context)
@@ -155,7 +157,7 @@ class Reconstruct(Algorithm):
             folder,
             footprints,
             layer,
-            where,
+            condition,
             None if extent.isNull() else sides,
             terrain and terrain.source(),
             crs.authid() if crs.isValid() else None,
@@ -249,13 +251,13 @@ class Load(Algorithm):
 
     def processAlgorithm(self, parameters, context, feedback):
         folder = self.parameterAsString(parameters, "FOLDER", context)
-        found = self.load(folder, self.parameterAsBool(parameters, "RAISED", context), context)
-        if not found:
+        run_layers = self.load(folder, self.parameterAsBool(parameters, "RAISED", context), context)
+        if not run_layers:
             raise QgsProcessingException(
                 f"expected the folder of a run, got {folder}, which has no buildings.gpkg; choose "
                 "another"
             )
-        return found
+        return run_layers
 
 
 ALGORITHMS = (Reconstruct, Evaluate, Convert, Load)

@@ -9,27 +9,27 @@ def reconstruct(
     out,
     footprints=None,
     layer=None,
-    where=None,
+    condition=None,
     bbox=None,
     terrain=None,
     crs=None,
     processes=None,
-    more="",
+    extra="",
 ):
     """The main job.
 
     `bbox` is (xmin, ymin, xmax, ymax) in the clouds' coordinates, `more` further options as typed.
     """
-    given = {
+    options = {
         "--footprints": footprints,
         "--layer": layer,
-        "--where": where,
+        "--where": condition,
         "--bbox": bbox and ",".join(f"{side:.10g}" for side in bbox),
         "--terrain": terrain,
         "--crs": crs,
         "--jobs": processes and str(processes),
     }
-    return [program, "reconstruct", *clouds, "--out", out, *pairs(given), *shlex.split(more)]
+    return [program, "reconstruct", *clouds, "--out", out, *pairs(options), *shlex.split(extra)]
 
 
 def evaluate(program, folder, clouds, footprints=None, layer=None):
@@ -53,8 +53,8 @@ def status(program, folder):
     return [program, "status", folder]
 
 
-def pairs(given):
+def pairs(options):
     """Options with their values, those without one left out; a value that begins with a dash cannot
     be taken for an option.
     """
-    return [f"{name}={value}" for name, value in given.items() if value]
+    return [f"{name}={value}" for name, value in options.items() if value]

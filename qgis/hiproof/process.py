@@ -39,53 +39,53 @@ def run(command, say, cancelled, progress=None):
             f"expected the program hiproof, got: {error}; install it (pip install hiproof) and "
             "name it in the parameter Program"
         ) from error
-    said = []
-    reader = threading.Thread(target=pass_lines, args=(process.stdout, say, said), daemon=True)
+    lines = []
+    reader = threading.Thread(target=pass_lines, args=(process.stdout, say, lines), daemon=True)
     reader.start()
-    asked = time.monotonic()
+    asked_at = time.monotonic()
     while process.poll() is None:
         if cancelled():
             process.terminate()
             process.wait()
             raise Failed("stopped; what was finished is kept, and the same run goes on from there")
-        if progress and time.monotonic() - asked > STATUS_S:
+        if progress and time.monotonic() - asked_at > STATUS_S:
             progress()
-            asked = time.monotonic()
+            asked_at = time.monotonic()
         time.sleep(POLL_S)
     reader.join()
     process.stdout.close()
     if process.returncode not in (0, 1):
         raise Failed(
-            "\n".join(said[-3:]) or f"{command[0]} ended with exit code {process.returncode}"
+            "\n".join(lines[-3:]) or f"{command[0]} ended with exit code {process.returncode}"
         )
     return process.returncode
 
 
-def pass_lines(lines, say, said):
+def pass_lines(lines, say, lines_kept):
     for line in lines:
-        said.append(line.rstrip())
-        say(said[-1])
+        lines_kept.append(line.rstrip())
+        say(lines_kept[-1])
 
 
 def make_environment():
     """QGIS sets variables for its own Python, which are not for another's; on Windows no window is
     to open.
     """
-    own = {
+    environment = {
         name: value
         for name, value in os.environ.items()
         if name not in ("PYTHONHOME", "PYTHONPATH")
     }
     return {
-        "env": own,
+        "env": environment,
         **({"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {}),
     }
 
 
 def measure_progress(program, folder):
     """The share of buildings done [%] of the run in `folder`, None while that is not known."""
-    asked = subprocess.run(
+    process = subprocess.run(
         commands.status(program, folder), capture_output=True, text=True, **make_environment()
     )
-    found = DONE.search(asked.stdout)
-    return 100.0 * int(found[1]) / int(found[2]) if found and int(found[2]) else None
+    match = DONE.search(process.stdout)
+    return 100.0 * int(match[1]) / int(match[2]) if match and int(match[2]) else None

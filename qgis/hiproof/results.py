@@ -18,11 +18,11 @@ HEIGHT = 'coalesce("rf_h_roof_max" - "rf_h_ground", 0)'
 def load_layers(folder):
     """(name, QgsVectorLayer) of those layers that the run's GeoPackage has."""
     path = os.path.join(folder, "buildings.gpkg")
-    found = (
+    layers = (
         (name, QgsVectorLayer(f"{path}|layername={name}", f"hiproof {name}", "ogr"))
         for name in ("buildings", "roof_surfaces")
     )
-    return [(name, layer) for name, layer in found if layer.isValid()]
+    return [(name, layer) for name, layer in layers if layer.isValid()]
 
 
 def choose_style(name, raised):

@@ -7,13 +7,13 @@ from benchmarks.budget import STAGES, Clock
 
 
 def test_a_stage_does_not_count_the_stages_inside_it():
-    now = 0.0
+    new = 0.0
 
     def work(seconds):
-        nonlocal now
-        now += seconds
+        nonlocal new
+        new += seconds
 
-    clock = Clock(lambda: now)
+    clock = Clock(lambda: new)
     inner = clock.time_stage("inner", lambda: work(2.0))
 
     def outer():
@@ -23,7 +23,7 @@ def test_a_stage_does_not_count_the_stages_inside_it():
 
     clock.time_stage("outer", outer)()
     assert clock.seconds == {"inner": 4.0, "outer": 1.0}
-    assert sum(clock.seconds.values()) == now
+    assert sum(clock.seconds.values()) == new
 
 
 @pytest.mark.parametrize("place", STAGES.values(), ids=STAGES)

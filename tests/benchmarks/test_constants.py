@@ -7,12 +7,12 @@ TEXT = '"""Größen."""\nMOST, LEAST_M = 7, 0.5  # größer\nNAMES = ("a",)\nTIL
 
 
 @pytest.mark.parametrize(
-    ("name", "factor", "now"),
+    ("name", "factor", "new_value"),
     [("MOST", 2.0, "14, 0.5"), ("LEAST_M", 0.5, "7, 0.25"), ("TILE_M", 2.0, "500.0")],
 )
-def test_one_number_is_changed(name, factor, now):
+def test_one_number_is_changed(name, factor, new_value):
     text = change_value(TEXT, name, factor)
-    assert now in text and len(text.splitlines()) == len(TEXT.splitlines())
+    assert new_value in text and len(text.splitlines()) == len(TEXT.splitlines())
     assert change_value(TEXT, name, 1.0) == TEXT
 
 

@@ -43,8 +43,8 @@ def test_the_truth_is_right_in_any_order(kind):
         parts = merge_alike(roof.parts)
         order = np.random.default_rng(seed).permutation(len(parts))
         shuffled = [parts[k] for k in order]
-        wanted, right, _ = compare_parts(roof, tuple(shuffled))
-        assert wanted == len(parts) and right
+        n_expected, right, _ = compare_parts(roof, tuple(shuffled))
+        assert n_expected == len(parts) and right
         assert [order[j] for j in match_parts(parts, shuffled, make_raster(roof.outline))] == list(
             range(len(parts))
         )
@@ -69,9 +69,9 @@ def test_a_hidden_volume_does_not_change_what_stands_for_what():
 
 def test_equal_neighbours_are_one_and_a_step_of_a_decimetre_keeps_them_apart():
     alike = [part(x=6.0 * k) for k in range(4)]
-    one = merge_alike(alike)
-    assert len(one) == 1 and one[0].area == pytest.approx(4 * 48.0)
-    assert one[0].parameters == pytest.approx({"width": 8.0, "height": 3.0})
+    merged = merge_alike(alike)
+    assert len(merged) == 1 and merged[0].area == pytest.approx(4 * 48.0)
+    assert merged[0].parameters == pytest.approx({"width": 8.0, "height": 3.0})
     assert len(merge_alike([*alike[:2], part(x=12.0, z=3.1), part(x=18.0, z=3.1)])) == 2
     assert len(merge_alike([alike[0], part(x=6.5)])) == 2  # half a metre of nothing between them
     assert len(merge_alike([alike[0], part("flat", x=6.0, length=6.0, width=8.0)])) == 2

@@ -43,11 +43,11 @@ needs_delft = pytest.mark.skipif(
 
 def simulate_building(kind, seed):
     """A simulated compound with its solid, as a reconstruction would return it."""
-    made = random_compound(
+    simulation = random_compound(
         np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0)
     )
-    solid = compose(made.roof, 0.0).move(made.roof.frame.origin)
-    return Building(f"{kind}-{seed}", Status.MODELLED, built=Model(made.roof, solid))
+    solid = compose(simulation.roof, 0.0).move(simulation.roof.frame.origin)
+    return Building(f"{kind}-{seed}", Status.MODELLED, built=Model(simulation.roof, solid))
 
 
 @pytest.fixture
@@ -74,12 +74,13 @@ def test_a_scan_lies_on_the_building_and_is_always_the_same(small_town):
     building = next(b for b in read_town(small_town) if b.id == "L-0")
     points = building.scan_points(4.0)
     assert np.array_equal(points, building.scan_points(4.0))
-    made = simulate_building("L", 0)
-    local = made.roof.frame.to_local(points)
-    inside = shapely.contains_xy(made.roof.outline.buffer(-0.4), *local[:, :2].T)
-    gap = made.roof.height_at(local[inside, :2]) - local[inside, 2]
+    product = simulate_building("L", 0)
+    local = product.roof.frame.to_local(points)
+    inside = shapely.contains_xy(product.roof.outline.buffer(-0.4), *local[:, :2].T)
+    gap = product.roof.height_at(local[inside, :2]) - local[inside, 2]
     assert (
-        inside.sum() > 3.0 * made.roof.outline.buffer(-0.4).area and np.median(np.abs(gap)) < 0.08
+        inside.sum() > 3.0 * product.roof.outline.buffer(-0.4).area
+        and np.median(np.abs(gap)) < 0.08
     )
 
 
@@ -94,33 +95,33 @@ def test_true_models_are_right_in_everything(small_town, tmp_path):
     )
     counts = count_wireframes(models, truth)
     assert counts.keys() == {building.id for building in buildings} and len(counts) == 3
-    for one in (*counts.values(), sum_counts(counts.values())):
-        assert one.edge_f1 == one.corner_f1 == 100.0
-        assert (one.edges, one.corners, one.faces) == (
-            one.true_edges,
-            one.true_corners,
-            one.true_faces,
+    for item in (*counts.values(), sum_counts(counts.values())):
+        assert item.edge_f1 == item.corner_f1 == 100.0
+        assert (item.edges, item.corners, item.faces) == (
+            item.true_edges,
+            item.true_corners,
+            item.true_faces,
         )
-        assert one.height_rmse_m < 0.01
+        assert item.height_rmse_m < 0.01
 
 
 def test_true_roofs_composed_anew_have_the_true_heights(small_town):
     for building in read_town(small_town):
         kind, seed = building.id.rsplit("-", 1)
-        truth, again = simulate_building(kind, int(seed)), compose_truth(building)
+        truth, rebuilt = simulate_building(kind, int(seed)), compose_truth(building)
         xy = make_raster(truth.roof.outline.buffer(-0.05)) + truth.roof.frame.origin[:2]
         heights = [
             b.roof.height_at(xy - b.roof.frame.origin[:2]) + b.roof.frame.origin[2]
-            for b in (truth, again)
+            for b in (truth, rebuilt)
         ]
         assert np.mean(np.abs(heights[0] - heights[1]) < 0.02) > 0.98
-        assert again.solid.select_faces("RoofSurface")
+        assert rebuilt.solid.select_faces("RoofSurface")
 
 
 @needs_judge
 @needs_towns
 def test_a_missing_model_counts_as_missed(tmp_path):
-    buildings = choose_buildings(read_town(TOWNS["essen"]), every=30)
+    buildings = choose_buildings(read_town(TOWNS["essen"]), step=30)
     write_truth(tmp_path / "truth.city.json", TOWNS["essen"], buildings)
     solids = [next(iter(building.solids.values())) for building in buildings]
     models = [
@@ -140,32 +141,30 @@ def flat_roof(building) -> Roof:
 
 
 def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
-    first, beside, apart = (
+    first, neighbour, distant = (
         box(),
         box().move(np.array([4.0, 0.0, 0.0])),
         box(2.0, 2.0).move(np.array([20.0, 0.0, 0.0])),
     )
-    found = group_touching("house", {"a": first, "b": beside, "c": apart})
-    assert [building.id for building in found] == ["house", "house~2"]
-    assert [sorted(building.solids) for building in found] == [["a", "b"], ["c"]]
-    assert found[0].footprint.equals_exact(
+    result = group_touching("house", {"a": first, "b": neighbour, "c": distant})
+    assert [building.id for building in result] == ["house", "house~2"]
+    assert [sorted(building.solids) for building in result] == [["a", "b"], ["c"]]
+    assert result[0].footprint.equals_exact(
         shapely.box(0, 0, 8, 5).normalize(), 1e-6, normalize=True
     )
-    assert find_ground(apart).area == pytest.approx(4.0)
+    assert find_ground(distant).area == pytest.approx(4.0)
 
 
 def test_draws_are_parts_of_the_whole_and_always_the_same():
-    every = list(range(101))
-    even, odd = (choose_buildings(every, parity=parity) for parity in ("even", "odd"))
-    assert sorted(even + odd) == every and even[:2] == [0, 2]
-    assert choose_buildings(every, every=10) == every[::10]
-    drawn = choose_buildings(every, most=12)
+    total = list(range(101))
+    even, odd = (choose_buildings(total, parity=parity) for parity in ("even", "odd"))
+    assert sorted(even + odd) == total and even[:2] == [0, 2]
+    assert choose_buildings(total, step=10) == total[::10]
+    draw = choose_buildings(total, limit=12)
     assert (
-        len(drawn) == 12
-        and drawn == sorted(set(drawn))
-        and drawn == choose_buildings(every, most=12)
+        len(draw) == 12 and draw == sorted(set(draw)) and draw == choose_buildings(total, limit=12)
     )
-    assert choose_buildings(every, most=500) == every
+    assert choose_buildings(total, limit=500) == total
 
 
 def test_a_table_has_a_row_for_every_size_there_is_pooled_and_by_building():
@@ -174,10 +173,10 @@ def test_a_table_has_a_row_for_every_size_there_is_pooled_and_by_building():
     head, *rows = (line.split("  ") for line in make_size_table([small, large]))
     cells = [[cell.strip() for cell in row if cell.strip()] for row in (head, *rows)]
     assert [row[0] for row in cells] == ["footprint", "all", "< 200 m2", "> 800 m2"]
-    every = dict(zip(*cells[:2], strict=True))
-    assert every["F1 pooled, mean"] == "47.4, 66.7"  # 18 of 38 edges; (100 + 33.3) / 2
-    assert every["ms per 100 m2"] == "19.0, 15.0"  # 190 ms on 1,000 m2; (10 + 20) / 2
-    assert every["in 0.2 m"] == "0.7500" and every["parts"] == "2.50"
+    total = dict(zip(*cells[:2], strict=True))
+    assert total["F1 pooled, mean"] == "47.4, 66.7"  # 18 of 38 edges; (100 + 33.3) / 2
+    assert total["ms per 100 m2"] == "19.0, 15.0"  # 190 ms on 1,000 m2; (10 + 20) / 2
+    assert total["in 0.2 m"] == "0.7500" and total["parts"] == "2.50"
 
 
 @needs_judge
@@ -190,10 +189,10 @@ def test_towns_have_the_buildings_that_are_known(town, n):
 @needs_delft
 def test_even_and_odd_footprints_are_all_footprints():
     path = SHARED / "data/delft/footprints.gpkg"
-    even, odd, every = (
+    even, odd, total = (
         {f.id for f in select_footprints(path, parity)} for parity in ("even", "odd", None)
     )
-    assert even | odd == every and not even & odd and min(len(even), len(odd)) > 0.4 * len(every)
+    assert even | odd == total and not even & odd and min(len(even), len(odd)) > 0.4 * len(total)
 
 
 @needs_towns

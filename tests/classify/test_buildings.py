@@ -9,15 +9,17 @@ from leafy_scenes import GROUND as GROUND_SOURCE
 from leafy_scenes import TREE, drone, forest, make_house_under_tree, town
 
 
-def f1(found, truth):
-    return 2 * (found & truth).sum() / (found.sum() + truth.sum())
+def f1(prediction, truth):
+    return 2 * (prediction & truth).sum() / (prediction.sum() + truth.sum())
 
 
-@pytest.mark.parametrize(("density", "least"), [(0.5, 0.9), (1.0, 0.93), (5.0, 0.97), (20.0, 0.98)])
-def test_a_town_is_told_from_its_trees_and_its_ground(density, least):
+@pytest.mark.parametrize(
+    ("density", "least_f1"), [(0.5, 0.9), (1.0, 0.93), (5.0, 0.97), (20.0, 0.98)]
+)
+def test_a_town_is_told_from_its_trees_and_its_ground(density, least_f1):
     cloud, _ = town(density)
     classes, built = classify(cloud.points), ~np.isin(cloud.source, (GROUND_SOURCE, TREE))
-    assert f1(classes == BUILDING, built) > least
+    assert f1(classes == BUILDING, built) > least_f1
     assert f1(classes == GROUND_CLASS, cloud.source == GROUND_SOURCE) > 0.99
 
 
@@ -29,9 +31,10 @@ def test_the_order_of_points_does_not_matter():
 
 def test_a_place_is_the_same_whatever_lies_far_from_it():
     cloud, _ = town(3.0)
-    far = cloud.points + (400.0, 0.0, 12.0)
+    distant_points = cloud.points + (400.0, 0.0, 12.0)
     assert np.array_equal(
-        classify(np.concatenate([cloud.points, far]))[: len(cloud)], classify(cloud.points)
+        classify(np.concatenate([cloud.points, distant_points]))[: len(cloud)],
+        classify(cloud.points),
     )
 
 
@@ -68,9 +71,9 @@ def test_points_in_one_place_are_no_building():
 
 def test_within_an_outline_leaves_are_left_out_and_the_roof_stays():
     cloud, building = make_house_under_tree(np.random.default_rng(2), 0.5)
-    within = shapely.contains_xy(building.footprint, *cloud.points[:, :2].T)
-    points, source = cloud.points[within], cloud.source[within]
-    kept = roof_points(points)
+    is_within = shapely.contains_xy(building.footprint, *cloud.points[:, :2].T)
+    points, source = cloud.points[is_within], cloud.source[is_within]
+    selection = roof_points(points)
     assert (source == TREE).sum() > 50
-    assert kept[source == 0].mean() > 0.95
-    assert kept[source == TREE].mean() < 0.15
+    assert selection[source == 0].mean() > 0.95
+    assert selection[source == TREE].mean() < 0.15

@@ -34,25 +34,23 @@ def test_a_copy_differs_in_its_classes_alone(tmp_path):
     path, out = rich_file(tmp_path / "in.laz", town, classes), tmp_path / "out.laz"
     result = CliRunner().invoke(app, ["classify", str(path), str(out)])
     assert result.exit_code == 0 and "building points of" in result.output
-    before, after = laspy.read(path), laspy.read(out)
-    for name in before.point_format.dimension_names:
-        assert name == "classification" or np.array_equal(before[name], after[name]), name
-    notes = [
-        [v.record_data_bytes() for v in las.vlrs if v.record_id != 4] for las in (before, after)
-    ]
+    old, new = laspy.read(path), laspy.read(out)
+    for name in old.point_format.dimension_names:
+        assert name == "classification" or np.array_equal(old[name], new[name]), name
+    notes = [[v.record_data_bytes() for v in las.vlrs if v.record_id != 4] for las in (old, new)]
     # 4 tells of the further dimensions
     assert notes[0] == notes[1] and b"kept as it is" in notes[1]
-    found, asked = np.asarray(after.classification), classes != 9
-    assert (found[~asked] == 9).all()
-    assert (found[asked] == town.classification[asked]).mean() > 0.97
+    classes_after, is_changeable = np.asarray(new.classification), classes != 9
+    assert (classes_after[~is_changeable] == 9).all()
+    assert (classes_after[is_changeable] == town.classification[is_changeable]).mean() > 0.97
 
 
 def test_points_that_are_neither_keep_their_class_unless_it_was_one_of_the_two():
-    before, found = (
+    old, result = (
         np.array([1, 5, 2, 6, 5, 0, 6], np.uint8),
         np.array([1, 1, 1, 1, 6, 2, 6], np.uint8),
     )
-    assert merge_classes(before, found).tolist() == [1, 5, 1, 1, 6, 2, 6]
+    assert merge_classes(old, result).tolist() == [1, 5, 1, 1, 6, 2, 6]
 
 
 @pytest.mark.parametrize("kind", [9, 7])

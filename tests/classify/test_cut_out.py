@@ -28,10 +28,12 @@ KINDS = [
 ]
 
 
-def scan_building(kind, density, seed=0, at=(0.0, 0.0, 0.0)):
+def scan_building(kind, density, seed=0, origin=(0.0, 0.0, 0.0)):
     rng = np.random.default_rng(seed)
     building = (
-        random_compound(rng, kind, at) if kind in KINDS[5:] else random_building(rng, kind, at)
+        random_compound(rng, kind, origin)
+        if kind in KINDS[5:]
+        else random_building(rng, kind, origin)
     )
     return scan(building, rng, ScanSettings(density=density, defects=Defects.none(), margin_m=4.0))
 
@@ -57,9 +59,9 @@ def test_a_house_from_a_drone_is_told_from_its_lawn_and_is_one_building_without(
 @pytest.mark.parametrize("kind", KINDS[:5])
 def test_the_answer_is_that_of_the_points_turned_moved_and_in_another_order(kind):
     cloud = scan_building(kind, 5.0)
-    for points, wanted in ((cloud.points, False), (cloud.points[cloud.source == ROOF], True)):
+    for points, expected in ((cloud.points, False), (cloud.points[cloud.source == ROOF], True)):
         turned = points[:, [1, 0, 2]] * (-1, 1, 1) + (85000.0, 446000.0, 30.0)
-        assert (is_cut_out(turned[::-1]) is not False) == wanted
+        assert (is_cut_out(turned[::-1]) is not False) == expected
 
 
 def test_a_surface_without_anything_high_may_be_a_roof_or_bare_ground():
@@ -76,11 +78,13 @@ def test_the_next_cell_with_points_is_that_of_a_plain_search():
     rng = np.random.default_rng(0)
     height = np.where(rng.random((9, 7)) < 0.5, -np.inf, rng.normal(size=(9, 7)))
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
-        found = find_next_heights(height, axis, way)
+        result = find_next_heights(height, axis, way)
         for cell in np.ndindex(height.shape):
-            beyond = [np.add(cell, -way * step * np.eye(2, dtype=int)[axis]) for step in (1, 2)]
-            seen = [height[tuple(c)] for c in beyond if (c >= 0).all() and (c < height.shape).all()]
-            assert found[cell] == next((z for z in seen if np.isfinite(z)), -np.inf)
+            outer = [np.add(cell, -way * step * np.eye(2, dtype=int)[axis]) for step in (1, 2)]
+            inside_values = [
+                height[tuple(c)] for c in outer if (c >= 0).all() and (c < height.shape).all()
+            ]
+            assert result[cell] == next((z for z in inside_values if np.isfinite(z)), -np.inf)
 
 
 def test_several_roofs_cut_out_are_a_building_each_with_all_of_their_points():
@@ -89,9 +93,9 @@ def test_several_roofs_cut_out_are_a_building_each_with_all_of_their_points():
         for k, kind in enumerate(("gable", "L", "T"))
     ]
     points = np.concatenate([cloud.points[cloud.source == ROOF] for cloud in clouds])
-    found = split_buildings(PointCloud(points))
-    assert len(found) == 3 and all(building.is_cut_out for building in found)
-    assert sum(len(building.index) for building in found) == len(points)
+    result = split_buildings(PointCloud(points))
+    assert len(result) == 3 and all(building.is_cut_out for building in result)
+    assert sum(len(building.index) for building in result) == len(points)
 
 
 def test_patches_of_bare_ground_are_no_roofs():

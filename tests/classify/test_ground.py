@@ -16,23 +16,23 @@ def land(slope=0.0, side=60.0, density=4.0, seed=0):
 
 def add_house(xyz, size=(14.0, 9.0), height=6.0):
     offset = np.abs(xyz[:, :2] - xyz[:, :2].mean(axis=0))
-    on = (offset < np.array(size) / 2).all(axis=1)
-    return np.where(on[:, None], xyz + (0, 0, height), xyz), on
+    is_house = (offset < np.array(size) / 2).all(axis=1)
+    return np.where(is_house[:, None], xyz + (0, 0, height), xyz), is_house
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.1, 0.3])
 def test_a_house_is_taken_away_and_the_ground_under_it_is_that_around(slope):
     xyz, rise = land(slope)
-    house, on = add_house(xyz)
-    off = ground_grid(house).height_at(house[on]) - rise(house[on])
-    assert np.abs(off).mean() < 0.15 + slope  # lowest in cells of a metre
+    house, is_house = add_house(xyz)
+    difference = ground_grid(house).height_at(house[is_house]) - rise(house[is_house])
+    assert np.abs(difference).mean() < 0.15 + slope  # lowest in cells of a metre
 
 
 @pytest.mark.parametrize("slope", [0.5, 1.0, 2.0])
 def test_a_slope_steeper_than_roofs_is_ground_up_to_its_border(slope):
     xyz, rise = land(slope)
-    off = rise(xyz) - ground_grid(xyz).height_at(xyz)
-    assert np.quantile(np.abs(off), 0.99) < 1.0 * slope
+    difference = rise(xyz) - ground_grid(xyz).height_at(xyz)
+    assert np.quantile(np.abs(difference), 0.99) < 1.0 * slope
 
 
 def test_a_pit_of_noise_is_no_ground():
@@ -43,10 +43,12 @@ def test_a_pit_of_noise_is_no_ground():
 
 @pytest.mark.parametrize("z", [-9999.0, -1e5])
 def test_a_height_that_stands_for_none_tilts_no_ground(z):
-    house, on = add_house(land(0.1)[0])
+    house, is_house = add_house(land(0.1)[0])
     pit = np.concatenate([house, [[*(house[:, :2].min(axis=0) + 5.0), z]]])
     np.testing.assert_allclose(
-        ground_grid(pit).height_at(house[on]), ground_grid(house).height_at(house[on]), atol=0.01
+        ground_grid(pit).height_at(house[is_house]),
+        ground_grid(house).height_at(house[is_house]),
+        atol=0.01,
     )
 
 

@@ -61,10 +61,13 @@ def test_houses_that_differ_are_told_apart_at_their_wall(height):
     points, area, world = block(height)
     houses = separate_houses(points, area, 1.0)
     assert len(houses) == 2
-    for own in (shapely.box(0, 0, 8.6, DEPTH), shapely.box(8.6, 0, WIDTH, DEPTH)):
-        own = shapely.transform(own, world)
+    for members in (shapely.box(0, 0, 8.6, DEPTH), shapely.box(8.6, 0, WIDTH, DEPTH)):
+        members = shapely.transform(members, world)
         assert (
-            max(shapely.intersection(own, h).area / shapely.union(own, h).area for h in houses)
+            max(
+                shapely.intersection(members, h).area / shapely.union(members, h).area
+                for h in houses
+            )
             > 0.93
         )
     assert sum(house.area for house in houses) == pytest.approx(area.area)
@@ -85,7 +88,7 @@ def test_houses_with_bushes_between_them_are_told_apart_in_any_order_of_points()
     houses = separate_houses(points, area, 1.0)
     shuffled = separate_houses(RNG.permutation(points), area, 1.0)
     assert len(houses) == 2
-    assert all(any(one.equals_exact(other, 1e-6) for other in shuffled) for one in houses)
+    assert all(any(first.equals_exact(other, 1e-6) for other in shuffled) for first in houses)
 
 
 def test_every_point_of_a_split_cloud_is_one_house_s():

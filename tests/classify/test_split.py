@@ -22,8 +22,10 @@ L_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 8), (9, 8), (9, 18), (0, 18)])
 BLOCKS = Settings.from_dict({"read": {"split_houses": False}})
 
 
-def turn_polygon(polygon, degrees, at=(85000.0, 446000.0)):
-    return shapely.affinity.translate(shapely.affinity.rotate(polygon, degrees, origin=(0, 0)), *at)
+def turn_polygon(polygon, degrees, origin=(85000.0, 446000.0)):
+    return shapely.affinity.translate(
+        shapely.affinity.rotate(polygon, degrees, origin=(0, 0)), *origin
+    )
 
 
 def points_in(polygon, density, seed=0, z=8.0):
@@ -57,14 +59,15 @@ def street(density=8.0):
 @pytest.mark.parametrize("density", [4.0, 8.0, 25.0])
 def test_houses_apart_are_told_apart_and_blocks_stay_together_where_asked(density):
     cloud, houses = street(density)
-    found = sorted(split_buildings(cloud, BLOCKS), key=lambda building: building.index[0])
-    wanted = [houses[0], houses[1].union(houses[2]), houses[3], houses[4]]
-    assert len(found) == 4
-    for building, house in zip(found, wanted, strict=True):
+    results = sorted(split_buildings(cloud, BLOCKS), key=lambda building: building.index[0])
+    expected = [houses[0], houses[1].union(houses[2]), houses[3], houses[4]]
+    assert len(results) == 4
+    for building, house in zip(results, expected, strict=True):
         assert iou(building.area.convex_hull, house.convex_hull) > 0.75
         assert shapely.intersects_xy(building.area, *cloud.xyz[building.index, :2].T).all()
     assert np.array_equal(
-        np.sort(np.concatenate([b.index for b in found])), np.flatnonzero(cloud.classification == 6)
+        np.sort(np.concatenate([b.index for b in results])),
+        np.flatnonzero(cloud.classification == 6),
     )
 
 
@@ -95,8 +98,8 @@ def test_groups_are_those_of_a_plain_search_over_all_pairs(seed):
     distance = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
     assert (group_of[:, None] == group_of[None])[distance < 0.5].all()  # surely within two cells
     for group in groups:
-        others = np.setdiff1d(np.arange(120), group)
-        assert not len(others) or distance[np.ix_(group, others)].min() > 0.5
+        remainder = np.setdiff1d(np.arange(120), group)
+        assert not len(remainder) or distance[np.ix_(group, remainder)].min() > 0.5
 
 
 @pytest.mark.parametrize("classes", [None, 0, 1])
@@ -114,14 +117,14 @@ def test_noise_is_no_part_of_the_one_building():
     assert building.index.tolist() == list(range(7, len(points)))
 
 
-@pytest.mark.parametrize("what", ["two houses", "wide", "many", "without classes"])
-def test_larger_clouds_without_building_class_are_refused(what):
-    box = shapely.box(0, 0, 90, 20) if what == "wide" else shapely.box(0, 0, 14, 9)
-    points = points_in(box, 2000 if what == "many" else 6)
-    if what == "two houses":
+@pytest.mark.parametrize("defect", ["two houses", "wide", "many", "without classes"])
+def test_larger_clouds_without_building_class_are_refused(defect):
+    box = shapely.box(0, 0, 90, 20) if defect == "wide" else shapely.box(0, 0, 14, 9)
+    points = points_in(box, 2000 if defect == "many" else 6)
+    if defect == "two houses":
         points = np.concatenate([points, points + [30, 0, 0]])
-    classification = None if what == "without classes" else np.ones(len(points), np.uint8)
-    if what == "without classes":
+    classification = None if defect == "without classes" else np.ones(len(points), np.uint8)
+    if defect == "without classes":
         points = np.concatenate([points, points + [30, 0, 0]])
     by_class = Settings.from_dict({"read": {"roofs": "class"}})
     with pytest.raises(
@@ -134,9 +137,9 @@ def test_larger_clouds_without_building_class_are_refused(what):
 def test_roofs_are_found_by_shape_where_no_class_tells_them():
     cloud, _ = street()
     with pytest.warns(InputWarning, match="no building class"):
-        found = split_buildings(PointCloud(cloud.xyz, np.ones(len(cloud), np.uint8)), BLOCKS)
-    assert len(found) == 4
-    roofs = np.sort(np.concatenate([building.index for building in found]))
+        result = split_buildings(PointCloud(cloud.xyz, np.ones(len(cloud), np.uint8)), BLOCKS)
+    assert len(result) == 4
+    roofs = np.sort(np.concatenate([building.index for building in result]))
     assert np.isin(roofs, np.flatnonzero(cloud.classification == 6)).mean() > 0.99
     only_ground = cloud.xyz[cloud.classification == 2]
     with pytest.raises(InputError, match="none of which lies on a smooth surface"):
@@ -151,8 +154,8 @@ def test_the_classes_there_are_named_and_another_may_be_chosen():
         match=r"class 6 .*got classes 2 \([\d,]+ points\), 67 \([\d,]+ points\).*--building-class",
     ):
         split_buildings(other, Settings.from_dict({"read": {"roofs": "class"}}))
-    chosen = Settings.from_dict({"read": {"building_classes": [67], "split_houses": False}})
-    assert len(split_buildings(other, chosen)) == 4
+    settings = Settings.from_dict({"read": {"building_classes": [67], "split_houses": False}})
+    assert len(split_buildings(other, settings)) == 4
 
 
 def test_groups_too_small_are_left_out_with_a_warning():
@@ -181,7 +184,7 @@ def test_every_exported_name_exists():
 @pytest.mark.skipif(not CTVIEW.is_dir(), reason="needs the shared data folder ctview")
 def test_the_ign_tiles_split_into_their_buildings():
     cloud = hiproof.read.read_points(CTVIEW)
-    found = split_buildings(cloud, BLOCKS)
-    assert cloud.crs.to_epsg() == 2154 and 9 <= len(found) <= 12
-    large = [b for b in found if b.area.area > 300]
-    assert len(large) == 5 and all(b.area.is_valid for b in found)
+    result = split_buildings(cloud, BLOCKS)
+    assert cloud.crs.to_epsg() == 2154 and 9 <= len(result) <= 12
+    large = [b for b in result if b.area.area > 300]
+    assert len(large) == 5 and all(b.area.is_valid for b in result)

@@ -17,11 +17,11 @@ def measure_widest_angle(rings):
     """Largest angle (deg) between two triangles of a face's constrained Delaunay triangulation,
     worked out plainly.
     """
-    every = np.concatenate(rings)
-    centre = every.mean(axis=0)
-    axes = np.linalg.svd(every - centre, full_matrices=False)[2]
+    points = np.concatenate(rings)
+    centre = points.mean(axis=0)
+    axes = np.linalg.svd(points - centre, full_matrices=False)[2]
     flat = [(ring - centre) @ axes[:2].T for ring in rings]
-    corner = {tuple(xy): xyz for xy, xyz in zip(np.concatenate(flat), every, strict=True)}
+    corner = {tuple(xy): xyz for xy, xyz in zip(np.concatenate(flat), points, strict=True)}
     normals = []
     for triangle in shapely.constrained_delaunay_triangles(
         shapely.Polygon(flat[0], flat[1:])
@@ -46,10 +46,10 @@ def shake(solid, rng):
     """
     for face in solid.faces:
         ring = solid.vertices[list(face.rings[0])]
-        beside = ring + (np.roll(ring, -1, axis=0) - ring) * rng.uniform(
+        neighbour = ring + (np.roll(ring, -1, axis=0) - ring) * rng.uniform(
             0.001, 0.02, (len(ring), 1)
         )
-        doubled = np.stack((ring, beside), axis=1)[:, : 1 + int(rng.integers(2))].reshape(-1, 3)
+        doubled = np.stack((ring, neighbour), axis=1)[:, : 1 + int(rng.integers(2))].reshape(-1, 3)
         yield doubled + rng.normal(0, 2e-4, doubled.shape)
 
 

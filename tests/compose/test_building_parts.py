@@ -64,9 +64,9 @@ def test_parts_are_valid_do_not_overlap_and_make_up_the_whole(kind, seed):
     for part in parts:
         assert check_solid(part.solid) == ()
         assert part.outline.is_valid and part.outline.area >= LEAST_PART_M2
-    for one, other in combinations(parts, 2):
+    for first, other in combinations(parts, 2):
         assert (
-            one.outline.intersection(other.outline).area < 1e-6
+            first.outline.intersection(other.outline).area < 1e-6
         )  # walls are upright: no overlap in plan, none in space (601)
     if parts:
         # walls of the whole run straight past corners within half a millimetre of their line
@@ -89,9 +89,10 @@ def test_roofs_that_meet_at_a_wall_are_parts_and_those_that_share_an_edge_are_on
 
 def test_a_tower_out_of_a_roof_is_a_part_and_the_rest_goes_around_it():
     parts = building_parts(compose(roof(level(0, 0, 12, 10, 5.0), level(4, 3, 8, 7, 9.0)), 0.0))
-    around, tower = parts
+    surrounding_part, tower = parts
     assert (
-        len(around.outline.interiors) == 1 and len(around.solid.select_faces(GROUND)[0].rings) == 2
+        len(surrounding_part.outline.interiors) == 1
+        and len(surrounding_part.solid.select_faces(GROUND)[0].rings) == 2
     )
     assert tower.outline.equals(shapely.box(4, 3, 8, 7)) and tower.solid.volume == pytest.approx(
         16 * 9.0
@@ -113,10 +114,12 @@ def test_what_is_smaller_than_a_part_stays_with_its_neighbour():
 def test_parts_move_with_the_building():
     solid = compose(roof(gable(0, 0, 6, 8, 6.0), level(6, 0, 10, 8, 3.0)), 0.0)
     shift = np.array([85000.0, 446000.0, 2.0])
-    for here, there in zip(building_parts(solid), building_parts(solid.move(shift)), strict=True):
+    for part, moved_part in zip(
+        building_parts(solid), building_parts(solid.move(shift)), strict=True
+    ):
         assert (
-            np.allclose(here.solid.vertices + shift, there.solid.vertices)
-            and here.solid.faces == there.solid.faces
+            np.allclose(part.solid.vertices + shift, moved_part.solid.vertices)
+            and part.solid.faces == moved_part.solid.faces
         )
 
 

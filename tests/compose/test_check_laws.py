@@ -142,8 +142,8 @@ def test_sound_solid_has_no_findings(solid):
 
 def test_hole_may_touch_its_outer_ring_in_one_point():
     extra = [(0, 5, 10), (3, 6, 10), (3, 4, 10)]
-    found = check_solid(replace_top([OUTER, (8, 9, 10)], extra))
-    assert not {finding.code for finding in found} & {201, 205, 206}
+    result = check_solid(replace_top([OUTER, (8, 9, 10)], extra))
+    assert not {finding.code for finding in result} & {201, 205, 206}
 
 
 def test_planarity_is_the_callers():
@@ -169,9 +169,9 @@ def test_findings_do_not_depend_on_where_the_solid_stands(kind):
     solid = compose(generate_roof(kind, 5), 0.0)
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    far = Solid(solid.vertices @ turn.T + [85000.0, 446000.0, 10.0], solid.faces)
-    assert check_solid(far) == ()
-    assert far.volume == pytest.approx(solid.volume, rel=1e-6)
+    distant_solid = Solid(solid.vertices @ turn.T + [85000.0, 446000.0, 10.0], solid.faces)
+    assert check_solid(distant_solid) == ()
+    assert distant_solid.volume == pytest.approx(solid.volume, rel=1e-6)
 
 
 def find_broken_edges(solid):
@@ -210,11 +210,19 @@ def field(n):
         axis.ravel() for axis in np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
     )
     top = np.column_stack((x, y, 5 + np.random.default_rng(0).uniform(0, 1, len(x))))
-    at = np.arange(len(x)).reshape(n + 1, n + 1)
-    rim = [*at[:-1, 0], *at[-1, :-1], *at[:0:-1, -1], *at[0, :0:-1]]
+    numbers = np.arange(len(x)).reshape(n + 1, n + 1)
+    rim = [*numbers[:-1, 0], *numbers[-1, :-1], *numbers[:0:-1, -1], *numbers[0, :0:-1]]
     base = {int(v): len(top) + k for k, v in enumerate(rim)}
-    rings = [(at[i, j], at[i + 1, j], at[i + 1, j + 1]) for i in range(n) for j in range(n)]
-    rings += [(at[i, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(n) for j in range(n)]
+    rings = [
+        (numbers[i, j], numbers[i + 1, j], numbers[i + 1, j + 1])
+        for i in range(n)
+        for j in range(n)
+    ]
+    rings += [
+        (numbers[i, j], numbers[i + 1, j + 1], numbers[i, j + 1])
+        for i in range(n)
+        for j in range(n)
+    ]
     rings += [(base[a], base[b], b, a) for a, b in zip(rim, rim[1:] + rim[:1], strict=True)]
     rings.append(tuple(base[v] for v in reversed(rim)))
     return make_solid(

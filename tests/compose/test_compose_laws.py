@@ -85,20 +85,20 @@ def count_thin_faces(solid):
 def test_thin_faces_join_neighbours_that_carry_their_planes_no_further_than_what_is_around(
     solids, kind
 ):
-    before = after = 0
+    old = new = 0
     for seed in SEEDS:
         roof, exact = solids[kind, seed]
         solid = compose(roof, Z_GROUND)
         assert check_solid(solid) == ()
-        (low, high), (lowest, highest) = measure_roof_heights(solid), measure_roof_heights(exact)
+        (lower, upper), (lowest, highest) = measure_roof_heights(solid), measure_roof_heights(exact)
         # a decimetre; two where slivers lie side by side
-        assert lowest - 0.2 < low and high < highest + 0.2
-        found, covering = measure_roof_height(solid, xy := sample(roof, 1500, seed))
+        assert lowest - 0.2 < lower and upper < highest + 0.2
+        result, covering = measure_roof_height(solid, xy := sample(roof, 1500, seed))
         assert (covering == 1).all()
-        wanted = roof.height_at(xy)
-        assert (np.abs(found - wanted) > 2e-3)[np.isfinite(wanted)].mean() < 0.1
-        before, after = before + count_thin_faces(exact), after + count_thin_faces(solid)
-    assert after <= 0.4 * before
+        expected = roof.height_at(xy)
+        assert (np.abs(result - expected) > 2e-3)[np.isfinite(expected)].mean() < 0.1
+        old, new = old + count_thin_faces(exact), new + count_thin_faces(solid)
+    assert new <= 0.4 * old
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -106,11 +106,13 @@ def test_roof_of_the_solid_is_the_height_function(solids, kind):
     for seed in SEEDS:
         roof, solid = solids[kind, seed]
         xy = sample(roof, 1500, seed)
-        wanted = roof.height_at(xy)
-        found, covering = measure_roof_height(solid, xy)
+        expected = roof.height_at(xy)
+        result, covering = measure_roof_height(solid, xy)
         assert (covering == 1).all()
-        off = np.abs(found - wanted)[np.isfinite(wanted)] > 2e-3
-        assert off.mean() < 2e-3, f"{kind} {seed}: {off.sum()} of {len(off)} points off"
+        is_wrong = np.abs(result - expected)[np.isfinite(expected)] > 2e-3
+        assert is_wrong.mean() < 2e-3, (
+            f"{kind} {seed}: {is_wrong.sum()} of {len(is_wrong)} points off"
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -146,8 +148,10 @@ def test_answer_moves_with_the_roof(solids, kind):
 def test_a_part_under_the_others_changes_nothing(solids):
     for kind in ("partition", "saw_tooth", "towers"):
         roof, solid = solids[kind, 1]
-        low = Part("flat", (Piece(shapely.box(-9, -9, 9, 9), np.array([[0.0, 0.0, -50.0]])),))
-        other = compose(Roof((*roof.parts, low), roof.outline, roof.frame), Z_GROUND, EXACT)
+        hidden_part = Part(
+            "flat", (Piece(shapely.box(-9, -9, 9, 9), np.array([[0.0, 0.0, -50.0]])),)
+        )
+        other = compose(Roof((*roof.parts, hidden_part), roof.outline, roof.frame), Z_GROUND, EXACT)
         assert other.volume == pytest.approx(solid.volume, rel=1e-4)
         assert len(other.select_faces("RoofSurface")) == len(solid.select_faces("RoofSurface"))
 

@@ -37,7 +37,7 @@ def edit(desk, parts, id=ID, **asked):
 
 
 def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
-    was = by_id(folder)
+    old = by_id(folder)
     start = desk.building(ID)
     assert start["type"] == "flat" and start["version"] == UNTOUCHED
     gable = edit(desk, start["parts"], action="change", part=0, change={"type": "gable"})
@@ -48,14 +48,14 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
         ID, {"parts": fitted["parts"], "version": start["version"], "note": "seen from the street"}
     )
     hiproof.reconstruct_area(make_request(town_files, folder, folder / EDITS_FILE))
-    now = by_id(folder)
-    assert now[ID]["type"] == "gable" and "(seen from the street, anna, " in now[ID]["detail"]
-    assert now[ID]["parts"] == fitted["parts"]
+    new = by_id(folder)
+    assert new[ID]["type"] == "gable" and "(seen from the street, anna, " in new[ID]["detail"]
+    assert new[ID]["parts"] == fitted["parts"]
     # the page goes on
     assert next(row for row in desk.buildings()["rows"] if row["id"] == ID)["type"] == "gable"
-    assert all(now[id] == was[id] for id in was if id != ID)
+    assert all(new[id] == old[id] for id in old if id != ID)
     solids = dict(read_solids(folder / "buildings.gml"))
-    assert len(solids) == len(was) and not any(
+    assert len(solids) == len(old) and not any(
         check_solid(solid, planarity_m=0.01) for solid in solids.values()
     )
 
@@ -113,7 +113,7 @@ def test_the_most_doubtful_come_first(desk):
 
 
 @pytest.mark.parametrize(
-    ("said", "reason"),
+    ("remark", "reason"),
     [
         ({"quality": "poor"}, "poor"),
         ({"status": "flat_fallback"}, "flat block"),
@@ -140,10 +140,10 @@ def test_the_most_doubtful_come_first(desk):
         ),
     ],
 )
-def test_whatever_speaks_against_a_model_adds_to_its_doubt(said, reason):
+def test_whatever_speaks_against_a_model_adds_to_its_doubt(remark, reason):
     plain = {"status": "modelled", "parts": [], "residuals": {"share_within_20cm": 0.95}}
-    found = measure_doubt(plain | said)
-    assert found.amount > measure_doubt(plain).amount and found.reasons == (reason,)
+    result = measure_doubt(plain | remark)
+    assert result.amount > measure_doubt(plain).amount and result.reasons == (reason,)
 
 
 def test_every_edit_gives_a_valid_model(desk):
@@ -155,24 +155,24 @@ def test_every_edit_gives_a_valid_model(desk):
         part=0,
         change={"type": "gable", "ridge_height": 12.0},
     )
-    two = edit(desk, gable["parts"], action="split", part=0)
-    assert len(two["parts"]) == 2 and two["figures"]["volume_m3"] == pytest.approx(
+    halves = edit(desk, gable["parts"], action="split", part=0)
+    assert len(halves["parts"]) == 2 and halves["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
     )
-    one = edit(desk, two["parts"], action="merge", part=0, other=1)
-    assert len(one["parts"]) == 1 and one["figures"]["volume_m3"] == pytest.approx(
+    merged = edit(desk, halves["parts"], action="merge", part=0, other=1)
+    assert len(merged["parts"]) == 1 and merged["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
     )
-    assert one["parts"][0]["parameters"]["length"] == pytest.approx(
+    assert merged["parts"][0]["parameters"]["length"] == pytest.approx(
         gable["parts"][0]["parameters"]["length"], abs=1e-3
     )
-    dormer = edit(desk, one["parts"], action="dormer", part=0)
+    dormer = edit(desk, merged["parts"], action="dormer", part=0)
     assert (
         len(dormer["parts"]) == 2
-        and dormer["figures"]["volume_m3"] > one["figures"]["volume_m3"] + 0.1
+        and dormer["figures"]["volume_m3"] > merged["figures"]["volume_m3"] + 0.1
     )
-    again = edit(desk, dormer["parts"], action="remove", part=1)
-    assert again["mesh"] == one["mesh"]
+    without_dormer = edit(desk, dormer["parts"], action="remove", part=1)
+    assert without_dormer["mesh"] == merged["mesh"]
 
 
 def test_what_is_held_is_not_refitted(desk):
@@ -184,8 +184,8 @@ def test_what_is_held_is_not_refitted(desk):
         part=0,
         change={"type": "gable", "ridge_height": 12.0},
     )
-    held = edit(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
-    assert held["figures"]["ridge_height"] == pytest.approx(12.0, abs=0.01)
+    fixed = edit(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
+    assert fixed["figures"]["ridge_height"] == pytest.approx(12.0, abs=0.01)
     assert edit(desk, raised["parts"], action="refit")["figures"]["ridge_height"] == pytest.approx(
         10.1, abs=0.1
     )
@@ -193,13 +193,13 @@ def test_what_is_held_is_not_refitted(desk):
 
 def test_types_are_tried_and_the_right_one_wins(desk):
     start = desk.building(ID)
-    tried = desk.alternatives(ID, {"parts": start["parts"], "part": 0})["types"]
-    share = {row["type"]: row["share"] for row in tried}
-    assert share["gable"] > 0.95 > share["flat"] and tried[0]["share"] >= share["gable"]
+    candidates = desk.alternatives(ID, {"parts": start["parts"], "part": 0})["types"]
+    share = {row["type"]: row["share"] for row in candidates}
+    assert share["gable"] > 0.95 > share["flat"] and candidates[0]["share"] >= share["gable"]
 
 
 @pytest.mark.parametrize(
-    ("asked", "message"),
+    ("change", "message"),
     [
         ({}, "expected an edit"),
         ({"action": "explode"}, "got 'explode'"),
@@ -216,54 +216,54 @@ def test_types_are_tried_and_the_right_one_wins(desk):
         ({"action": "refit", "held": {"first": []}}, "names by part"),
     ],
 )
-def test_an_edit_that_cannot_be_is_one_sentence(desk, asked, message):
+def test_an_edit_that_cannot_be_is_one_sentence(desk, change, message):
     with pytest.raises(HiproofError, match=message) as caught:
-        desk.change(ID, {"parts": desk.building(ID)["parts"], "asked": asked})
+        desk.change(ID, {"parts": desk.building(ID)["parts"], "asked": change})
     assert "\n" not in str(caught.value)
 
 
 def test_two_windows_lose_nothing(folder):
-    one, other = Desk(folder, "anna"), Desk(folder, "ben")
-    seen = one.building(ID), other.building(ID)
+    first_desk, other = Desk(folder, "anna"), Desk(folder, "ben")
+    buildings = first_desk.building(ID), other.building(ID)
     flat, gable = (
-        seen[0]["parts"],
-        edit(other, seen[1]["parts"], action="change", part=0, change={"type": "gable"}),
+        buildings[0]["parts"],
+        edit(other, buildings[1]["parts"], action="change", part=0, change={"type": "gable"}),
     )
-    mine = one.accept(ID, {"parts": flat, "version": seen[0]["version"]})
+    accepted = first_desk.accept(ID, {"parts": flat, "version": buildings[0]["version"]})
     with pytest.raises(OtherVersion, match="anna accepted") as caught:
-        other.accept(ID, {"parts": gable["parts"], "version": seen[1]["version"]})
-    assert caught.value.version == mine["version"]
+        other.accept(ID, {"parts": gable["parts"], "version": buildings[1]["version"]})
+    assert caught.value.version == accepted["version"]
     assert other.building(ID)["accepted"]["who"] == "anna"
     other.accept("house-1", {"parts": other.building("house-1")["parts"], "version": UNTOUCHED})
     other.accept(ID, {"parts": gable["parts"], "version": caught.value.version})
-    kept = dict(read_overrides(str(folder / EDITS_FILE)))
-    assert {id: record["who"] for id, record in kept.items()} == {ID: "ben", "house-1": "ben"}
-    assert kept[ID]["parts"][0]["type"] == "gable"
+    stored = dict(read_overrides(str(folder / EDITS_FILE)))
+    assert {id: record["who"] for id, record in stored.items()} == {ID: "ben", "house-1": "ben"}
+    assert stored[ID]["parts"][0]["type"] == "gable"
 
 
 def test_no_process_writes_over_another(folder):
     """Two processes accept on one folder at once, each other buildings."""
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
-        done = list(pool.map(accept_overrides, [folder] * 2, range(2)))
-    kept = {id: record["ridge_height"] for id, record in read_overrides(str(folder / EDITS_FILE))}
-    assert kept == {id: height for own in done for id, height in own.items()}
+        accepted = list(pool.map(accept_overrides, [folder] * 2, range(2)))
+    stored = {id: record["ridge_height"] for id, record in read_overrides(str(folder / EDITS_FILE))}
+    assert stored == {id: height for heights in accepted for id, height in heights.items()}
 
 
 def accept_overrides(folder, number):
     """Keep overrides of ten buildings of this process's own; their heights."""
-    edits, done = Edits(folder), {}
+    edits, heights = Edits(folder), {}
     for k in range(10):
         id, height = f"{number}-{k}", 1.0 + k
         edits.put(id, {"id": id, "ridge_height": height}, UNTOUCHED)
-        done[id] = height
-    return done
+        heights[id] = height
+    return heights
 
 
 def test_an_accepted_edit_can_be_taken_back(folder, desk):
     start = desk.building(ID)
-    done = desk.accept(ID, {"parts": start["parts"], "version": start["version"]})
+    accepted = desk.accept(ID, {"parts": start["parts"], "version": start["version"]})
     assert desk.buildings()["accepted"] == 1
-    assert desk.withdraw(ID, {"version": done["version"]}) == {"version": UNTOUCHED}
+    assert desk.withdraw(ID, {"version": accepted["version"]}) == {"version": UNTOUCHED}
     assert desk.building(ID)["accepted"] is None and (folder / EDITS_FILE).read_text() == ""
 
 
@@ -276,13 +276,15 @@ def test_what_makes_no_solid_is_not_accepted(folder, desk):
 
 
 def test_the_file_starts_with_the_overrides_that_the_run_obeyed(town_files, folder, tmp_path):
-    known = tmp_path / "known.jsonl"
-    known.write_text(json.dumps({"id": "house-1", "ridge_height": 9.5}) + "\n")
-    hiproof.reconstruct_area(make_request(town_files, folder, known))
+    overrides = tmp_path / "known.jsonl"
+    overrides.write_text(json.dumps({"id": "house-1", "ridge_height": 9.5}) + "\n")
+    hiproof.reconstruct_area(make_request(town_files, folder, overrides))
     desk = Desk(folder, "anna")
     desk.accept(ID, {"parts": desk.building(ID)["parts"], "version": UNTOUCHED})
-    kept = dict(read_overrides(str(folder / EDITS_FILE)))
-    assert kept["house-1"] == {"id": "house-1", "ridge_height": 9.5} and kept[ID]["who"] == "anna"
+    stored = dict(read_overrides(str(folder / EDITS_FILE)))
+    assert (
+        stored["house-1"] == {"id": "house-1", "ridge_height": 9.5} and stored[ID]["who"] == "anna"
+    )
 
 
 def test_points_are_those_of_the_run(desk):
@@ -331,19 +333,19 @@ def test_a_run_made_by_relative_names_is_known_from_anywhere(run_by_relative_nam
 
 
 def test_the_same_run_from_elsewhere_redoes_nothing(town_files, run_by_relative_names):
-    was = (run_by_relative_names / "run/buildings.gml").stat().st_ino
-    there = [str(run_by_relative_names / Path(file).name) for file in town_files]
-    known = run_by_relative_names / "known.jsonl"
-    hiproof.reconstruct_area(make_request(there, run_by_relative_names / "run", known))
-    assert (run_by_relative_names / "run/buildings.gml").stat().st_ino == was
+    inode = (run_by_relative_names / "run/buildings.gml").stat().st_ino
+    paths = [str(run_by_relative_names / Path(file).name) for file in town_files]
+    overrides = run_by_relative_names / "known.jsonl"
+    hiproof.reconstruct_area(make_request(paths, run_by_relative_names / "run", overrides))
+    assert (run_by_relative_names / "run/buildings.gml").stat().st_ino == inode
 
 
 def test_a_run_goes_on_where_its_files_were_moved(town_files, run_by_relative_names, tmp_path):
     project = run_by_relative_names.rename(tmp_path / "archive")
-    was = (project / "run/buildings.gml").stat().st_ino
-    there = [str(project / Path(file).name) for file in town_files]
-    hiproof.reconstruct_area(make_request(there, project / "run", project / "known.jsonl"))
-    assert (project / "run/buildings.gml").stat().st_ino == was
+    inode = (project / "run/buildings.gml").stat().st_ino
+    paths = [str(project / Path(file).name) for file in town_files]
+    hiproof.reconstruct_area(make_request(paths, project / "run", project / "known.jsonl"))
+    assert (project / "run/buildings.gml").stat().st_ino == inode
     assert Desk(project / "run", "anna").cloud(ID)["count"]
 
 
@@ -393,9 +395,9 @@ def test_buildings_that_are_not_there_are_a_sentence(desk):
 
 def test_gaps_are_heights_of_the_points_drawn_over_the_roof(desk):
     start, cloud = desk.building(ID), desk.cloud(ID)
-    shown = edit(desk, start["parts"], action="show")
+    displayed = edit(desk, start["parts"], action="show")
     places = np.frombuffer(decode_bytes(cloud["places"]), "<f4").reshape(-1, 3)
-    gaps = np.frombuffer(decode_bytes(shown["gaps"]), "<f4")
+    gaps = np.frombuffer(decode_bytes(displayed["gaps"]), "<f4")
     level = start["parts"][0]["position"][2]
     inside = gaps != 9.0  # a point on the outline itself may have no roof under it
     assert len(gaps) == len(places) and inside.mean() > 0.98

@@ -138,7 +138,7 @@ def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
     choose(page, "house-0")
     page.select_option("#type", "gable")
     wait_for_building(page, "house-0: gable")
-    was = read_figure(page, "ridge_height")
+    old_height = read_figure(page, "ridge_height")
     box = page.locator("[data-handle=ridge]").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
@@ -146,7 +146,7 @@ def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
     page.mouse.move(x, y - 25, steps=4)
     page.mouse.move(x, y - 50, steps=4)
     page.mouse.up()
-    wait_until_true(page, f"now.model.figures.ridge_height > {was + 0.5}")
+    wait_until_true(page, f"now.model.figures.ridge_height > {old_height + 0.5}")
     page.evaluate("() => queue")
     assert page.is_checked("[data-pin=height]")
     raised = read_figure(page, "ridge_height")
@@ -155,7 +155,9 @@ def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
     assert read_figure(page, "ridge_height") == pytest.approx(raised, abs=0.005)
     press_key(page, "u")
     press_key(page, "u")
-    assert read_figure(page, "ridge_height") == was and not page.is_checked("[data-pin=height]")
+    assert read_figure(page, "ridge_height") == old_height and not page.is_checked(
+        "[data-pin=height]"
+    )
 
 
 def test_an_edge_and_a_number_change_the_model(page):
@@ -205,14 +207,14 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
     town_files, page, folder
 ):
     choose(page, "house-1")
-    was = read_figure(page, "volume_m3")
+    old_volume = read_figure(page, "volume_m3")
     page.fill("#ground", "1.25")
     page.keyboard.press("Enter")
     wait_until_true(page, "now.model.figures.z_ground === 1.25")
     page.evaluate("() => queue")
-    assert read_figure(page, "volume_m3") > was
+    assert read_figure(page, "volume_m3") > old_volume
     press_key(page, "u")
-    assert read_figure(page, "volume_m3") == was and page.input_value("#ground") != "1.25"
+    assert read_figure(page, "volume_m3") == old_volume and page.input_value("#ground") != "1.25"
     page.fill("#ground", "1.25")
     page.keyboard.press("Enter")
     press_key(page, "a")
@@ -228,11 +230,11 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
     assert page.inner_text("#title") == "house-2: flat"
     page.click("#leave-out")
     press_key(page, "a")
-    said = dict(read_overrides(str(folder / EDITS_FILE)))
+    overrides = dict(read_overrides(str(folder / EDITS_FILE)))
     assert (
-        said["house-1"]["z_ground"] == 1.25
-        and said["house-2"]["leave_out"] is True
-        and "parts" not in said["house-2"]
+        overrides["house-1"]["z_ground"] == 1.25
+        and overrides["house-2"]["leave_out"] is True
+        and "parts" not in overrides["house-2"]
     )
     hiproof.reconstruct_area(make_request(town_files, folder, folder / EDITS_FILE))
     rows = by_id(folder)
@@ -270,16 +272,16 @@ def test_a_server_that_is_gone_is_said_and_costs_nothing(page):
     browser a moment.
     """
     choose(page, "house-0")
-    shown = page.inner_text("#title"), read_figure(page, "share_within_20cm")
+    displayed = page.inner_text("#title"), read_figure(page, "share_within_20cm")
     page.evaluate("() => { window.reached = window.fetch; }")
-    for answer, told in [
+    for answer, message in [
         ("Promise.reject(new TypeError('Failed to fetch'))", "the server does not answer"),
         ("Promise.resolve(new Response('<html>', { status: 502 }))", "the server answered 502"),
     ]:
         page.evaluate(f"() => {{ window.fetch = () => {answer}; }}")
         press_key(page, "r")
-        assert told in page.inner_text("#say")
-        assert (page.inner_text("#title"), read_figure(page, "share_within_20cm")) == shown
+        assert message in page.inner_text("#say")
+        assert (page.inner_text("#title"), read_figure(page, "share_within_20cm")) == displayed
     page.evaluate("() => { window.fetch = window.reached; }")
     press_key(page, "r")
     assert page.inner_text("#say") == ""
@@ -312,8 +314,8 @@ def test_axe_finds_nothing_and_the_whole_building_is_shown(browser, page_service
     with pages.open_page(browser, page_service.address, size) as page:
         wait_for_building(page, "house-")
         places = project_on_canvas(page, "viewer", "viewer.corners")
-        low, high = np.min(places, axis=0), np.max(places, axis=0)
-        assert (low >= 0).all() and (high <= 1).all() and (high - low).max() > 0.4
+        lower, upper = np.min(places, axis=0), np.max(places, axis=0)
+        assert (lower >= 0).all() and (upper <= 1).all() and (upper - lower).max() > 0.4
         assert list_complaints(page) == [] and not is_too_wide(page)
         for letter in "a", "s":
             press_key(page, letter)

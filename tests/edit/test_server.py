@@ -26,16 +26,16 @@ OWN = {"Host": "127.0.0.1:8000", "Content-Type": "application/json"}
 
 @pytest.fixture
 def service(folder):
-    made = Service(Desk(folder, "anna"))
-    made.port = 8000
-    return made
+    made_service = Service(Desk(folder, "anna"))
+    made_service.port = 8000
+    return made_service
 
 
 def get_status(service, target=None, method="GET", body=b"", **headers):
     target = f"/{service.token}/buildings" if target is None else target
-    told = {**OWN, **{name.replace("_", "-"): value for name, value in headers.items()}}
+    sent_headers = {**OWN, **{name.replace("_", "-"): value for name, value in headers.items()}}
     return service.answer(
-        method, target, {k: v for k, v in told.items() if v is not None}, body
+        method, target, {k: v for k, v in sent_headers.items() if v is not None}, body
     ).code
 
 
@@ -87,8 +87,8 @@ def test_without_the_token_nothing_is_told(service):
         "/é/",
         "*",
     ):
-        found = service.answer("GET", target, OWN)
-        assert found.code == 403 and service.token.encode() not in found.body, target
+        response = service.answer("GET", target, OWN)
+        assert response.code == 403 and service.token.encode() not in response.body, target
 
 
 def test_no_path_leads_out_of_the_page(service, folder):
@@ -110,7 +110,7 @@ def test_no_path_leads_out_of_the_page(service, folder):
 
 
 @pytest.mark.parametrize(
-    ("body", "wanted"),
+    ("body", "expected"),
     [
         (b"", 422),
         (b"{", 422),
@@ -122,9 +122,9 @@ def test_no_path_leads_out_of_the_page(service, folder):
         (b'{"id": "house-0", "parts": [{"type": NaN}], "asked": {"action": "show"}}', 422),
     ],
 )
-def test_a_body_that_makes_no_sense_is_one_sentence(service, body, wanted):
-    found = service.answer("POST", f"/{service.token}/change", OWN, body)
-    assert found.code == wanted and json.loads(found.body)["error"].startswith("expected")
+def test_a_body_that_makes_no_sense_is_one_sentence(service, body, expected):
+    response = service.answer("POST", f"/{service.token}/change", OWN, body)
+    assert response.code == expected and json.loads(response.body)["error"].startswith("expected")
 
 
 def test_only_json_is_taken_as_an_edit(service):
@@ -140,9 +140,9 @@ def test_another_version_is_told_to_the_page(service):
     body = {"id": "house-0", "parts": parts, "version": UNTOUCHED}
     target = f"/{service.token}/accept"
     assert service.answer("POST", target, OWN, json.dumps(body).encode()).code == 200
-    found = service.answer("POST", target, OWN, json.dumps(body).encode())
-    assert found.code == 409
-    body["version"] = json.loads(found.body)["version"]
+    response = service.answer("POST", target, OWN, json.dumps(body).encode())
+    assert response.code == 409
+    body["version"] = json.loads(response.body)["version"]
     assert service.answer("POST", target, OWN, json.dumps(body).encode()).code == 200
 
 
@@ -187,8 +187,8 @@ def start_server(folder):
         command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
     )
     for line in process.stdout:
-        if found := re.match(r"open (\S+)", line):
-            return process, found[1]
+        if match := re.match(r"open (\S+)", line):
+            return process, match[1]
     raise AssertionError(f"the server ended with {process.wait()}")
 
 
@@ -206,8 +206,8 @@ def accept_until_killed(folder, number):
             while True:
                 id, number = f"house-{number % 3}", number + 1
                 if id not in versions:
-                    seen = json.loads(request(address, "GET", f"building?id={id}").text)
-                    versions[id], parts = seen["version"], seen["parts"]
+                    building = json.loads(request(address, "GET", f"building?id={id}").text)
+                    versions[id], parts = building["version"], building["parts"]
                 body = {"id": id, "parts": parts, "version": versions[id], "note": f"edit {number}"}
                 answer = request(address, "POST", "accept", body)
                 assert answer.status == 200, answer.text
@@ -229,16 +229,19 @@ def accept_until_killed(folder, number):
 
 
 def test_ctrl_c_leaves_nothing_half_written(folder):
-    before = {path.name for path in folder.iterdir()}
+    old_names = {path.name for path in folder.iterdir()}
     process, _ = accept_until_killed(folder, signal.SIGINT)
     assert process.returncode == 0
-    assert {path.name for path in folder.iterdir()} - before == {EDITS_FILE, f".{EDITS_FILE}.lock"}
+    assert {path.name for path in folder.iterdir()} - old_names == {
+        EDITS_FILE,
+        f".{EDITS_FILE}.lock",
+    }
 
 
 def test_a_kill_loses_no_accepted_edit(folder):
     _, confirmed = accept_until_killed(folder, signal.SIGKILL)
-    kept = dict(read_overrides(str(folder / EDITS_FILE)))
-    assert set(kept) == set(confirmed)
+    stored = dict(read_overrides(str(folder / EDITS_FILE)))
+    assert set(stored) == set(confirmed)
     for id, note in confirmed.items():  # one that was on its way may have come through as well
-        assert int(kept[id]["note"].split()[1]) >= int(note.split()[1])
+        assert int(stored[id]["note"].split()[1]) >= int(note.split()[1])
     assert Desk(folder, "ben").building("house-0")["accepted"]["who"] == "anna"

@@ -77,10 +77,10 @@ def test_points_on_a_shared_edge_are_covered_once():
 
 
 def test_vertical_takes_the_nearest_of_stacked_surfaces_and_no_walls():
-    low = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    lower_ring = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
     wall = np.array([[1.0, 0, 0], [1, 2, 0], [1, 2, 9], [1, 0, 9]])
     points = np.array([[1.0, 1, 1], [1, 1, 4]])
-    assert vertical_distances(points, [low, low + [0, 0, 5], wall]).tolist() == [1, 1]
+    assert vertical_distances(points, [lower_ring, lower_ring + [0, 0, 5], wall]).tolist() == [1, 1]
 
 
 def test_without_polygons_nothing_is_near():

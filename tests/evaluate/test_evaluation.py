@@ -59,9 +59,16 @@ def test_figures_are_those_the_points_were_made_with(run):
 
 
 def test_a_model_equals_itself(run):
-    own = run.figures[0].comparison
-    assert own.reference_id == "house-1" and own.plan_iou == pytest.approx(1)
-    assert (own.ridge_height_m, own.slope_deg, own.azimuth_deg, own.volume_m3) == (0, 0, 0, 0)
+    self_comparison = run.figures[0].comparison
+    assert self_comparison.reference_id == "house-1" and self_comparison.plan_iou == pytest.approx(
+        1
+    )
+    assert (
+        self_comparison.ridge_height_m,
+        self_comparison.slope_deg,
+        self_comparison.azimuth_deg,
+        self_comparison.volume_m3,
+    ) == (0, 0, 0, 0)
 
 
 def test_a_reference_from_elsewhere_is_told_of(run_folder, tmp_path):
@@ -79,11 +86,11 @@ def test_a_reference_from_elsewhere_is_told_of(run_folder, tmp_path):
 
 
 def test_differences_have_the_sign_of_ours_minus_theirs():
-    ours, theirs = gable_solid(ridge=7.5), gable_solid(ridge=7.0)
-    found = compare(ours, "x", theirs)
-    assert found.ridge_height_m == pytest.approx(0.5)
-    assert found.slope_deg == pytest.approx(math.degrees(math.atan(3.5 / 4) - math.atan(3 / 4)))
-    assert found.volume_m3 == pytest.approx(8 * 12 * 0.25)
+    first, theirs = gable_solid(ridge=7.5), gable_solid(ridge=7.0)
+    result = compare(first, "x", theirs)
+    assert result.ridge_height_m == pytest.approx(0.5)
+    assert result.slope_deg == pytest.approx(math.degrees(math.atan(3.5 / 4) - math.atan(3 / 4)))
+    assert result.volume_m3 == pytest.approx(8 * 12 * 0.25)
 
 
 def test_a_reference_without_roof_surfaces_gives_no_figures():
@@ -124,9 +131,9 @@ def test_a_number_that_is_anothers_id_elsewhere_is_not_taken_for_it(ids, expecte
 
 
 def test_where_nothing_lies_nearby_the_id_tells():
-    far = shapely.box(900, 900, 910, 910)
+    distant_area = shapely.box(900, 900, 910, 910)
     assert match_by_id_or_overlap(
-        [block("a", 0.0), BuildingModel("b")], [("b", far), ("a", far)]
+        [block("a", 0.0), BuildingModel("b")], [("b", distant_area), ("a", distant_area)]
     ) == [1, 0]
     assert match_by_id_or_overlap([block("a", 0.0)], []) == [None]
 
@@ -150,9 +157,9 @@ def test_footprints_are_found_by_the_column_that_named_the_buildings(tmp_path, i
     )
     inputs = {"footprints": str(tmp_path / "a.gpkg"), "id_attribute": "nr" if is_told else None}
     (tmp_path / "run.json").write_text(json.dumps({"inputs": inputs, "crs": "EPSG:7415"}))
-    found = evaluate_run(tmp_path).footprints
-    assert all(shapely.equals(one, area) for one, area in zip(found[:2], areas, strict=False))
-    assert not is_told or shapely.equals(found[2], areas[2])
+    result = evaluate_run(tmp_path).footprints
+    assert all(shapely.equals(item, area) for item, area in zip(result[:2], areas, strict=False))
+    assert not is_told or shapely.equals(result[2], areas[2])
 
 
 def test_points_go_to_every_outline_that_holds_them():
@@ -207,17 +214,22 @@ def test_the_tables_fit_a_narrow_terminal(run_folder, tmp_path, monkeypatch, cap
     monkeypatch.setenv("COLUMNS", "80")
     points, reference = str(run_folder / "points.xyz"), str(run_folder / "buildings.city.jsonl")
     evaluate(run_folder, [points], reference=reference, out=tmp_path)
-    said = capsys.readouterr().out
-    assert "…" not in said and said.count("buildings") >= 2 and "volume" in said and "0.000" in said
+    output = capsys.readouterr().out
+    assert (
+        "…" not in output
+        and output.count("buildings") >= 2
+        and "volume" in output
+        and "0.000" in output
+    )
 
 
 def test_buildings_that_no_mean_holds_are_counted(run_folder, tmp_path, capsys):
     cloud = str(run_folder / "points.xyz")
     evaluate(run_folder, [cloud], out=tmp_path)
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     rows = json.loads((tmp_path / "evaluation.json").read_text())["buildings"]
-    without = sum(row["psd_mean"] is None for row in rows)
-    assert 0 < without < len(rows) and f"no distances of {without} building" in said
+    n_without = sum(row["psd_mean"] is None for row in rows)
+    assert 0 < n_without < len(rows) and f"no distances of {n_without} building" in output
 
 
 def test_the_clouds_are_the_runs_own_where_none_are_named(run_folder, tmp_path):
@@ -240,12 +252,12 @@ def test_no_cloud_to_measure_against_is_refused(tmp_path):
 
 def test_buildings_of_which_no_place_is_known_have_no_points(run_folder, tmp_path):
     lines = (run_folder / "buildings.city.jsonl").read_text().splitlines(keepends=True)
-    for name, kept in (("none", []), ("bare", lines[-1:])):
+    for name, kept_lines in (("none", []), ("bare", lines[-1:])):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "buildings.city.jsonl").write_text("".join([lines[0], *kept]))
+        (tmp_path / name / "buildings.city.jsonl").write_text("".join([lines[0], *kept_lines]))
         evaluate(tmp_path / name, [str(run_folder / "points.xyz")])
         rows = json.loads((tmp_path / name / "evaluation.json").read_text())["buildings"]
-        assert [row["points"] for row in rows] == [0] * len(kept)
+        assert [row["points"] for row in rows] == [0] * len(kept_lines)
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path):

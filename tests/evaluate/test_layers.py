@@ -42,13 +42,13 @@ def test_points_of_one_roof_are_one_surface_whatever_their_noise(seed, density, 
     st.floats(0.0, 1.0),
 )
 def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(
-    seed, apart_m, share, side, between
+    seed, apart_m, share, side, model_height
 ):
     roof, points = compound(seed)
     raised = np.random.default_rng(seed).random(len(points)) < share
-    points[:, 2] += side * apart_m * (raised - between)
-    found, distance_m = find_second_surface(points, roof)
-    assert found > 0.4
+    points[:, 2] += side * apart_m * (raised - model_height)
+    result, distance_m = find_second_surface(points, roof)
+    assert result > 0.4
     assert distance_m == pytest.approx(apart_m, abs=0.05)
 
 
@@ -64,12 +64,14 @@ def test_a_part_that_the_model_lacks_is_no_second_surface(seed, height_m):
 def test_the_split_of_a_cell_is_the_best_of_all():
     rng = np.random.default_rng(3)
     xy, values = rng.uniform(0, 4, (60, 2)), rng.normal(size=60)
-    counts, smaller, apart, within = split_cells(xy, values, 100.0)
+    counts, smaller, steps, variances = split_cells(xy, values, 100.0)
     ordered = np.sort(values)
     k = min(range(1, 60), key=lambda k: ordered[:k].var() * k + ordered[k:].var() * (60 - k))
-    left = (ordered[:k].var() * k + ordered[k:].var() * (60 - k)) / 60 / values.var()
+    unexplained = (ordered[:k].var() * k + ordered[k:].var() * (60 - k)) / 60 / values.var()
     assert counts.tolist() == [60] and smaller.tolist() == [min(k, 60 - k)]
-    assert (apart[0], within[0]) == pytest.approx((ordered[k:].mean() - ordered[:k].mean(), left))
+    assert (steps[0], variances[0]) == pytest.approx(
+        (ordered[k:].mean() - ordered[:k].mean(), unexplained)
+    )
 
 
 def test_a_building_says_that_its_points_lie_on_two_surfaces():
@@ -85,9 +87,9 @@ def test_a_building_says_that_its_points_lie_on_two_surfaces():
 def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, cut):
     roof, points = compound(seed, density)
     assert unseen_share(points, roof.outline) < 0.03  # by chance one place in a thousand
-    seen = points[points[:, 0] > np.quantile(points[:, 0], cut)]
-    assume(len(seen) >= 30)  # fewer may be near all of a small roof
-    assert 0.2 < unseen_share(seen, roof.outline) < cut + 0.2
+    visible = points[points[:, 0] > np.quantile(points[:, 0], cut)]
+    assume(len(visible) >= 30)  # fewer may be near all of a small roof
+    assert 0.2 < unseen_share(visible, roof.outline) < cut + 0.2
 
 
 def test_a_score_of_points_in_a_corner_of_a_large_outline_leaves_the_rest_unseen():

@@ -74,8 +74,8 @@ def test_facade_points_do_not_count_for_the_share():
     facade = np.column_stack([np.full(30, 0.1), y, np.linspace(0, 4, 30)])
     figures = quality(block(), np.concatenate([roof_points(), facade]), shapely.box(0, 0, 10, 6))
     assert figures.share_within_20cm == 1 and figures.psd_mean > 0.1
-    few = quality(block(), facade, shapely.box(0, 0, 10, 6))
-    assert np.isnan(few.share_within_20cm)
+    narrow_quality = quality(block(), facade, shapely.box(0, 0, 10, 6))
+    assert np.isnan(narrow_quality.share_within_20cm)
 
 
 @pytest.mark.skipif(not AMSTERDAM.is_dir(), reason="needs the real data in ../shared")
@@ -127,17 +127,19 @@ def test_cells_are_counted_as_one_by_one(seed):
     rng = np.random.default_rng(seed)
     outline = shapely.MultiPoint(rng.uniform(-9, 9, (8, 2))).convex_hull
     xyz, dz = rng.uniform(-12, 12, (150, 3)), rng.uniform(0, 1, 150)
-    own = {}
-    for (x, y, _), off in zip(xyz, dz, strict=True):
-        own.setdefault((math.floor(x), math.floor(y)), []).append(off > 0.5)
+    gaps_by_cell = {}
+    for (x, y, _), gap in zip(xyz, dz, strict=True):
+        gaps_by_cell.setdefault((math.floor(x), math.floor(y)), []).append(gap > 0.5)
     cells = [
         (x, y)
         for x in range(-10, 10)
         for y in range(-10, 10)
         if outline.covers(shapely.Point(x + 0.5, y + 0.5))
     ]
-    assert nodata_share(xyz, outline) == pytest.approx(np.mean([cell not in own for cell in cells]))
-    assert unexplained_area(xyz, dz) == sum(np.mean(away) > 0.5 for away in own.values())
+    assert nodata_share(xyz, outline) == pytest.approx(
+        np.mean([cell not in gaps_by_cell for cell in cells])
+    )
+    assert unexplained_area(xyz, dz) == sum(np.mean(gaps) > 0.5 for gaps in gaps_by_cell.values())
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 20, 21, 400])

@@ -60,8 +60,10 @@ def test_what_is_no_cityjson_is_refused_in_a_sentence(tmp_path, text):
 def test_a_part_that_is_no_number_is_refused_in_a_sentence(tmp_path, part):
     write_sample_run(tmp_path)
     path = run_models(tmp_path)
-    told = json.dumps({"type": "RoofSurface", "hiproof_part": part, "hiproof_part_type": "gable"})
-    path.write_text(path.read_text().replace('{"type": "RoofSurface"}', told))
+    semantics = json.dumps(
+        {"type": "RoofSurface", "hiproof_part": part, "hiproof_part_type": "gable"}
+    )
+    path.write_text(path.read_text().replace('{"type": "RoofSurface"}', semantics))
     with pytest.raises(
         InputError, match=r"expected building house-1 in line 2 of .* as the number of a part"
     ):

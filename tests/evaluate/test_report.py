@@ -94,15 +94,15 @@ def run_in_browser(page, folder, *flags):
         "--virtual-time-budget=3000",
         *flags,
     ]
-    done = subprocess.run(
+    process = subprocess.run(
         [*command, "--dump-dom", (folder / "page.html").as_uri()],
         capture_output=True,
         text=True,
         timeout=120,
     )
-    said = re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert said, f"the page's scripts did not run to their end: {done.stderr[-2000:]}"
-    return json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    answer = re.search(r'<pre id="said">(.*?)</pre>', process.stdout, re.DOTALL)
+    assert answer, f"the page's scripts did not run to their end: {process.stderr[-2000:]}"
+    return json.loads(answer[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
 
 
 @pytest.fixture(scope="module")
@@ -148,12 +148,12 @@ def test_the_colours_follow_the_choice(browser_answer):
 
 @needs_browser
 def test_without_webgl_the_map_still_works(page, tmp_path):
-    said = run_in_browser(page, tmp_path, "--disable-3d-apis")
+    answer = run_in_browser(page, tmp_path, "--disable-3d-apis")
     assert (
-        not said["webgl"]
-        and said["marks"] == 3
-        and "house-1" in said["afterMapClick"]
-        and not said["faults"]
+        not answer["webgl"]
+        and answer["marks"] == 3
+        and "house-1" in answer["afterMapClick"]
+        and not answer["faults"]
     )
 
 
@@ -214,8 +214,8 @@ def test_a_run_without_points_is_reported_too(tmp_path):
 
 
 def test_of_too_many_buildings_the_worst_are_shown_and_all_are_counted(run):
-    many = run.only([0, 2, 2, 2, 2, 1, 2, 2, 2, 2])
-    page = report_html(many, most_shown=4)
+    large_run = run.only([0, 2, 2, 2, 2, 1, 2, 2, 2, 2])
+    page = report_html(large_run, most_shown=4)
     data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', page)[1])
     ids = [building["id"] for building in data["buildings"]]
     assert {"house-1", "block 2"} <= set(ids) and len(ids) <= 4

@@ -49,9 +49,9 @@ def on_block(count=600, height=6.0, seed=0):
     )
 
 
-def cluster(count, height, around=(6.0, 5.0), width=2.5):
+def cluster(count, height, centre=(6.0, 5.0), width=2.5):
     rng = np.random.default_rng(1)
-    xy = np.array(around) + rng.uniform(-width / 2, width / 2, (count, 2))
+    xy = np.array(centre) + rng.uniform(-width / 2, width / 2, (count, 2))
     return np.column_stack([xy, np.linspace(6.0 + 0.9 * height, 6.0 + height, count)])
 
 
@@ -74,10 +74,10 @@ def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
     """
     narrow = shapely.box(0.0, 0.0, 12.0, 1.4)
     points = np.random.default_rng(2).uniform((0, 0), (12, 1.4), (400, 2))
-    off = (np.arange(400) % 5 < 3) * side * off_m
-    found = judge_model(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + off]))
-    assert found.grade is Grade.POOR and any(
-        "% of its points lie within 0.2 m" in reason for reason in found.reasons
+    deviation = (np.arange(400) % 5 < 3) * side * off_m
+    verdict = judge_model(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + deviation]))
+    assert verdict.grade is Grade.POOR and any(
+        "% of its points lie within 0.2 m" in reason for reason in verdict.reasons
     )
 
 
@@ -106,13 +106,13 @@ def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
 @pytest.mark.parametrize("count", [5, 41, 296])
 @pytest.mark.parametrize("height", [4.0, 30.0])
 def test_points_far_above_a_model_are_named(count, height):
-    found = judge_model(
+    verdict = judge_model(
         block(), np.concatenate([on_block(3000), cluster(count, height, width=1.5)])
     )
-    assert found.grade is not Grade.GOOD
+    assert verdict.grade is not Grade.GOOD
     assert (
         f"{count} points up to {height:.{1 if height < 10 else 0}f} m above the model"
-        in found.reasons
+        in verdict.reasons
     )
 
 
@@ -128,9 +128,9 @@ def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
     points = on_block(1500)
     yard = (abs(points[:, 0] - 6) < 1.5) & (abs(points[:, 1] - 4.5) < 1.5)
     points[yard, 2] -= 4.0
-    found = judge_model(block(), points)
-    assert found.grade is not Grade.GOOD
-    assert any(reason.endswith("m below the model") for reason in found.reasons)
+    verdict = judge_model(block(), points)
+    assert verdict.grade is not Grade.GOOD
+    assert any(reason.endswith("m below the model") for reason in verdict.reasons)
 
 
 def test_half_a_building_without_points_is_poor_and_a_tenth_is_not():
@@ -139,7 +139,7 @@ def test_half_a_building_without_points_is_poor_and_a_tenth_is_not():
     assert judge_model(block(), points[points[:, 0] < 11.0]).grade is not Grade.POOR
 
 
-def run_over_spire(folder, code, most=20_000):
+def run_over_spire(folder, code, max_points=20_000):
     """What the run writes of a house over whose middle 60 points of class `code` rise to 30 m."""
     town = make_town(1, density=40.0)
     west, south, east, north = town.footprints["house-0"].bounds
@@ -153,7 +153,7 @@ def run_over_spire(folder, code, most=20_000):
     classes = np.append(town.classification, np.full(60, code, np.uint8))
     cloud = write_cloud(folder / "cloud.laz", np.concatenate([town.xyz, spire]), classes)
     footprints = write_footprints(folder / "footprints.geojson", town.footprints)
-    settings = Settings.from_dict({"city": {"max_points_a_building": most}})
+    settings = Settings.from_dict({"city": {"max_points_a_building": max_points}})
     summary = reconstruct_area(
         Request((str(cloud),), folder / "out", str(footprints), settings=settings)
     )
@@ -161,9 +161,9 @@ def run_over_spire(folder, code, most=20_000):
     return row, summary
 
 
-@pytest.mark.parametrize(("code", "most"), [(6, 20_000), (6, 1000), (18, 20_000)])
-def test_neither_thinning_nor_a_class_of_noise_hides_a_spire(tmp_path, code, most):
-    row, summary = run_over_spire(tmp_path, code, most)
+@pytest.mark.parametrize(("code", "max_points"), [(6, 20_000), (6, 1000), (18, 20_000)])
+def test_neither_thinning_nor_a_class_of_noise_hides_a_spire(tmp_path, code, max_points):
+    row, summary = run_over_spire(tmp_path, code, max_points)
     lines = describe(Ledger(tmp_path / "out" / ".hiproof" / "ledger.sqlite", read_only=True))
     assert f"quality: {graded_words({row['quality']: 1})}" in lines
     assert row["quality"] != "good" and "m above the model" in row["detail"]

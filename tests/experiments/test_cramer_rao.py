@@ -75,7 +75,7 @@ def test_gauss_newton_with_known_sides_reaches_the_bound(kind):
     rng = np.random.default_rng(5)
     from experiments.cramer_rao import compute_height_gradient
 
-    used = [2, *range(5, primitive.theta_size)]
+    free = [2, *range(5, primitive.theta_size)]
     half_width, half_length = theta[3:5]
     errors = []
     for _ in range(400):
@@ -83,9 +83,9 @@ def test_gauss_newton_with_known_sides_reaches_the_bound(kind):
         u, v = rng.uniform(-half_length, half_length, n), rng.uniform(-half_width, half_width, n)
         c, s = math.cos(theta[2]), math.sin(theta[2])
         xy = np.column_stack([theta[0] + u * c - v * s, theta[1] + u * s + v * c])
-        gradient = compute_height_gradient(primitive, theta, xy)[:, used]
+        gradient = compute_height_gradient(primitive, theta, xy)[:, free]
         errors.append(np.linalg.lstsq(gradient, rng.normal(0, 0.1, n), rcond=None)[0])
-    information = compute_height_information(primitive, theta, 4.0, 0.1)[np.ix_(used, used)]
+    information = compute_height_information(primitive, theta, 4.0, 0.1)[np.ix_(free, free)]
     bound = np.sqrt(np.diag(np.linalg.inv(information)))
     np.testing.assert_allclose(np.std(errors, axis=0) / bound, 1, atol=0.15)
 
@@ -116,8 +116,8 @@ def test_the_covariance_is_symmetric_and_positive():
     for kind in EXAMPLES:
         primitive, theta = make_theta(kind)
         covariance = compute_best_covariance(primitive, theta, 4.72, 0.1)
-        known = np.isfinite(np.diag(covariance))
-        inner = covariance[np.ix_(known, known)]
+        is_known = np.isfinite(np.diag(covariance))
+        inner = covariance[np.ix_(is_known, is_known)]
         np.testing.assert_allclose(inner, inner.T, rtol=1e-6, atol=1e-12)
         assert np.linalg.eigvalsh(inner).min() > 0
 

@@ -113,8 +113,8 @@ def test_ransac_finds_the_planes_of_a_clean_hip_and_repeats_itself():
     planes = detect_planes(points)
     assert match_faces(planes, list_true_faces(building)) == (4, 0)
     assert match_faces([*planes, planes[0]], list_true_faces(building)) == (4, 1)
-    again = detect_planes(points)
-    assert [p.inliers.tolist() for p in planes] == [p.inliers.tolist() for p in again]
+    repeat = detect_planes(points)
+    assert [p.inliers.tolist() for p in planes] == [p.inliers.tolist() for p in repeat]
 
 
 @needs_ransac

@@ -29,14 +29,14 @@ def move(outline, shift):
     return shapely.transform(outline, lambda c: c + shift)
 
 
-@pytest.mark.parametrize("far", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("distance", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("angle", [0.3, 2.0, 4.4])
-def test_the_shift_is_found(far, angle):
-    shift = far * np.array([np.cos(angle), np.sin(angle)])
-    found = find_shift(points_in(L_SHAPE)[:, :2], move(L_SHAPE, -shift))
-    assert found.is_clear
-    assert np.hypot(*(found.xy - shift)) < 0.1
-    assert (np.abs(found.xy - shift) < 4 * found.sigma).all()
+def test_the_shift_is_found(distance, angle):
+    shift = distance * np.array([np.cos(angle), np.sin(angle)])
+    result = find_shift(points_in(L_SHAPE)[:, :2], move(L_SHAPE, -shift))
+    assert result.is_clear
+    assert np.hypot(*(result.xy - shift)) < 0.1
+    assert (np.abs(result.xy - shift) < 4 * result.sigma).all()
 
 
 def test_a_footprint_in_its_place_stays():
@@ -46,8 +46,8 @@ def test_a_footprint_in_its_place_stays():
 
 def test_a_house_in_a_row_is_not_moved_along_the_row():
     row = points_in(shapely.box(-20, 0, 26, 9))
-    found = find_shift(row[:, :2], shapely.box(0.8, 0, 6.8, 9))
-    assert not found.is_clear
+    result = find_shift(row[:, :2], shapely.box(0.8, 0, 6.8, 9))
+    assert not result.is_clear
 
 
 def test_points_cut_off_at_the_footprint_tell_nothing():
@@ -59,9 +59,9 @@ def test_points_cut_off_at_the_footprint_tell_nothing():
 
 @pytest.mark.parametrize("reach", [0.4, -0.4])
 def test_a_roof_larger_or_smaller_than_its_footprint_is_no_shift_and_is_said(reach):
-    found = find_shift(points_in(L_SHAPE)[:, :2], L_SHAPE.buffer(-reach, join_style="mitre"))
-    assert not found.is_clear
-    assert found.is_size_clear and found.beyond == pytest.approx(reach, abs=0.1)
+    result = find_shift(points_in(L_SHAPE)[:, :2], L_SHAPE.buffer(-reach, join_style="mitre"))
+    assert not result.is_clear
+    assert result.is_size_clear and result.beyond == pytest.approx(reach, abs=0.1)
 
 
 @pytest.mark.parametrize("count", [0, 1, 19])
@@ -77,25 +77,25 @@ def test_reconstruct_moves_the_outline_and_keeps_the_footprint():
     house = shapely.box(0, 0, 12, 8)
     points, footprint = points_in(house), move(house, (-1.0, 0.5))
     assert AROUND_M == PLANNED_AROUND_M
-    found = reconstruct(points, footprint)
-    assert found.shift == (pytest.approx(1.0, abs=0.1), pytest.approx(-0.5, abs=0.1))
-    assert found.footprint.equals(footprint)
-    outline = shapely.transform(found.roof.outline, found.roof.frame.to_world)
+    building = reconstruct(points, footprint)
+    assert building.shift == (pytest.approx(1.0, abs=0.1), pytest.approx(-0.5, abs=0.1))
+    assert building.footprint.equals(footprint)
+    outline = shapely.transform(building.roof.outline, building.roof.frame.to_world)
     assert np.hypot(*(np.array(outline.centroid.coords[0]) - house.centroid.coords[0])) < 0.1
-    assert "was moved by (" in found.detail
+    assert "was moved by (" in building.detail
 
 
 def test_align_off_leaves_it():
     house = shapely.box(0, 0, 12, 8)
-    found = reconstruct(points_in(house), move(house, (-1.0, 0.5)), settings=OFF)
-    assert found.shift == (0.0, 0.0) and "moved" not in found.detail
+    building = reconstruct(points_in(house), move(house, (-1.0, 0.5)), settings=OFF)
+    assert building.shift == (0.0, 0.0) and "moved" not in building.detail
 
 
 @pytest.mark.parametrize("overhang", [0.8, 1.0])
-@pytest.mark.parametrize("far", [0.0, 0.5, 2.0])
-def test_a_roof_that_overhangs_all_around_does_not_hide_the_shift(overhang, far):
-    shift = far * np.array([0.8, 0.6])
+@pytest.mark.parametrize("distance", [0.0, 0.5, 2.0])
+def test_a_roof_that_overhangs_all_around_does_not_hide_the_shift(overhang, distance):
+    shift = distance * np.array([0.8, 0.6])
     roof = points_in(L_SHAPE.buffer(overhang, join_style="mitre"))[:, :2]
-    found = find_shift(roof, move(L_SHAPE, -shift))
-    assert np.hypot(*(found.xy - shift)) < 0.1 and found.is_clear == (far > 0)
-    assert found.is_size_clear and found.beyond == pytest.approx(overhang, abs=0.1)
+    result = find_shift(roof, move(L_SHAPE, -shift))
+    assert np.hypot(*(result.xy - shift)) < 0.1 and result.is_clear == (distance > 0)
+    assert result.is_size_clear and result.beyond == pytest.approx(overhang, abs=0.1)

@@ -43,22 +43,25 @@ def test_a_yard_is_cut_out_within_a_few_per_cent(place, density, turn, shift):
         place(scatter(FOOTPRINT - yard, density)),
         place(scatter(yard.buffer(-0.3), 1, 1)),
     )
-    found = find_bare_ground(shapely.transform(FOOTPRINT, place), roof, ground)
+    result = find_bare_ground(shapely.transform(FOOTPRINT, place), roof, ground)
     true = shapely.transform(FOOTPRINT - yard, place)
     assert (
-        found.outline.is_valid and found.outline.symmetric_difference(true).area < 0.05 * true.area
+        result.outline.is_valid
+        and result.outline.symmetric_difference(true).area < 0.05 * true.area
     )
-    assert found.area_m2 == pytest.approx(yard.area, rel=0.2)
-    edges = np.diff(shapely.get_coordinates(found.outline.exterior), axis=0)
+    assert result.area_m2 == pytest.approx(yard.area, rel=0.2)
+    edges = np.diff(shapely.get_coordinates(result.outline.exterior), axis=0)
     quarter = np.degrees(np.arctan2(edges[:, 1], edges[:, 0]) - turn) % 90
     assert np.minimum(quarter, 90 - quarter)[np.hypot(*edges.T) > 0.1].max() < 0.5, "right angles"
 
 
 def test_ground_that_a_wall_hides_is_bare_as_far_as_there_is_no_roof():
     yard = YARDS["in the middle"]
-    seen = scatter(shapely.box(5.3, 3.3, 8.8, 8.7), 1)  # the eastern 2 m lie in the shadow
-    found = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 8), seen)
-    assert found.outline.symmetric_difference(FOOTPRINT - yard).area < 0.04 * 156
+    visible_ground = scatter(
+        shapely.box(5.3, 3.3, 8.8, 8.7), 1
+    )  # the eastern 2 m lie in the shadow
+    result = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 8), visible_ground)
+    assert result.outline.symmetric_difference(FOOTPRINT - yard).area < 0.04 * 156
 
 
 @pytest.mark.parametrize(
@@ -76,22 +79,22 @@ def test_a_roof_stays_whole(ground):
 
 def test_a_yard_that_would_leave_two_buildings_is_measured_and_not_cut():
     yard = shapely.box(5, 0, 11, 12)
-    found = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 5), scatter(yard, 1))
-    assert found.outline is None and found.area_m2 == pytest.approx(72, rel=0.1)
+    result = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 5), scatter(yard, 1))
+    assert result.outline is None and result.area_m2 == pytest.approx(72, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_largest_sum_is_that_of_all_rectangles_tried(seed):
     value = np.random.default_rng(seed).integers(-3, 3, (5, 7)).astype(float)
     top, bottom, left, right, total = largest_sum(value)
-    every = [
+    sums = [
         value[a:b, c:d].sum()
         for a in range(5)
         for b in range(a + 1, 6)
         for c in range(7)
         for d in range(c + 1, 8)
     ]
-    assert total == max([0.0, *every]) == value[top:bottom, left:right].sum()
+    assert total == max([0.0, *sums]) == value[top:bottom, left:right].sum()
 
 
 def sloping(xy):
@@ -110,15 +113,15 @@ def test_the_ground_is_a_plane_by_what_is_known_of_it():
 def test_nothing_stands_where_few_points_lie_above_the_ground(share, is_empty):
     xy = scatter(FOOTPRINT, 4)
     points = np.column_stack([xy, sloping(xy) + np.where(xy[:, 0] < 16 * share, 4.0, 0.1)])
-    found = classify_standing(points, np.array([0.1, -0.2, 3.0]))
-    assert found.is_empty == is_empty and found.low_share == pytest.approx(1 - share, abs=0.05)
+    result = classify_standing(points, np.array([0.1, -0.2, 3.0]))
+    assert result.is_empty == is_empty and result.low_share == pytest.approx(1 - share, abs=0.05)
 
 
 def test_ground_seen_below_a_roof_does_not_make_it_none():
     xy = scatter(FOOTPRINT, 4)
     points = np.concatenate([np.column_stack([xy, np.full(len(xy), z)]) for z in (0.0, 2.4)])
-    found = classify_standing(points, np.zeros(3))
-    assert found.low_share == 0.5 and not found.is_empty and cover(points, ~found.is_low) > 0.8
+    result = classify_standing(points, np.zeros(3))
+    assert result.low_share == 0.5 and not result.is_empty and cover(points, ~result.is_low) > 0.8
 
 
 def test_points_of_another_height_system_lie_on_no_ground():

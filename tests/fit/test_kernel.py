@@ -81,33 +81,33 @@ def test_gradient_equals_the_numeric_one(kind, primitive, plan_is_free):
         if primitive.strips > 1 and k in (0, 1, 2, 3):
             continue  # a point that changes its tooth jumps: there is no derivative
         step = 1e-6 * np.eye(9)[k]
-        ahead, behind = (
+        ahead, backward = (
             compiled(problem, kind, theta + step)[0],
             compiled(problem, kind, theta - step)[0],
         )
-        assert gradient[k] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-3)
+        assert gradient[k] == pytest.approx((ahead - backward) / 2e-6, rel=2e-4, abs=2e-3)
 
 
 @each_variant
 def test_minimise_descends_and_stays_in_the_box(kind, primitive):
     theta, problem = theta_and_problem(primitive)
-    low, high = theta - 0.3, theta + 0.4
+    lower, upper = theta - 0.3, theta + 0.4
     start = theta + 0.2
-    before = compiled(problem, kind, start)[0]
-    value, *_ = kernel.minimise(problem, tables(), kind, start, low, high, NOISE, 10, 1e-3)
-    assert value <= before
-    assert (start >= low - 1e-12).all() and (start <= high + 1e-12).all()
+    start_value = compiled(problem, kind, start)[0]
+    value, *_ = kernel.minimise(problem, tables(), kind, start, lower, upper, NOISE, 10, 1e-3)
+    assert value <= start_value
+    assert (start >= lower - 1e-12).all() and (start <= upper + 1e-12).all()
 
 
 def test_fixed_parameters_do_not_move():
     gable = CATALOGUE["gable"]
     theta, problem = theta_and_problem(gable)
     kind = variants().index(gable)
-    low, high = np.full(9, -np.inf), np.full(9, np.inf)
+    lower, upper = np.full(9, -np.inf), np.full(9, np.inf)
     fixed = [0, 1, 3, 4]
-    low[fixed] = high[fixed] = theta[fixed]
+    lower[fixed] = upper[fixed] = theta[fixed]
     moved = theta + np.array([0, 0, 0.05, 0, 0, 0.3, 0.1, 0, 0])
-    kernel.minimise(problem, tables(), kind, moved, low, high, NOISE, 20, 1e-6)
+    kernel.minimise(problem, tables(), kind, moved, lower, upper, NOISE, 20, 1e-6)
     np.testing.assert_array_equal(moved[fixed], theta[fixed])
     assert abs(moved[5] - theta[5]) < 0.1
 
@@ -127,7 +127,9 @@ def test_a_point_of_no_roof_probability_does_not_matter():
 
 def test_gradient_and_hessian_are_finite_for_points_far_away():
     theta, problem = theta_and_problem(CATALOGUE["hip"])
-    far = problem._replace(points=problem.points * (1e3, 1e3, 1e3, 1))
-    value, gradient, hessian, inliers, _ = compiled(far, variants().index(CATALOGUE["hip"]), theta)
+    distant_problem = problem._replace(points=problem.points * (1e3, 1e3, 1e3, 1))
+    value, gradient, hessian, inliers, _ = compiled(
+        distant_problem, variants().index(CATALOGUE["hip"]), theta
+    )
     assert np.isfinite(value) and np.isfinite(gradient).all() and np.isfinite(hessian).all()
-    assert 0 <= inliers <= len(far.points)
+    assert 0 <= inliers <= len(distant_problem.points)

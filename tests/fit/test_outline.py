@@ -148,7 +148,7 @@ def test_an_oblique_wall_is_drawn_as_one():
     assert count_corners(outline) == 4 and iou(outline, truth) > 0.96
 
 
-def scan_block(outline, seed=0, high=6.0, step_at=None):
+def scan_block(outline, seed=0, height=6.0, step_at=None):
     """Points (n, 3), evenly spread, 5 a square metre, of a level roof with walls; beyond x =
     `step_at` three metres lower.
     """
@@ -169,8 +169,8 @@ def scan_block(outline, seed=0, high=6.0, step_at=None):
     walls = shapely.get_coordinates(np.concatenate(places))
     top = np.where(
         np.concatenate([roof, walls])[:, 0] > (np.inf if step_at is None else step_at + 0.01),
-        high - 3,
-        high,
+        height - 3,
+        height,
     )
     z = top - np.r_[np.zeros(len(roof)), rng.uniform(0.0, 6.0, len(walls))]
     return np.column_stack([np.concatenate([roof, walls]) + rng.normal(0, 0.05, (len(z), 2)), z])
@@ -218,9 +218,9 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
     drawing = make_drawing(make_lines(np.array(wedge, float)), 0.0, border)
     assert len(add_steps(drawing, border, 1).lines) == 7  # no matter of single sides
-    found = add_steps(drawing, border, RUN)
-    assert len(found.lines) == 8 and found.cost < drawing.cost
-    assert iou(shapely.Polygon(found.corners), truth) > 0.96
+    result = add_steps(drawing, border, RUN)
+    assert len(result.lines) == 8 and result.cost < drawing.cost
+    assert iou(shapely.Polygon(result.corners), truth) > 0.96
 
 
 def test_an_outline_ends_in_no_spike():
@@ -321,24 +321,29 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
         notch[1, 1] = middle @ [np.cos(notch[1, 0]), np.sin(notch[1, 0])]
         changes = [(replace_lines(lines, i, 1, lines[i, 0] + 0.05, lines[i, 1] + 0.3), 2)]
         changes += [(drop_line(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
-        for new, fresh in changes:
-            found, anew = (
-                apply_change(new, drawing, i, 1, fresh, border),
+        for new, expected in changes:
+            result, redrawn = (
+                apply_change(new, drawing, i, 1, expected, border),
                 make_drawing(new, 0.0, border),
             )
-            assert evaluate_change(new, drawing, i, 1, fresh, border, np.inf) == pytest.approx(
-                found.cost
+            assert evaluate_change(new, drawing, i, 1, expected, border, np.inf) == pytest.approx(
+                result.cost
             )
-            if np.isfinite(anew.cost):
+            if np.isfinite(redrawn.cost):
                 assert (
-                    evaluate_change(new, drawing, i, 1, fresh, border, found.cost - 1e-6) == np.inf
+                    evaluate_change(new, drawing, i, 1, expected, border, result.cost - 1e-6)
+                    == np.inf
                 )
                 assert (
-                    evaluate_change(new, drawing, i, 1, fresh, border, found.cost + 1e-6) < np.inf
+                    evaluate_change(new, drawing, i, 1, expected, border, result.cost + 1e-6)
+                    < np.inf
                 )
-                assert found.cost == pytest.approx(anew.cost) and found.structure == anew.structure
-                assert found.own == pytest.approx(anew.own) and found.corners == pytest.approx(
-                    anew.corners
+                assert (
+                    result.cost == pytest.approx(redrawn.cost)
+                    and result.structure == redrawn.structure
+                )
+                assert result.own == pytest.approx(redrawn.own) and result.corners == pytest.approx(
+                    redrawn.corners
                 )
                 priced += 1
     assert priced >= 12
@@ -370,9 +375,9 @@ def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
 def test_the_given_direction_is_that_of_the_edges():
     xy, _ = points_in(L_SHAPE, 8.0, angle=0.5)
     edges = np.diff(shapely.get_coordinates(estimate_outline(xy, kappa=0.5).exterior), axis=0)
-    off = np.abs(np.angle(np.exp(4j * (np.arctan2(edges[:, 1], edges[:, 0]) - 0.5)))) / 4
+    angle = np.abs(np.angle(np.exp(4j * (np.arctan2(edges[:, 1], edges[:, 0]) - 0.5)))) / 4
     length = np.hypot(edges[:, 0], edges[:, 1])
-    assert length[off < 0.02].sum() > 0.8 * length.sum()
+    assert length[angle < 0.02].sum() > 0.8 * length.sum()
 
 
 @pytest.mark.parametrize(
@@ -387,15 +392,17 @@ def test_points_that_span_no_area_are_an_error_with_a_sentence(xy):
 def test_kept_densities_say_of_a_side_what_its_points_do(seed):
     rng = np.random.default_rng(seed)
     depth, a_metre = rng.uniform(-0.79, DEEP_M, 60), rng.uniform(2.0, 90.0)
-    near = depth[depth < SHALLOW_M - OFFSETS_M[0]]
+    shallow = depth[depth < SHALLOW_M - OFFSETS_M[0]]
     for row, (blur, walls) in enumerate(product(BLURS_M, WALLS_M)):
-        away = (near[:, None] + OFFSETS_M) / blur
+        distance = (shallow[:, None] + OFFSETS_M) / blur
         density = np.where(
-            np.abs(away) > SURE_BLURS, away > 0.0, norm.cdf(away) + walls * norm.pdf(away) / blur
+            np.abs(distance) > SURE_BLURS,
+            distance > 0.0,
+            norm.cdf(distance) + walls * norm.pdf(distance) / blur,
         )
         logs = np.log(a_metre * (density + STRAY_SHARE)).sum(axis=0) - a_metre * (
             DEEP_M + OFFSETS_M + walls
         )
-        off = np.abs(log_likelihoods(depth, a_metre, log_densities())[row] - logs)
+        difference = np.abs(log_likelihoods(depth, a_metre, log_densities())[row] - logs)
         # where it is cut off the density jumps by a third
-        assert np.median(off) < 1e-3 * len(near) and off.max() < 0.6
+        assert np.median(difference) < 1e-3 * len(shallow) and difference.max() < 0.6

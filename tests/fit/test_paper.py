@@ -24,13 +24,13 @@ def test_plane_distances_equal_the_plane_equation():
     primitive = CATALOGUE["hip"]
     vertices = primitive.vertices({"width": 8, "length": 12, "height": 3, "ridge_length": 5})
     points = np.random.default_rng(0).normal(0, 3, (20, 3))
-    for face, found in zip(
+    for face, distances in zip(
         primitive.faces, plane_distances(points, vertices, primitive.faces), strict=True
     ):
         a, b, c = vertices[list(face[:3])]
         normal = np.cross(b - a, c - a)
         np.testing.assert_allclose(
-            np.abs(found), np.abs((points - a) @ normal) / np.linalg.norm(normal), atol=1e-9
+            np.abs(distances), np.abs((points - a) @ normal) / np.linalg.norm(normal), atol=1e-9
         )
 
 

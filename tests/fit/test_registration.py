@@ -11,5 +11,5 @@ from hiproof.fit.registration import blur
 def test_a_blur_is_that_of_scipy_bit_by_bit(shape, sigma):
     raster = (np.random.default_rng(0).random(shape) > 0.5).astype(np.float32)
     expected = ndimage.gaussian_filter(raster, sigma, truncate=3.0)
-    found = blur(raster, sigma)
-    assert found.dtype == np.float32 and np.array_equal(found, expected)
+    blurred = blur(raster, sigma)
+    assert blurred.dtype == np.float32 and np.array_equal(blurred, expected)

@@ -88,8 +88,8 @@ def test_the_fit_moves_with_the_points(name):
     points = sample_roof(name, typical_theta(name))
     shift = np.array([1e7, -1e7, 500.0])
     moved = fit_roof(points + shift)
-    still = fit_roof(points)
-    np.testing.assert_allclose(moved.vertices - shift, still.vertices, atol=2e-3)
+    unmoved = fit_roof(points)
+    np.testing.assert_allclose(moved.vertices - shift, unmoved.vertices, atol=2e-3)
 
 
 @pytest.mark.parametrize("name", ["gable", "hip", "half_hip"])
@@ -97,12 +97,12 @@ def test_the_fit_turns_with_the_points(name):
     points = sample_roof(name, typical_theta(name))
     c, s = np.cos(1.1), np.sin(1.1)
     turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    still, turned = fit_roof(points), fit_roof(points @ turn)
-    assert turned.type == still.type
-    assert turned.parameters == pytest.approx(still.parameters, abs=0.02)
+    unturned, turned = fit_roof(points), fit_roof(points @ turn)
+    assert turned.type == unturned.type
+    assert turned.parameters == pytest.approx(unturned.parameters, abs=0.02)
     np.testing.assert_allclose(
         shapely.centroid(shapely.MultiPoint(turned.vertices[:, :2])).coords[0],
-        (still.vertices @ turn)[:, :2].mean(axis=0),
+        (unturned.vertices @ turn)[:, :2].mean(axis=0),
         atol=0.02,
     )
 
@@ -111,8 +111,8 @@ def test_outline_gives_the_plan_and_only_heights_are_fitted():
     theta = typical_theta("gable", kappa=0.4)
     points = sample_roof("gable", theta, density=4.0)
     plan = CATALOGUE["gable"].part(theta).pieces[0].outline.buffer(0.8, join_style="mitre")
-    around = np.random.default_rng(2).uniform(-12, 12, (60, 3))
-    fit = fit_roof(np.vstack([points, around]), plan, only("gable"))
+    outliers = np.random.default_rng(2).uniform(-12, 12, (60, 3))
+    fit = fit_roof(np.vstack([points, outliers]), plan, only("gable"))
     assert fit.parameters["width"] == pytest.approx(8 + 1.6, abs=0.02)
     assert fit.parameters["length"] == pytest.approx(13 + 1.6, abs=0.02)
     assert fit.parameters["height"] / (fit.parameters["width"] / 2) == pytest.approx(0.75, abs=0.03)

@@ -55,15 +55,15 @@ def damaged_clouds(folder: Path, seed: int = 0) -> list[Damaged]:
     cases = {}
     for name, (ending, raw) in sound.items():
         cases |= {
-            f"{what} in {name}": (ending, *rest) for what, rest in header_lies(name, raw).items()
+            f"{kind} in {name}": (ending, *case) for kind, case in header_lies(name, raw).items()
         }
     cases |= laz_lies(sound) | copc_lies(sound) | text_and_ply() | garble(sound, seed)
-    found = []
+    results = []
     for name, (ending, content, sentence) in cases.items():
         path = folder / (re.sub(r"[^\w.+-]", "_", name) + ending)
         path.write_bytes(content)
-        found.append(Damaged(name, path, sentence))
-    return found
+        results.append(Damaged(name, path, sentence))
+    return results
 
 
 def sound_clouds(folder: Path) -> dict[str, tuple[str, bytes]]:
@@ -136,8 +136,8 @@ def header_lies(name: str, raw: bytes) -> dict[str, tuple[bytes, str]]:
         lies["count of a million millions"] = (count, 10**12, "1000000000000 points")
         lies["evlr count"] = ("evlr count", 2**32 - 1, "4294967295 records")
     changed = {
-        what: (replace_field(raw, field, value), sentence)
-        for what, (field, value, sentence) in lies.items()
+        damage: (replace_field(raw, field, value), sentence)
+        for damage, (field, value, sentence) in lies.items()
     }
     if "laz" in name or name == "copc":
         place = 227 if "1.2" in name else 375  # COPC's own record, else LASzip's
@@ -168,8 +168,8 @@ def laz_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
             "chunk table beyond the end": ("<q", start, len(raw) + 5, "chunk table"),
             "chunk table before the points": ("<q", start, 10, "chunk table"),
         }
-        for what, (form, place, value, sentence) in lies.items():
-            cases[f"{what} in {name}"] = (ending, pack(raw, form, place, value), sentence)
+        for damage, (form, place, value, sentence) in lies.items():
+            cases[f"{damage} in {name}"] = (ending, pack(raw, form, place, value), sentence)
     return cases
 
 
@@ -192,14 +192,14 @@ def copc_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
         "octree of no width": (pack(raw, "<d", 375 + 54 + 24, 0.0), "octree"),
         "octree elsewhere": (pack(raw, "<d", 375 + 54, 0.0), "octree"),
     }
-    return {f"{what} in copc": (ending, *rest) for what, rest in lies.items()}
+    return {f"{damage} in copc": (ending, *case) for damage, case in lies.items()}
 
 
 def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
     """Text and PLY that break off, overflow or say what cannot be."""
     ply = "ply\nformat {} 1.0\nelement vertex {}\n{}end_header\n"
     xyz = "property double x\nproperty double y\nproperty double z\n"
-    binary, three = "binary_little_endian", np.arange(9.0).tobytes()
+    binary, values = "binary_little_endian", np.arange(9.0).tobytes()
     rows = "85010.0 446012.0 7.0\n85011.0 446012.0 7.0\n"
     return {
         "one line of 1e300": (".xyz", f"{rows}1e300 447500 5 6\n".encode(), r"1e\+300"),
@@ -209,7 +209,7 @@ def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
         "only blank lines": (".csv", b"\n" * 50, "x y z"),
         "repeated property": (
             ".ply",
-            (ply.format(binary, 3, xyz + "property float x\n")).encode() + three,
+            (ply.format(binary, 3, xyz + "property float x\n")).encode() + values,
             "twice",
         ),
         "superscript count": (
@@ -219,7 +219,7 @@ def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
         ),
         "count of a million millions in ply": (
             ".ply",
-            ply.format(binary, 10**12, xyz).encode() + three,
+            ply.format(binary, 10**12, xyz).encode() + values,
             "vertices",
         ),
         "the same in ascii": (
@@ -229,10 +229,10 @@ def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
         ),
         "count of 4000 digits": (
             ".ply",
-            ply.format(binary, "9" * 4000, xyz).encode() + three,
+            ply.format(binary, "9" * 4000, xyz).encode() + values,
             "vertices",
         ),
-        "negative count": (".ply", ply.format(binary, -3, xyz).encode() + three, "vertices"),
+        "negative count": (".ply", ply.format(binary, -3, xyz).encode() + values, "vertices"),
         "coordinate 1e300 in ply": (
             ".ply",
             ply.format("ascii", 1, xyz).encode() + b"1e300 2 3\n",

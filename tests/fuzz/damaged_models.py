@@ -79,10 +79,10 @@ def damaged_models(folder: Path) -> dict[str, bytes]:
 def damaged_members(lines: list[dict]) -> dict[str, bytes]:
     """Lines, vertices, objects and attributes that are something else than they should be."""
     attributes = (1, "CityObjects", ..., "attributes")
-    head, first, *others = join_lines(lines).splitlines(keepends=True)
+    head, first, *other_lines = join_lines(lines).splitlines(keepends=True)
     return {
-        "cut off": head + b"".join(others) + first[: len(first) // 2],
-        "nested after the header": head + b"[" * DEEP + b"]" * DEEP + b"\n" + b"".join(others),
+        "cut off": head + b"".join(other_lines) + first[: len(first) // 2],
+        "nested after the header": head + b"[" * DEEP + b"]" * DEEP + b"\n" + b"".join(other_lines),
         "feature is a list": change(lines, 1, to=[]),
         "feature is null": change(lines, 1, to=None),
         "vertices of two": change(lines, 1, "vertices", by=lambda v: [p[:2] for p in v]),

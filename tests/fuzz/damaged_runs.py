@@ -280,8 +280,8 @@ def find_faults(
         rng = random.Random(number)
         name = rng.choice(FILES)
         content = damaged_text(texts[name], rng)
-        chosen = [reader for reader, (_, files) in READERS.items() if name in files]
-        for reader in rng.sample(chosen, min(readers, len(chosen))):
+        readers_of_file = [reader for reader, (_, files) in READERS.items() if name in files]
+        for reader in rng.sample(readers_of_file, min(readers, len(readers_of_file))):
             shutil.rmtree(work, ignore_errors=True)
             shutil.copytree(sound, work)
             (work / name).write_bytes(content)
@@ -294,16 +294,16 @@ def find_faults(
 
 def main() -> None:
     count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    found: Counter[str] = Counter()
+    name: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         sound = write_sound_run(Path(folder))
         for number, reader, fault in find_faults(sound, Path(folder) / "work", count, seed):
             lines = fault.strip().splitlines()
             key = f"{lines[-1][:150]} {lines[-3].strip() if len(lines) > 3 else ''}"
-            found[key] += 1
-            if found[key] == 1:
+            name[key] += 1
+            if name[key] == 1:
                 print(f"--- {number} {reader}\n{fault}", flush=True)
-    print(f"{count} damaged runs, {sum(found.values())} faults: {dict(found)}")
+    print(f"{count} damaged runs, {sum(name.values())} faults: {dict(name)}")
 
 
 if __name__ == "__main__":

@@ -91,21 +91,21 @@ SHAPES = (
 
 def draw_secret(rng: random.Random) -> str:
     sign = (rng.choice(SIGNS), rng.choice(SIGNS))
-    made = PARTS[0] + sign[0] + PARTS[1] + (sign[1] + PARTS[2] if rng.random() < 0.5 else "")
-    return quote(made, safe="") if rng.random() < 0.2 else made
+    text = PARTS[0] + sign[0] + PARTS[1] + (sign[1] + PARTS[2] if rng.random() < 0.5 else "")
+    return quote(text, safe="") if rng.random() < 0.2 else text
 
 
 def draw_address(rng: random.Random) -> str:
     """An address with a secret, in some with a character dropped or repeated outside of it."""
-    before, after = rng.choice(SHAPES).split("{}")
-    if rng.random() < 0.2 and len(after) > 3:
-        place = rng.randrange(1, len(after))
-        after = (
-            after[:place]
-            + after[place:][rng.choice([0, 1]) :]
+    prefix, suffix = rng.choice(SHAPES).split("{}")
+    if rng.random() < 0.2 and len(suffix) > 3:
+        place = rng.randrange(1, len(suffix))
+        suffix = (
+            suffix[:place]
+            + suffix[place:][rng.choice([0, 1]) :]
             + rng.choice(["", "", "@", ":", " "])
         )
-    return before + draw_secret(rng) + after
+    return prefix + draw_secret(rng) + suffix
 
 
 def call(*arguments: str) -> str:
@@ -118,8 +118,8 @@ def call(*arguments: str) -> str:
         news.listener,
     )
     try:
-        asked = patch.object(sys, "argv", ["hiproof", *arguments])
-        with asked, redirect_stdout(out), redirect_stderr(out), suppress(SystemExit):
+        patched_arguments = patch.object(sys, "argv", ["hiproof", *arguments])
+        with patched_arguments, redirect_stdout(out), redirect_stderr(out), suppress(SystemExit):
             cli.main()
     finally:
         LOGGER.handlers[:], warnings.showwarning, news.listener = handlers, show, listener
@@ -141,7 +141,7 @@ def list_ways(folder: Path) -> dict[str, Callable[[str], str]]:
     files.
     """
     run, cloud, log, out = folder / "run", str(folder / "cloud.xyz"), folder / "log", folder / "out"
-    asked = (
+    functions = (
         "reconstruct",
         "--out",
         str(out),
@@ -152,74 +152,82 @@ def list_ways(folder: Path) -> dict[str, Callable[[str], str]]:
         "--restart",
     )
 
-    def api(told: str) -> str:
+    def api(given_address: str) -> str:
         try:
-            with redirect_stderr(StringIO()) as said:
-                reconstruct_area(Request((cloud,), out, told, restart=True))
+            with redirect_stderr(StringIO()) as output:
+                reconstruct_area(Request((cloud,), out, given_address, restart=True))
         except Exception as error:
-            return said.getvalue() + str(error)
-        return said.getvalue()
+            return output.getvalue() + str(error)
+        return output.getvalue()
 
     return {
-        "load": lambda told: call("load", str(run), told),
-        "load in pieces": lambda told: call("load", str(run), *told.split()),
-        "footprints": lambda told: (
-            call(*asked, cloud, "--footprints", told) + read_files(out) + read_files(log.parent)
+        "load": lambda given_address: call("load", str(run), given_address),
+        "load in pieces": lambda given_address: call("load", str(run), *given_address.split()),
+        "footprints": lambda given_address: (
+            call(*functions, cloud, "--footprints", given_address)
+            + read_files(out)
+            + read_files(log.parent)
         ),
-        "cloud": lambda told: call(*asked, cloud, told) + read_files(out) + read_files(log.parent),
-        "terrain": lambda told: call(*asked, cloud, "--terrain", told) + read_files(out),
-        "overrides": lambda told: call(*asked, cloud, f"--overrides={told}") + read_files(out),
-        "evaluate": lambda told: (
-            call("evaluate", str(run), told, "--out", str(out)) + read_files(out)
+        "cloud": lambda given_address: (
+            call(*functions, cloud, given_address) + read_files(out) + read_files(log.parent)
         ),
-        "classify": lambda told: call("classify", told, str(out / "c.laz")),
-        "check": lambda told: call("check", told),
-        "wrong command": lambda told: call(told),
+        "terrain": lambda given_address: (
+            call(*functions, cloud, "--terrain", given_address) + read_files(out)
+        ),
+        "overrides": lambda given_address: (
+            call(*functions, cloud, f"--overrides={given_address}") + read_files(out)
+        ),
+        "evaluate": lambda given_address: (
+            call("evaluate", str(run), given_address, "--out", str(out)) + read_files(out)
+        ),
+        "classify": lambda given_address: call("classify", given_address, str(out / "c.laz")),
+        "check": lambda given_address: call("check", given_address),
+        "wrong command": lambda given_address: call(given_address),
         "from Python": api,
     }
 
 
 def find_leak(text: str) -> str:
     """Which part of a secret stands in a text, as it is or encoded; empty where none does."""
-    for some in (text, unquote(text), unquote(unquote(text))):
+    for variant in (text, unquote(text), unquote(unquote(text))):
         for part in PARTS:
             for start in range(len(part) - 2):
-                if part[start : start + 4].lower() in some.lower():
+                if part[start : start + 4].lower() in variant.lower():
                     return part[start : start + 4]
     return ""
 
 
 def find_leaks(
-    folder: Path, count: int, seed: int = 0, chosen: int = 100
+    folder: Path, count: int, seed: int = 0, selection: int = 100
 ) -> Iterator[tuple[str, str, str]]:
     """Yield (way, address, what was said) of those of `count` addresses whose secret is repeated by
     some `chosen` ways.
     """
     write_sample_run(folder / "run")
     (folder / "cloud.xyz").write_text("".join(f"{x} {y} 5.0\n" for x in range(8) for y in range(8)))
-    known = list_ways(folder)
+    functions = list_ways(folder)
     for number in range(seed, seed + count):
         rng = random.Random(number)
-        told = draw_address(rng)
-        for way in rng.sample(sorted(known), min(chosen, len(known))):
+        given_address = draw_address(rng)
+        for way in rng.sample(sorted(functions), min(selection, len(functions))):
             masking.SECRETS = masking.Secrets()
-            said = known[way](told)
+            output = functions[way](given_address)
             for file in (folder / "log", *(folder / "out").rglob("*")):
                 if file.is_file():
                     file.unlink()
-            if find_leak(said):
-                yield way, told, said
+            if find_leak(output):
+                yield way, given_address, output
 
 
 def main() -> None:
     count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
     logging.captureWarnings(False)
     with tempfile.TemporaryDirectory() as folder:
-        found = list(find_leaks(Path(folder), count, seed))
-    for way, told, said in found[:20]:
-        around = [line for line in said.splitlines() if find_leak(line)]
-        print(f"--- {way}\n{told}\n{re.sub(chr(10), ' ', str(around[:3]))[:600]}")
-    print(f"{count} addresses, {len(found)} leaks")
+        name = list(find_leaks(Path(folder), count, seed))
+    for way, message, output in name[:20]:
+        context_lines = [line for line in output.splitlines() if find_leak(line)]
+        print(f"--- {way}\n{message}\n{re.sub(chr(10), ' ', str(context_lines[:3]))[:600]}")
+    print(f"{count} addresses, {len(name)} leaks")
 
 
 if __name__ == "__main__":

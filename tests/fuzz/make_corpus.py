@@ -26,7 +26,7 @@ def make_corpus(folder: Path, seed: int = 0) -> dict[str, str]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_town(folder, make_town(2, 3.0))  # sound, to run the damaged ones beside
-    found = {
+    results = {
         str(case.path.relative_to(folder)): case.sentence
         for case in damaged_clouds(folder / "clouds", seed)
     }
@@ -45,13 +45,13 @@ def make_corpus(folder: Path, seed: int = 0) -> dict[str, str]:
                 folder / kind / (file_name(name) + (".city.jsonl" if kind == "models" else ".json"))
             )
             path.write_bytes(content)
-            found[str(path.relative_to(folder))] = NAMED
+            results[str(path.relative_to(folder))] = NAMED
     (folder / "footprints").mkdir(exist_ok=True)
     for name, (ring, status) in ODD.items():
         path = write_beside_a_sound_one(folder / "footprints" / f"{file_name(name)}.geojson", ring)
-        found[str(path.relative_to(folder))] = status
-    (folder / "corpus.json").write_text(json.dumps(found, indent=1) + "\n")
-    return found
+        results[str(path.relative_to(folder))] = status
+    (folder / "corpus.json").write_text(json.dumps(results, indent=1) + "\n")
+    return results
 
 
 def file_name(name: str) -> str:

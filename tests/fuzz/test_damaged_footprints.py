@@ -65,10 +65,10 @@ def test_an_odd_footprint_gets_a_status_and_harms_no_other(name, cloud, single_r
 def test_an_outline_keeps_its_shape_and_says_how_far():
     outline = shapely.Polygon(wavy(5000))
     simple, remark = stages.without_needless_vertices(outline)
-    within = float(remark.rsplit("within ", 1)[1].removesuffix(" m"))
+    distance = float(remark.rsplit("within ", 1)[1].removesuffix(" m"))
     assert shapely.get_num_coordinates(simple) <= stages.MOST_OUTLINE_VERTICES
-    assert simple.is_valid and within <= 0.08
-    assert shapely.hausdorff_distance(simple.exterior, outline.exterior) <= within + 1e-9
+    assert simple.is_valid and distance <= 0.08
+    assert shapely.hausdorff_distance(simple.exterior, outline.exterior) <= distance + 1e-9
 
 
 def comb(teeth):
@@ -107,8 +107,8 @@ def test_a_plan_keeps_the_footprint_and_works_on_a_simpler_area(tmp_path):
     (job,) = make_jobs((Footprint("a", outline, {"year": 1950}),))
     plan = WorkPlan((job,), {"0_0_0": (0,)}, None, Settings())
     plan.save(tmp_path / "plan.jsonl")
-    (again,) = WorkPlan.load(tmp_path / "plan.jsonl").jobs
-    assert again.footprint.polygon.equals_exact(outline) and again.area.equals_exact(job.area)
+    (loaded,) = WorkPlan.load(tmp_path / "plan.jsonl").jobs
+    assert loaded.footprint.polygon.equals_exact(outline) and loaded.area.equals_exact(job.area)
     assert shapely.get_num_coordinates(job.area) < 20
 
 
@@ -132,9 +132,9 @@ def test_meetings_count_edges_that_do_not_follow_one_another():
 
 
 @QUICK
-@given(rest=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=12))
-def test_any_ring_becomes_valid_polygons_of_a_buildings_size_or_none(rest):
-    polygons = simple_polygons(shapely.Polygon([(0.0, 0.0), *rest]))
+@given(numbers=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=12))
+def test_any_ring_becomes_valid_polygons_of_a_buildings_size_or_none(numbers):
+    polygons = simple_polygons(shapely.Polygon([(0.0, 0.0), *numbers]))
     assert polygons
     for polygon in polygons:
         assert polygon.is_valid

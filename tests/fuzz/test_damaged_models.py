@@ -62,9 +62,12 @@ def cases(make, tmp_path_factory):
 def test_damaged_files_are_refused_with_a_sentence(command, run_folder, tmp_path_factory):
     for name, content in cases(damaged_files, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        code, said = answer(COMMANDS[command], run_folder)
+        code, output = answer(COMMANDS[command], run_folder)
         assert (
-            code == 2 and said.startswith("expected") and "got" in said and str(run_folder) in said
+            code == 2
+            and output.startswith("expected")
+            and "got" in output
+            and str(run_folder) in output
         ), name
     assert sorted(path.name for path in run_folder.iterdir() if path.suffix != ".mtl") == [
         MODELS,
@@ -83,9 +86,11 @@ def test_a_damaged_building_is_named_and_the_others_are_used(
         written.unlink(missing_ok=True)
         caplog.clear()
         assert answer(COMMANDS[command], run_folder) == (2, ""), name
-        (said,) = caplog.messages
-        assert "left out: expected" in said and "got" in said and str(run_folder) in said, name
-        assert "house-1" in said or re.search(r"line \d", said), name
+        (output,) = caplog.messages
+        assert "left out: expected" in output and "got" in output and str(run_folder) in output, (
+            name
+        )
+        assert "house-1" in output or re.search(r"line \d", output), name
         assert re.search(b"block[ _]2", written.read_bytes()), name
 
 
@@ -94,15 +99,15 @@ def test_a_run_of_damaged_buildings_alone_is_refused(run_folder):
     path.write_text(path.read_text().replace('"Solid"', '"Solid", "boundaries": 3'))
     path.write_text(re.sub(r'"boundaries": \[\[.*?\]\]\]\]', '"boundaries": 3', path.read_text()))
     for command in COMMANDS.values():
-        code, said = answer(command, run_folder)
-        assert code == 2, said
+        code, output = answer(command, run_folder)
+        assert code == 2, output
 
 
 def test_damaged_files_cannot_be_checked(run_folder, tmp_path_factory):
     for name, content in cases(damaged_files, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        code, said = answer(check.count_invalid, [run_folder / MODELS], 0.01)
-        assert code == 2 and said.startswith("expected") and "got" in said, name
+        code, output = answer(check.count_invalid, [run_folder / MODELS], 0.01)
+        assert code == 2 and output.startswith("expected") and "got" in output, name
 
 
 def test_damaged_buildings_count_as_invalid(run_folder, tmp_path_factory, capsys):
@@ -132,9 +137,9 @@ def test_unusual_models_are_used(command, run_folder, tmp_path_factory):
 @pytest.mark.parametrize("name", RECORDS)
 def test_a_damaged_record_is_answered_with_a_sentence_or_does_not_matter(name, command, run_folder):
     (run_folder / "run.json").write_bytes(RECORDS[name])
-    code, said = answer(COMMANDS[command], run_folder)
+    code, output = answer(COMMANDS[command], run_folder)
     assert code == (0 if name in ("clouds are numbers", "a path with a zero") else 2)
-    assert code == 0 or "expected" in said
+    assert code == 0 or "expected" in output
 
 
 @pytest.fixture(scope="module")
@@ -156,8 +161,8 @@ def test_any_change_of_the_text_is_read_or_answered(data, sound_text):
     (folder / MODELS).write_text(text[:start] + inserted + text[start + length :])
     for read in (read_models, read_solids):
         try:
-            found = list(read(folder / MODELS))
+            results = list(read(folder / MODELS))
         except HiproofError as error:
             assert str(error).startswith("expected")
         else:
-            assert len(found) <= len(SOLIDS) + 1
+            assert len(results) <= len(SOLIDS) + 1

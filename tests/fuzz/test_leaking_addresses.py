@@ -13,15 +13,15 @@ COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_add
 
 @pytest.mark.filterwarnings("ignore")
 def test_no_command_repeats_a_password(tmp_path):
-    assert list(find_leaks(tmp_path, COUNT, chosen=1)) == []
+    assert list(find_leaks(tmp_path, COUNT, selection=1)) == []
 
 
 def test_pieces_that_a_library_may_quote_are_hidden():
     for number in range(200):
-        told = draw_address(random.Random(number))
-        remember(told)
-        for text in (told, repr(told), *re.split(r"[@:/?#&= '\"]", told)):
-            assert find_leak(mask(f"got: {text!r}; check it")) == "", told
+        message = draw_address(random.Random(number))
+        remember(message)
+        for text in (message, repr(message), *re.split(r"[@:/?#&= '\"]", message)):
+            assert find_leak(mask(f"got: {text!r}; check it")) == "", message
 
 
 def test_sentences_keep_their_words():

@@ -22,12 +22,12 @@ def test_damaged_clouds_are_named_and_harm_no_building(with_footprints, tmp_path
     cloud, footprints = map(str, write_town(tmp_path, make_town(2, 3.0)))
     footprints = footprints if with_footprints else None
     damaged = {str(case.path): case.sentence for case in damaged_clouds(tmp_path / "damaged")}
-    alone = reconstruct_area(Request((cloud,), tmp_path / "alone", footprints))
+    single_run = reconstruct_area(Request((cloud,), tmp_path / "alone", footprints))
     summary = reconstruct_area(Request((cloud, *damaged), tmp_path / "together", footprints))
-    assert alone.exit_code == 0 and summary.exit_code == 2
-    said = dict(summary.broken_inputs)
-    assert said.keys() == damaged.keys()
-    assert all(re.search(sentence, said[path]) for path, sentence in damaged.items())
+    assert single_run.exit_code == 0 and summary.exit_code == 2
+    reasons = dict(summary.broken_inputs)
+    assert reasons.keys() == damaged.keys()
+    assert all(re.search(sentence, reasons[path]) for path, sentence in damaged.items())
     assert records(tmp_path / "together") == records(tmp_path / "alone")
 
 

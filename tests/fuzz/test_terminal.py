@@ -55,8 +55,8 @@ def test_an_interrupted_run_says_what_is_kept_and_goes_on(
 
         patch.setattr(city_run, "merge", interrupt)
         assert hiproof(*command) == 130
-    said = capsys.readouterr().err
-    assert "interrupted" in said and "the same command goes on from there" in said
+    output = capsys.readouterr().err
+    assert "interrupted" in output and "the same command goes on from there" in output
     assert hiproof(*command) == 0
     assert "solve 0.0 s" in capsys.readouterr().out
 
@@ -98,8 +98,8 @@ def test_an_interrupt_while_packages_are_imported_ends_without_a_traceback(impor
         next(line for line in process.stderr if line.rstrip().endswith(imported))
         time.sleep(0.01)
         process.send_signal(signal.SIGINT)
-        said = [line for line in process.stderr if not line.startswith("import time:")]
-    assert process.returncode == 130 and said in ([], [f"hiproof: {cli.KEPT}\n"])
+        output = [line for line in process.stderr if not line.startswith("import time:")]
+    assert process.returncode == 130 and output in ([], [f"hiproof: {cli.KEPT}\n"])
 
 
 def test_importing_the_package_leaves_interrupts_alone():
@@ -142,9 +142,9 @@ def test_a_file_that_is_named_like_markup_is_named_as_it_is(hiproof, town, tmp_p
     broken.write_bytes(town[0].read_bytes()[:500])
     out = tmp_path / "[bold]out[" / "bold]"
     assert hiproof("reconstruct", town[0], broken, "--footprints", town[1], "--out", out) == 2
-    said = capsys.readouterr().out
-    assert f"could not be read: {broken}: expected" in said
-    assert f"models: {out}" in said
+    output = capsys.readouterr().out
+    assert f"could not be read: {broken}: expected" in output
+    assert f"models: {out}" in output
 
 
 def test_a_roof_type_that_looks_like_markup_is_shown_as_it_is(tmp_path, capsys):

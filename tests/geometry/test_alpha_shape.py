@@ -65,10 +65,15 @@ def test_a_radius_below_every_spacing_is_refused():
 def test_the_shape_is_the_same_far_from_the_origin(seed):
     """At a national grid's coordinates, where doubles have steps of a nanometre."""
     xy = np.random.default_rng(seed).uniform(0.0, 12.0, (600, 2)).round(3)
-    far = np.array([390_123.0, 5_656_789.0])
-    here, there = alpha_shape(xy), alpha_shape(xy + far)
-    assert there.area == pytest.approx(here.area, rel=1e-6)
-    assert shapely.transform(there, lambda corners: corners - far).hausdorff_distance(here) < 1e-6
+    distant_origin = np.array([390_123.0, 5_656_789.0])
+    first, second = alpha_shape(xy), alpha_shape(xy + distant_origin)
+    assert second.area == pytest.approx(first.area, rel=1e-6)
+    assert (
+        shapely.transform(second, lambda corners: corners - distant_origin).hausdorff_distance(
+            first
+        )
+        < 1e-6
+    )
 
 
 @pytest.mark.parametrize("holes", [True, False])

@@ -11,18 +11,22 @@ MOST = 12
 
 @given(st.lists(st.tuples(st.integers(0, MOST - 1), st.integers(0, MOST - 1)), max_size=20))
 def test_components_are_those_of_a_graph_search(links):
-    found = label_components(MOST, np.array(links, np.int64).reshape(-1, 2).T)
+    result = label_components(MOST, np.array(links, np.int64).reshape(-1, 2).T)
     expected = np.full(MOST, -1)
     for member in range(MOST):
         if expected[member] >= 0:
             continue
         number, front = expected.max() + 1, {member}
         while front:
-            at = front.pop()
-            expected[at] = number
-            ends = {one + other - at for one, other in links if at in (one, other)}
+            node = front.pop()
+            expected[node] = number
+            ends = {
+                link_start + other - node
+                for link_start, other in links
+                if node in (link_start, other)
+            }
             front |= {end for end in ends if expected[end] < 0}
-    assert found.tolist() == expected.tolist()
+    assert result.tolist() == expected.tolist()
 
 
 def test_a_long_chain_in_any_order_is_one_component():

@@ -13,6 +13,6 @@ WHOLE = st.integers(-(10**8), 10**8).map(float) | st.integers(-2, 2).map(float)
 @given(arrays(float, st.tuples(st.integers(0, 30), st.just(2)), elements=WHOLE))
 def test_cells_are_numbered_as_numpy_numbers_rows(cells):
     expected, number = np.unique(cells, axis=0, return_inverse=True)
-    found, found_number = number_cells(cells)
-    assert np.array_equal(found, expected) and np.array_equal(found_number, number.ravel())
+    result, found_number = number_cells(cells)
+    assert np.array_equal(result, expected) and np.array_equal(found_number, number.ravel())
     assert count_cells(cells) == len(expected)

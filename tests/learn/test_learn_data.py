@@ -54,12 +54,12 @@ def box_city(count, code="1000"):
 
 def test_simulated_clouds_are_the_same_whenever_asked_for_and_differ_by_role():
     source = open_source("simulated")
-    first, again, other = (
+    first, repeat, other = (
         source.sample(TRAINING, 5),
         source.sample(TRAINING, 5),
         source.sample(VALIDATION, 5),
     )
-    np.testing.assert_array_equal(first.xyz, again.xyz)
+    np.testing.assert_array_equal(first.xyz, repeat.xyz)
     assert first.xyz.shape != other.xyz.shape or not np.array_equal(first.xyz, other.xyz)
 
 
@@ -94,11 +94,11 @@ def test_a_cut_corner_leaves_a_convex_plan_under_the_same_planes():
     for seed in range(20):
         rng = np.random.default_rng(seed)
         part = random_building(rng, "hip").roof.parts[0]
-        before, after = part.pieces[0], without_a_corner(rng, part).pieces[0]
-        assert 0.5 * before.outline.area < after.outline.area < before.outline.area
-        assert after.outline.within(before.outline.buffer(1e-9))
-        assert after.outline.convex_hull.area == pytest.approx(after.outline.area)
-        np.testing.assert_array_equal(before.planes, after.planes)
+        old, new = part.pieces[0], without_a_corner(rng, part).pieces[0]
+        assert 0.5 * old.outline.area < new.outline.area < old.outline.area
+        assert new.outline.within(old.outline.buffer(1e-9))
+        assert new.outline.convex_hull.area == pytest.approx(new.outline.area)
+        np.testing.assert_array_equal(old.planes, new.planes)
 
 
 def test_a_resized_part_keeps_its_shape_and_a_lengthened_one_its_ends():

@@ -81,11 +81,11 @@ def test_buildings_are_read_once_and_split_by_id(source):
 
 def test_points_of_surfaces_carry_the_type_and_the_rest_none(source, tmp_path):
     roof_points = sorted(write_roofn3d(tmp_path).values())
-    told = [
+    labels = [
         int(source.on_surface[a:b].sum())
         for a, b in zip(source.starts[:-1], source.starts[1:], strict=True)
     ]
-    assert sorted(told) == roof_points
+    assert sorted(labels) == roof_points
     for index in range(10):
         sample = source.sample(TRAINING, index)
         assert set(np.unique(sample.labels)) <= {NOT_ROOF, sample.type}
@@ -94,9 +94,9 @@ def test_points_of_surfaces_carry_the_type_and_the_rest_none(source, tmp_path):
 
 def test_training_draws_types_evenly_and_never_what_is_held_out(source):
     held_out = {source.sample(TEST, i).xyz.tobytes() for i in range(source.held_out.sum())}
-    drawn = [source.sample(TRAINING, i) for i in range(150)]
-    assert not held_out & {sample.xyz.tobytes() for sample in drawn}
-    assert np.bincount([sample.type for sample in drawn]).min() > 25
+    samples = [source.sample(TRAINING, i) for i in range(150)]
+    assert not held_out & {sample.xyz.tobytes() for sample in samples}
+    assert np.bincount([sample.type for sample in samples]).min() > 25
 
 
 def test_files_that_are_missing_or_of_another_layout_are_refused(tmp_path):

@@ -43,8 +43,8 @@ def clouds(count, layout=TINY.layout, start=0):
 def largest_difference(network, path, arrangements):
     with torch.no_grad():
         expected = network(*network_inputs(arrangements, network.settings.layout))
-    told = run(load(str(path)), arrangements)
-    return max(np.abs(a.numpy() - b).max() for a, b in zip(expected, told, strict=True))
+    probabilities = run(load(str(path)), arrangements)
+    return max(np.abs(a.numpy() - b).max() for a, b in zip(expected, probabilities, strict=True))
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -92,7 +92,7 @@ def test_gradient_reaches_every_weight():
 
 
 def test_symmetric_mirrors_along_and_across_and_nothing_else():
-    features, seen = clouds(1)[0].features, set()
+    features, visible = clouds(1)[0].features, set()
     for seed in range(20):
         signs = symmetric(features, np.random.default_rng(seed)) / np.where(
             features == 0, 1, features
@@ -107,14 +107,14 @@ def test_symmetric_mirrors_along_and_across_and_nothing_else():
         np.testing.assert_array_equal(
             np.where(features == 0, expected, signs), np.tile(expected, (len(features), 1))
         )
-        seen.add((along, across))
-    assert len(seen) == 4
+        visible.add((along, across))
+    assert len(visible) == 4
 
 
 def test_varied_keeps_labels_with_their_points():
     xyz, labels, _ = training_sample(np.random.default_rng(6))
-    still = AugmentSettings(scale=0.0, stretch=0.0, jitter_m=0.0)
-    changed, kept = vary_cloud(xyz, labels, np.random.default_rng(1), still)
+    settings = AugmentSettings(scale=0.0, stretch=0.0, jitter_m=0.0)
+    changed, new_labels = vary_cloud(xyz, labels, np.random.default_rng(1), settings)
     label_of = {tuple(point): label for point, label in zip(xyz, labels, strict=True)}
-    assert [label_of[tuple(point)] for point in changed] == kept.tolist()
+    assert [label_of[tuple(point)] for point in changed] == new_labels.tolist()
     assert len(changed) <= len(xyz)

@@ -128,9 +128,9 @@ def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one()
 
 
 def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
-    small, far = shapely.box(0, 0, 0.1, 0.1), shapely.box(5, 5, 6, 6)
-    left, others = share_surface(small, small, far)
-    assert left.equals(small) and others.is_empty
+    small, distant = shapely.box(0, 0, 0.1, 0.1), shapely.box(5, 5, 6, 6)
+    remaining, remainder = share_surface(small, small, distant)
+    assert remaining.equals(small) and remainder.is_empty
 
 
 def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
@@ -144,11 +144,11 @@ def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
             (-4.604, 0.098),
         ]
     )
-    own = shapely.Polygon([(-2.039, 1.999), (-4.604, 0.098), (-4.72, 0.253)])
+    members = shapely.Polygon([(-2.039, 1.999), (-4.604, 0.098), (-4.72, 0.253)])
     other = shapely.Polygon([(-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)])
-    left, others = share_surface(area, own, other)
-    assert {left.geom_type, others.geom_type} == {"MultiPolygon"}
-    assert left.area + others.area == pytest.approx(area.area, abs=1e-2)
+    remaining, remainder = share_surface(area, members, other)
+    assert {remaining.geom_type, remainder.geom_type} == {"MultiPolygon"}
+    assert remaining.area + remainder.area == pytest.approx(area.area, abs=1e-2)
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -215,9 +215,9 @@ def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
     path = write_lines(
         tmp_path / "p.jsonl", house() | {"id": "one"}, wrong, house() | {"id": "two"}
     )
-    done = CliRunner().invoke(app, ["build", str(path), "--out", str(tmp_path / "out")])
-    assert done.exit_code == 2
-    assert "building wrong: expected a positive width" in done.output
+    result = CliRunner().invoke(app, ["build", str(path), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert "building wrong: expected a positive width" in result.output
     rows = {row["id"]: row for row in hiproof.read_parameters(tmp_path / "out/parameters.jsonl")}
     assert [rows[id]["status"] for id in ("one", "wrong", "two")] == [
         "modelled",
@@ -297,8 +297,8 @@ def test_buildings_may_be_fewer_and_in_another_order(demo_run, tmp_path):
     (tmp_path / "p.jsonl").write_text("\n".join([head, *lines[10:4:-1]]) + "\n")
     build_file(tmp_path / "p.jsonl", tmp_path / "out")
     whole = set((demo_run / "buildings.city.jsonl").read_text().splitlines()[1:])
-    some = (tmp_path / "out/buildings.city.jsonl").read_text().splitlines()[1:]
-    assert len(some) == 6 and set(some) <= whole
+    subset = (tmp_path / "out/buildings.city.jsonl").read_text().splitlines()[1:]
+    assert len(subset) == 6 and set(subset) <= whole
 
 
 def test_shapes_and_schema_are_printed():
@@ -313,11 +313,11 @@ def test_the_head_keeps_feet(tmp_path):
     feet = {"hiproof_parameters": 1, "crs": None, "unit": "foot"}
     build_file(write_lines(tmp_path / "p.jsonl", house(), head=feet), tmp_path / "feet")
     build_file(write_lines(tmp_path / "q.jsonl", house()), tmp_path / "metres")
-    low = [
+    heights = [
         pyogrio.read_bounds(tmp_path / name / "buildings.gpkg", layer="buildings")[1][:2, 0]
         for name in ("feet", "metres")
     ]
-    assert low[0] == pytest.approx(np.array(low[1]) / 0.3048)
+    assert heights[0] == pytest.approx(np.array(heights[1]) / 0.3048)
 
 
 @pytest.mark.parametrize(

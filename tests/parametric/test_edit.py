@@ -48,11 +48,11 @@ def test_a_changed_building_is_composed_as_it_was(gable):
     house = hiproof.build(building_record(gable), deep)
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-4, 4, 20), np.linspace(-3, 3, 20)))
     points = np.column_stack([x, y, 9.0 - 0.5 * np.abs(y)]) + house.roof.frame.origin
-    more = house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0])
+    larger = house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0])
     for changed in (
         house.with_part(0, type="hip"),
-        more,
-        more.without_part(1),
+        larger,
+        larger.without_part(1),
         house.refit(points),
     ):
         record = building_record(changed)
@@ -122,33 +122,35 @@ def test_heights_count_from_the_lowest_eave_whichever_it_becomes(gable, eave):
     assert raised.parts[0].translation[2] == pytest.approx(shed.parts[0].translation[2] + eave)
     top = raised.with_part(0, ridge_height=14.0)
     assert top.solid.vertices[:, 2].max() == pytest.approx(14.0, abs=1e-3)
-    low = raised.with_part(0, eave_height=6.0).roof
-    assert low.height_at(low.parts[0].pieces[0].outline.exterior.coords).min() == pytest.approx(
-        6.0 - low.frame.origin[2]
-    )
+    lowered = raised.with_part(0, eave_height=6.0).roof
+    assert lowered.height_at(
+        lowered.parts[0].pieces[0].outline.exterior.coords
+    ).min() == pytest.approx(6.0 - lowered.frame.origin[2])
 
 
 def test_a_moved_part_roofs_what_its_rectangle_covers(gable):
-    two = gable.with_part(1, type="flat", position=[0, 0, 9.0], width=2.0, length=2.0)
-    assert two.parts[1].area == pytest.approx(4.0) and two.solid.vertices[
+    two_parts = gable.with_part(1, type="flat", position=[0, 0, 9.0], width=2.0, length=2.0)
+    assert two_parts.parts[1].area == pytest.approx(4.0) and two_parts.solid.vertices[
         :, 2
     ].max() == pytest.approx(11.0)
-    aside = two.with_part(1, position=[6.0, 0.0, 9.0])
-    assert aside.parts[1].area == pytest.approx(2.0)
-    assert len(two.without_part(1).parts) == 1
+    moved_part = two_parts.with_part(1, position=[6.0, 0.0, 9.0])
+    assert moved_part.parts[1].area == pytest.approx(2.0)
+    assert len(two_parts.without_part(1).parts) == 1
 
 
 def test_arrays_tuples_and_numbers_of_numpy_are_what_lists_and_numbers_are(gable):
     place = gable.parts[0].translation + (1.0, 0.0, 0.5)
     sizes = {"width": 3.0, "length": 4.0, "type": "gable"}
-    asked = [
+    changes = [
         sizes | {"position": place.tolist()},
         sizes | {"position": tuple(place)},
         sizes | {"position": place, "width": np.float32(3.0), "length": np.int64(4)},
     ]
     for index in (0, 1):
-        one, *others = (gable.with_part(index, **change) for change in asked)
-        assert all(np.array_equal(one.solid.vertices, other.solid.vertices) for other in others)
+        first, *remainder = (gable.with_part(index, **change) for change in changes)
+        assert all(
+            np.array_equal(first.solid.vertices, other.solid.vertices) for other in remainder
+        )
 
 
 def test_what_cannot_be_is_one_sentence(gable):
@@ -187,10 +189,10 @@ def test_a_refit_finds_what_was_changed(kind):
     changed = house.with_part(
         0, height=1.3 * true, eave_height=house.parts[0].translation[2] - 0.5 + roof.frame.origin[2]
     )
-    found = changed.refit(points)
-    assert found.parts[0].parameters[name] == pytest.approx(true, abs=0.05)
-    assert found.quality.share_within_20cm > 0.95 and found.parts[0].sigma[name] < 0.05
-    assert found.status is Status.MODELLED and "fitted" in found.detail
+    refitted = changed.refit(points)
+    assert refitted.parts[0].parameters[name] == pytest.approx(true, abs=0.05)
+    assert refitted.quality.share_within_20cm > 0.95 and refitted.parts[0].sigma[name] < 0.05
+    assert refitted.status is Status.MODELLED and "fitted" in refitted.detail
 
 
 def sample_house(house, rng, noise=0.03):
@@ -222,8 +224,8 @@ def test_an_edit_is_what_is_written_of_it(gable):
 
 def test_random_edits_are_valid_or_one_sentence():
     outcomes = random_edits(EDITS, BUILDINGS, seed=3)
-    found = {what for counts in outcomes.values() for what in counts}
-    assert found == {"valid", "one sentence"}
+    kinds = {kind for counts in outcomes.values() for kind in counts}
+    assert kinds == {"valid", "one sentence"}
     assert sum(counts["valid"] for counts in outcomes.values()) > EDITS / 2
 
 

@@ -32,10 +32,10 @@ def test_a_recess_is_as_deep_as_it_says_and_changes_nothing_beside_it(house, sun
     x, y = np.meshgrid(np.linspace(-5.9, 5.9, 40), np.linspace(-3.9, 3.9, 40))
     xy = np.column_stack([x.ravel(), y.ravel()])
     inside = (np.abs(xy) < 0.5 * SIDE_M).all(axis=1)
-    before, after = house.roof.height_at(xy), sunk.roof.height_at(xy)
+    old, new = house.roof.height_at(xy), sunk.roof.height_at(xy)
     ridge = house.roof.height_at(np.zeros((1, 2)))[0]
-    assert after[inside] == pytest.approx(np.full(inside.sum(), ridge - DEPTH_M), abs=1e-6)
-    assert after[~inside] == pytest.approx(before[~inside], abs=1e-6)
+    assert new[inside] == pytest.approx(np.full(inside.sum(), ridge - DEPTH_M), abs=1e-6)
+    assert new[~inside] == pytest.approx(old[~inside], abs=1e-6)
     assert not check_solid(sunk.solid)
 
 
@@ -44,23 +44,23 @@ def test_a_recess_is_as_deep_as_it_says_and_changes_nothing_beside_it(house, sun
 )
 def test_where_a_recess_goes_the_roof_comes_back(house, sunk, change):
     position = [float(v) for v in sunk.parts[1].translation]
-    there = sunk.with_part(1, **change)
-    back = there.with_part(1, position=position, rotation=0.0, width=SIDE_M, length=SIDE_M)
-    assert not check_solid(there.solid)
+    moved = sunk.with_part(1, **change)
+    back = moved.with_part(1, position=position, rotation=0.0, width=SIDE_M, length=SIDE_M)
+    assert not check_solid(moved.solid)
     assert back.solid.volume == pytest.approx(sunk.solid.volume, abs=0.01)
     direct = rebuild(house, with_recess(building_record(house)["parts"], house.roof, 0)).with_part(
         1, **change
     )
-    assert there.solid.volume == pytest.approx(direct.solid.volume, abs=0.01)
+    assert moved.solid.volume == pytest.approx(direct.solid.volume, abs=0.01)
 
 
 def test_a_recess_of_the_same_area_takes_the_same_volume_anywhere_on_a_level_roof(house):
     flat = house.with_part(0, type="flat")
     sunk = rebuild(flat, with_recess(building_record(flat)["parts"], flat.roof, 0))
-    taken = flat.solid.volume - sunk.solid.volume
+    volume = flat.solid.volume - sunk.solid.volume
     moved = sunk.with_part(1, position=[2.5, -1.5, float(sunk.parts[1].translation[2])])
-    assert taken == pytest.approx(SIDE_M**2 * DEPTH_M, abs=0.01)
-    assert flat.solid.volume - moved.solid.volume == pytest.approx(taken, abs=0.01)
+    assert volume == pytest.approx(SIDE_M**2 * DEPTH_M, abs=0.01)
+    assert flat.solid.volume - moved.solid.volume == pytest.approx(volume, abs=0.01)
 
 
 def test_a_part_that_leaves_nothing_out_stays_as_it_is(house):

@@ -27,10 +27,10 @@ def scene(seed):
 def test_heights_are_the_roofs(seed):
     roof, points, unknowns = scene(seed)
     expected = points[:, 2] - roof.height_at(points[:, :2])
-    found = Heights(roof.parts, points, unknowns).at(unknowns.start).gaps
+    gaps = Heights(roof.parts, points, unknowns).at(unknowns.start).gaps
     covered = np.isfinite(expected)
-    np.testing.assert_allclose(found[covered], expected[covered], atol=1e-6)
-    assert (np.abs(found[~covered]) == UNBOUNDED_M).all()
+    np.testing.assert_allclose(gaps[covered], expected[covered], atol=1e-6)
+    assert (np.abs(gaps[~covered]) == UNBOUNDED_M).all()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -41,9 +41,11 @@ def test_slopes_are_differences_of_heights_away_from_creases(seed):
     slopes = heights.jacobian(x, surface)
     for column in range(len(x)):
         moved = [heights.at(x + sign * STEP * np.eye(len(x))[column]) for sign in (1.0, -1.0)]
-        same = np.logical_and.reduce(
+        is_one_plane = np.logical_and.reduce(
             [(m.part == surface.part) & (m.row == surface.row) for m in moved]
         )
         numeric = (moved[1].gaps - moved[0].gaps) / (2.0 * STEP)
-        assert same.mean() > 0.9
-        np.testing.assert_allclose(slopes[same, column], numeric[same], atol=1e-2, rtol=1e-3)
+        assert is_one_plane.mean() > 0.9
+        np.testing.assert_allclose(
+            slopes[is_one_plane, column], numeric[is_one_plane], atol=1e-2, rtol=1e-3
+        )

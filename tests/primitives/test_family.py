@@ -40,9 +40,9 @@ def members(shape, count=12):
         yield add_cants(rng, member) if seed % 4 == 3 and any(member.has) else member
 
 
-def add_cants(rng, member, most=3):
+def add_cants(rng, member, limit=3):
     """The member with one to `most` planes over walls that cut corners of its rectangle off."""
-    count = rng.integers(1, most + 1)
+    count = rng.integers(1, limit + 1)
     facing = 0.5 * math.pi * rng.permutation(4)[:count] + rng.uniform(0.3, 1.2, count)
     distance = np.hypot(*member.half) * rng.uniform(0.6, 0.9, count)
     return replace(
@@ -138,9 +138,9 @@ def test_what_runs_over_nothing_is_written_so_that_it_can_be_read():
         written = {name: round(value, 6) for name, value in words.items()}
         refuse_no_shape(member.name, written, "part 0")
         planes = compute_planes(member.name, written, kappa, place)
-        at = np.column_stack([strew_over_plan(member), np.ones(200)])
-        assert (at @ planes.T).min(axis=1) == pytest.approx(
-            (at @ member.planes().T).min(axis=1), abs=1e-3
+        places = np.column_stack([strew_over_plan(member), np.ones(200)])
+        assert (places @ planes.T).min(axis=1) == pytest.approx(
+            (places @ member.planes().T).min(axis=1), abs=1e-3
         )
 
 
@@ -167,8 +167,11 @@ def test_however_its_axes_were_turned_a_member_is_described_alike(shape):
     for member in members(shape):
         described = member.describe()
         assert described[0] == pytest.approx(member.turn().describe()[0], abs=1e-9)
-        once = member.canonical()
-        assert once.has == once.canonical().has and once.kappa == once.canonical().kappa
+        canonical = member.canonical()
+        assert (
+            canonical.has == canonical.canonical().has
+            and canonical.kappa == canonical.canonical().kappa
+        )
 
 
 @each_shape
@@ -208,10 +211,10 @@ def test_eaves_lie_where_the_parameters_say(shape):
                 parameters[f"eave_{name}"],
                 math.tan(math.radians(parameters[f"pitch_{name}"])),
             )
-            own = np.abs(planes[:, :2] @ inwards - pitch) + np.abs(
+            eave_heights = np.abs(planes[:, :2] @ inwards - pitch) + np.abs(
                 planes @ (*middle, 1.0) - translation[2] - eave
             )
-            assert own.min() < 1e-9
+            assert eave_heights.min() < 1e-9
 
 
 def test_names_are_told_from_planes_eaves_and_pitches():
@@ -255,8 +258,8 @@ def test_a_member_like_a_shape_is_described_in_its_words(shape):
         theta_p, kappa, translation = shape.from_theta(shape.canonical_theta(theta))
         member = read_member(shape.name, theta_p, kappa, translation)
         if member.name == shape.name:  # an asymmetric gable whose slopes are drawn equal is a gable
-            named, kappa_named, place = member.describe()
-            assert named == pytest.approx(theta_p)
+            description, kappa_named, place = member.describe()
+            assert description == pytest.approx(theta_p)
             period = math.pi if shape.half_turn_symmetric else 2 * math.pi
             assert math.remainder(kappa_named - kappa, period) == pytest.approx(0.0, abs=1e-9)
             assert place == pytest.approx(translation)
@@ -285,7 +288,7 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
     kind = get(shape) if regular else None
     if not regular and any(member.has):
         member = add_cants(np.random.default_rng(4), member)
-    each = [
+    singles = [
         replace(
             member,
             half=member.half + change,
@@ -297,25 +300,25 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
     ]
     looks_alike = member.turn(2).has == member.has  # else it is seen from one side alone
     for kappa in [member.turn(quarters).kappa for quarters in (range(4) if looks_alike else (0,))]:
-        together, alone = (
-            stack_members(each).measure_as(kind, kappa),
-            [own.measure_as(kind, kappa) for own in each],
+        together, separate = (
+            stack_members(singles).measure_as(kind, kappa),
+            [members.measure_as(kind, kappa) for members in singles],
         )
-        assert np.array([np.broadcast_to(of, 3) for of in together]) == pytest.approx(
-            np.array(alone).T, abs=1e-12
+        assert np.array([np.broadcast_to(values, 3) for values in together]) == pytest.approx(
+            np.array(separate).T, abs=1e-12
         )
 
 
 def stack_members(members):
     """Members of one direction as one that is several."""
     arrays = (
-        np.stack([getattr(member, of) for member in members], axis=1)
-        for of in ("centre", "half", "eaves", "slopes", "leans")
+        np.stack([getattr(member, field) for member in members], axis=1)
+        for field in ("centre", "half", "eaves", "slopes", "leans")
     )
     centre, half, eaves, slopes, leans = arrays
     tops, cants = (
-        np.array([own.top for own in members]),
-        np.stack([own.cants for own in members], axis=2),
+        np.array([matching.top for matching in members]),
+        np.stack([matching.cants for matching in members], axis=2),
     )
     return Member(members[0].kappa, centre, half, eaves, slopes, tops, leans, cants)
 
@@ -331,11 +334,11 @@ def test_a_cant_rises_square_from_its_wall(shape):
         if not any(member.has):
             continue
         parameters, kappa, translation = add_cants(rng, member).describe()
-        told = [name.split("_")[1] for name in parameters if name.startswith("facing_")]
+        wall_names = [name.split("_")[1] for name in parameters if name.startswith("facing_")]
         planes = read_member(member.name, parameters, kappa, translation).planes()[
-            -len(told) - member.has_top :
-        ][: len(told)]
-        for cant, plane in zip(told, planes, strict=True):
+            -len(wall_names) - member.has_top :
+        ][: len(wall_names)]
+        for cant, plane in zip(wall_names, planes, strict=True):
             out = kappa + math.radians(parameters[f"facing_{cant}"])
             way = np.array([math.cos(out), math.sin(out)])
             wall = translation[:2] + parameters[f"distance_{cant}"] * way

@@ -50,8 +50,8 @@ def test_planes_of_the_term_table_are_those_of_the_vertices(primitive):
 def test_theta_and_named_parameters_are_inverse(primitive):
     for theta_p, kappa, translation in random_roofs(primitive):
         theta = primitive.to_theta(theta_p, kappa, translation)
-        named, kappa_back, translation_back = primitive.from_theta(theta)
-        assert named == pytest.approx(theta_p)
+        parameters, kappa_back, translation_back = primitive.from_theta(theta)
+        assert parameters == pytest.approx(theta_p)
         assert kappa_back == pytest.approx(kappa)
         np.testing.assert_allclose(translation_back, translation, atol=1e-9)
         assert primitive.is_proper(theta)
@@ -117,7 +117,7 @@ def test_canonical_theta_is_the_same_surface_and_idempotent(primitive):
 def test_codes_bounds_and_signs_are_complete(primitive):
     assert primitive.citygml_code.isdigit() and primitive.adv_code.isdigit()
     assert set(primitive.signed) <= set(primitive.parameters)
-    assert all(low < high for low, high in primitive.bounds)
+    assert all(lower < upper for lower, upper in primitive.bounds)
     assert all(start.source in CATALOGUE for start in primitive.starts)
     assert all(len(start.q) == 1 + len(primitive.bounds) for start in primitive.starts)
 

@@ -84,8 +84,8 @@ def test_it_is_found_as_a_whole_and_as_a_union_of_volumes(house_and_points, part
 
 def test_it_is_built_from_what_is_written(house):
     record = building_record(house)
-    again = hiproof.build(record)
-    assert np.array_equal(again.solid.vertices, house.solid.vertices)
+    rebuilt = hiproof.build(record)
+    assert np.array_equal(rebuilt.solid.vertices, house.solid.vertices)
     defs = schema()["$defs"]["part"]
     assert NAME in defs["properties"]["type"]["enum"]
     assert NAME in [rule["if"]["properties"]["type"]["const"] for rule in defs["allOf"]]

@@ -35,29 +35,29 @@ def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
     footprints = [
         Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints
     ]
-    for footprint, found in zip(footprints, assign_points(xyz, footprints), strict=True):
+    for footprint, result in zip(footprints, assign_points(xyz, footprints), strict=True):
         assert np.array_equal(
-            found, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1]))
+            result, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1]))
         )
     grid = PointGrid(xyz)
     for footprint in footprints:
-        found = grid.find_within(footprint.polygon, 3.0)
+        result = grid.find_within(footprint.polygon, 3.0)
         distance = shapely.distance(footprint.polygon, shapely.points(xyz[:, :2]))
-        near = np.zeros(len(xyz), bool)
-        near[found] = True
-        assert near[distance < 2.9].all() and not near[distance > 3.0].any()
+        is_near = np.zeros(len(xyz), bool)
+        is_near[result] = True
+        assert is_near[distance < 2.9].all() and not is_near[distance > 3.0].any()
 
 
 def test_neighbours_do_not_take_points_from_each_other():
     xy = np.array([[0.5, 0.5], [1.5, 0.5]])
-    both = [Footprint("a", shapely.box(0, 0, 2, 1)), Footprint("b", shapely.box(1, 0, 3, 1))]
-    assert [found.tolist() for found in assign_points(xy, both)] == [[0, 1], [1]]
+    footprints = [Footprint("a", shapely.box(0, 0, 2, 1)), Footprint("b", shapely.box(1, 0, 3, 1))]
+    assert [result.tolist() for result in assign_points(xy, footprints)] == [[0, 1], [1]]
 
 
 def test_no_points_and_no_polygon_find_nothing():
     footprints = [Footprint("a", shapely.box(0, 0, 1, 1)), Footprint("b", shapely.Polygon())]
-    assert [len(found) for found in assign_points(np.empty((0, 3)), footprints)] == [0, 0]
-    assert [len(found) for found in assign_points(np.ones((4, 3)) * 0.5, footprints)] == [
+    assert [len(result) for result in assign_points(np.empty((0, 3)), footprints)] == [0, 0]
+    assert [len(result) for result in assign_points(np.ones((4, 3)) * 0.5, footprints)] == [
         4,
         0,
     ]

@@ -18,7 +18,7 @@ def test_examples_in_the_docstrings_run(module):
 
 
 @pytest.mark.parametrize(
-    "first, second, same",
+    "first, second, is_same",
     [
         (7415, 28992, True),
         (28992, 28992, True),
@@ -27,9 +27,9 @@ def test_examples_in_the_docstrings_run(module):
         (7415, None, False),
     ],
 )
-def test_plan_decides_whether_two_are_the_same(first, second, same):
-    assert same_horizontal(parse_crs(first), parse_crs(second)) is same
-    assert same_horizontal(parse_crs(second), parse_crs(first)) is same
+def test_plan_decides_whether_two_are_the_same(first, second, is_same):
+    assert same_horizontal(parse_crs(first), parse_crs(second)) is is_same
+    assert same_horizontal(parse_crs(second), parse_crs(first)) is is_same
 
 
 def test_wkt_without_a_code_is_recognised():

@@ -109,8 +109,8 @@ def write_with_gaps(path, **fields):
 
 
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
-@pytest.mark.parametrize("where", [None, "name <> 'D' or name = 'E'"])
-def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, ending, where):
+@pytest.mark.parametrize("condition", [None, "name <> 'D' or name = 'E'"])
+def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, ending, condition):
     """They became decimals: a year 1931.0, a yes 1.0, and an id beyond 2^53 that of its
     neighbour.
     """
@@ -121,7 +121,9 @@ def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, e
         number=2**53 + np.array([1, 0, 3], np.int64),
         height=np.array([7.5, 0, 8.0]),
     )
-    by_name = {f.id: f.attributes for f in read_footprints(path, id_attribute="name", where=where)}
+    by_name = {
+        f.id: f.attributes for f in read_footprints(path, id_attribute="name", where=condition)
+    }
     assert by_name["B"] == {"name": "B"}
     assert [by_name["A"][k] for k in ("year", "listed", "number", "height")] == [
         1931,
@@ -169,21 +171,23 @@ def test_heights_of_the_outline_are_left_out(tmp_path):
 
 
 def test_multipolygons_are_split_and_name_their_feature(tmp_path):
-    both = shapely.MultiPolygon([SQUARE, shift(HOLED, 20)])
-    path = write(tmp_path / "a.gpkg", [both, shift(SQUARE, 60)], id=np.array(["M", "N"], object))
+    polygons = shapely.MultiPolygon([SQUARE, shift(HOLED, 20)])
+    path = write(
+        tmp_path / "a.gpkg", [polygons, shift(SQUARE, 60)], id=np.array(["M", "N"], object)
+    )
     footprints = read_footprints(path)
     assert [f.id for f in footprints] == ["M-1", "M-2", "N"]
     assert (
         footprints[1].attributes == {"id": "M", "part_of": "M"}
         and "part_of" not in footprints[2].attributes
     )
-    assert sum(f.polygon.area for f in footprints[:2]) == pytest.approx(both.area)
+    assert sum(f.polygon.area for f in footprints[:2]) == pytest.approx(polygons.area)
 
 
 @pytest.mark.parametrize("code", [28992, 25831, 4326])
 def test_footprints_move_into_the_clouds_plan_crs(tmp_path, code):
-    there = Transformer.from_crs(28992, code, always_xy=True)
-    polygon = shapely.transform(SQUARE, lambda xy: np.column_stack(there.transform(*xy.T)))
+    transformer = Transformer.from_crs(28992, code, always_xy=True)
+    polygon = shapely.transform(SQUARE, lambda xy: np.column_stack(transformer.transform(*xy.T)))
     path = write(tmp_path / "a.gpkg", [polygon], crs=f"EPSG:{code}")
     back = read_footprints(path, target_crs=CRS.from_epsg(7415))[0].polygon
     assert np.abs(np.subtract(back.exterior.coords, SQUARE.exterior.coords)).max() < 0.001
@@ -242,8 +246,8 @@ def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_
     tmp_path, recwarn
 ):
     ring = shapely.Polygon(shift(SQUARE, 50).buffer(5).exterior, [shift(SQUARE, 50).exterior])
-    apart = [SQUARE, shift(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shift(SQUARE, 50)]
-    read_footprints(write(tmp_path / "a.gpkg", apart))
+    separate = [SQUARE, shift(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shift(SQUARE, 50)]
+    read_footprints(write(tmp_path / "a.gpkg", separate))
     assert not recwarn.list
     ids = np.array(["house", "annex", "block"], object)
     path = write(tmp_path / "b.gpkg", [SQUARE, SQUARE.buffer(-2), shift(SQUARE, 20)], id=ids)
@@ -298,12 +302,12 @@ def test_coordinates_that_are_no_numbers_enclose_no_area():
 
 def test_a_file_of_several_layers_needs_a_name(tmp_path):
     path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
-    more = [np.array(["B", "C"], object)]
+    attributes = [np.array(["B", "C"], object)]
     squares = shapely.to_wkb(np.array([shift(SQUARE, 20), shift(SQUARE, 40)], object))
     pyogrio.raw.write(
         path,
         squares,
-        more,
+        attributes,
         ["name"],
         layer="sheds",
         geometry_type="Polygon",
@@ -334,14 +338,18 @@ def test_a_table_without_geometry_is_no_layer_to_choose_from(tmp_path):
 
 
 def test_features_of_several_polygons_are_said_once(tmp_path):
-    both = shapely.MultiPolygon([SQUARE, shift(SQUARE, 20)])
+    polygons = shapely.MultiPolygon([SQUARE, shift(SQUARE, 20)])
     with pytest.warns(
         InputWarning, match="2 features of several polygons became 4 buildings"
-    ) as told:
+    ) as remarks:
         read_footprints(
-            write(tmp_path / "a.gpkg", [both, shift(both, 60)], id=np.array(["M", "N"], object))
+            write(
+                tmp_path / "a.gpkg",
+                [polygons, shift(polygons, 60)],
+                id=np.array(["M", "N"], object),
+            )
         )
-    assert len(told) == 1
+    assert len(remarks) == 1
 
 
 def reproject(xy, source, target):
@@ -393,15 +401,15 @@ SLIPS = {
 
 @pytest.mark.parametrize("slip", SLIPS)
 def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
-    xy, named, cloud_xy, cloud, expected = SLIPS[slip]
-    in_use = xy if named is None or cloud is None else reproject(xy, named, cloud)
+    xy, source, cloud_xy, cloud, expected = SLIPS[slip]
+    in_use = xy if source is None or cloud is None else reproject(xy, source, cloud)
     footprints = [
         Footprint(str(i), shapely.Point(point).buffer(1e-3)) for i, point in enumerate(in_use)
     ]
     reach = 1e-5 if np.abs(cloud_xy).max() < 180 else 20.0
     bounds = (*(cloud_xy.min(axis=0) - reach), *(cloud_xy.max(axis=0) + reach))
     with pytest.raises(InputError, match=expected) as caught:
-        check_overlap(footprints, bounds, named, cloud)
+        check_overlap(footprints, bounds, source, cloud)
     assert str(caught.value).startswith("expected footprints that overlap the cloud in x")
 
 
@@ -417,8 +425,8 @@ def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     ],
 )
 def test_coordinates_far_from_where_their_crs_is_used_are_told(code, xy, expected):
-    told = doubtful_place(CRS.from_epsg(code), xy)
-    assert told is None if expected is None else expected in told
+    remark = doubtful_place(CRS.from_epsg(code), xy)
+    assert remark is None if expected is None else expected in remark
 
 
 @pytest.mark.parametrize("crs", [None, "EPSG:28992"])
@@ -432,13 +440,13 @@ def test_footprints_in_degrees_that_name_another_crs_are_refused(crs, tmp_path):
 
 
 def test_what_names_no_crs_and_counts_in_degrees_is_refused():
-    low = np.array([[4.36, 52.0], [4.37, 52.01]])
+    degrees = np.array([[4.36, 52.0], [4.37, 52.01]])
     with pytest.raises(
         InputError,
         match=r"got coordinates in x 4\.36000 to 4\.38000.* look like degrees; reproject",
     ):
-        refuse_degrees(np.hstack([low, low + 0.01]), "the point clouds", "reproject")
-    refuse_degrees(np.hstack([low, low + 12.0]), "the point clouds", "reproject")
+        refuse_degrees(np.hstack([degrees, degrees + 0.01]), "the point clouds", "reproject")
+    refuse_degrees(np.hstack([degrees, degrees + 12.0]), "the point clouds", "reproject")
     refuse_degrees(np.hstack([HERE, HERE + 0.01]), "the point clouds", "reproject")
     refuse_degrees(np.full((1, 4), np.nan), "the point clouds", "reproject")
 

@@ -89,14 +89,14 @@ def test_the_runs_hold_every_point_of_any_boxes(indexed_cloud, seed, monkeypatch
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 10)
     path, xyz = indexed_cloud
     rng = np.random.default_rng(seed)
-    low = rng.uniform((610990, 6269990), (611380, 6270280), (3, 2))
-    boxes = np.hstack([low, low + rng.uniform(1, 60, (3, 2))])
+    lower = rng.uniform((610990, 6269990), (611380, 6270280), (3, 2))
+    boxes = np.hstack([lower, lower + rng.uniform(1, 60, (3, 2))])
     runs = read_lax(path).find_runs(boxes)
     read = np.concatenate([cloud.xyz for cloud in iter_points(path, 100, runs=runs)])
-    wanted = np.array(
+    is_expected = np.array(
         [p for p in xyz if any((p[:2] >= b[:2]).all() and (p[:2] <= b[2:]).all() for b in boxes)]
     )
-    assert {tuple(p) for p in wanted.round(2)} <= {tuple(p) for p in read.round(2)}
+    assert {tuple(p) for p in is_expected.round(2)} <= {tuple(p) for p in read.round(2)}
     assert len(read) == (runs[:, 1] - runs[:, 0]).sum() < POINTS
 
 
@@ -124,11 +124,11 @@ def test_an_index_that_cannot_be_used_is_left_aside(indexed_cloud, harm):
     path, xyz = indexed_cloud
     if harm == "of another file":
         write_las(path, xyz[:-1])
-    beside = path.with_suffix(".lax")
-    data = bytearray(beside.read_bytes())
+    index_path = path.with_suffix(".lax")
+    data = bytearray(index_path.read_bytes())
     if harm == "64 bits":
         data[56] = 1
-    beside.write_bytes(
+    index_path.write_bytes(
         {
             "cut off": data[: len(data) // 2 // 4 * 4],
             "something else": b"not an index" * 20,

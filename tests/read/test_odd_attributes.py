@@ -35,10 +35,10 @@ def write_geojson(path, **columns):
 
 def read_values(path, name, **options):
     """The attribute of each footprint, and the remarks that reading them made."""
-    with pytest.warns(InputWarning) as told:
+    with pytest.warns(InputWarning) as remarks:
         footprints = read_footprints(path, **options)
     return [footprint.attributes.get(name) for footprint in footprints], [
-        str(remark.message) for remark in told
+        str(remark.message) for remark in remarks
     ]
 
 
@@ -56,8 +56,8 @@ ODD = {
 def test_one_impossible_date_refuses_no_file(tmp_path, kind):
     dates = ODD[kind]
     path = write_geojson(tmp_path / "a.geojson", built=dates, year=[1999, 2024, 2001, None])
-    found, remarks = read_values(path, "built")
-    assert found == dates
+    values, remarks = read_values(path, "built")
+    assert values == dates
     assert len(remarks) == 1 and "read as text" in remarks[0] and remarks[0].endswith(": built")
     years = [footprint.attributes.get("year") for footprint in read_footprints(path)]
     assert years == [1999, 2024, 2001, None] and type(years[0]) is int
@@ -68,10 +68,10 @@ def test_an_impossible_date_goes_with_conditions_and_boxes(tmp_path):
     path = write_geojson(
         tmp_path / "a.geojson", built=ODD["the 30th of February"], year=[1999, 2024, 2001, 1998]
     )
-    chosen = read_footprints(
+    footprints = read_footprints(
         path, where="year < 2010", target_crs="EPSG:32633", bbox=(500025, 4649776, 500080, 4649786)
     )
-    assert [(footprint.id, footprint.attributes.get("built")) for footprint in chosen] == [
+    assert [(footprint.id, footprint.attributes.get("built")) for footprint in footprints] == [
         ("h2", None),
         ("h3", "1998-01-01"),
     ]
@@ -110,8 +110,8 @@ def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
         ).fetchall():
             base.execute(f'drop trigger "{trigger}"')
         base.execute("update a set name = cast(x'41ff42' as text) where name = 'b'")
-    found, remarks = read_values(path, "name")
-    assert found == ["Straße", "A\ufffdB", "c", "d"] and len(remarks) == 1
+    values, remarks = read_values(path, "name")
+    assert values == ["Straße", "A\ufffdB", "c", "d"] and len(remarks) == 1
 
 
 def test_several_odd_attributes_are_named_in_one_remark(tmp_path):
@@ -119,8 +119,8 @@ def test_several_odd_attributes_are_named_in_one_remark(tmp_path):
     path = write_geojson(
         tmp_path / "a.geojson", built=ODD["the year nought"], flags=lists, name=list("abcd")
     )
-    found, remarks = read_values(path, "name")
-    assert found == list("abcd") and len(remarks) == 1 and remarks[0].endswith(": built, flags")
+    values, remarks = read_values(path, "name")
+    assert values == list("abcd") and len(remarks) == 1 and remarks[0].endswith(": built, flags")
 
 
 def test_more_attributes_than_a_geopackage_has_columns_are_told_before_work(recwarn):

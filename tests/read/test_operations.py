@@ -31,13 +31,13 @@ def without_grids():
 
 
 def test_a_missing_grid_is_named_with_what_to_do():
-    found = find("EPSG:27700", "EPSG:32630", LONDON)
-    assert found.accuracy_m == 2.0 and "OSGB36 to WGS 84 (6)" in found.name
-    assert found.missing_grids == (OSTN15,) and found.missing_accuracy_m == 1.0
-    assert found.remark.startswith(
+    operation = find("EPSG:27700", "EPSG:32630", LONDON)
+    assert operation.accuracy_m == 2.0 and "OSGB36 to WGS 84 (6)" in operation.name
+    assert operation.missing_grids == (OSTN15,) and operation.missing_accuracy_m == 1.0
+    assert operation.remark.startswith(
         "footprints.gpkg: transformed from EPSG:27700 (OSGB36 / British National Grid)"
     )
-    assert f"projsync --file {OSTN15}" in found.remark and "PROJ_NETWORK=ON" in found.remark
+    assert f"projsync --file {OSTN15}" in operation.remark and "PROJ_NETWORK=ON" in operation.remark
 
 
 def test_an_operation_of_unknown_accuracy_is_coarse():
@@ -46,17 +46,17 @@ def test_an_operation_of_unknown_accuracy_is_coarse():
 
 
 def test_an_accurate_operation_needs_no_remark():
-    found = find("EPSG:28992", "EPSG:25831", (85000.0, 447000.0))
-    assert found.accuracy_m == 0.25 and found.remark == ""
-    assert found.missing_grids == ("nl_nsgi_rdtrans2018.tif",)
+    operation = find("EPSG:28992", "EPSG:25831", (85000.0, 447000.0))
+    assert operation.accuracy_m == 0.25 and operation.remark == ""
+    assert operation.missing_grids == ("nl_nsgi_rdtrans2018.tif",)
     assert find("EPSG:4258", "EPSG:25832", (9.0, 50.0)).accuracy_m == 0.0
 
 
 def test_an_operation_survives_json_and_is_known_again():
-    found = find("EPSG:27700", "EPSG:32630", LONDON)
-    again = Operation.from_dict(json.loads(json.dumps(found.to_dict())))
-    assert again == found and is_current(again)
-    assert not is_current(Operation(**{**found.to_dict(), "name": "OSTN15", "accuracy_m": 1.0}))
+    operation = find("EPSG:27700", "EPSG:32630", LONDON)
+    loaded = Operation.from_dict(json.loads(json.dumps(operation.to_dict())))
+    assert loaded == operation and is_current(loaded)
+    assert not is_current(Operation(**{**operation.to_dict(), "name": "OSTN15", "accuracy_m": 1.0}))
 
 
 def test_footprints_that_come_by_a_coarse_operation_are_remarked(tmp_path):

@@ -35,12 +35,12 @@ YEARS = [None if i == 4 else 1900 + i for i in range(9)]
 
 def write(path, geometry, encoding="WKB", covering=None, crs=RD_JSON, **columns):
     """A file of the `columns` and a geometry column, in row groups of three rows."""
-    told = {"encoding": encoding, "geometry_types": ["Polygon"]}
-    told |= {"crs": crs} if crs != "absent" else {}
+    metadata = {"encoding": encoding, "geometry_types": ["Polygon"]}
+    metadata |= {"crs": crs} if crs != "absent" else {}
     if covering:
         columns["box"] = [dict(zip(SIDES, b, strict=True)) for b in covering]
-        told["covering"] = {"bbox": {side: ["box", side] for side in SIDES}}
-    geo = {"version": "1.1.0", "primary_column": "outline", "columns": {"outline": told}}
+        metadata["covering"] = {"bbox": {side: ["box", side] for side in SIDES}}
+    geo = {"version": "1.1.0", "primary_column": "outline", "columns": {"outline": metadata}}
     table = pyarrow.table({**columns, "outline": geometry})
     table = table.replace_schema_metadata({"geo": json.dumps(geo)})
     parquet.write_table(table, path, row_group_size=3)
@@ -82,11 +82,11 @@ def test_a_file_gives_what_a_geopackage_gives(tmp_path, encoding, has_boxes):
         year=YEARS,
         height=pyarrow.array([0.2] * 9, pyarrow.float32()),
     )
-    same = tmp_path / "a.gpkg"
+    geopackage = tmp_path / "a.gpkg"
     fields = [np.array(IDS, object), np.array([y or 0 for y in YEARS], np.int32)]
     gap = np.array([y is None for y in YEARS])
     pyogrio.raw.write(
-        str(same),
+        str(geopackage),
         wkb,
         [*fields, np.full(9, 0.2)],
         ["id", "year", "height"],
@@ -95,20 +95,20 @@ def test_a_file_gives_what_a_geopackage_gives(tmp_path, encoding, has_boxes):
         crs="EPSG:28992",
     )
     assert footprint_crs(path) == RD
-    for chosen in (
+    for options in (
         {},
         {"where": "year > 1904 and id <> 'h8'"},
         {"where": "year is null"},
         {"bbox": (85045, 446000, 85075, 446001), "target_crs": RD},
         {"bbox": (85045, 446000, 85075, 446001), "target_crs": RD, "where": "year = 1903"},
     ):
-        assert read_footprints(path, **chosen) == read_footprints(same, **chosen)
+        assert read_footprints(path, **options) == read_footprints(geopackage, **options)
 
 
 def test_rows_keep_their_number_whichever_are_read(tmp_path):
     path = write(tmp_path / "a.parquet", shapely.to_wkb(SHAPES).tolist(), covering=boxes(SHAPES))
-    some = read_footprints(path, bbox=(85155, 446000, 85161, 446001), target_crs=RD)
-    assert [f.id for f in some] == ["8"]
+    subset = read_footprints(path, bbox=(85155, 446000, 85161, 446001), target_crs=RD)
+    assert [f.id for f in subset] == ["8"]
     assert [f.id for f in read_footprints(path)] == [str(i) for i in range(9)]
 
 
@@ -117,9 +117,9 @@ def test_a_row_without_geometry_stays(tmp_path):
     for kind in ("polygon", "multipolygon"):
         path = write(tmp_path / f"{kind}.parquet", in_lists(shapes, kind), kind, id=IDS[:3])
         with pytest.warns(match="no area that a building could have"):
-            found = read_footprints(path)
-        assert [f.polygon.is_empty for f in found] == [False, True, False]
-        assert found[2].polygon.equals(SHAPES[2])
+            footprints = read_footprints(path)
+        assert [f.polygon.is_empty for f in footprints] == [False, True, False]
+        assert footprints[2].polygon.equals(SHAPES[2])
 
 
 def test_attributes_of_any_type_become_plain_values(tmp_path):
@@ -164,10 +164,10 @@ def test_only_row_groups_around_a_box_are_fetched(tmp_path):
     path = write(folder / "a.parquet", wkb, covering=boxes(SHAPES), id=IDS)
     box = {"bbox": (85155, 446000, 85161, 446001), "target_crs": RD}
     with serve(folder, log) as address:
-        found = read_footprints(f"{address}/a.parquet", **box)
+        footprints = read_footprints(f"{address}/a.parquet", **box)
         with pytest.raises(InputError, match=r"^expected GeoParquet footprints at .+no\.parquet"):
             read_footprints(f"{address}/no.parquet")
-    assert found == read_footprints(path, **box) and [f.id for f in found] == ["h8"]
+    assert footprints == read_footprints(path, **box) and [f.id for f in footprints] == ["h8"]
     columns = parquet.ParquetFile(path).metadata.row_group(2).to_dict()["columns"]
     starts = [int(line.split()[1]) for line in log.read_text().splitlines()]
     assert min(starts) >= min(c["dictionary_page_offset"] or c["data_page_offset"] for c in columns)
@@ -221,7 +221,7 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_what_cannot_be_footprints_gets_one_sentence(tmp_path, name):
-    make, chosen, expected = BAD[name]
+    make, options, expected = BAD[name]
     make(tmp_path / "a.parquet")
     with pytest.raises(InputError, match=expected):
-        read_footprints(tmp_path / "a.parquet", **chosen)
+        read_footprints(tmp_path / "a.parquet", **options)

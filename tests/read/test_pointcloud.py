@@ -239,9 +239,9 @@ def test_withheld_points_are_left_out_with_a_warning(tmp_path):
     las.write(tmp_path / "b.las")
     with pytest.warns(InputWarning, match="4 points flagged as withheld"):
         assert np.allclose(read_points(tmp_path / "b.las").xyz, xyz[4:], atol=1e-6)
-    with pytest.warns(InputWarning) as told:
+    with pytest.warns(InputWarning) as remarks:
         assert sum(len(cloud) for cloud in iter_points(tmp_path / "b.las", chunk_points=3)) == 6
-    assert len(told) == 1, "a file's withheld points are told once, not by the chunk"
+    assert len(remarks) == 1, "a file's withheld points are told once, not by the chunk"
 
 
 def write_coarse_las(path, xyz, plan, height):
@@ -262,16 +262,18 @@ def write_rounded_text(path, xyz, plan, height):
     ("write", "name"), [(write_coarse_las, "a.las"), (write_rounded_text, "a.csv")]
 )
 @pytest.mark.parametrize(
-    ("plan", "height", "told"),
+    ("plan", "height", "is_remarked"),
     [(1.0, 0.1, "1 m in plan and 0.1 m in height"), (0.001, 0.1, "0.1 m in height")],
 )
-def test_coordinates_in_coarse_steps_are_told_of_once(tmp_path, write, name, plan, height, told):
+def test_coordinates_in_coarse_steps_are_told_of_once(
+    tmp_path, write, name, plan, height, is_remarked
+):
     header = read_header(write(tmp_path / name, some_points()[0], plan, height))
-    others = [replace(header, path=other) for other in ("b", "c")]
+    copies = [replace(header, path=other) for other in ("b", "c")]
     with pytest.warns(
-        InputWarning, match=f"{name} and 2 more: coordinates come in steps of {told}, and"
+        InputWarning, match=f"{name} and 2 more: coordinates come in steps of {is_remarked}, and"
     ) as caught:
-        warn_coarse([header, *others], METRES)
+        warn_coarse([header, *copies], METRES)
     assert len(caught) == 1
 
 

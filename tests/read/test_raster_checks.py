@@ -238,8 +238,8 @@ def test_a_tiny_raster_is_a_level_or_a_slope(tmp_path, side):
 def test_heights_in_feet_of_the_rasters_crs(tmp_path):
     crs, transform = "EPSG:2263+6360", from_origin(980000, 200000, 3, 3)
     path = write(tmp_path / "dtm.tif", np.full((SIDE, SIDE), 30.0), transform, crs)
-    at = np.array([[980010.0, 199990.0]]) * 1200 / 3937
-    assert read_terrain(path).height_at(at)[0] == pytest.approx(30.0 * 1200 / 3937)
+    places = np.array([[980010.0, 199990.0]]) * 1200 / 3937
+    assert read_terrain(path).height_at(places)[0] == pytest.approx(30.0 * 1200 / 3937)
 
 
 def test_a_raster_without_a_crs_counts_as_the_cloud_does(tmp_path):

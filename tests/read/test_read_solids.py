@@ -133,9 +133,9 @@ def test_solid_comes_back(tmp_path, name):
     ("kind", "ids"), [("MultiSurface", 1), ("CompositeSolid", 2), ("MultiSolid", 2)]
 )
 def test_other_geometries_come_out_shell_by_shell(tmp_path, kind, ids):
-    found = list(read_solids(write_text(tmp_path, "a.city.json", json.dumps(city(kind)))))
-    assert [name for name, _ in found] == ["house", "house#2"][:ids]
-    assert all(check_solid(solid) == () for _, solid in found)
+    results = list(read_solids(write_text(tmp_path, "a.city.json", json.dumps(city(kind)))))
+    assert [name for name, _ in results] == ["house", "house#2"][:ids]
+    assert all(check_solid(solid) == () for _, solid in results)
 
 
 def test_inner_shell_is_turned_inside_out(tmp_path):
@@ -146,8 +146,8 @@ def test_inner_shell_is_turned_inside_out(tmp_path):
         [[ring[::-1] for ring in face] for face in outer],
     ]
     del model["CityObjects"]["house"]["geometry"][0]["semantics"]
-    found = list(read_solids(write_text(tmp_path, "a.json", json.dumps(model))))
-    assert len(found) == 2 and all(check_solid(solid) == () for _, solid in found)
+    results = list(read_solids(write_text(tmp_path, "a.json", json.dumps(model))))
+    assert len(results) == 2 and all(check_solid(solid) == () for _, solid in results)
 
 
 def test_open_ring_is_a_finding(tmp_path):

@@ -33,8 +33,8 @@ def roof(seed, count=40):
 
 
 def row(id, class_name, points):
-    few = multipoint(points[:2])
-    return f'{id},{class_name},"{multipoint(points)}","{OUTLINE}",,"{few}","{BREP}"\n'
+    small = multipoint(points[:2])
+    return f'{id},{class_name},"{multipoint(points)}","{OUTLINE}",,"{small}","{BREP}"\n'
 
 
 @pytest.fixture

@@ -25,14 +25,14 @@ ELL = [(0, 0), (12, 0), (12, 6), (6, 6), (6, 9), (0, 9), (0, 0)]
 POLYHEDRON, TIN, TRIANGLE = 15, 16, 17
 
 
-def body(ring, low=100.0, high=106.0):
+def body(ring, z_bottom=100.0, z_top=106.0):
     """Faces of a block on `ring`, top and bottom first."""
     ring = [(x + X, y + Y) for x, y in ring]
     walls = [
-        [(*a, low), (*b, low), (*b, high), (*a, high), (*a, low)]
+        [(*a, z_bottom), (*b, z_bottom), (*b, z_top), (*a, z_top), (*a, z_bottom)]
         for a, b in itertools.pairwise(ring)
     ]
-    return [[(x, y, z) for x, y in ring] for z in (low, high)] + walls
+    return [[(x, y, z) for x, y in ring] for z in (z_bottom, z_top)] + walls
 
 
 def triangles(faces):
@@ -143,10 +143,10 @@ def test_layers_that_pyogrio_refuses_are_read(tmp_path, declared):
         assert [footprint.id for footprint in read_footprints(path)] == ["h0", "h1", "h2"]
     for layer in ("a", 0):
         assert len(read_footprints(path, layer=layer)) == 3
-    (chosen,) = read_footprints(
+    (selection,) = read_footprints(
         path, where="id = 'h1'", target_crs="EPSG:32633", bbox=(X + 21, Y, X + 22, Y + 1)
     )
-    assert chosen.id == "h1" and chosen.polygon.area == pytest.approx(108.0)
+    assert selection.id == "h1" and selection.polygon.area == pytest.approx(108.0)
     with pytest.raises(InputError, match="it has a"):
         read_footprints(path, layer="b")
 

@@ -77,20 +77,22 @@ def test_tiles_change_nothing(tmp_path, monkeypatch):
 
 def test_a_raster_in_another_crs_is_asked_there(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif"), crs="EPSG:25831")
-    there = Transformer.from_crs(28992, 25831, always_xy=True)
+    transformer = Transformer.from_crs(28992, 25831, always_xy=True)
     assert np.allclose(
-        model.height_at(np.column_stack(there.transform(*inside().T))), plane(inside()), atol=1e-4
+        model.height_at(np.column_stack(transformer.transform(*inside().T))),
+        plane(inside()),
+        atol=1e-4,
     )
     assert read_terrain(tmp_path / "dtm.tif", crs="EPSG:7415").transformer is None
 
 
 def test_a_raster_survives_the_way_to_another_process(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif"), crs="EPSG:25831")
-    there = np.column_stack(
+    places = np.column_stack(
         Transformer.from_crs(28992, 25831, always_xy=True).transform(*inside().T)
     )
     assert np.array_equal(
-        pickle.loads(pickle.dumps(model)).height_at(there), model.height_at(there)
+        pickle.loads(pickle.dumps(model)).height_at(places), model.height_at(places)
     )
 
 
@@ -115,10 +117,10 @@ def test_heights_that_no_ground_has_are_unknown_although_the_raster_does_not_say
     heights = np.full((80, 120), 2.0)
     heights[:, :60] = nothing
     model = read_terrain(write_raster(tmp_path / "dtm.tif", heights=heights))
-    found = model.height_at(
+    result = model.height_at(
         np.array([[WEST + 10, NORTH - 20], [WEST + 29.8, NORTH - 20], [WEST + 50, NORTH - 20]])
     )
-    assert np.isnan(found[0]) and found[1:].tolist() == [2.0, 2.0]
+    assert np.isnan(result[0]) and result[1:].tolist() == [2.0, 2.0]
 
 
 def test_thinning_depends_neither_on_order_nor_on_tiles():
@@ -136,8 +138,8 @@ def test_thinning_equals_a_plain_loop_over_cells(seed):
     points = np.round(np.random.default_rng(seed).uniform(-20, 20, (400, 3)), 4)
     slow = []
     for cell in np.unique(np.floor(points[:, [1, 0]] / 3.0), axis=0):
-        own = points[(np.floor(points[:, [1, 0]] / 3.0) == cell).all(axis=1)]
-        slow.append([*own[:, :2].mean(axis=0), np.sort(own[:, 2])[(len(own) - 1) // 2]])
+        members = points[(np.floor(points[:, [1, 0]] / 3.0) == cell).all(axis=1)]
+        slow.append([*members[:, :2].mean(axis=0), np.sort(members[:, 2])[(len(members) - 1) // 2]])
     assert np.allclose(thin_to_grid(points, 3.0), slow, atol=1e-9)
 
 
@@ -147,20 +149,24 @@ class Around:
     source = "ground points"
 
     def height_at(self, xy):
-        near = np.hypot(*(xy - [WEST, NORTH]).T) < 100.0
-        return np.where(near, plane(xy) + 1.0, np.nan)
+        is_near = np.hypot(*(xy - [WEST, NORTH]).T) < 100.0
+        return np.where(is_near, plane(xy) + 1.0, np.nan)
 
 
 def test_a_chain_asks_the_next_where_one_does_not_know(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif", width=20, height=20))
     chain = TerrainChain([model, None, Around()])
-    here, there, nowhere = [WEST + 5, NORTH - 5], [WEST + 40, NORTH - 20], [WEST + 900, NORTH]
-    heights, sources = chain.heights_and_sources(np.array([here, there, nowhere]))
-    assert heights[0] == pytest.approx(plane(np.array([here]))[0])
-    assert heights[1] == pytest.approx(plane(np.array([there]))[0] + 1, abs=0.1)
+    first_place, second_place, nowhere = (
+        [WEST + 5, NORTH - 5],
+        [WEST + 40, NORTH - 20],
+        [WEST + 900, NORTH],
+    )
+    heights, sources = chain.heights_and_sources(np.array([first_place, second_place, nowhere]))
+    assert heights[0] == pytest.approx(plane(np.array([first_place]))[0])
+    assert heights[1] == pytest.approx(plane(np.array([second_place]))[0] + 1, abs=0.1)
     assert np.isnan(heights[2]) and sources == ("terrain model dtm.tif", "ground points")
-    assert chain.heights_and_sources(np.array([there]))[1] == ("ground points",)
-    assert np.array_equal(chain.height_at(np.array([here])), heights[:1])
+    assert chain.heights_and_sources(np.array([second_place]))[1] == ("ground points",)
+    assert np.array_equal(chain.height_at(np.array([first_place])), heights[:1])
 
 
 @pytest.mark.parametrize(

@@ -25,12 +25,12 @@ def test_a_thousand_equal_points_are_one():
 @pytest.mark.parametrize("cells", [50, 10**9], ids=["by a table", "by sorting"])
 def test_occupied_cells_are_those_of_numpy(cells):
     keys = np.random.default_rng(0).integers(0, 50, 200)
-    for mine, plain in zip(
+    for matching, plain in zip(
         occupied_cells(keys, cells),
         np.unique(keys, return_inverse=True, return_counts=True),
         strict=True,
     ):
-        assert np.array_equal(mine, plain)
+        assert np.array_equal(matching, plain)
 
 
 @pytest.mark.parametrize("spread", [3.0, 1e6], ids=["dense", "scattered"])
@@ -43,8 +43,8 @@ def test_one_point_a_cell_equals_the_plain_loop(spread, cell_m):
             point
         )
     expected = [
-        [*np.mean(own, axis=0)[:2], np.sort([p[2] for p in own])[(len(own) - 1) // 2]]
-        for _, own in sorted(slow.items())
+        [*np.mean(members, axis=0)[:2], np.sort([p[2] for p in members])[(len(members) - 1) // 2]]
+        for _, members in sorted(slow.items())
     ]
     assert np.allclose(
         rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2), expected, atol=1e-9

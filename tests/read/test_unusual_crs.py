@@ -192,8 +192,8 @@ def test_units_are_understood_and_so_is_whether_there_is_a_place(kind):
 
 @pytest.mark.parametrize("kind", REFUSED)
 def test_what_no_roof_can_be_built_in_is_refused_in_one_sentence(kind):
-    definition, told = REFUSED[kind]
-    with pytest.raises(InputError, match=told) as caught:
+    definition, message = REFUSED[kind]
+    with pytest.raises(InputError, match=message) as caught:
         find_units(parse_crs(definition), "the cloud")
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 400
 
@@ -425,8 +425,8 @@ def test_a_local_cloud_takes_its_place_from_the_footprints_and_keeps_its_heights
     assert (
         frame.crs.sub_crs_list[0].to_epsg() == 32633 and vertical_crs(frame.crs).to_epsg() == 5703
     )
-    alone = find_frame(tmp_path, OWN_FEET)
-    assert (alone.units.plan, alone.units.height) == pytest.approx((US_FOOT, 1.0))
+    single_frame = find_frame(tmp_path, OWN_FEET)
+    assert (single_frame.units.plan, single_frame.units.height) == pytest.approx((US_FOOT, 1.0))
     heights = find_frame(tmp_path, (34735, directory(*short(k4099=9003))), path)
     assert (heights.units.plan, heights.units.height) == pytest.approx((1.0, US_FOOT))
     assert find_frame(tmp_path, (34735, directory(*short(k4099=9001)))).crs is None
@@ -467,7 +467,7 @@ def test_a_terrain_model_beside_a_local_cloud_is_asked_in_its_own_coordinates(
     }
     with rasterio.open(tmp_path / "dtm.tif", "w", **profile) as file:
         file.write(np.full((40, 40), 7.0, np.float32), 1)
-    asked = parse_crs(LOCAL[cloud][0] if cloud else "EPSG:32633")
-    units = find_units(asked)
-    terrain = read_terrain(tmp_path / "dtm.tif", asked, units)
+    request = parse_crs(LOCAL[cloud][0] if cloud else "EPSG:32633")
+    units = find_units(request)
+    terrain = read_terrain(tmp_path / "dtm.tif", request, units)
     assert terrain.height_at(units.to_metres([[500010.0, 4649780.0]]))[0] == pytest.approx(7.0)

@@ -39,8 +39,8 @@ def test_adding_a_constant_to_all_bics_changes_nothing():
 
 
 def test_a_zero_probability_is_bounded_so_that_evidence_can_undo_it():
-    needed = -2 * np.log(SMALLEST_PRIOR) / EVIDENCE_EXPONENT * 10
-    assert next(iter(combine({"gable": 1.0, "hip": 0.0}, {"gable": needed, "hip": 0.0}))) == "hip"
+    evidence = -2 * np.log(SMALLEST_PRIOR) / EVIDENCE_EXPONENT * 10
+    assert next(iter(combine({"gable": 1.0, "hip": 0.0}, {"gable": evidence, "hip": 0.0}))) == "hip"
 
 
 def test_types_without_evidence_or_without_prior():
@@ -59,8 +59,11 @@ def test_a_type_the_fit_gave_up_is_behind_the_best_but_its_evidence_says_little(
         next(iter(combine({"flat": 0.99, "gable": 0.005, "hip": 0.005}, bics, points=200)))
         == "flat"
     )
-    more, fewer = combine(even, bics, points=2000)["flat"], combine(even, bics, points=20)["flat"]
-    assert more < fewer
+    many_points, few_points = (
+        combine(even, bics, points=2000)["flat"],
+        combine(even, bics, points=20)["flat"],
+    )
+    assert many_points < few_points
 
 
 class FakeFit:
@@ -76,16 +79,16 @@ class FakeFit:
 
 
 def test_most_probable_fits_again_only_where_the_network_disagrees_with_the_evidence():
-    asked = []
+    requests = []
 
     def fit(names):
-        asked.append(names)
+        requests.append(names)
         return FakeFit(names)
 
-    found, posterior = choose_most_probable(fit, {"gable": 0.9, "hip": 0.1})
-    assert found.type == "gable" == next(iter(posterior)) and asked == [()]
-    found, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
-    assert found.type == "hip" == next(iter(posterior)) and asked == [(), (), ("hip",)]
+    choice, posterior = choose_most_probable(fit, {"gable": 0.9, "hip": 0.1})
+    assert choice.type == "gable" == next(iter(posterior)) and requests == [()]
+    choice, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert choice.type == "hip" == next(iter(posterior)) and requests == [(), (), ("hip",)]
 
 
 @pytest.mark.parametrize("worse", [{"noise_m": 0.09}, {"outlier_share": 0.05}])
@@ -93,19 +96,19 @@ def test_a_named_type_far_from_the_points_is_not_built(worse):
     def fit(names):
         return FakeFit(names, **(worse if names else {}))
 
-    found, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
-    assert next(iter(posterior)) == "hip" and found.type == "gable"
+    choice, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert next(iter(posterior)) == "hip" and choice.type == "gable"
 
 
 def test_with_the_papers_objective_the_named_type_is_built():
     def fit(names):
         return FakeFit(names, noise_m=0.9 if names else 0.5, objective="paper")
 
-    found, _ = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
-    assert found.type == "hip"
+    choice, _ = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert choice.type == "hip"
 
 
 def test_expected_distance_is_the_mean_over_noise_and_outliers():
-    drawn = np.abs(np.random.default_rng(0).normal(0, 0.05, 100_000))
-    assert expected_distance(FakeFit(())) == pytest.approx(drawn.mean(), rel=0.01)
+    distances = np.abs(np.random.default_rng(0).normal(0, 0.05, 100_000))
+    assert expected_distance(FakeFit(())) == pytest.approx(distances.mean(), rel=0.01)
     assert expected_distance(FakeFit((), outlier_share=1.0)) == OUTLIER_DISTANCE_M

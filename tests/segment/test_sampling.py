@@ -37,18 +37,18 @@ def compute_distances(a, b):
 
 
 def slow_farthest_points(xyz, count):
-    chosen = [int(np.argmax(((xyz - xyz.mean(axis=0)) ** 2).sum(axis=1)))]
-    while len(chosen) < count:
-        chosen.append(int(np.argmax(compute_distances(xyz, xyz[chosen]).min(axis=1))))
-    return chosen
+    indices = [int(np.argmax(((xyz - xyz.mean(axis=0)) ** 2).sum(axis=1)))]
+    while len(indices) < count:
+        indices.append(int(np.argmax(compute_distances(xyz, xyz[indices]).min(axis=1))))
+    return indices
 
 
 def slow_surface(xyz, i):
     """Normal, roughness, convexity and offset over reach of point `i`, by the eigenvectors of its
     neighbours.
     """
-    away = compute_distances(xyz[i : i + 1], xyz)[0]
-    nearest = np.argsort(away)[:SURFACE_NEIGHBOURS]
+    distance = compute_distances(xyz[i : i + 1], xyz)[0]
+    nearest = np.argsort(distance)[:SURFACE_NEIGHBOURS]
     mean = xyz[nearest].mean(axis=0)
     values, vectors = np.linalg.eigh(np.cov(xyz[nearest].T, bias=True))
     normal = vectors[:, 0] * (-1 if vectors[2, 0] < 0 else 1)
@@ -56,7 +56,7 @@ def slow_surface(xyz, i):
         normal,
         np.sqrt(max(values[0], 0)),
         (xyz[i] - mean) @ normal,
-        (mean - xyz[i])[:2] / away[nearest[-1]],
+        (mean - xyz[i])[:2] / distance[nearest[-1]],
     )
 
 
@@ -67,48 +67,54 @@ def test_choice_and_surfaces_equal_the_slow_oracle(seed):
     assert order.tolist() == slow_farthest_points(xyz, COUNT)
     for row, i in enumerate(order):
         normal, roughness, convexity, offset = slow_surface(xyz, i)
-        told = dict(zip(POINT_FEATURES, features[row], strict=True))
-        assert told["normal_z"] == pytest.approx(normal[2], abs=1e-5)
-        assert told["roughness"] == pytest.approx(min(roughness / 0.2, 5), abs=1e-4)
+        features_by_name = dict(zip(POINT_FEATURES, features[row], strict=True))
+        assert features_by_name["normal_z"] == pytest.approx(normal[2], abs=1e-5)
+        assert features_by_name["roughness"] == pytest.approx(min(roughness / 0.2, 5), abs=1e-4)
         if normal[2] > 1e-6:
-            assert told["convexity"] == pytest.approx(np.clip(convexity / 0.2, -5, 5), abs=1e-4)
-        assert np.hypot(told["offset_x"], told["offset_y"]) == pytest.approx(
-            np.hypot(*offset), abs=1e-5
-        )
+            assert features_by_name["convexity"] == pytest.approx(
+                np.clip(convexity / 0.2, -5, 5), abs=1e-4
+            )
+        assert np.hypot(
+            features_by_name["offset_x"], features_by_name["offset_y"]
+        ) == pytest.approx(np.hypot(*offset), abs=1e-5)
 
 
 def slow_groups(xyz, centres, sources, count, radius):
     """Sorted distances of the nearest `count` within `radius`, the nearest repeated where there are
     fewer.
     """
-    away = np.sort(compute_distances(xyz[np.arange(centres) % len(xyz)], xyz[:sources]), axis=1)[
-        :, :count
-    ]
-    away = np.pad(away, ((0, 0), (0, count - away.shape[1])), constant_values=np.inf)
-    return np.where(away <= radius, away, away[:, :1])
+    distance = np.sort(
+        compute_distances(xyz[np.arange(centres) % len(xyz)], xyz[:sources]), axis=1
+    )[:, :count]
+    distance = np.pad(distance, ((0, 0), (0, count - distance.shape[1])), constant_values=np.inf)
+    return np.where(distance <= radius, distance, distance[:, :1])
 
 
 @pytest.mark.parametrize("count", [200, 40, 12])
 def test_neighbourhoods_equal_the_slow_oracle(count):
     xyz = some_cloud(1, count)
     order, _, groups, radii, ups, weights = arrange_cloud(xyz, COUNT, *LEVELS, GROUP)
-    found, chosen = len(order), xyz[order]
-    for above, level, index, radius in zip((COUNT, *LEVELS), LEVELS, groups, radii, strict=False):
-        cover = compute_distances(xyz, chosen[:level]).min(axis=1).max()
+    n_points, ordered = len(order), xyz[order]
+    for upper_part, level, index, radius in zip(
+        (COUNT, *LEVELS), LEVELS, groups, radii, strict=False
+    ):
+        cover = compute_distances(xyz, ordered[:level]).min(axis=1).max()
         assert radius == pytest.approx(BALL_FACTOR * max(cover, 1e-3), rel=1e-5)
-        centres = chosen[np.arange(level) % found]
-        told = np.sqrt(((chosen[index] - centres[:, None]) ** 2).sum(axis=2))
+        centres = ordered[np.arange(level) % n_points]
+        message = np.sqrt(((ordered[index] - centres[:, None]) ** 2).sum(axis=2))
         expected = slow_groups(
-            chosen, level, min(above, found), GROUP, BALL_FACTOR * max(cover, 1e-3)
+            ordered, level, min(upper_part, n_points), GROUP, BALL_FACTOR * max(cover, 1e-3)
         )
-        np.testing.assert_allclose(told, expected, atol=1e-9)
+        np.testing.assert_allclose(message, expected, atol=1e-9)
     for target, source, index, weight in (
         (LEVELS[0], LEVELS[2], ups[0], weights[0]),
         (COUNT, LEVELS[0], *ups[1:], weights[1]),
     ):
-        away = slow_groups(chosen, target, min(source, found), 3, np.inf)
+        distance = slow_groups(ordered, target, min(source, n_points), 3, np.inf)
         np.testing.assert_allclose(
-            weight, (1 / (away + 1e-3)) / (1 / (away + 1e-3)).sum(axis=1)[:, None], rtol=1e-4
+            weight,
+            (1 / (distance + 1e-3)) / (1 / (distance + 1e-3)).sum(axis=1)[:, None],
+            rtol=1e-4,
         )
         assert index.max() < source
 
@@ -123,10 +129,10 @@ def test_few_points_are_all_chosen_and_repeated():
 
 def test_thinning_to_a_grid_keeps_the_extent_and_bounds_the_count():
     xyz = np.random.default_rng(0).uniform(0, (40.0, 20.0, 6.0), (20_000, 3))
-    kept = thin_to_grid(xyz, 1000, chunk=3000)
-    assert 200 < len(kept) <= 1000
-    assert len(np.unique(kept)) == len(kept)
-    assert (np.ptp(xyz[kept], axis=0) > 0.85 * np.ptp(xyz, axis=0)).all()
+    thinned = thin_to_grid(xyz, 1000, chunk=3000)
+    assert 200 < len(thinned) <= 1000
+    assert len(np.unique(thinned)) == len(thinned)
+    assert (np.ptp(xyz[thinned], axis=0) > 0.85 * np.ptp(xyz, axis=0)).all()
 
 
 def test_thinning_does_not_depend_on_the_chunk():
@@ -159,9 +165,9 @@ def test_a_tilted_plane_has_its_normal_everywhere_and_falls_along_an_axis():
 @pytest.mark.parametrize("angle", [0.3, 1.9, -2.5, np.pi / 2, np.pi])
 def test_features_do_not_change_when_the_points_turn(angle):
     xyz = some_cloud(4, 400)
-    before, after = arrange(xyz, LAYOUT), arrange(turn(xyz, angle), LAYOUT)
-    np.testing.assert_array_equal(before.select, after.select)
-    np.testing.assert_allclose(before.features, after.features, atol=1e-4)
+    old, new = arrange(xyz, LAYOUT), arrange(turn(xyz, angle), LAYOUT)
+    np.testing.assert_array_equal(old.select, new.select)
+    np.testing.assert_allclose(old.features, new.features, atol=1e-4)
 
 
 def test_the_first_axis_is_the_long_one():

@@ -37,21 +37,24 @@ def test_types_are_those_of_whole_roofs_in_the_catalogues_order():
 
 def test_probabilities_are_distributions():
     points, _, _ = cloud(0)
-    found = segment(points)
-    assert sum(found.types.values()) == pytest.approx(1.0)
-    assert found.labels.shape == found.not_roof.shape == (len(points),)
-    assert ((found.not_roof >= 0) & (found.not_roof <= 1)).all()
-    assert set(np.unique(found.labels)) <= {NOT_ROOF, *range(len(ROOF_TYPES))}
+    result = segment(points)
+    assert sum(result.types.values()) == pytest.approx(1.0)
+    assert result.labels.shape == result.not_roof.shape == (len(points),)
+    assert ((result.not_roof >= 0) & (result.not_roof <= 1)).all()
+    assert set(np.unique(result.labels)) <= {NOT_ROOF, *range(len(ROOF_TYPES))}
 
 
 def test_simulated_roofs_are_recognised_and_freed_of_what_is_no_roof():
     right, intersection, union = 0, 0, 0
     for seed in range(60):
         points, labels, type = cloud(seed)
-        found = segment(points)
-        right += found.type == type
-        told, true = ~found.is_roof, labels == NOT_ROOF
-        intersection, union = intersection + (told & true).sum(), union + (told | true).sum()
+        result = segment(points)
+        right += result.type == type
+        is_rejected, true = ~result.is_roof, labels == NOT_ROOF
+        intersection, union = (
+            intersection + (is_rejected & true).sum(),
+            union + (is_rejected | true).sum(),
+        )
     assert right >= 54
     assert intersection / union > 0.8
 
@@ -60,38 +63,38 @@ def test_simulated_roofs_are_recognised_and_freed_of_what_is_no_roof():
 def test_turning_about_z_changes_nothing(angle):
     for seed in range(3):
         points, _, _ = cloud(seed)
-        before, after = segment(points), segment(turn(points, angle))
-        np.testing.assert_allclose(
-            list(after.types.values()), list(before.types.values()), atol=1e-3
-        )
-        assert (before.labels == after.labels).mean() > 0.995
+        old, new = segment(points), segment(turn(points, angle))
+        np.testing.assert_allclose(list(new.types.values()), list(old.types.values()), atol=1e-3)
+        assert (old.labels == new.labels).mean() > 0.995
 
 
 def test_moving_and_reordering_change_nothing():
     points, _, _ = cloud(3)
     order = np.random.default_rng(0).permutation(len(points))
-    before, after = segment(points), segment(points[order] + (85_000.0, 446_000.0, 12.0))
-    np.testing.assert_allclose(list(after.types.values()), list(before.types.values()), atol=1e-3)
-    assert (before.labels[order] == after.labels).mean() > 0.995
+    old, new = segment(points), segment(points[order] + (85_000.0, 446_000.0, 12.0))
+    np.testing.assert_allclose(list(new.types.values()), list(old.types.values()), atol=1e-3)
+    assert (old.labels[order] == new.labels).mean() > 0.995
 
 
 def test_named_types_alone_are_chosen_among():
     points, _, _ = cloud(4, ("hip",))
-    found = segment(points, Settings().replace({"fit": {"types": ("pyramid", "gable", "hip")}}))
-    assert found.type == "hip"
-    assert sum(found.types[name] for name in ("pyramid", "gable", "hip")) == pytest.approx(1.0)
-    names = {ROOF_TYPES[label] for label in np.unique(found.labels) if label != NOT_ROOF}
+    result = segment(points, Settings().replace({"fit": {"types": ("pyramid", "gable", "hip")}}))
+    assert result.type == "hip"
+    assert sum(result.types[name] for name in ("pyramid", "gable", "hip")) == pytest.approx(1.0)
+    names = {ROOF_TYPES[label] for label in np.unique(result.labels) if label != NOT_ROOF}
     assert names <= {"pyramid", "gable", "hip"}
 
 
 def test_labelled_real_roofs():
     if not REAL_ROOFS.is_dir():
         pytest.skip("needs ../shared/data/roofn3d/labelled")
-    told = {path.name: segment(np.loadtxt(path)[:, :3]).type for path in REAL_ROOFS.glob("*/*.pts")}
+    types = {
+        path.name: segment(np.loadtxt(path)[:, :3]).type for path in REAL_ROOFS.glob("*/*.pts")
+    }
     wrong = [
         path
         for path in REAL_ROOFS.glob("*/*.pts")
-        if AS_GABLE.get(told[path.name], told[path.name]) != path.parent.name
+        if AS_GABLE.get(types[path.name], types[path.name]) != path.parent.name
     ]
     assert len(wrong) <= 2, wrong
 
@@ -102,14 +105,14 @@ def test_labelled_real_roofs_with_the_fits_evidence():
     right = 0
     for path in sorted(REAL_ROOFS.glob("*/*.pts")):
         points = np.loadtxt(path)[:, :3]
-        found = segment(points)
-        fit = partial(fit_roof, points, weights=found.weights)
+        result = segment(points)
+        fit = partial(fit_roof, points, weights=result.weights)
         _, posterior = choose_most_probable(
             lambda types, fit=fit: fit(settings=Settings.from_dict({"fit": {"types": types}})),
-            found.types,
+            result.types,
         )
-        named = next(iter(posterior))
-        right += AS_GABLE.get(named, named) == path.parent.name
+        most_probable = next(iter(posterior))
+        right += AS_GABLE.get(most_probable, most_probable) == path.parent.name
     assert right >= 11
 
 
@@ -124,11 +127,11 @@ def test_labels_are_carried_back_from_the_nearest_samples():
 def test_points_weigh_nothing_only_where_they_are_surely_no_roof():
     logits = np.log([[0.1, 0.9], [0.3, 0.7], [0.9, 0.1]])
     sampled = np.repeat(np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0]]), 12, axis=0)
-    found = Segmentation({"gable": 1.0}, np.repeat(logits, 12, axis=0), sampled, sampled)
-    assert found.weights.tolist() == [0.0] * 12 + [1.0] * 24
-    assert found.is_roof.tolist() == [False] * 24 + [True] * 12
-    alone = Segmentation({"gable": 1.0}, logits[[0] * 12], sampled[:12], sampled[:12])
-    assert alone.weights.tolist() == [1.0] * 12
+    result = Segmentation({"gable": 1.0}, np.repeat(logits, 12, axis=0), sampled, sampled)
+    assert result.weights.tolist() == [0.0] * 12 + [1.0] * 24
+    assert result.is_roof.tolist() == [False] * 24 + [True] * 12
+    first_only = Segmentation({"gable": 1.0}, logits[[0] * 12], sampled[:12], sampled[:12])
+    assert first_only.weights.tolist() == [1.0] * 12
 
 
 def test_points_are_labelled_only_when_asked_for(monkeypatch):
@@ -145,10 +148,10 @@ def test_a_large_cloud_takes_bounded_memory():
     points = np.column_stack([xy, 8 - 0.6 * abs(xy[:, 1] - 6)])
     segment(points[:1000])
     tracemalloc.start()
-    found = segment(points)
+    result = segment(points)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert found.type == "gable" and len(found.labels) == len(points)
+    assert result.type == "gable" and len(result.labels) == len(points)
     assert peak < 12 * points.nbytes
 
 

@@ -29,12 +29,12 @@ def test_points_and_table_say_what_segment_says(tmp_path):
     assert segment_files(clouds, out, Settings()) == {}
     las = laspy.read(out)
     np.testing.assert_allclose(las.xyz, np.concatenate(points), atol=1e-3)
-    found = [segment(cloud) for cloud in points]
-    assert (las.roof_type == np.concatenate([f.labels + 1 for f in found])).mean() > 0.99
+    results = [segment(cloud) for cloud in points]
+    assert (las.roof_type == np.concatenate([f.labels + 1 for f in results])).mean() > 0.99
     assert np.bincount(las.building).tolist() == [0, *map(len, points)]
     rows = list(csv.DictReader(out.with_suffix(".csv").read_text().splitlines()))
-    assert [row["type"] for row in rows] == [f.type for f in found]
-    assert sum(float(rows[0][name]) for name in found[0].types) == pytest.approx(1.0, abs=1e-3)
+    assert [row["type"] for row in rows] == [f.type for f in results]
+    assert sum(float(rows[0][name]) for name in results[0].types) == pytest.approx(1.0, abs=1e-3)
 
 
 def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path):

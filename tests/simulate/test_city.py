@@ -118,12 +118,12 @@ def test_streets_offer_every_type():
 
 
 def test_the_command_reports_and_refuses(tmp_path):
-    done = CliRunner().invoke(
+    result = CliRunner().invoke(
         app, ["city", str(tmp_path), "--buildings", "3", "--density", "0.5", "--tile", "200"]
     )
-    assert done.exit_code == 0 and "3 buildings" in done.output
-    again = CliRunner().invoke(app, ["city", str(tmp_path), "--buildings", "3"])
-    assert again.exit_code == 2 and "without a city" in again.output
+    assert result.exit_code == 0 and "3 buildings" in result.output
+    second = CliRunner().invoke(app, ["city", str(tmp_path), "--buildings", "3"])
+    assert second.exit_code == 2 and "without a city" in second.output
 
 
 def test_impossible_cities_are_refused_in_a_sentence(tmp_path):

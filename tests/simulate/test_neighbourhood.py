@@ -42,8 +42,8 @@ def test_bundled_files_are_what_the_command_makes(tmp_path):
     bundled = demo_files()
     assert (tmp_path / "truth.json").read_text() == bundled["truth"].read_text()
     for name in ("cloud.laz", "terrain.tif"):
-        made = (tmp_path / name).stat().st_size
-        assert made == pytest.approx(bundled[name.split(".")[0]].stat().st_size, rel=0.02)
+        size = (tmp_path / name).stat().st_size
+        assert size == pytest.approx(bundled[name.split(".")[0]].stat().st_size, rel=0.02)
 
 
 def test_roof_points_follow_the_truth(cloud):

@@ -46,12 +46,16 @@ def profile(building, u, v):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_each_type_has_its_heights(seed):
     rng = np.random.default_rng(seed)
-    near = 1 - 1e-9
+    almost_one = 1 - 1e-9
     for type in ROOF_TYPES:
         building = random_building(rng, type)
         p = building.parameters
-        corners = [profile(building, u, v) for u in (-near, near) for v in (-near, near)]
-        middle, end = profile(building, 0.0, 1e-9), profile(building, near, 1e-9)
+        corners = [
+            profile(building, u, v)
+            for u in (-almost_one, almost_one)
+            for v in (-almost_one, almost_one)
+        ]
+        middle, end = profile(building, 0.0, 1e-9), profile(building, almost_one, 1e-9)
         h = p.get("height", 0.0)
         assert building.type == type and min(corners) == pytest.approx(0.0, abs=1e-6)
         if type == "flat":
@@ -59,9 +63,9 @@ def test_each_type_has_its_heights(seed):
         elif type in ("monopitch", "shed"):
             assert max(corners) == pytest.approx(h, abs=1e-6)
         elif type == "asymmetric_gable":
-            assert profile(building, near, p["ridge_offset"] * 2 / p["width"]) == pytest.approx(
-                h, abs=1e-6
-            )
+            assert profile(
+                building, almost_one, p["ridge_offset"] * 2 / p["width"]
+            ) == pytest.approx(h, abs=1e-6)
             assert max(corners) == pytest.approx(p["eave_step"], abs=1e-6)
         else:
             low_end = {"gable": h, "gambrel": h, "half_hip": h - p.get("hip_height", 0.0)}.get(
@@ -126,11 +130,11 @@ def test_dormers_come_out_of_one_slope_and_end_under_it():
             side = np.sign(y_low + y_high)
             front, back = sorted((y_low, y_high), key=lambda y: -side * y)
             x = np.linspace(x_low, x_high, 7)
-            above = dormer.pieces[0].height_at(np.column_stack([x, np.full(7, front)]))
-            above -= house.pieces[0].height_at(np.column_stack([x, np.full(7, front)]))
-            below = dormer.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
-            below -= house.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
-            assert above.min() > 0.6 and below.max() < -0.05 and back * side > 0
+            front_heights = dormer.pieces[0].height_at(np.column_stack([x, np.full(7, front)]))
+            front_heights -= house.pieces[0].height_at(np.column_stack([x, np.full(7, front)]))
+            back_heights = dormer.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
+            back_heights -= house.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
+            assert front_heights.min() > 0.6 and back_heights.max() < -0.05 and back * side > 0
         outlines = [dormer.pieces[0].outline for dormer in dormers]
         assert shapely.union_all(outlines).area == pytest.approx(
             sum(outline.area for outline in outlines)
@@ -168,12 +172,12 @@ def test_kappa_turns_the_building_and_nothing_else():
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)
 def test_truth_rebuilds_the_building(kind):
     building = random_compound(np.random.default_rng(8), kind, origin=(5.0, 6.0, 7.0))
-    again = read_truth(json.loads(json.dumps(building.truth())))
-    assert again.footprint.symmetric_difference(building.footprint).area < 1e-6
+    rebuilt = read_truth(json.loads(json.dumps(building.truth())))
+    assert rebuilt.footprint.symmetric_difference(building.footprint).area < 1e-6
     xy = np.random.default_rng(0).uniform(-8, 8, (500, 2))
     xy = xy[shapely.contains_xy(building.outline.buffer(-0.01), xy[:, 0], xy[:, 1])]
-    assert np.allclose(again.roof.height_at(xy), building.roof.height_at(xy), equal_nan=True)
-    assert again.kind == kind and again.z_ground == 7.0
+    assert np.allclose(rebuilt.roof.height_at(xy), building.roof.height_at(xy), equal_nan=True)
+    assert rebuilt.kind == kind and rebuilt.z_ground == 7.0
 
 
 def test_what_is_no_truth_is_refused():

@@ -43,8 +43,8 @@ def slow_first_hit(building, xy0, slope, step=0.002):
     hits = np.zeros(len(xy0))
     for i, (start, tilt) in enumerate(zip(xy0, slope, strict=True)):
         roof = building.roof.height_at(start + heights[:, None] * tilt)
-        under = np.flatnonzero(heights <= np.nan_to_num(roof, nan=-1.0))
-        hits[i] = heights[under[0]] if len(under) else 0.0
+        is_under = np.flatnonzero(heights <= np.nan_to_num(roof, nan=-1.0))
+        hits[i] = heights[is_under[0]] if len(is_under) else 0.0
     return hits
 
 
@@ -144,14 +144,14 @@ def test_seeds_reproduce(seed):
 def test_defects_all_happen_and_none_happens_without_them():
     rng = np.random.default_rng(17)
     everything = Defects(*(1.0,) * 8, outliers=0.02)
-    seen = set()
+    visited = set()
     for _ in range(6):
-        seen |= set(
+        visited |= set(
             scan(
                 random_building(rng, "gable"), rng, ScanSettings(margin_m=2.0, defects=everything)
             ).source
         )
-    assert seen == set(range(len(SOURCES)))
+    assert visited == set(range(len(SOURCES)))
     bare = scan(random_building(rng, "gable"), rng, ScanSettings(defects=Defects.none()))
     assert set(bare.source) <= {ROOF, WALL, GROUND}
 
@@ -198,14 +198,14 @@ def test_uniform_points_have_the_papers_noise():
 def test_training_samples_keep_their_promises():
     rng = np.random.default_rng(19)
     types = ("pyramid", "gable", "hip")
-    seen = set()
+    visited = set()
     for _ in range(40):
         points, labels, type = training_sample(rng, types, n_points=(100, 400), density=(2.0, 8.0))
         assert 100 <= len(points) <= 400 and len(labels) == len(points)
         assert set(labels) <= {type, 3} and type in labels
         assert np.abs(points.mean(axis=0)).max() < 1e-9
-        seen.add(type)
-    assert seen == {0, 1, 2}
+        visited.add(type)
+    assert visited == {0, 1, 2}
 
 
 def test_pieces_that_beams_cannot_enter_are_refused():

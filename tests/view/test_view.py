@@ -88,9 +88,9 @@ def tiles(tmp_path_factory):
         for id, (kind, solid) in SOLIDS.items()
     ]
     pair = two_parts()
-    beside = pair.solid.move(np.array([0, 20, 0]) - ORIGIN)
+    neighbour = pair.solid.move(np.array([0, 20, 0]) - ORIGIN)
     models.append(
-        pair._replace(solid=beside, attributes={"parameters": parameters("gable", "hip")})
+        pair._replace(solid=neighbour, attributes={"parameters": parameters("gable", "hip")})
     )
     with pytest.warns(UserWarning, match="no CRS"):
         write_models(folder, models)
@@ -144,9 +144,9 @@ def render_document(page, folder, serving, profile):
 def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving, tmp_path):
     page = render_page("a <run>").replace("</body>", ACT + "</body>")
     text = render_document(page, tiles, serving, tmp_path / "profile")
-    said = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
-    assert said, f"the page's scripts did not run to their end: {text[-2000:]}"
-    say = json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
+    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
+    say = json.loads(answer[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
     assert say["faults"] == [] and say["webgl"] and say["tiles"] == 1
     # of all parts, the most frequent first
     assert say["legend"].split() == ["gable", "flat", "hip"]
@@ -206,14 +206,14 @@ def test_a_port_that_is_taken_is_told(tiles, serving):
 def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys):
     write_sample_run(tmp_path)
     with open_tiles(tmp_path) as folder:
-        made = (folder / "tileset.json").stat().st_mtime_ns
-    with open_tiles(tmp_path) as again:
-        assert again == folder and (folder / "tileset.json").stat().st_mtime_ns == made
-    os.utime(tmp_path / "buildings.city.jsonl", (made / 1e9 + 10, made / 1e9 + 10))
-    with open_tiles(tmp_path) as anew:
-        assert (anew / "tileset.json").stat().st_mtime_ns > made
-    with open_tiles(folder) as own:
-        assert own == folder
+        time_made = (folder / "tileset.json").stat().st_mtime_ns
+    with open_tiles(tmp_path) as second:
+        assert second == folder and (folder / "tileset.json").stat().st_mtime_ns == time_made
+    os.utime(tmp_path / "buildings.city.jsonl", (time_made / 1e9 + 10, time_made / 1e9 + 10))
+    with open_tiles(tmp_path) as third:
+        assert (third / "tileset.json").stat().st_mtime_ns > time_made
+    with open_tiles(folder) as first:
+        assert first == folder
 
 
 def test_a_folder_of_neither_is_refused(tmp_path):
@@ -263,13 +263,13 @@ def test_other_commands_say_how_to_write_elsewhere(tmp_path, monkeypatch):
     cloud = tmp_path / "points.xyz"
     cloud.write_text("85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n")
     refuse_writing_below(tmp_path / "run", monkeypatch)
-    for call, told in (
+    for call, message in (
         (lambda: convert(tmp_path / "run"), "hiproof convert {} OUT"),
         (lambda: report(tmp_path / "run"), "hiproof report {} --out FILE"),
         (lambda: evaluate(tmp_path / "run", [str(cloud)]), "hiproof evaluate {} --out FOLDER"),
     ):
         with pytest.raises(OutputError, match="read-only") as caught:
             call()
-        assert told.format(tmp_path / "run") in str(caught.value)
+        assert message.format(tmp_path / "run") in str(caught.value)
     convert(tmp_path / "run", tmp_path / "a.glb")
     assert (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"

@@ -56,13 +56,13 @@ def test_everything_is_explained():
 def test_buildings_have_the_attributes_declared():
     feet = Units(0.3048, 0.3048, "foot", "foot")
     for building in (make_building(gable_house()), make_lost_building()):
-        found = building_attributes(building, measure_figures(building), units=feet)
-        own = set(found) - set(building.attributes)
-        assert own == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
+        result = building_attributes(building, measure_figures(building), units=feet)
+        added = set(result) - set(building.attributes)
+        assert added == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
         for attribute, prefix in (
             (a, p) for table, p in ((ROOFER, PREFIX), (HIPROOF, OWN)) for a in table
         ):
-            value = found[prefix + attribute.name]
+            value = result[prefix + attribute.name]
             assert value is None or isinstance(value, KINDS[attribute.kind]), attribute.name
     assert OWN + "units" not in building_attributes(make_lost_building(), None, units=METRES)
 

@@ -58,8 +58,8 @@ def cielab(linear):
 @pytest.mark.parametrize("vision", SEEN)
 @pytest.mark.parametrize("legend", LEGENDS)
 def test_colours_of_a_legend_are_far_apart(legend, vision):
-    seen = [cielab(np.array(SEEN[vision]) @ linear_rgb(colour)) for colour in LEGENDS[legend]]
-    nearest = min(np.linalg.norm(a - b) for a, b in combinations(seen, 2))
+    colours = [cielab(np.array(SEEN[vision]) @ linear_rgb(colour)) for colour in LEGENDS[legend]]
+    nearest = min(np.linalg.norm(a - b) for a, b in combinations(colours, 2))
     assert nearest >= FAR.get(legend, FAR_ELSE)
 
 

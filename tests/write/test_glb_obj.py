@@ -40,8 +40,8 @@ def test_triangles_tile_every_face_and_keep_its_side(solid):
     ):
         assert (triangles == face_triangles(solid.vertices, face)).all()
         expected = sum(ring_normal(solid.vertices[list(ring)]) for ring in face.rings)
-        found = sum(ring_normal(solid.vertices[t]) for t in triangles)
-        np.testing.assert_allclose(found, expected, atol=1e-9)
+        normal = sum(ring_normal(solid.vertices[t]) for t in triangles)
+        np.testing.assert_allclose(normal, expected, atol=1e-9)
         areas = [np.linalg.norm(ring_normal(solid.vertices[t])) for t in triangles]
         assert sum(areas) == pytest.approx(np.linalg.norm(expected))
 
@@ -60,8 +60,10 @@ def test_glb_holds_every_building_with_its_properties(tmp_path):
 
 
 def test_attributes_of_the_input_do_not_take_the_place_of_id_and_type(tmp_path):
-    told = {"id": "a", "roof_type": "thatch", "type": "church"}
-    write_glb(tmp_path / "a.glb", [ViewedModel("a", "gable", gable_solid(), told, {0: "gable"})])
+    attributes = {"id": "a", "roof_type": "thatch", "type": "church"}
+    write_glb(
+        tmp_path / "a.glb", [ViewedModel("a", "gable", gable_solid(), attributes, {0: "gable"})]
+    )
     (node,) = parse_glb(tmp_path / "a.glb")[0]["nodes"]
     assert node["extras"] == {
         "id": "a",
@@ -97,19 +99,19 @@ def test_an_unheard_of_roof_type_gets_a_material_that_exists(tmp_path):
 def test_a_roof_face_has_the_colour_of_its_part(tmp_path):
     write_glb(tmp_path / "a.glb", [two_parts()])
     document, _ = parse_glb(tmp_path / "a.glb")
-    drawn = [document["materials"][p["material"]] for p in document["meshes"][0]["primitives"]]
-    colours = {m["name"]: m["pbrMetallicRoughness"]["baseColorFactor"] for m in drawn}
+    materials = [document["materials"][p["material"]] for p in document["meshes"][0]["primitives"]]
+    colours = {m["name"]: m["pbrMetallicRoughness"]["baseColorFactor"] for m in materials}
     assert list(colours) == ["roof gable", "roof hip", "WallSurface", "GroundSurface"]
     assert [colours[f"roof {kind}"][:3] for kind in ("gable", "hip")] == [
         list(linear_rgb(type_colour(kind))) for kind in ("gable", "hip")
     ]
     write_obj(tmp_path / "a.obj", [two_parts()])
-    used = [
+    is_used = [
         line[7:]
         for line in (tmp_path / "a.obj").read_text().splitlines()
         if line.startswith("usemtl")
     ]
-    assert used == ["roof_gable", "roof_hip", "WallSurface", "GroundSurface"]
+    assert is_used == ["roof_gable", "roof_hip", "WallSurface", "GroundSurface"]
 
 
 def test_no_buildings_make_a_valid_empty_file(tmp_path):

@@ -107,12 +107,12 @@ def test_all_that_is_written_is_valid(tmp_path, write):
 
 
 @pytest.mark.parametrize(
-    ("shift", "low", "high"), [((0, 0), (0, 0), (10, 8)), ((1.5, -0.5), (-1.5, 0), (10, 8.5))]
+    ("shift", "lower", "upper"), [((0, 0), (0, 0), (10, 8)), ((1.5, -0.5), (-1.5, 0), (10, 8.5))]
 )
-def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, low, high):
+def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, lower, upper):
     root = gml(tmp_path, [replace(terrace(), shift=shift)], WHOLE)
     corners = [np.array(text.split(), float)[:2] for text in find(root, "//gml:Envelope/*/text()")]
-    np.testing.assert_allclose(corners, RD_ORIGIN[:2] + np.array([low, high]))
+    np.testing.assert_allclose(corners, RD_ORIGIN[:2] + np.array([lower, upper]))
 
 
 @pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])

@@ -26,23 +26,29 @@ DELFT = Path(__file__).parents[3] / "shared" / "data" / "delft"
 GROUND, TREE = SOURCES.index("ground"), SOURCES.index("tree")
 
 
-def buildings(clouds, footprints, most):
+def buildings(clouds, footprints, limit):
     """The models of `most` of the footprints, drawn by chance."""
     points = [read_points(path) for path in clouds]
     xyz = np.concatenate([cloud.xyz[cloud.classification == BUILDING_CLASS] for cloud in points])
-    asked = list(read_footprints(footprints))
-    asked = [asked[k] for k in np.random.default_rng(0).permutation(len(asked))[:most]]
-    own = assign_points(xyz, asked)
-    return [hiproof.reconstruct(xyz[i], f, settings=PLAIN) for i, f in zip(own, asked, strict=True)]
+    footprints_read = list(read_footprints(footprints))
+    footprints_read = [
+        footprints_read[k]
+        for k in np.random.default_rng(0).permutation(len(footprints_read))[:limit]
+    ]
+    indices = assign_points(xyz, footprints_read)
+    return [
+        hiproof.reconstruct(xyz[i], f, settings=PLAIN)
+        for i, f in zip(indices, footprints_read, strict=True)
+    ]
 
 
 def assert_follows(building):
-    again = hiproof.build(json.loads(parameters_line(building)))
-    assert building_record(again) == building_record(building)
-    assert np.array_equal(again.solid.vertices, building.solid.vertices)
-    assert again.solid.faces == building.solid.faces
-    for piece, told in zip(building.roof.pieces, again.roof.pieces, strict=True):
-        assert np.array_equal(piece.planes, told.planes)
+    rebuilt = hiproof.build(json.loads(parameters_line(building)))
+    assert building_record(rebuilt) == building_record(building)
+    assert np.array_equal(rebuilt.solid.vertices, building.solid.vertices)
+    assert rebuilt.solid.faces == building.solid.faces
+    for piece, rebuilt_piece in zip(building.roof.pieces, rebuilt.roof.pieces, strict=True):
+        assert np.array_equal(piece.planes, rebuilt_piece.planes)
 
 
 @pytest.mark.skipif(not DELFT.is_dir(), reason="needs ../shared/data/delft")
@@ -84,8 +90,10 @@ def test_a_part_that_no_file_can_hold_is_given_up_alone_and_the_building_says_so
         (gable,) = (part for part in fitted.parts if part.type == "gable")
         sizes = {name: gable.parameters[name] for name in ("width", "length")}
         sided = {"pitch_front": 42.0, "eave_front": 0.0, "pitch_back": 42.0, "eave_back": 0.0}
-        others = tuple(part for part in fitted.parts if part is not gable)
-        return replace(fitted, parts=(*others, replace(gable, parameters=sizes | sided | wrong)))
+        other_parts = tuple(part for part in fitted.parts if part is not gable)
+        return replace(
+            fitted, parts=(*other_parts, replace(gable, parameters=sizes | sided | wrong))
+        )
 
     monkeypatch.setattr(stages, "fit", fit_wrongly)
     building = hiproof.reconstruct(points, shapely.box(0, 0, 12, 7), settings=PLAIN)

@@ -61,14 +61,14 @@ def test_coordinates_come_back_within_a_millimetre(way):
         (-5e3, -5e3, -3), (5e3, 5e3, 90), (500, 3)
     )
     for units in (FileUnits.of(crs, out_crs=out).gml, FileUnits.of(crs, out_crs=out).cityjson):
-        there = units.from_metres(places)
-        assert np.abs(units.to_metres(there) - places).max() < 1e-3
-        assert np.abs(there[:, :2] - places[:, :2]).max() > 100.0
+        places_back = units.from_metres(places)
+        assert np.abs(units.to_metres(places_back) - places).max() < 1e-3
+        assert np.abs(places_back[:, :2] - places[:, :2]).max() > 100.0
         # a plan goes as a place does
-        assert np.array_equal(units.from_metres(places[:, :2]), there[:, :2])
-        assert units.from_metres(places[0]) == pytest.approx(there[0]) and units.height * there[
-            :, 2
-        ] == pytest.approx(places[:, 2], abs=1e-3)
+        assert np.array_equal(units.from_metres(places[:, :2]), places_back[:, :2])
+        assert units.from_metres(places[0]) == pytest.approx(
+            places_back[0]
+        ) and units.height * places_back[:, 2] == pytest.approx(places[:, 2], abs=1e-3)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -79,12 +79,10 @@ def test_solids_stay_valid_and_their_walls_upright(way):
         assert building_attributes(building, units=units)["hiproof_iso19107_lod22"] == "[]", (
             building.id
         )
-        before, after = building.solid.vertices, units.from_metres(building.solid.vertices)
+        old, new = building.solid.vertices, units.from_metres(building.solid.vertices)
         for face in building.solid.select_faces(WALL):
             ring = list(face.rings[0])
-            assert len(np.unique(after[ring, :2], axis=0)) == len(
-                np.unique(before[ring, :2], axis=0)
-            )
+            assert len(np.unique(new[ring, :2], axis=0)) == len(np.unique(old[ring, :2], axis=0))
 
 
 def test_a_solid_that_breaks_on_the_way_says_so():
@@ -130,15 +128,16 @@ def gml_places(path):
 def test_all_files_stand_in_the_same_place(town):
     units = FileUnits.of("EPSG:7415", out_crs="EPSG:25831")
     for name in ("buildings.gml", "buildings.citygml3.gml"):
-        here, there = (gml_places(town / run / name) for run in ("here", "there"))
-        assert np.abs(units.gml.to_metres(there[0]) - here[0]).max() < 1e-3
-        assert there[1] == "urn:ogc:def:crs,crs:EPSG::25831,crs:EPSG::5709"
+        first, second = (gml_places(town / run / name) for run in ("here", "there"))
+        assert np.abs(units.gml.to_metres(second[0]) - first[0]).max() < 1e-3
+        assert second[1] == "urn:ogc:def:crs,crs:EPSG::25831,crs:EPSG::5709"
     runs = [list(read_models(town / run / "buildings.city.jsonl")) for run in ("here", "there")]
-    for one, other in zip(*runs, strict=True):
+    for item, other in zip(*runs, strict=True):
         assert (
-            np.abs(units.cityjson.to_metres(other.solid.vertices) - one.solid.vertices).max() < 1e-3
+            np.abs(units.cityjson.to_metres(other.solid.vertices) - item.solid.vertices).max()
+            < 1e-3
         )
-        assert one.solid.faces == other.solid.faces
+        assert item.solid.faces == other.solid.faces
     for layer in ("buildings", "parts", "roof_surfaces"):
         metas, shapes = zip(
             *(table(town / run / "buildings.gpkg", layer) for run in ("here", "there")), strict=True
@@ -160,10 +159,10 @@ def table(path, layer):
 
 
 def test_parameters_stay_in_the_clouds_crs_and_build_the_same_bytes(town, tmp_path):
-    here, there = (
+    first, second = (
         (town / run / "parameters.jsonl").read_bytes().split(b"\n") for run in ("here", "there")
     )
-    assert here[1:] == there[1:]
+    assert first[1:] == second[1:]
     build_file(town / "there/parameters.jsonl", tmp_path / "again")
     for name in (
         "buildings.gml",
@@ -187,12 +186,12 @@ def test_parameters_stay_in_the_clouds_crs_and_build_the_same_bytes(town, tmp_pa
 
 def test_models_elsewhere_are_judged_where_their_points_are(town):
     cloud = str(town / "cloud.laz")
-    for here, there in zip(
+    for first, second in zip(
         *(evaluate_run(town / run, [cloud]).figures for run in ("here", "there")), strict=True
     ):
         assert (
-            there.quality.rmse == pytest.approx(here.quality.rmse, abs=1e-4)
-            and here.quality.points > 50
+            second.quality.rmse == pytest.approx(first.quality.rmse, abs=1e-4)
+            and first.quality.points > 50
         )
     assert run_crs_text(town / "there").startswith(
         "COMPOUNDCRS"
@@ -227,7 +226,7 @@ def test_a_projection_of_another_place_is_doubted():
     (job,) = make_jobs((Footprint("house", shapely.box(85000, 446000, 85010, 446010)),))
     for out, is_told in (("EPSG:25835", True), ("EPSG:25832", False)):
         units = FileUnits.of("EPSG:7415", out_crs=out)
-        with warnings.catch_warnings(record=True) as said:
+        with warnings.catch_warnings(record=True) as remarks:
             warnings.simplefilter("always")
             warn_files_elsewhere((job,), choose_file_crs("EPSG:7415", out), units)
-        assert [str(w.message).count("4.4 E 52.0 N, far from") for w in said] == [1] * is_told
+        assert [str(w.message).count("4.4 E 52.0 N, far from") for w in remarks] == [1] * is_told

@@ -29,12 +29,12 @@ def two_levels():
     """A quarter of the roof at 3 m, three quarters at 6 m (only the faces that the figures of a
     roof need).
     """
-    low, high = (
+    lower, upper = (
         prism([[(0, 0), (1, 0), (1, 4), (0, 4)]], 0, 3),
         prism([[(1, 0), (4, 0), (4, 4), (1, 4)]], 0, 6),
     )
-    shifted = [Face(tuple(tuple(i + 8 for i in r) for r in f.rings), f.kind) for f in high.faces]
-    return Solid(np.vstack([low.vertices, high.vertices]), low.faces + tuple(shifted))
+    shifted = [Face(tuple(tuple(i + 8 for i in r) for r in f.rings), f.kind) for f in upper.faces]
+    return Solid(np.vstack([lower.vertices, upper.vertices]), lower.faces + tuple(shifted))
 
 
 @pytest.mark.parametrize(
@@ -74,15 +74,16 @@ def test_a_valley_is_no_ridge():
 
 @pytest.mark.parametrize("width", [0.1, 1 / 3, 7.7])
 def test_half_the_roof_at_a_level_is_enough_for_it(width):
-    low, high = (
+    lower, upper = (
         prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 3),
         prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 6),
     )
-    faces = low.select_faces(ROOF) + tuple(
-        Face(tuple(tuple(i + 8 for i in r) for r in f.rings), ROOF) for f in high.select_faces(ROOF)
+    faces = lower.select_faces(ROOF) + tuple(
+        Face(tuple(tuple(i + 8 for i in r) for r in f.rings), ROOF)
+        for f in upper.select_faces(ROOF)
     )
     for order in (faces, faces[::-1]):
-        assert roof_figures(Solid(np.vstack([low.vertices, high.vertices]), order)).h_50p == 3.0
+        assert roof_figures(Solid(np.vstack([lower.vertices, upper.vertices]), order)).h_50p == 3.0
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -134,11 +135,14 @@ def test_many_levels_are_searched_exactly():
 
 @pytest.mark.parametrize("shift", [(0, 0, 0), (1e7, -1e7, 0), (85000, 446000, -6)])
 def test_figures_move_with_the_solid(shift):
-    here, there = roof_figures(hip_house()), roof_figures(hip_house().move(np.array(shift, float)))
+    first, second = (
+        roof_figures(hip_house()),
+        roof_figures(hip_house().move(np.array(shift, float))),
+    )
     for name in ("h_min", "h_50p", "h_70p", "h_max", "h_ridge", "h_base"):
-        assert getattr(there, name) - shift[2] == pytest.approx(getattr(here, name), abs=1e-6)
+        assert getattr(second, name) - shift[2] == pytest.approx(getattr(first, name), abs=1e-6)
     for name in ("volume_m3", "plan_area_m2", "roof_area_m2", "slope_deg", "azimuth_deg"):
-        assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-6)
+        assert getattr(second, name) == pytest.approx(getattr(first, name), rel=1e-6)
 
 
 @pytest.mark.parametrize("top", [2.37151, 2.37155, 9.99996])

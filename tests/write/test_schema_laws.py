@@ -175,7 +175,7 @@ def test_cityjson_geometries_have_type_lod_boundaries_and_matching_semantics(seq
     _, features = sequence
     for feature in features:
         (city_object,) = feature["CityObjects"].values()
-        used = set()
+        indices = set()
         for geometry in city_object.get("geometry", []):
             assert isinstance(geometry["lod"], str)
             shells = (
@@ -185,7 +185,7 @@ def test_cityjson_geometries_have_type_lod_boundaries_and_matching_semantics(seq
             rings = [ring for shell in shells for surface in shell for ring in surface]
             # not closed, no repeats
             assert all(len(ring) >= 3 and len(set(ring)) == len(ring) for ring in rings)
-            used |= {index for ring in rings for index in ring}
+            indices |= {index for ring in rings for index in ring}
             if "semantics" in geometry:
                 semantics = geometry["semantics"]
                 assert set(semantics) == {"surfaces", "values"}
@@ -200,4 +200,4 @@ def test_cityjson_geometries_have_type_lod_boundaries_and_matching_semantics(seq
                 assert {v for values in semantics["values"] for v in values} == set(
                     range(len(semantics["surfaces"]))
                 )
-        assert used == set(range(len(feature["vertices"])))
+        assert indices == set(range(len(feature["vertices"])))

@@ -39,17 +39,17 @@ def town(count=60, seed=0):
     """Houses of many sizes over half a kilometre, attributes that are not always known."""
     rng = np.random.default_rng(seed)
     for k in range(count):
-        at = ORIGIN + [*np.round(rng.uniform(0, 500, 2), 2), np.round(rng.uniform(0, 5), 2)]
+        position = ORIGIN + [*np.round(rng.uniform(0, 500, 2), 2), np.round(rng.uniform(0, 5), 2)]
         width = float(rng.uniform(4, 30))
         solid = courtyard_solid(width, width / 3) if k % 5 == 0 else gable_solid(width, 1.5 * width)
-        told = {
+        attributes = {
             "k": k,
             "half known": None if k % 2 else k / 2,
             "name": None if k % 3 else f"Haus {k} ü",
             "flag": k > 3,
         }
         kind = "flat" if k % 5 == 0 else "gable"
-        yield ViewedModel(f"house-{k}", kind, solid.move(at), told, {0: kind})
+        yield ViewedModel(f"house-{k}", kind, solid.move(position), attributes, {0: kind})
 
 
 @pytest.fixture(scope="module")
@@ -64,11 +64,11 @@ def tiled_town(tmp_path_factory):
     return folder, json.loads((folder / "tileset.json").read_text())
 
 
-def iterate_tiles(tile, above=()):
+def iterate_tiles(tile, ancestors=()):
     """(tile, those above it) of all tiles."""
-    yield tile, above
+    yield tile, ancestors
     for child in tile.get("children", ()):
-        yield from iterate_tiles(child, (*above, tile))
+        yield from iterate_tiles(child, (*ancestors, tile))
 
 
 def is_inside(xyz, volume, slack=1e-6):
@@ -100,15 +100,15 @@ def read_table_rows(document, binary):
     extension = document["extensions"]["EXT_structural_metadata"]
     (table,) = extension["propertyTables"]
     columns = {}
-    for id, told in extension["schema"]["classes"][table["class"]]["properties"].items():
+    for id, property in extension["schema"]["classes"][table["class"]]["properties"].items():
         values = view_bytes(document, binary, table["properties"][id]["values"])
-        if told["type"] == "SCALAR":
-            columns[told["name"]] = np.frombuffer(values, "<f8").tolist()
+        if property["type"] == "SCALAR":
+            columns[property["name"]] = np.frombuffer(values, "<f8").tolist()
         else:
             ends = np.frombuffer(
                 view_bytes(document, binary, table["properties"][id]["stringOffsets"]), "<u4"
             )
-            columns[told["name"]] = [values[a:b].decode() for a, b in pairwise(ends.tolist())]
+            columns[property["name"]] = [values[a:b].decode() for a, b in pairwise(ends.tolist())]
     assert {len(column) for column in columns.values()} == {table["count"]}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
@@ -117,34 +117,34 @@ def test_every_building_stands_in_one_tile_at_its_place_within_a_centimetre(tile
     folder, tileset = tiled_town
     transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
     expected = {model.id: model.solid for model in town()}
-    found = []
+    results = []
     for tile, _ in iterate_tiles(tileset["root"]):
         places, ids, rows = read_content(folder, tile)
         world = globe.from_earth(places @ transform[:3, :3].T + transform[:3, 3])
         for number, row in enumerate(rows):
-            found.append(row["id"])
-            drawn = world[ids == number].reshape(-1, 3, 3)
+            results.append(row["id"])
+            triangles = world[ids == number].reshape(-1, 3, 3)
             solid = expected[row["id"]]
-            apart = np.linalg.norm(drawn.reshape(-1, 1, 3) - solid.vertices, axis=2)
-            assert apart.min(axis=1).max() < 0.01 and apart.min(axis=0).max() < 0.01
-            own = drawn - solid.vertices.mean(axis=0)
-            volume = np.einsum("ij,ij->", own[:, 0], np.cross(own[:, 1], own[:, 2])) / 6
+            distance = np.linalg.norm(triangles.reshape(-1, 1, 3) - solid.vertices, axis=2)
+            assert distance.min(axis=1).max() < 0.01 and distance.min(axis=0).max() < 0.01
+            centred = triangles - solid.vertices.mean(axis=0)
+            volume = np.einsum("ij,ij->", centred[:, 0], np.cross(centred[:, 1], centred[:, 2])) / 6
             assert volume > 10  # the triangles close it, and face outwards
-    assert sorted(found) == sorted(expected)
+    assert sorted(results) == sorted(expected)
 
 
 def boxes_on_earth(folder):
     """The least and the largest Earth-centred coordinates (2, 3) of every building."""
-    tileset, found = json.loads((folder / "tileset.json").read_text()), {}
+    tileset, corners = json.loads((folder / "tileset.json").read_text()), {}
     transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
     for tile, _ in iterate_tiles(tileset["root"]):
         places, ids, rows = read_content(folder, tile)
         earth = places @ transform[:3, :3].T + transform[:3, 3]
-        found |= {
+        corners |= {
             row["id"]: np.array([f(earth[ids == k], axis=0) for f in (np.min, np.max)])
             for k, row in enumerate(rows)
         }
-    return found
+    return corners
 
 
 @pytest.mark.parametrize("out", ["EPSG:25831", "EPSG:25832", "EPSG:3857"])
@@ -156,9 +156,9 @@ def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled_town, tmp_pa
         for m in town()
     )
     write_models(tmp_path / "there.3dtiles", moved, f"{out}+5709", GEOID_M)
-    here, there = boxes_on_earth(tiled_town[0]), boxes_on_earth(tmp_path / "there.3dtiles")
-    assert here.keys() == there.keys()
-    assert max(np.abs(here[id] - there[id]).max() for id in here) < 0.01
+    direct, indirect = boxes_on_earth(tiled_town[0]), boxes_on_earth(tmp_path / "there.3dtiles")
+    assert direct.keys() == indirect.keys()
+    assert max(np.abs(direct[id] - indirect[id]).max() for id in direct) < 0.01
 
 
 def test_attributes_are_those_of_the_building(tiled_town):
@@ -166,23 +166,26 @@ def test_attributes_are_those_of_the_building(tiled_town):
     expected = {model.id: (model.roof_type, model.attributes) for model in town()}
     for tile, _ in iterate_tiles(tileset["root"]):
         for row in read_content(folder, tile)[2]:
-            roof_type, told = expected[row["id"]]
-            assert row["type"] == roof_type and row["k"] == told["k"]
+            roof_type, attributes = expected[row["id"]]
+            assert row["type"] == roof_type and row["k"] == attributes["k"]
             assert row["half known"] == (
-                NO_NUMBER if told["half known"] is None else told["half known"]
+                NO_NUMBER if attributes["half known"] is None else attributes["half known"]
             )
-            assert row["name"] == (told["name"] or "") and row["flag"] == str(told["flag"]).lower()
+            assert (
+                row["name"] == (attributes["name"] or "")
+                and row["flag"] == str(attributes["flag"]).lower()
+            )
 
 
 def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
     write_models(tmp_path / "a.3dtiles", [two_parts()], "EPSG:7415", GEOID_M)
     document, binary = parse_glb(tmp_path / "a.3dtiles/tiles/r.glb")
     names = document["meshes"][0]["primitives"][0]["attributes"]
-    up = accessor_values(document, binary, names["NORMAL"])[:, 1]
+    upward = accessor_values(document, binary, names["NORMAL"])[:, 1]
     painted = {
         tuple(c)
         for c in accessor_values(document, binary, names["COLOR_0"])[
-            (up > 0.1) & (up < 0.9)
+            (upward > 0.1) & (upward < 0.9)
         ].tolist()
     }
     assert painted == {
@@ -193,10 +196,10 @@ def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
 
 def test_boxes_hold_what_is_drawn_in_them_and_below(tiled_town):
     folder, tileset = tiled_town
-    for tile, above in iterate_tiles(tileset["root"]):
+    for tile, ancestors in iterate_tiles(tileset["root"]):
         places, _, _ = read_content(folder, tile)
         assert is_inside(places, tile["content"]["boundingVolume"])
-        for outer in (tile, *above):
+        for outer in (tile, *ancestors):
             assert is_inside(places, outer["boundingVolume"])
             assert is_inside(compute_corners(tile["boundingVolume"]), outer["boundingVolume"])
 
@@ -204,9 +207,9 @@ def test_boxes_hold_what_is_drawn_in_them_and_below(tiled_town):
 def test_geometric_errors_decrease_to_nothing(tiled_town):
     _, tileset = tiled_town
     assert len(list(iterate_tiles(tileset["root"]))) > 5
-    for tile, above in iterate_tiles(tileset["root"]):
+    for tile, ancestors in iterate_tiles(tileset["root"]):
         assert tile["refine"] == "ADD"
-        assert tile["geometricError"] <= (above[-1] if above else tileset)["geometricError"]
+        assert tile["geometricError"] <= (ancestors[-1] if ancestors else tileset)["geometricError"]
         assert (tile["geometricError"] > 0) == bool(tile.get("children"))
 
 
@@ -253,12 +256,12 @@ def test_places_come_back_from_the_globe(name):
 
 def test_a_geoid_height_raises_all_by_as_much():
     world = np.append(PLACES["EPSG:28992"], 3.0)[None]
-    low, high = (Globe.of("EPSG:28992", height) for height in (0.0, 43.2))
-    assert high.geographic(world)[0, 2] == pytest.approx(46.2)
-    assert np.linalg.norm(high.to_earth(world) - low.to_earth(world)) == pytest.approx(
+    lower, upper = (Globe.of("EPSG:28992", height) for height in (0.0, 43.2))
+    assert upper.geographic(world)[0, 2] == pytest.approx(46.2)
+    assert np.linalg.norm(upper.to_earth(world) - lower.to_earth(world)) == pytest.approx(
         43.2, abs=1e-6
     )
-    assert "43.2" in high.heights and high.is_known
+    assert "43.2" in upper.heights and upper.is_known
 
 
 def test_heights_that_are_guessed_are_said_to_be():
@@ -296,11 +299,11 @@ def test_an_older_tileset_is_replaced_whole(tmp_path):
 def test_a_failure_leaves_the_older_tileset(tmp_path):
     folder = tmp_path / "a.3dtiles"
     write_models(folder, town(2), "EPSG:7415", GEOID_M)
-    before = (folder / "tiles" / "r.glb").read_bytes()
+    content = (folder / "tiles" / "r.glb").read_bytes()
     nowhere = ViewedModel("x", "flat", gable_solid().move(np.array([1e9, 1e9, 0])), {}, {})
     with pytest.raises(InputError, match="no place there"):
         write_models(folder, [*town(3), nowhere], "EPSG:7415", GEOID_M)
-    assert (folder / "tiles" / "r.glb").read_bytes() == before
+    assert (folder / "tiles" / "r.glb").read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["a.3dtiles"]
 
 
@@ -326,11 +329,11 @@ def test_no_solids_are_told(tmp_path):
 
 
 def test_properties_have_ids_that_the_extension_allows():
-    found = Found()
-    found.add({"a b": 1, "a-b": "x", "9": None, "big": 2**60, "both": 1, "ü": True})
-    found.add({"a b": 2.5, "9": 3, "both": "y"})
-    told = {p.name: (p.id, p.is_number) for p in found.properties()}
-    assert told == {
+    collected = Found()
+    collected.add({"a b": 1, "a-b": "x", "9": None, "big": 2**60, "both": 1, "ü": True})
+    collected.add({"a b": 2.5, "9": 3, "both": "y"})
+    properties = {p.name: (p.id, p.is_number) for p in collected.properties()}
+    assert properties == {
         "a b": ("a_b", True),
         "a-b": ("a_b_2", False),
         "9": ("_9", True),
@@ -375,8 +378,8 @@ def test_the_command_tells_id_type_and_parameters(tmp_path, capsys):
 
 
 def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters(tmp_path, globe):
-    told = {"id": 7, "type": "church", "year": 1905}
-    model = ViewedModel("a", "gable", gable_solid().move(ORIGIN), told, {0: "gable"})
+    attributes = {"id": 7, "type": "church", "year": 1905}
+    model = ViewedModel("a", "gable", gable_solid().move(ORIGIN), attributes, {0: "gable"})
     write_models(tmp_path / "a.3dtiles", [model], "EPSG:7415", GEOID_M)
     tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
     (row,) = read_content(tmp_path / "a.3dtiles", tileset["root"])[2]
@@ -403,10 +406,10 @@ def find_node_package(package):
     root = subprocess.run(
         ["npm", "root", "--global"], capture_output=True, text=True
     ).stdout.strip()
-    done = subprocess.run(
+    process = subprocess.run(
         ["node", "-e", f"require('{package}')"], capture_output=True, env=node_environment(root)
     )
-    return done.returncode == 0, root
+    return process.returncode == 0, root
 
 
 def node_environment(root):
@@ -417,8 +420,8 @@ def node_environment(root):
 
 
 def test_the_gltf_validator_finds_no_fault(tiled_town):
-    has, root = find_node_package("gltf-validator")
-    if not has:
+    is_installed, root = find_node_package("gltf-validator")
+    if not is_installed:
         pytest.skip("no gltf-validator here; npm install --global gltf-validator")
     script = """
     const validator = require("gltf-validator"), fs = require("fs");
@@ -428,11 +431,11 @@ def test_the_gltf_validator_finds_no_fault(tiled_town):
     """
     folder, _ = tiled_town
     for file in sorted((folder / "tiles").iterdir())[:3]:
-        done = subprocess.run(
+        process = subprocess.run(
             ["node", "-e", script, str(file)],
             capture_output=True,
             text=True,
             env=node_environment(root),
             timeout=120,
         )
-        assert json.loads(done.stdout) == [0, 0, 1], done.stderr
+        assert json.loads(process.stdout) == [0, 0, 1], process.stderr

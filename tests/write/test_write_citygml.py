@@ -87,14 +87,14 @@ def test_the_text_is_what_lxml_would_print(tmp_path):
 
 @given(st.text(max_size=12))
 def test_any_text_comes_back_from_xml(text):
-    known = "".join(
+    allowed = "".join(
         c
         if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd" or c > "\uffff"
         else "\ufffd"
         for c in text
     )
     element = etree.fromstring(f'<a b="{xml_attribute(text)}">{xml_text(text)}</a>')
-    assert (element.get("b"), element.text or "") == (known, known)
+    assert (element.get("b"), element.text or "") == (allowed, allowed)
 
 
 def test_every_building_is_there(tmp_path):
@@ -180,11 +180,11 @@ def test_envelope_holds_everything(tmp_path):
     (box_,) = find(root, "/core:CityModel/gml:boundedBy/gml:Envelope")
     assert box_.get("srsName") == "urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709"
     assert box_.get("srsDimension") == "3"
-    low, high = (np.array(corner.text.split(), float) for corner in box_)
+    lower, upper = (np.array(corner.text.split(), float) for corner in box_)
     xyz = np.concatenate(
         [np.array(t.split(), float).reshape(-1, 3) for t in find(root, "//gml:posList/text()")]
     )
-    np.testing.assert_allclose([low, high], [xyz.min(axis=0), xyz.max(axis=0)])
+    np.testing.assert_allclose([lower, upper], [xyz.min(axis=0), xyz.max(axis=0)])
 
 
 @pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-1e7, 12345678.9, 8848.0)])

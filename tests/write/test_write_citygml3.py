@@ -91,12 +91,12 @@ def new(root, path):
 
 def assert_in_order(element, sequence):
     """The children of `element` are of the sequence's names, in its order."""
-    known = [
+    reference = [
         f"{{{NAMESPACES_3[prefix]}}}{name}"
         for prefix, names in sequence.items()
         for name in names.split()
     ]
-    places = [known.index(child.tag) for child in element]
+    places = [reference.index(child.tag) for child in element]
     assert places == sorted(places)
 
 
@@ -124,18 +124,18 @@ def test_order_names_and_ids_are_as_the_schemas_ask(roots):
 def test_the_same_solids_come_back(files):
     old, later = (list(read_solids(file)) for file in files)
     assert [name for name, _ in later] == [name for name, _ in old] and len(later) >= 4
-    for (_, solid), (_, again) in zip(old, later, strict=True):
-        np.testing.assert_array_equal(again.vertices, solid.vertices)
-        assert again.faces == solid.faces and again.defects == ()
+    for (_, solid), (_, solid_back) in zip(old, later, strict=True):
+        np.testing.assert_array_equal(solid_back.vertices, solid.vertices)
+        assert solid_back.faces == solid.faces and solid_back.defects == ()
 
 
 def test_the_same_attributes_stand_in_both(roots):
     old, later = roots
-    told = [
+    old_attributes = [
         [(a.get("name"), a[0].text) for a in b.xpath("gen:*", namespaces=OLD)]
         for b in old.iter(f"{{{OLD['bldg']}}}Building")
     ]
-    again = [
+    new_attributes = [
         [
             (
                 a.findtext("gen:name", None, NAMESPACES_3),
@@ -145,7 +145,7 @@ def test_the_same_attributes_stand_in_both(roots):
         ]
         for b in new(later, "//bldg:Building")
     ]
-    assert again == told and all(told)
+    assert new_attributes == old_attributes and all(old_attributes)
     assert new(later, "//gen:IntAttribute[gen:name='n']/gen:value/text()") == ["3"]
     for path in (
         "//bldg:roofType/text()",

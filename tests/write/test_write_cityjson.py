@@ -59,11 +59,11 @@ def test_valid_by_the_schema(tmp_path, buildings, crs):
     )
     head, *features = sequence(tmp_path, buildings, crs)
     assert len(features) == len(buildings)
-    assert [error.message for one in features for error in feature.iter_errors(one)] == []
+    assert [error.message for item in features for error in feature.iter_errors(item)] == []
     assert [
         error.message
-        for one in (head, document(tmp_path, buildings, crs))
-        for error in whole.iter_errors(one)
+        for item in (head, document(tmp_path, buildings, crs))
+        for error in whole.iter_errors(item)
     ] == []
 
 
@@ -94,14 +94,16 @@ def test_document_and_sequence_hold_the_same(tmp_path):
     assert whole["metadata"] == head["metadata"]
     vertices = np.array(whole["vertices"])
     for feature in features:
-        ((name, one),) = feature["CityObjects"].items()
+        ((name, feature_object),) = feature["CityObjects"].items()
         other = whole["CityObjects"][name]
-        assert other["attributes"] == one["attributes"]
-        for here, there in zip(one.get("geometry", []), other.get("geometry", []), strict=True):
-            own = np.array(feature["vertices"])
+        assert other["attributes"] == feature_object["attributes"]
+        for feature_geometry, document_geometry in zip(
+            feature_object.get("geometry", []), other.get("geometry", []), strict=True
+        ):
+            own_vertices = np.array(feature["vertices"])
             assert (
-                own[flat(here["boundaries"])].tolist()
-                == vertices[flat(there["boundaries"])].tolist()
+                own_vertices[flat(feature_geometry["boundaries"])].tolist()
+                == vertices[flat(document_geometry["boundaries"])].tolist()
             )
 
 
@@ -156,15 +158,15 @@ def test_the_prefix_is_the_callers(tmp_path):
 
 
 def test_footprint_looks_up(tmp_path):
-    _, drawn, yard = sequence(tmp_path, [street()[1], street()[3]])
-    for feature in (drawn, yard):
+    _, drawing, yard = sequence(tmp_path, [street()[1], street()[3]])
+    for feature in (drawing, yard):
         (city_object,) = feature["CityObjects"].values()
         footprint = city_object["geometry"][0]
         assert (footprint["type"], footprint["lod"]) == ("MultiSurface", "0")
         outer, *holes = (np.array(feature["vertices"])[ring] for ring in footprint["boundaries"][0])
         assert shapely.LinearRing(outer[:, :2]).is_ccw
         assert not any(shapely.LinearRing(hole[:, :2]).is_ccw for hole in holes)
-    assert drawn["vertices"][0][2] == 15000
+    assert drawing["vertices"][0][2] == 15000
     assert len(holes) == 1
 
 
@@ -200,12 +202,12 @@ def test_far_away_and_under_water(tmp_path, origin):
 
 
 def test_an_added_building_leaves_the_others_as_they_were(tmp_path):
-    before = sequence(tmp_path, street()[2:])
-    after = sequence(
+    old = sequence(tmp_path, street()[2:])
+    new = sequence(
         tmp_path,
         [*street()[2:], make_building(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))],
     )
-    assert after[1:-1] == before[1:]
+    assert new[1:-1] == old[1:]
 
 
 def test_incremental_equals_whole(tmp_path):

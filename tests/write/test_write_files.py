@@ -125,18 +125,18 @@ def file_size_limit():
 def test_no_space_left_says_so(tmp_path):
     with (
         pytest.raises(OutputError, match="the disk is full; free some space"),
-        atomic(tmp_path / "a") as beside,
+        atomic(tmp_path / "a") as neighbour,
     ):
-        beside.write_text("half")
+        neighbour.write_text("half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     assert names_in(tmp_path) == []
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
 def test_a_full_device_says_so(tmp_path):
-    with pytest.raises(OutputError, match="the disk is full"), atomic(tmp_path / "a") as beside:
-        beside.symlink_to("/dev/full")
-        beside.write_text("x" * 100_000)
+    with pytest.raises(OutputError, match="the disk is full"), atomic(tmp_path / "a") as neighbour:
+        neighbour.symlink_to("/dev/full")
+        neighbour.write_text("x" * 100_000)
     assert names_in(tmp_path) == []
 
 

@@ -24,9 +24,9 @@ def generate_buildings(seed):
     would give them.
     """
     rng = np.random.default_rng(seed)
-    made = {type: random_building(rng, type) for type in ROOF_TYPES}
-    made |= {kind: random_compound(rng, kind) for kind in COMPOUND_KINDS}
-    for number, (name, sim) in enumerate(made.items()):
+    building = {type: random_building(rng, type) for type in ROOF_TYPES}
+    building |= {kind: random_compound(rng, kind) for kind in COMPOUND_KINDS}
+    for number, (name, sim) in enumerate(building.items()):
         origin = sim.roof.frame.origin
         solid = compose(sim.roof, 0.0).move(origin)
         quality = Quality(points=100 + number, density=4.0, rmse=0.05)
@@ -76,8 +76,12 @@ def test_figures_agree_with_the_roof(run):
         got, want = [figures.h_50p, figures.h_70p], np.percentile(z, [50, 70])
         # A step in the roof may lie just at the percentile, where a sample cannot tell on which
         # side.
-        near = np.percentile(z, [[48, 68], [52, 72]])
-        assert ((near[0] - 0.05 <= got) & (got <= near[1] + 0.05)).all(), (building.id, got, want)
+        percentiles = np.percentile(z, [[48, 68], [52, 72]])
+        assert ((percentiles[0] - 0.05 <= got) & (got <= percentiles[1] + 0.05)).all(), (
+            building.id,
+            got,
+            want,
+        )
         assert figures.h_max == pytest.approx(z.max(), abs=0.15)
         assert figures.plan_area_m2 == pytest.approx(building.roof.outline.area, rel=1e-3)
 
@@ -111,9 +115,11 @@ def test_both_formats_hold_the_same_corners(run):
             np.array(p.text.split(), float).reshape(-1, 3)
             for p in building.iterfind(".//{*}LinearRing/{*}posList")
         ]
-        here = {tuple(np.rint(corner * 1e4).astype(int)) for ring in rings for corner in ring}
+        corners_here = {
+            tuple(np.rint(corner * 1e4).astype(int)) for ring in rings for corner in ring
+        }
         xyz = np.array(feature["vertices"]) * transform["scale"] + transform["translate"]
-        assert here == {tuple(corner) for corner in np.rint(xyz * 1e4).astype(int)}
+        assert corners_here == {tuple(corner) for corner in np.rint(xyz * 1e4).astype(int)}
 
 
 def test_order_does_not_matter(run, tmp_path):

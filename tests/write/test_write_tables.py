@@ -53,10 +53,12 @@ def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(t
     were full.
     """
     building = make_building(box())
-    many = {f"a{i}": i for i in range(2500)}
-    few, _, _ = table(tmp_path, [building])
-    columns, _, _ = table(tmp_path, [replace(building, attributes={**building.attributes, **many})])
-    assert set(few) < set(columns) and len(columns) == 1998
+    large = {f"a{i}": i for i in range(2500)}
+    columns_of_few, _, _ = table(tmp_path, [building])
+    columns, _, _ = table(
+        tmp_path, [replace(building, attributes={**building.attributes, **large})]
+    )
+    assert set(columns_of_few) < set(columns) and len(columns) == 1998
     room = attributes.attributes_with_a_column()
     assert all(columns[f"a{i}"][0] == i for i in range(room)) and "a2499" not in columns
 
