@@ -203,7 +203,7 @@ def test_nothing_is_said_where_no_crs_is_known(tmp_path):
 def test_other_programs_find_features_by_their_place_and_keep_the_index(tmp_path):
     """GDAL finds features by the spatial index, and the triggers keep up with what it adds."""
     squares = [shapely.box(x, 0, x + 1, 1) for x in range(0, 100, 10)]
-    buildings = [unmodelled(str(n), footprint=square) for n, square in enumerate(squares)]
+    buildings = [make_lost_building(str(n), footprint=square) for n, square in enumerate(squares)]
     write_attributes(tmp_path / "a.gpkg", buildings, "EPSG:28992")
 
     def find(box):
@@ -238,5 +238,5 @@ DERIVED = CRS.from_wkt(
     "crs", [CRS("EPSG:28992"), CRS("+proj=tmerc +lat_0=52 +lon_0=5 +ellps=bessel"), DERIVED]
 )
 def test_the_crs_comes_back_whether_it_has_a_code_or_not(tmp_path, crs):
-    _, _, meta = table(tmp_path, [modelled(box())], crs)
+    _, _, meta = table(tmp_path, [make_building(box())], crs)
     assert CRS(meta["crs"]) == crs

@@ -32,8 +32,8 @@ from .rows import Row, split_lines, table_rows
 from .styles import TABLE, style_rows
 
 BUILDINGS = "buildings"
-MULTI_POLYGON, POLYGON_Z = GeometryType("MULTIPOLYGON"), GeometryType("POLYGON", has_z=True)
-LAYERS = {BUILDINGS: MULTI_POLYGON, "parts": MULTI_POLYGON, "roof_surfaces": POLYGON_Z}
+OUTLINE_GEOMETRY, POLYGON_Z = GeometryType("MULTIPOLYGON"), GeometryType("POLYGON", has_z=True)
+LAYERS = {BUILDINGS: OUTLINE_GEOMETRY, "parts": OUTLINE_GEOMETRY, "roof_surfaces": POLYGON_Z}
 """Tables and the geometry of their rows."""
 
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}

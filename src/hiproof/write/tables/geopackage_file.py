@@ -29,7 +29,7 @@ UNDEFINED_SRS, CUSTOM_SRS = -1, 100_000
 BLOB_HEADER = struct.Struct("<2sBBi4d")
 BLOB_FLAGS = 0b0000_0011  # bits: an envelope in plan follows, and numbers are little endian
 
-SCHEMA = """
+FILE_SCHEMA = """
 PRAGMA journal_mode = OFF;  -- the file is seen once it is whole
 PRAGMA synchronous = OFF;
 PRAGMA application_id = 0x47504B47;  -- "GPKG"
@@ -105,7 +105,7 @@ class GeoPackage:
         self.database = sqlite3.connect(path, isolation_level=None)
         self.types: dict[str, str] = {}
         self.boxes: dict[str, np.ndarray] = {}
-        self.database.executescript(SCHEMA)
+        self.database.executescript(FILE_SCHEMA)
         self.srs_id = self.add_reference_systems(wkt)
 
     def add_reference_systems(self, wkt: str | None) -> int:
