@@ -32,7 +32,7 @@ $(VENV)/docs: $(VENV)/core
 	touch $@
 
 demo: $(VENV)/core
-	$(BIN)/hiproof demo demo
+	$(BIN)/hiproof demo --out demo
 	$(BIN)/hiproof check demo/buildings.city.jsonl
 	@echo "The models lie in demo/: buildings.gml (CityGML), buildings.city.jsonl (CityJSON), parameters.jsonl, buildings.gpkg"
 

@@ -48,7 +48,7 @@ import numpy as np
 
 from hiproof.city import solve
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.cli.check import count_invalid
+from hiproof.cli.check import check_file, count_bad
 from hiproof.compose import check_solid
 from hiproof.parametric.building import build
 from hiproof.parametric.file import opened_parameters, read_parameters
@@ -150,7 +150,7 @@ def judge_files(name: str, out: Path, findings: Findings) -> None:
             judge_solid(name, record, head.compose, findings)
     for path in (*sorted(out.glob("buildings*.gml")), out / "buildings.city.jsonl"):
         with contextlib.redirect_stdout(io.StringIO()) as printed:
-            invalid = count_invalid([path], planarity_m=0.01)
+            invalid = count_bad([check_file(path, planarity_m=0.01)])
         findings.counts[CHECKED] += int(re.findall(r": (\d+) solids?,", printed.getvalue())[-1])
         if invalid:
             findings.counts[INVALID_WRITTEN] += invalid - 1

@@ -43,7 +43,7 @@ from hiproof.simulate.city import City, write_city
 
 DEFAULTS = Settings()
 FLAT = Settings.from_dict(
-    {"fit": {"parts": "one", "types": ["flat"]}, "segment": {"enabled": False}}
+    {"fit": {"parts": "one", "types": ["flat"]}, "segment": {"network": "never"}}
 )
 RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 

@@ -18,8 +18,8 @@ import numpy as np
 from hiproof.evaluate.metrics import iou, plan_outline, psd
 from hiproof.fit.single import fit_roof
 from hiproof.geometry.alpha_shape import alpha_shape
+from hiproof.method import reconstruct
 from hiproof.model import Fit, Solid
-from hiproof.reconstruct import reconstruct
 
 DATA = Path("../shared/data/roofn3d/nyc_roofs.npz")
 

@@ -39,7 +39,7 @@ from .city import make_city
 FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
 OVERRIDES = 50
 FLAT = Settings.from_dict(
-    {"fit": {"types": ["flat"], "parts": "one"}, "segment": {"enabled": False}}
+    {"fit": {"types": ["flat"], "parts": "one"}, "segment": {"network": "never"}}
 )
 
 

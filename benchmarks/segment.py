@@ -263,9 +263,9 @@ def judge_new_york() -> str | None:
     faces = np.split(data["face"], data["offset"][1:-1])
     rows = []
     for parts in ("one", "compound"):
-        for enabled in (False, True):
+        for network in ("never", "auto"):
             settings = Settings().replace(
-                {"fit": {"parts": parts}, "segment": {"enabled": enabled}}
+                {"fit": {"parts": parts}, "segment": {"network": network}}
             )
             distances = [
                 measure_roof_distance(cloud, face > 0, settings)
@@ -275,7 +275,7 @@ def judge_new_york() -> str | None:
             rows.append(
                 (
                     parts,
-                    "with" if enabled else "without",
+                    network,
                     *(f"{figure:.4f} m" for figure in figures),
                 )
             )

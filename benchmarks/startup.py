@@ -89,7 +89,7 @@ def main() -> None:
         ]
         for name, options in (
             ("", []),
-            (", no network", ["--no-network"]),
+            (", no network", ["--network", "never"]),
             (", one primitive a building", ["--parts", "one"]),
         ):
             compare(f"whole Delft run{name}", [*run, "--out", out, *options], 3)

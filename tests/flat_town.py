@@ -7,7 +7,7 @@ from pathlib import Path
 
 import hiproof
 
-WRONG = hiproof.Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["flat"]}})
+WRONG = hiproof.Settings.from_dict({"segment": {"network": "never"}, "fit": {"types": ["flat"]}})
 
 
 def make_request(

@@ -42,7 +42,7 @@ PACKAGES = {
 NEEDY = {
     "a terrain model": ("rasterio", "", ["--terrain", "dtm.tif"]),
     "a terrain model by address": ("rasterio", "", ["--terrain", "https://example.org/dtm.tif"]),
-    "the network's opinion": ("onnxruntime", "", ["--network"]),
+    "the network's opinion": ("onnxruntime", "", ["--network", "always"]),
     "one primitive": ("onnxruntime", "", ["--parts", "one"]),
     "the paper's objective": ("onnxruntime", "", ["--objective", "paper"]),
     "one primitive by the settings": ("onnxruntime", '[fit]\nparts = "one"', []),
@@ -124,11 +124,9 @@ def test_one_primitive_by_the_points_alone_is_said_to_do_without(
         *options,
     ]
     assert command(*arguments) == 2
-    assert capsys.readouterr().err.endswith(
-        "or --no-network (segment.enabled = false) to go by the points alone\n"
-    )
+    assert capsys.readouterr().err.endswith("or --network never to go by the points alone\n")
     if options == ["--parts", "one"]:
-        assert command(*arguments, "--no-network") == 0
+        assert command(*arguments, "--network", "never") == 0
 
 
 def test_points_by_address_are_refused_before_anything_is_written(hide_package, tmp_path):
@@ -186,7 +184,7 @@ def test_a_neighbourhood_is_refused_before_it_is_written(hide_package, tmp_path)
             for arguments in (
                 {"fit": {"parts": "one"}},
                 {"fit": {"objective": "paper"}},
-                {"segment": {"always": True}},
+                {"segment": {"network": "always"}},
             )
         ),
     ],
@@ -206,7 +204,7 @@ def test_training_names_its_extra(hide_package):
 
 
 @pytest.mark.parametrize(
-    "arguments", [{}, {"fit": {"parts": "one"}, "segment": {"enabled": False}}]
+    "arguments", [{}, {"fit": {"parts": "one"}, "segment": {"network": "never"}}]
 )
 def test_a_roof_is_the_same_without_what_it_does_not_ask_for(arguments, hide_package):
     settings = Settings.from_dict(arguments)
@@ -243,6 +241,7 @@ def test_the_demo_asks_for_no_extra(tmp_path):
             "-c",
             f"{hide}{run}{tell}",
             "demo",
+            "--out",
             str(tmp_path / names[:7]),
             names,
         ]

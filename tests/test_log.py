@@ -117,13 +117,13 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
     def refuse(request, progress):
         raise InputError("expected points at https://u:s3cret@host, got none")
 
-    monkeypatch.setattr("hiproof.cli.running.reconstruct_area", refuse)
+    monkeypatch.setattr("hiproof.city.run.reconstruct_area", refuse)
     (tmp_path / "a.laz").write_bytes(b"LASF")
     arguments = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
     monkeypatch.setattr(
         sys,
         "argv",
-        ["hiproof", *arguments, "--log-file", str(tmp_path / "run.log"), "--log-level", "error"],
+        ["hiproof", *arguments, "--log-file", str(tmp_path / "run.log"), "--quiet"],
     )
     with pytest.raises(SystemExit) as ended:
         main()

@@ -64,7 +64,7 @@ CONFIGURATIONS = {
     "no softness": ("[fit]\nside_softness_m = []", [], "1 or more values"),
     "points below the "
     "least": ("[city]\nmax_points_a_building = 10", [], "between 1000 and 10000000"),
-    "boolean of a number": ("[segment]\nenabled = 1", [], "true or false, got 1"),
+    "boolean of a number": ("[write]\nparquet = 1", [], "true or false, got 1"),
     "boolean of text": ('[write]\nparquet = "yes"', [], "true or false, got 'yes'"),
     "text of a number": ("[read]\ncrs = 28992", [], "to be text, got 28992"),
     "unknown section": ("[reading]\na = 1", [], "[reading]"),
@@ -87,7 +87,7 @@ CONFIGURATIONS = {
     "weights that are no "
     "network": ('[segment]\nweights = "{cloud}"', [], "expected an ONNX network"),
     "missing weights nobody asks "
-    "for": ('[segment]\nweights = "missing.onnx"', ["--no-network"], RUNS),
+    "for": ('[segment]\nweights = "missing.onnx"', ["--network", "never"], RUNS),
     "no CUDA": ('[segment]\ndevice = "cuda"', [], "expected a CUDA device"),
     "CRS in degrees": ('[read]\ncrs = "EPSG:4326"', [], "projected CRS, got WGS 84 in degrees"),
     "CRS in degrees as an "
@@ -135,7 +135,7 @@ def begun(monkeypatch):
         requests.append(request)
         return Summary((), 0, {}, {}, None, None, (), (), {})
 
-    monkeypatch.setattr("hiproof.cli.running.reconstruct_area", check_only)
+    monkeypatch.setattr("hiproof.city.run.reconstruct_area", check_only)
     return requests
 
 

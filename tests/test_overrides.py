@@ -26,7 +26,7 @@ from hiproof.write.parameters import building_record
 from run_records import by_id, records
 from tiny_town import make_town, write_cloud, write_footprints
 
-PLAIN = Settings.from_dict({"segment": {"enabled": False}})
+PLAIN = Settings.from_dict({"segment": {"network": "never"}})
 
 
 @pytest.fixture(scope="module")

@@ -113,7 +113,7 @@ def test_the_installed_wheel_is_imported_and_models_the_demo(installed_python, t
     assert Path(place).is_relative_to(installed_python.parents[1])
     command = installed_python.with_name("hiproof.exe" if os.name == "nt" else "hiproof")
     assert run(command, "--version", env=environment).split() == ["hiproof", version]
-    output = run(command, "demo", tmp_path / "demo", env=environment)
+    output = run(command, "demo", "--out", tmp_path / "demo", env=environment)
     assert "26 buildings" in output and (tmp_path / "demo/buildings.gml").stat().st_size > 10_000
 
 

@@ -14,7 +14,7 @@ from hiproof.settings import Settings
 from hiproof.stages import candidates
 from tiny_town import gable
 
-PLAIN = Settings.from_dict({"segment": {"enabled": False}})
+PLAIN = Settings.from_dict({"segment": {"network": "never"}})
 FOOTPRINT = shapely.box(0, 0, 12, 8)
 
 
@@ -269,7 +269,7 @@ def test_one_primitive_by_either_objective(objective):
 
 def test_the_network_adds_its_opinion_where_it_is_heeded_or_asked():
     building = hiproof.reconstruct(
-        gable_points(), FOOTPRINT, settings=Settings.from_dict({"segment": {"always": True}})
+        gable_points(), FOOTPRINT, settings=Settings.from_dict({"segment": {"network": "always"}})
     )
     assert building.type == "gable"
     assert sum(building.recognised.values()) == pytest.approx(1.0)
@@ -283,7 +283,7 @@ def test_the_network_adds_its_opinion_where_it_is_heeded_or_asked():
 
 
 def test_parts_that_became_flat_although_not_asked_for_are_told():
-    settings = Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["hip"]}})
+    settings = Settings.from_dict({"segment": {"network": "never"}, "fit": {"types": ["hip"]}})
     points = np.column_stack([gable_points()[:, :2], np.full(len(gable_points()), 6.0)])
     building = hiproof.reconstruct(points, FOOTPRINT, settings=settings)
     assert {part.type for part in building.parts} <= {"flat", "hip"}

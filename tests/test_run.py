@@ -121,13 +121,13 @@ def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp
 def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path):
     reconstruct_area(Request((str(files[0]),), tmp_path / "own", str(files[1])))
     old_records = records(tmp_path / "own")
-    refused = CliRunner().invoke(app, ["demo", str(tmp_path / "own")])
+    refused = CliRunner().invoke(app, ["demo", "--out", str(tmp_path / "own")])
     assert (
         "expected a folder for the demo" in str(refused.exception)
         and records(tmp_path / "own") == old_records
     )
     for _ in range(2):
-        assert CliRunner().invoke(app, ["demo", str(tmp_path / "demo")]).exit_code == 0
+        assert CliRunner().invoke(app, ["demo", "--out", str(tmp_path / "demo")]).exit_code == 0
 
 
 def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(

@@ -6,17 +6,18 @@ Airborne LiDAR point clouds into watertight, semantic LoD2 building models.
     fit = hiproof.fit_roof(points)                       # one primitive, all points
     building = hiproof.reconstruct(points, footprint)    # a valid solid, with status and quality
 
-Most names below are imported when first used, so that `import hiproof` stays fast; `reconstruct` is
-imported at once, since a module of the same name would otherwise take its place.
+The names below are imported when they are first used, so that `import hiproof` and the command line
+start at once.
 """
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import early  # first, so that Ctrl-C while the rest is imported ends the command quietly  # noqa: F401
-from .model.building import METHODS
-from .reconstruct import reconstruct
+
+if TYPE_CHECKING:
+    from .method import reconstruct as reconstruct
 
 __version__ = "0.1.0"
 
@@ -24,6 +25,7 @@ _HOME = {
     "build": "parametric",
     "plot": "draw.plot",
     "read_parameters": "parametric",
+    "reconstruct": "method",
     "reconstruct_area": "city.run",
     "Request": "city.request",
     "Summary": "city.run",
@@ -70,14 +72,7 @@ _HOME = {
     "Terrain": "read.terrain",
 }
 
-_METHODS = {
-    "with_part": "parametric.edit",
-    "without_part": "parametric.edit",
-    "refit": "parametric.refit",
-    "render_building": "draw.html",
-}
-
-__all__ = ["__version__", "reconstruct", *sorted(_HOME)]
+__all__ = ["__version__", *sorted(_HOME)]
 
 
 def __getattr__(name: str) -> Any:
@@ -98,7 +93,16 @@ def _import_when_called(module: str, name: str) -> Callable[..., Any]:
     return call
 
 
-METHODS.update({name: _import_when_called(module, name) for name, module in _METHODS.items()})
+METHODS = {
+    name: _import_when_called(module, name)
+    for name, module in {
+        "with_part": "parametric.edit",
+        "without_part": "parametric.edit",
+        "refit": "parametric.refit",
+        "render_building": "draw.html",
+    }.items()
+}
+"""Functions that methods of `model.Building` call, from packages that stand above `model`."""
 
 
 def __dir__() -> list[str]:

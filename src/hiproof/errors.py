@@ -67,11 +67,11 @@ class CompositionError(HiproofError):
 
 def is_interrupt(error: BaseException) -> bool:
     """Whether `error` is a Ctrl-C in disguise: of one that comes while compiled code runs Python
-    makes a SystemError, or several one of the other, which what catches an `Exception` would take
-    for a failure.
+    makes a SystemError, or several one of the other, and of one that comes in an import a package
+    may make an ImportError. What catches an `Exception` would take these for a failure.
     """
     cause: BaseException | None = error
-    while isinstance(cause, SystemError):
+    while isinstance(cause, (SystemError, ImportError)):
         cause = cause.__cause__
     return isinstance(cause, KeyboardInterrupt)
 

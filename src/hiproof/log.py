@@ -118,11 +118,20 @@ def make_handler(handler: logging.Handler, form: str, level: int) -> logging.Han
     return handler
 
 
+def console_level() -> Level:
+    """The level from which the log is shown; warning where nothing was started."""
+    console = find_console()
+    return Level.warning if console is None else Level(logging.getLevelName(console.level).lower())
+
+
+def find_console() -> Console | None:
+    return next((handler for handler in LOGGER.handlers if isinstance(handler, Console)), None)
+
+
 def worker_arguments() -> tuple:
     """The arguments of `start` that a worker process needs to log as this one does; none where
     nothing was started."""
-    console = next((handler for handler in LOGGER.handlers if isinstance(handler, Console)), None)
-    if console is None:
+    if find_console() is None:
         return ()
     file = next(
         (
@@ -132,7 +141,7 @@ def worker_arguments() -> tuple:
         ),
         None,
     )
-    return Level(logging.getLevelName(console.level).lower()), file
+    return console_level(), file
 
 
 def log_warning(

@@ -33,9 +33,8 @@ def setting(
     `lower` and `upper` are inclusive bounds, `choices` the allowed values.
 
     Of a setting of several values they hold for each, and there are at least `minimum`. With an
-    `option` (such as "--roofs") the command line has it, its help and default made of this;
-    settings that share one are set together. One that `names` "files" is another where other bytes
-    stand in them.
+    `option` (such as "--roofs") the command line has it, its help and default made of this. One
+    that `names` "files" is another where other bytes stand in them.
     """
     metadata = {
         "help": help,
@@ -138,8 +137,8 @@ class FitSettings:
     )
     parts: str = setting(
         "compound",
-        "as many primitives as the evidence pays for, or one (extra `network`, unless "
-        "--no-network)",
+        "as many primitives as the points support, or one (extra `network`, unless --network "
+        "never)",
         choices=("compound", "one"),
         option="--parts",
     )
@@ -171,15 +170,12 @@ class CompoundSettings:
 class SegmentSettings:
     """[segment] recognising the roof before fitting it."""
 
-    enabled: bool = setting(
-        True,
-        "let the network weigh points and types where one primitive is fitted to a building",
-        option="--network",
-    )
-    always: bool = setting(
-        False,
-        "ask it of every building and write its answer, though a fit of several does without "
-        "(extra `network`)",
+    network: str = setting(
+        "auto",
+        "where the network is used (extra `network`): auto only where one primitive is fitted to a "
+        "building, always on every building, whose recognised types are then written, never not at "
+        "all",
+        choices=("auto", "always", "never"),
         option="--network",
     )
     weights: str = setting(

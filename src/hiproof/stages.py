@@ -120,10 +120,9 @@ def fits_one(settings: Settings) -> bool:
 
 
 def asks_network(settings: Settings) -> bool:
-    """Whether the network is asked: where one primitive is fitted it is heeded, where several are
-    its opinion may be wanted beside.
-    """
-    return settings.segment.enabled and (fits_one(settings) or settings.segment.always)
+    """Whether the network is used: with `auto` only where one primitive is fitted to a building."""
+    network = settings.segment.network
+    return network == "always" or (network == "auto" and fits_one(settings))
 
 
 def refuse_without_network(settings: Settings) -> None:
@@ -135,9 +134,7 @@ def refuse_without_network(settings: Settings) -> None:
     if asks_network(settings):
         from .segment.inference import import_onnxruntime
 
-        import_onnxruntime(
-            alternative="--no-network (segment.enabled = false) to go by the points alone"
-        )
+        import_onnxruntime(alternative="--network never to go by the points alone")
 
 
 def start_building(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:

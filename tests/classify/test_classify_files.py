@@ -32,7 +32,7 @@ def test_a_copy_differs_in_its_classes_alone(tmp_path):
     town = make_town()
     classes = np.where(np.arange(len(town.xyz)) % 50 == 0, 9, 1)
     path, out = rich_file(tmp_path / "in.laz", town, classes), tmp_path / "out.laz"
-    result = CliRunner().invoke(app, ["classify", str(path), str(out)])
+    result = CliRunner().invoke(app, ["classify", str(path), "--out", str(out)])
     assert result.exit_code == 0 and "building points of" in result.output
     old, new = laspy.read(path), laspy.read(out)
     for name in old.point_format.dimension_names:

@@ -181,7 +181,7 @@ def edit(folder: Path) -> None:
 def build(folder: Path) -> None:
     built = build_file(folder / "parameters.jsonl", folder / "built")
     assert built.exit_code != 1, built.not_built
-    if check.count_invalid([folder / "built" / "buildings.city.jsonl"], 0.01):
+    if check.count_bad([check.check_file(folder / "built" / "buildings.city.jsonl", 0.01)]):
         raise AssertionError("built what is invalid")
 
 
@@ -214,7 +214,10 @@ def load(folder: Path) -> None:
 
 
 READERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
-    "check": (lambda folder: check.count_invalid([folder / FILES[0]], 0.01), FILES[:1]),
+    "check": (
+        lambda folder: check.count_bad([check.check_file(folder / FILES[0], 0.01)]),
+        FILES[:1],
+    ),
     "convert glb": (lambda folder: convert(folder, None, Made.glb), FILES),
     "convert obj": (lambda folder: convert(folder, None, Made.obj), FILES),
     "view": (view, FILES),

@@ -147,8 +147,7 @@ def list_ways(folder: Path) -> dict[str, Callable[[str], str]]:
         str(out),
         "--log-file",
         str(log),
-        "--log-level",
-        "debug",
+        "--verbose",
         "--restart",
     )
 
@@ -180,7 +179,9 @@ def list_ways(folder: Path) -> dict[str, Callable[[str], str]]:
         "evaluate": lambda given_address: (
             call("evaluate", str(run), given_address, "--out", str(out)) + read_files(out)
         ),
-        "classify": lambda given_address: call("classify", given_address, str(out / "c.laz")),
+        "classify": lambda given_address: call(
+            "classify", given_address, "--out", str(out / "c.laz")
+        ),
         "check": lambda given_address: call("check", given_address),
         "wrong command": lambda given_address: call(given_address),
         "from Python": api,

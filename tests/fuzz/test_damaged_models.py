@@ -103,17 +103,21 @@ def test_a_run_of_damaged_buildings_alone_is_refused(run_folder):
         assert code == 2, output
 
 
+def count_bad_solids(path):
+    return check.count_bad([check.check_file(path, 0.01)])
+
+
 def test_damaged_files_cannot_be_checked(run_folder, tmp_path_factory):
     for name, content in cases(damaged_files, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        code, output = answer(check.count_invalid, [run_folder / MODELS], 0.01)
+        code, output = answer(count_bad_solids, run_folder / MODELS)
         assert code == 2 and output.startswith("expected") and "got" in output, name
 
 
 def test_damaged_buildings_count_as_invalid(run_folder, tmp_path_factory, capsys):
     for name, content in cases(damaged_models, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        assert answer(check.count_invalid, [run_folder / MODELS], 0.01)[0] == 1, name
+        assert answer(count_bad_solids, run_folder / MODELS)[0] == 1, name
         assert (
             "1 solid, 1 valid, 0 invalid, 1 damaged building left out" in capsys.readouterr().out
         ), name
@@ -122,7 +126,7 @@ def test_damaged_buildings_count_as_invalid(run_folder, tmp_path_factory, capsys
 def test_solids_that_are_none_are_found_invalid(run_folder, tmp_path_factory, capsys):
     for name, content in cases(invalid_models, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        assert answer(check.count_invalid, [run_folder / MODELS], 0.01)[0] == 1, name
+        assert answer(count_bad_solids, run_folder / MODELS)[0] == 1, name
         assert "2 solids, 1 valid, 1 invalid" in capsys.readouterr().out, name
 
 

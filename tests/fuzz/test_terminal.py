@@ -91,7 +91,7 @@ def test_an_interrupt_ends_a_build_from_parameters(hiproof, town, tmp_path, monk
 
 @pytest.mark.parametrize("imported", ["hiproof.early", "numpy", "typer"])
 def test_an_interrupt_while_packages_are_imported_ends_without_a_traceback(imported):
-    command = [sys.executable, "-X", "importtime", "-m", "hiproof", "settings"]
+    command = [sys.executable, "-X", "importtime", "-m", "hiproof", "attributes"]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
     ) as process:

@@ -70,7 +70,7 @@ def demo_run(tmp_path_factory):
     files, out = demo_files(), tmp_path_factory.mktemp("demo")
     pytest.importorskip("pyarrow", reason="GeoParquet needs pyarrow (extra `city`)")
     everything = {"parquet": True, "citygml": "both", "osm_tags": True}
-    settings = hiproof.Settings.from_dict({"segment": {"enabled": False}, "write": everything})
+    settings = hiproof.Settings.from_dict({"segment": {"network": "never"}, "write": everything})
     request = hiproof.Request(
         (str(files["cloud"]),),
         out,

@@ -20,7 +20,7 @@ from hiproof.simulate import SOURCES
 from hiproof.status import Status
 from hiproof.write.parameters import building_record, parameters_line
 
-PLAIN = Settings.from_dict({"segment": {"enabled": False}})
+PLAIN = Settings.from_dict({"segment": {"network": "never"}})
 BUILDING_CLASS, SOME = 6, 12
 DELFT = Path(__file__).parents[3] / "shared" / "data" / "delft"
 GROUND, TREE = SOURCES.index("ground"), SOURCES.index("tree")

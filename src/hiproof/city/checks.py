@@ -70,10 +70,11 @@ def refuse_settings(settings: Settings) -> None:
     refuse_unknown_types(settings.fit)
     refuse_crs(settings.read)
     refuse_without_network(settings)
-    if settings.segment.enabled and (settings.segment.weights or settings.segment.device != "cpu"):
+    segment = settings.segment
+    if segment.network != "never" and (segment.weights or segment.device != "cpu"):
         from ..segment.inference import SHIPPED_WEIGHTS, load
 
-        load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
+        load(segment.weights or str(SHIPPED_WEIGHTS), segment.device)
 
 
 def refuse_unknown_types(fit: Any) -> None:

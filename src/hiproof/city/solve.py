@@ -20,13 +20,13 @@ from ..fit.align import Shift, find_shift
 from ..frames import Units
 from ..log import LOGGER
 from ..masking import mask
+from ..method import reconstruct
 from ..model import Building
 from ..parametric.override import Override, overridden
 from ..read.assign import PointGrid, grow_polygon
 from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import hashes, thin_to_count, without_repeats
-from ..reconstruct import reconstruct
 from ..stages import add_remark, distinct, largest_polygon, shift_remark
 from ..status import Doubt, Status
 from ..write.files import atomic_file

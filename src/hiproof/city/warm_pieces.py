@@ -91,9 +91,9 @@ def solid() -> None:
     """Plan cells, the closed shell, its quality and its texts; a building of three points is
     composed without a fit.
     """
-    from .. import reconstruct
     from ..compose import compose
     from ..frames import LocalFrame
+    from ..method import reconstruct
     from ..model import Part, Piece, Roof
     from ..write.head import FileHead
     from ..write.run_files import fragments

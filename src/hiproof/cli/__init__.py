@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from itertools import takewhile
 
-from ..early import INTERRUPTED, interrupt_as_usual
+from ..early import INTERRUPTED
 
 CUT_OFF = re.compile(r"//[^/@\s]*:(?!\d*(?:/|$))[^@]*$")  # an address that ends within its password
 KEPT = (
@@ -32,7 +32,6 @@ def main() -> None:
     remember(*addresses_in(sys.argv[1:]))
     log.start()
     news.listener = news.Lines(log.LOGGER.warning)
-    interrupt_as_usual()
     try:
         app()
     except HiproofError as error:

@@ -1,9 +1,14 @@
-"""All commands, each in a file of its name; the work is done elsewhere."""
+"""The command `hiproof`: its commands are imported when they are named, so that its help shows at
+once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib import import_module
+from itertools import groupby
 from typing import Annotated, Any
 
 import typer
@@ -11,29 +16,59 @@ from typer.core import TyperGroup
 
 from .. import __version__
 from ..masking import mask
-from .attributes import attributes
-from .build import build
-from .check import check
-from .classify import classify
-from .convert import convert
-from .demo import demo
-from .edit import edit
-from .evaluate import evaluate
-from .footprints import footprints
-from .load import load
-from .reconstruct import reconstruct
-from .report import report
-from .repro import repro
-from .segment import segment
-from .settings import settings
-from .status import status
-from .train import train
-from .view import view
-from .warm import warm
+from .command import Command, with_log_options
+from .commands import COMMANDS
 
 
-class MaskingGroup(TyperGroup):
-    """The commands, whose complaints about wrong usage hold no password of an argument."""
+class CommandTable(Mapping[str, Any]):
+    """All commands by name; each is imported when it is looked up."""
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
+        return import_command(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+@functools.cache
+def import_command(name: str) -> Any:
+    """Return the command `name`, whose module and function have its name."""
+    function = getattr(import_module(f".{name}", __package__), name)
+    single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    entry = COMMANDS[name]
+    add = single.command(name, cls=Command, epilog=f"Example: {entry.example}")
+    add(with_log_options(function))
+    command: Any = typer.main.get_command(single)
+    command.first_options = entry.first_options
+    return command
+
+
+class Commands(TyperGroup):
+    """The commands in groups; complaints about wrong usage hold no password of an argument."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands = CommandTable()  # type: ignore[assignment]
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(COMMANDS)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the groups of commands, then the options, as plain text: rich takes a while."""
+        self.format_usage(ctx, formatter)
+        self.format_help_text(ctx, formatter)
+        for group, names in groupby(COMMANDS, lambda name: COMMANDS[name].group):
+            with formatter.section(group):
+                formatter.write_dl([(name, COMMANDS[name].help) for name in names])
+        with formatter.section("Options"):
+            records = [param.get_help_record(ctx) for param in self.get_params(ctx)]
+            formatter.write_dl([record for record in records if record])
+        self.format_epilog(ctx, formatter)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         with mask_complaints():
@@ -59,17 +94,17 @@ def mask_complaints() -> Iterator[None]:
 
 
 app = typer.Typer(
-    cls=MaskingGroup,
+    cls=Commands,
     name="hiproof",
-    help="Airborne LiDAR point clouds into watertight, semantic, parametric LoD2 building models.",
+    help="Turn airborne LiDAR point clouds into watertight, semantic, parametric LoD2 models.",
+    epilog=f"Example: {COMMANDS['reconstruct'].example}",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
 
-def version(targets: bool) -> None:
-    if targets:
+def print_version(is_asked_for: bool) -> None:
+    if is_asked_for:
         print(f"hiproof {__version__}")
         raise typer.Exit
 
@@ -77,31 +112,8 @@ def version(targets: bool) -> None:
 @app.callback()
 def common(
     version: Annotated[
-        bool, typer.Option("--version", callback=version, is_eager=True, help="print the version")
+        bool,
+        typer.Option("--version", callback=print_version, is_eager=True, help="print the version"),
     ] = False,
 ) -> None:
     pass
-
-
-for command in (
-    reconstruct,
-    demo,
-    warm,
-    check,
-    settings,
-    attributes,
-    status,
-    load,
-    build,
-    edit,
-    evaluate,
-    report,
-    repro,
-    convert,
-    view,
-    classify,
-    footprints,
-    segment,
-    train,
-):
-    app.command()(command)

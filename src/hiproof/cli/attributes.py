@@ -7,8 +7,7 @@ import typer
 
 def attributes() -> None:
     """Print every attribute and table that a run writes, with kind, unit and meaning, as
-    Markdown.
-    """
+    Markdown."""
     from ..write.attribute_list import attributes_text
 
     typer.echo(attributes_text(), nl=False)

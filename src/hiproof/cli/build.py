@@ -9,6 +9,7 @@ import typer
 
 from ..log import count_things
 from .options import with_settings
+from .progress import show_progress
 
 
 def print_shapes(targets: bool) -> None:
@@ -32,7 +33,7 @@ def print_schema(targets: bool) -> None:
 @with_settings("write")
 def build(
     parameters: Annotated[
-        Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")
+        Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or as you changed it")
     ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
     shapes: Annotated[
@@ -41,7 +42,7 @@ def build(
             "--shapes",
             callback=print_shapes,
             is_eager=True,
-            help="print every roof type's parameters",
+            help="print the parameters of every roof type",
         ),
     ] = False,
     schema: Annotated[
@@ -55,17 +56,17 @@ def build(
     ] = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
-    """Build the models of a parameters.jsonl again, or of what a person made of it, drawn as the
-    file says or as options do.
+    """Make all files of a run again from its parameters.jsonl, which you may have edited.
 
     Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid
     solid, or unusable input.
     """
-    from ..parametric.run import build_file
-    from .running import Bar, graded_words
+    from .running import graded_words
 
-    with Bar() as bar:
-        built = build_file(parameters, out, lambda done: bar.update("build", done, None), changes)
+    with show_progress("build") as update:
+        from ..parametric.run import build_file
+
+        built = build_file(parameters, out, lambda done: update("build", done), changes)
     for id, reason in built.not_built:
         typer.echo(f"not built: building {id}: {reason}", err=True)
     typer.echo(

@@ -2,14 +2,61 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..log import count_things
-from ..read.damage import SkippedBuildings
+from .progress import Update, show_progress
+
+
+@dataclass
+class CheckedFile:
+    """How many solids of a file are valid, how many buildings are damaged, and which solids break
+    which rules (by val3dity's codes).
+    """
+
+    path: Path
+    solids: int = 0
+    damaged: int = 0
+    by_code: Counter[int] = field(default_factory=Counter)
+    findings: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
+
+    @property
+    def invalid(self) -> int:
+        return len(self.findings)
+
+    def describe(self) -> str:
+        """Count the solids in a line."""
+        codes = "".join(f", {n} with code {code}" for code, n in sorted(self.by_code.items()))
+        damaged = (
+            f", {count_things(self.damaged, 'damaged building')} left out" if self.damaged else ""
+        )
+        return (
+            f"{self.path}: {count_things(self.solids, 'solid')}, {self.solids - self.invalid} "
+            f"valid, {self.invalid} invalid{codes}{damaged}"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same for `--json`, with every finding."""
+        return {
+            "file": str(self.path),
+            "solids": self.solids,
+            "valid": self.solids - self.invalid,
+            "invalid": self.invalid,
+            "damaged": self.damaged,
+            "by_code": {str(code): n for code, n in sorted(self.by_code.items())},
+            "findings": [
+                {"id": id, "code": finding.code, "message": finding.message}
+                for id, findings in self.findings
+                for finding in findings
+            ],
+        }
 
 
 def check(
@@ -17,36 +64,46 @@ def check(
     planarity: Annotated[
         float, typer.Option(min=0.0, help="largest distance of a vertex from its face's plane, m")
     ] = 0.01,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of text")] = False,
 ) -> None:
-    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid or
-    cannot be read."""
-    raise typer.Exit(1 if count_invalid(files, planarity) else 0)
+    """Check that solids are valid by ISO 19107, with val3dity's codes.
+
+    Exit code: 0 all solids are valid, 1 some are invalid or cannot be read, 2 unusable input.
+    """
+    say = typer.echo if not as_json else lambda text: None
+    with show_progress("check") as update:
+        checked = [check_file(path, planarity, say, update) for path in files]
+    if as_json:
+        result = {"valid": not count_bad(checked), "files": [file.to_dict() for file in checked]}
+        typer.echo(json.dumps(result, indent=1))
+    raise typer.Exit(1 if count_bad(checked) else 0)
 
 
-def count_invalid(files: list[Path], planarity_m: float) -> int:
-    """How many solids of `files` are invalid or damaged; prints a line for each of them and a count
-    a file."""
+def count_bad(checked: list[CheckedFile]) -> int:
+    """Count the solids that are invalid and the buildings that are damaged."""
+    return sum(file.invalid + file.damaged for file in checked)
+
+
+def check_file(
+    path: Path,
+    planarity_m: float,
+    say: Callable[[str], None] = typer.echo,
+    update: Update = lambda *_: None,
+) -> CheckedFile:
+    """Check every solid of a file, and say a line for each invalid one and a count at the end."""
     from ..compose import check_solid
+    from ..read.damage import SkippedBuildings
     from ..read.solids import read_solids
 
-    invalid = 0
-    for path in files:
-        codes: Counter[int] = Counter()
-        total = bad = 0
-        left_out = SkippedBuildings()
-        for id, solid in read_solids(path, left_out):
-            total += 1
-            findings = check_solid(solid, planarity_m=planarity_m)
-            if findings:
-                bad += 1
-                codes.update({finding.code for finding in findings})
-                typer.echo(
-                    f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3])
-                )
-        by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
-        by_code += left_out.describe()
-        typer.echo(
-            f"{path}: {count_things(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}"
-        )
-        invalid += bad + left_out.count
-    return invalid
+    result, left_out = CheckedFile(path), SkippedBuildings()
+    for id, solid in read_solids(path, left_out):
+        result.solids += 1
+        update("check", result.solids)
+        findings = check_solid(solid, planarity_m=planarity_m)
+        if findings:
+            result.findings.append((id, findings))
+            result.by_code.update({finding.code for finding in findings})
+            say(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
+    result.damaged = left_out.count
+    say(result.describe())
+    return result

@@ -7,11 +7,15 @@ from typing import Annotated
 
 import typer
 
+from .progress import show_progress
+
 
 def classify(
     cloud: Annotated[Path, typer.Argument(help="LAS, LAZ or COPC file")],
-    out: Annotated[Path, typer.Argument(help="LAZ or LAS file to write")],
-    crs: Annotated[str | None, typer.Option(help="CRS of the cloud [default: as it says]")] = None,
+    out: Annotated[Path, typer.Option(help="LAZ or LAS file to write")],
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of the cloud (default: that of the file)")
+    ] = None,
     unit: Annotated[
         str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
     ] = None,
@@ -19,15 +23,15 @@ def classify(
     """Find ground (class 2) and buildings (6) by the shape of the cloud, and write a copy with
     these classes.
 
-    Points that were of these classes and are found to be neither become unclassified (1); all other
-    classes, and everything else of the file, stay as they are. Noise, water and bridges are left
-    alone.
+    Points of these classes that turn out to be neither become unclassified (1). Noise, water and
+    bridges keep their classes, as does everything else in the file.
     """
-    from ..classify.files import classify_file
-    from ..settings import Settings
+    with show_progress("classify"):
+        from ..classify.files import classify_file
+        from ..settings import Settings
 
-    read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
-    counts = classify_file(cloud, out, Settings().replace({"read": read}))
+        read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
+        counts = classify_file(cloud, out, Settings().replace({"read": read}))
     typer.echo(
         f"{out}: {counts['ground']:,} ground and {counts['building']:,} building points of "
         f"{counts['points']:,}"

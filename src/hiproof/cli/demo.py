@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 
 def demo(
-    folder: Annotated[Path, typer.Argument(help="folder for the results")] = Path("demo"),
+    out: Annotated[Path, typer.Option(help="folder for the results")] = Path("demo"),
 ) -> None:
-    """Run the main job on the bundled simulated neighbourhood, all roof types in it."""
-    from ..city.request import Request
-    from ..simulate import demo_files
+    """Model the 26 houses of a bundled, simulated neighbourhood, which has every roof type."""
     from .running import run_request
 
+    raise typer.Exit(run_request(lambda: make_request(out)))
+
+
+def make_request(out: Path) -> Any:
+    """Make the request of the demo.
+
+    The ground is that of the cloud: the terrain model beside it takes an extra, and a demo is the
+    same wherever it runs.
+    """
+    from ..city.request import Request
+    from ..simulate import demo_files
+
     files = {name: str(path) for name, path in demo_files().items()}
-    refuse_other_run(folder, files["cloud"])
-    # the ground is the cloud's own: the terrain model beside it takes an extra, and a demo is the
-    # same wherever it runs
-    code = run_request(Request((files["cloud"],), folder, files["footprints"], restart=True))
-    if code == 0:
-        typer.echo(
-            f"look at them: hiproof view {folder}; a page about them: hiproof report {folder}"
-        )
-    raise typer.Exit(code)
+    refuse_other_run(out, files["cloud"])
+    return Request((files["cloud"],), out, files["footprints"], restart=True)
 
 
 def refuse_other_run(folder: Path, cloud: str) -> None:

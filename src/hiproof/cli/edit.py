@@ -14,24 +14,24 @@ from ..log import count_things
 def edit(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     who: Annotated[
-        str | None, typer.Option(help="name under which edits are kept [default: the user's]")
+        str | None, typer.Option(help="name under which edits are kept (default: your user name)")
     ] = None,
     clouds: Annotated[
         Path | None,
         typer.Option(
             exists=True,
             file_okay=False,
-            help="folder in which the run's files lie now, where they were moved",
+            help="folder that now holds the inputs of the run, if they were moved",
         ),
     ] = None,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="port of the page [default: any that is free]")
+        int, typer.Option(min=0, max=65535, help="port of the page (default: a free one)")
     ] = 0,
 ) -> None:
-    """Open a page on this machine to go through doubtful buildings, mend and accept them.
+    """Open a page on this machine to check doubtful buildings and correct them.
 
-    What is accepted stands in edits.jsonl in the folder, which `--overrides` of the next run obeys.
-    Ctrl-C ends it.
+    Accepted edits go into edits.jsonl in the folder. Pass that file to the next run with
+    `--overrides`. Ctrl-C ends the page.
     """
     from ..edit.desk import Desk
     from ..edit.edits import EDITS_FILE

@@ -4,7 +4,9 @@ model.
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +14,7 @@ import typer
 
 from ..errors import InputError, OutputError
 from ..log import count_things
-from ..read.damage import SkippedBuildings
-from ..write.files import elsewhere
+from .progress import show_progress
 
 SHOWN_FIGURES = {
     "psd_mean": "PSD",
@@ -39,12 +40,12 @@ def evaluate(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     clouds: Annotated[
         list[str] | None,
-        typer.Argument(help="point files to measure against [default: those of the run]"),
+        typer.Argument(help="point files to measure against (default: those of the run)"),
     ] = None,
     footprints: Annotated[
         str | None,
         typer.Option(
-            help="building polygons [default: those of the run, else the models' own outlines]"
+            help="building polygons (default: those of the run, otherwise the models' outlines)"
         ),
     ] = None,
     layer: Annotated[
@@ -52,18 +53,26 @@ def evaluate(
     ] = None,
     reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="folder for evaluation.csv and .json [default: the run's]")
+        Path | None,
+        typer.Option(help="folder for evaluation.csv and .json (default: that of the run)"),
     ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print the figures as JSON instead of tables")
+    ] = False,
 ) -> None:
-    """Measure the models of a run: distances of points, shares, IoU and volume per building, per
-    type and overall.
-    """
-    from ..evaluate.evaluation import summarise, to_csv, to_json
-    from ..evaluate.run import evaluate_run
-    from ..write.files import atomic_file
+    """Measure the models of a run: distances of points, shares, IoU and volume of each building, of
+    each type and of all.
 
-    left_out = SkippedBuildings()
-    run = evaluate_run(folder, clouds or (), footprints, reference, layer, left_out)
+    The figures of each building go into evaluation.csv and evaluation.json.
+    """
+    with show_progress("measure"):
+        from ..evaluate.evaluation import summarise, to_csv, to_json
+        from ..evaluate.run import evaluate_run
+        from ..read.damage import SkippedBuildings
+        from ..write.files import atomic_file, elsewhere
+
+        left_out = SkippedBuildings()
+        run = evaluate_run(folder, clouds or (), footprints, reference, layer, left_out)
     left_out.refuse_all(model.is_damaged for model in run.models)
     if not run.clouds:
         raise InputError(
@@ -81,19 +90,25 @@ def evaluate(
         raise (
             elsewhere(error, f"hiproof evaluate {folder} --out FOLDER") if out is None else error
         ) from error
-    print_summary(summarise(run.figures), reference is not None)
-    typer.echo(
-        f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: "
-        f"{count_things(len(run.figures), 'building')}{left_out.describe()}"
-    )
-    unmeasured = sum(math.isnan(figures.quality.psd_mean) for figures in run.figures)
-    if unmeasured:
-        entries = count_things(unmeasured, "building")
+    if as_json:
+        typer.echo(json.dumps(summarise(run.figures), indent=1, allow_nan=False))
+    else:
+        print_summary(summarise(run.figures), reference is not None)
         typer.echo(
-            f"no distances of {entries} (no model, or no points): their means are the others'"
+            f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: "
+            f"{count_things(len(run.figures), 'building')}{left_out.describe()}"
         )
+        describe_gaps(run.figures)
     if left_out.exit_code:
         raise typer.Exit(left_out.exit_code)
+
+
+def describe_gaps(figures: Sequence[Any]) -> None:
+    """Say how many buildings have no distances, where any has none."""
+    unmeasured = sum(math.isnan(item.quality.psd_mean) for item in figures)
+    if unmeasured:
+        entries = count_things(unmeasured, "building")
+        typer.echo(f"{entries} without distances (no model, or no points) are not in the means")
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:

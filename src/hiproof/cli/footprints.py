@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..errors import SettingsError
+from .progress import show_progress
 
 
 def footprints(
@@ -18,18 +19,32 @@ def footprints(
     out: Annotated[Path, typer.Option(help="GeoPackage to write")],
     layer: Annotated[str | None, typer.Option(help="building (default) or building_part")] = None,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the clouds (default: as their files say)")
+        str | None, typer.Option(help="CRS of the clouds (default: that of their files)")
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(help="settings file (default: hiproof.toml beside the data)")
+        Path | None, typer.Option(help="settings file (default: hiproof.toml next to the data)")
     ] = None,
 ) -> None:
     """Fetch the building footprints of the clouds' extent from Overture Maps (extra `parquet`).
 
-    Pass the file to `hiproof reconstruct --footprints`, with or without a network. Example:
-
-    hiproof footprints tile.laz --out footprints.gpkg
+    Pass the file to `hiproof reconstruct --footprints`, with or without a network.
     """
+    if out.suffix.lower() != ".gpkg":
+        raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")
+    with show_progress("fetch"):
+        note = fetch_footprints(clouds, out, layer, crs, config)
+    sources = ", ".join(source["dataset"] for source in note["sources"])
+    typer.echo(
+        f"{out}: {note['footprints']:,} footprints of {note['name']} {note['release']} "
+        f"({note['licence']}; from {sources or 'unnamed sources'}). Attribute them as "
+        f"{note['attribution']}."
+    )
+
+
+def fetch_footprints(
+    clouds: list[str], out: Path, layer: str | None, crs: str | None, config: Path | None
+) -> dict[str, Any]:
+    """Write the footprints of the clouds' extent to `out`; returns where they come from."""
     from ..city.from_overture import keep_footprints
     from ..city.prepare import read_headers
     from ..city.request import Request
@@ -37,18 +52,10 @@ def footprints(
     from ..settings import Settings
     from .reconstruct import find_settings_file
 
-    if out.suffix.lower() != ".gpkg":
-        raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")
     config = config or find_settings_file(*clouds)
     settings = Settings.from_toml(config) if config else Settings()
     files = tuple(map(str, expand_paths(tuple(clouds))))
     request = Request(
         files, out, layer=layer, settings=settings.replace({"read": {"crs": crs}} if crs else {})
     )
-    note = keep_footprints(request, read_headers(files), out)
-    sources = ", ".join(source["dataset"] for source in note["sources"])
-    typer.echo(
-        f"{out}: {note['footprints']:,} footprints of {note['name']} {note['release']} "
-        f"({note['licence']}; from {sources or 'unnamed sources'}). Attribute them as "
-        f"{note['attribution']}."
-    )
+    return keep_footprints(request, read_headers(files), out)

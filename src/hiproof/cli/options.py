@@ -47,21 +47,15 @@ def with_options(command: Callable[..., None], sections: tuple[str, ...]) -> Cal
     """
     selection = [item for item in declared_settings() if not sections or item.section in sections]
     declared = [item for item in selection if item.field.metadata["option"]]
-    by_name: dict[str, list[Declared]] = {}
-    for item in declared:
-        by_name.setdefault(item.parameter, []).append(item)
     command_parameters = [
         p
         for p in inspect.signature(command, eval_str=True).parameters.values()
         if p.name != "changes"
     ]
-    parameters = [
-        *command_parameters,
-        *(make_parameter(name, same) for name, same in by_name.items()),
-    ]
+    parameters = [*command_parameters, *map(make_parameter, declared)]
 
     def run_command(**values: Any) -> None:
-        arguments = {name: values.pop(name) for name in by_name}
+        arguments = {item.parameter: values.pop(item.parameter) for item in declared}
         command(**values, changes=collect_changes(declared, arguments))
 
     run_command.__name__, run_command.__doc__ = command.__name__, command.__doc__
@@ -80,17 +74,18 @@ def declared_settings() -> list[Declared]:
     ]
 
 
-def make_parameter(name: str, same: list[Declared]) -> inspect.Parameter:
-    """The parameter `name` for those settings that are set together, None where it is not given."""
-    metadata = same[-1].field.metadata
-    metavar = "|".join(map(str, metadata["choices"])) or None
+def make_parameter(item: Declared) -> inspect.Parameter:
+    """Make the parameter of a setting, None where it is not given."""
+    metadata = item.field.metadata
     option = typer.Option(
-        help="; ".join(format_help(item.field) for item in same),
-        metavar=metavar,
-        rich_help_panel=same[0].heading,
+        help=format_help(item.field),
+        metavar="|".join(map(str, metadata["choices"])) or None,
+        rich_help_panel=item.heading,
     )
-    kind: Any = Annotated[OPTION_TYPES[same[0].field.type] | None, option]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+    kind: Any = Annotated[OPTION_TYPES[item.field.type] | None, option]
+    return inspect.Parameter(
+        item.parameter, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind
+    )
 
 
 OPTION_TYPES: dict[Any, Any] = {

@@ -8,11 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import SettingsError
-from ..log import LOGGER, Level, start
+from ..log import LOGGER, console_level, start
 from ..settings import Settings
+from .command import print_every_option
 from .options import parse_box, with_settings
 
 SETTINGS_FILE = "hiproof.toml"
+FURTHER = "Further options"  # heading of those that fewer people need
 
 
 @with_settings()
@@ -26,19 +28,26 @@ def reconstruct(
         str | None,
         typer.Option(
             help="building polygons: a file, an address, a PostGIS table, or overture for those of "
-            "Overture Maps (extra `parquet`); without them the cloud is split"
+            "Overture Maps (extra `parquet`); without them hiproof finds the buildings"
         ),
     ] = None,
     layer: Annotated[
-        str | None, typer.Option(help="layer of the footprints, where a file has several")
+        str | None,
+        typer.Option(
+            help="layer of the footprints, where a file has several", rich_help_panel=FURTHER
+        ),
     ] = None,
     where: Annotated[
-        str | None, typer.Option(help='SQL condition on the footprints, such as "year < 1950"')
+        str | None,
+        typer.Option(
+            help='SQL condition on the footprints, such as "year < 1950"', rich_help_panel=FURTHER
+        ),
     ] = None,
     bbox: Annotated[
         str | None,
         typer.Option(
-            help="only buildings in this box: xmin,ymin,xmax,ymax in the clouds' coordinates"
+            help="model only buildings in this box: xmin,ymin,xmax,ymax in the coordinates of the "
+            "clouds"
         ),
     ] = None,
     id_attribute: Annotated[
@@ -47,67 +56,82 @@ def reconstruct(
     terrain: Annotated[
         str | None,
         typer.Option(
-            help="terrain model (GeoTIFF; extra `terrain`); else the cloud's ground class"
+            help="terrain model (GeoTIFF; extra `terrain`); default: the clouds' ground points"
         ),
     ] = None,
     overrides: Annotated[
         str | None,
         typer.Option(
-            help="what is known better of some buildings (JSONL or a table); the fit obeys it"
+            help="values that you know of some buildings (JSONL or a table); hiproof keeps them "
+            "and fits the rest"
         ),
     ] = None,
     config: Annotated[
         Path | None,
         typer.Option(
-            help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)"
+            help="settings file, see `hiproof settings` (default: hiproof.toml next to the data)",
+            rich_help_panel=FURTHER,
         ),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(help="processes on this machine (default: as many as pay, a core each)"),
+        typer.Option(
+            help="number of worker processes (default: up to one per core, fewer for a small run)"
+        ),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")
+        str | None,
+        typer.Option(help="address of a Dask scheduler (extra `city`)", rich_help_panel=FURTHER),
     ] = None,
     restart: Annotated[
-        bool, typer.Option("--restart", help="begin anew in a folder that holds another run")
+        bool, typer.Option("--restart", help="discard an earlier run in this folder")
     ] = False,
     log_file: Annotated[
-        Path | None, typer.Option(help="keep the log from progress on here, added at the end")
+        Path | None, typer.Option(help="append the log to this file", rich_help_panel=FURTHER)
     ] = None,
-    log_level: Annotated[
-        Level, typer.Option(help="what of the log to show; debug also in the file")
-    ] = Level.warning,
+    help_all: Annotated[
+        bool,
+        typer.Option(
+            "--help-all",
+            is_eager=True,
+            callback=print_every_option,
+            help="show all options, in groups",
+        ),
+    ] = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
-    """Reconstruct the buildings of point clouds into CityGML, CityJSON, parameters and attributes.
+    """Model the buildings of point clouds as CityGML, CityJSON, parameters and tables.
 
-    Exit code: 0 all buildings were modelled or explained by their data, 1 an internal error, 2
-    unusable input.
+    Run the same command again to resume. Exit code: 0 every building has a model or a reason why
+    not, 1 an internal error, 2 unusable input.
     """
-    from ..city.request import Request
-    from ..read.pointcloud import expand_paths
     from .running import run_request
 
-    start(log_level, log_file)
+    start(console_level(), log_file)
     box = None if bbox is None else parse_box(bbox)
-    config = config or find_settings_file(*clouds, footprints)
-    request = Request(
-        clouds=tuple(map(str, expand_paths(tuple(clouds)))),
-        out=out,
-        footprints=footprints,
-        layer=layer,
-        where=where,
-        bbox=box,
-        id_attribute=id_attribute,
-        terrain=terrain,
-        overrides=overrides,
-        settings=(Settings.from_toml(config) if config else Settings()).replace(changes or {}),
-        processes=jobs,
-        scheduler=scheduler,
-        restart=restart,
-    )
-    raise typer.Exit(run_request(request))
+
+    def make_request() -> Any:
+        from ..city.request import Request
+        from ..read.pointcloud import expand_paths
+
+        file = config or find_settings_file(*clouds, footprints)
+        return Request(
+            clouds=tuple(map(str, expand_paths(tuple(clouds)))),
+            out=out,
+            footprints=footprints,
+            layer=layer,
+            where=where,
+            bbox=box,
+            id_attribute=id_attribute,
+            terrain=terrain,
+            overrides=overrides,
+            settings=(Settings.from_toml(file) if file else Settings()).replace(changes or {}),
+            processes=jobs,
+            scheduler=scheduler,
+            restart=restart,
+        )
+
+    raise typer.Exit(run_request(make_request))
 
 
 def find_settings_file(*inputs: str | None) -> Path | None:

@@ -9,44 +9,46 @@ import typer
 
 from ..errors import OutputError
 from ..log import count_things
-from ..read.damage import SkippedBuildings
-from ..write.files import elsewhere
+from .progress import show_progress
 
 
 def report(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     clouds: Annotated[
         list[str] | None,
-        typer.Argument(help="point files [default: those of the run, if still there]"),
+        typer.Argument(help="point files (default: those of the run)"),
     ] = None,
     footprints: Annotated[
-        str | None, typer.Option(help="building polygons [default: those of the run]")
+        str | None, typer.Option(help="building polygons (default: those of the run)")
     ] = None,
     layer: Annotated[str | None, typer.Option(help="layer of the footprints")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="file to write [default: report.html in the folder]")
+        Path | None, typer.Option(help="file to write (default: report.html in the folder)")
     ] = None,
 ) -> None:
-    """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings,
-    settings.
+    """Write a self-contained HTML page about a run: a map, quality charts and the 20 worst
+    buildings in 3D.
 
     Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable
     input.
     """
-    from ..evaluate.report import write_report
-    from ..evaluate.run import evaluate_run
+    with show_progress("measure"):
+        from ..evaluate.report import write_report
+        from ..evaluate.run import evaluate_run
+        from ..read.damage import SkippedBuildings
+        from ..write.files import elsewhere
 
-    path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
-    run = evaluate_run(
-        folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True
-    )
-    left_out.refuse_all(model.is_damaged for model in run.models)
-    try:
-        write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
-    except OutputError as error:
-        raise (
-            elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error
-        ) from error
+        path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
+        run = evaluate_run(
+            folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True
+        )
+        left_out.refuse_all(model.is_damaged for model in run.models)
+        try:
+            write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
+        except OutputError as error:
+            raise (
+                elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error
+            ) from error
     size = f"{path.stat().st_size / 1e6:.1f} MB"
     typer.echo(f"{path}: {count_things(len(run.models), 'building')}, {size}{left_out.describe()}")
     if left_out.exit_code:

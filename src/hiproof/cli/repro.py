@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..log import Level, start
+from .progress import show_progress
 
 
 def repro(
@@ -15,19 +15,19 @@ def repro(
         Path, typer.Argument(help="folder that a run kept of a failed building (OUT/failures/ID)")
     ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
-    log_level: Annotated[Level, typer.Option(help="what of the log to show")] = Level.warning,
 ) -> None:
-    """Run a building again that hiproof failed on, to repeat the failure or to see that it is
-    mended.
+    """Run a building again on which hiproof failed, to repeat the failure or to see that it is
+    fixed.
 
     Exit code: 0 the building has an outcome, 1 the failure repeats, 2 the folder cannot be used.
     """
-    from ..city.repro import solve_bundle
     from ..masking import mask
     from ..status import Status
 
-    start(log_level)
-    building, trace = solve_bundle(folder, out)
+    with show_progress("repeat"):
+        from ..city.repro import solve_bundle
+
+        building, trace = solve_bundle(folder, out)
     if trace:
         typer.echo(mask(trace), err=True)
     typer.echo(f"building {building.id}: {building.detail or building.status.value}")

@@ -1,57 +1,31 @@
-"""A run seen from the terminal: a bar while it works, a table at its end."""
+"""A run seen from the terminal: its progress while it works, a summary at its end."""
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING
 
-from ..city.run import Request, Summary, reconstruct_area
-from ..compiled import news
-from ..log import count_things
+from ..log import Level, console_level, count_things
 from ..status import Grade, Status
+from .progress import show_progress
+
+if TYPE_CHECKING:
+    from ..city.request import Request
+    from ..city.run import Summary
 
 
-def run_request(request: Request) -> int:
-    """Run a request and print its summary; returns the exit code."""
-    with Bar() as bar:
-        summary = reconstruct_area(request, bar.update)
-    print_summary(summary)
+def run_request(make_request: Callable[[], Request]) -> int:
+    """Run the request that is made and print its summary; returns the exit code.
+
+    Progress is shown before the request is made, since what it takes is imported then.
+    """
+    with show_progress("plan") as update:
+        from ..city.run import reconstruct_area
+
+        summary = reconstruct_area(make_request(), update)
+    if console_level() is not Level.error:
+        print_summary(summary)
     return summary.exit_code
-
-
-class Bar:
-    """A progress bar on standard error, none when that is no terminal."""
-
-    STEPS: ClassVar = {
-        "compile": "compiling, once for each version",
-        "sort": "reading points",
-        "solve": "fitting roofs",
-        "merge": "writing models",
-        "build": "building models",
-    }
-
-    def __enter__(self) -> Bar:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        console = Console(stderr=True)
-        self.bar = Progress(console=console, transient=True, disable=not console.is_terminal)
-        self.tasks: dict[str, Any] = {}
-        self.bar.start()
-        self.lines = news.listener
-        if console.is_terminal:
-            news.listener = functools.partial(self.update, "compile")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        news.listener = self.lines
-        self.bar.stop()
-
-    def update(self, step: str, finished: int, total: int | None) -> None:
-        if step not in self.tasks:
-            self.tasks[step] = self.bar.add_task(self.STEPS.get(step, step), total=total)
-        self.bar.update(self.tasks[step], completed=finished, total=total)
 
 
 def graded_words(by_quality: Mapping[str, int]) -> str:

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from .progress import show_progress
+
 
 def segment(
     clouds: Annotated[
@@ -16,10 +18,11 @@ def segment(
         typer.Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)"),
     ],
     out: Annotated[
-        Path, typer.Option(help="LAZ file for the labelled points; the table lies beside it as CSV")
+        Path,
+        typer.Option(help="LAZ file for the labelled points; the table goes next to it as CSV"),
     ],
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the clouds [default: as they say]")
+        str | None, typer.Option(help="CRS of the clouds (default: that of their files)")
     ] = None,
     unit: Annotated[
         str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
@@ -29,19 +32,21 @@ def segment(
     ] = "",
     device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
-    """Label every point with a roof type or not-roof, and name each building's type (extra
+    """Label every point with a roof type or not-roof, and name the type of each building (extra
     `network`).
 
-    The LAZ has the extra dimensions roof_type (number of the type in the table's columns, from 1; 0
-    is no roof), not_roof (probability) and building (the file's number on the command line, from
-    1). Exit code 1 if a building could not be labelled; the others are written all the same.
+    The LAZ has the extra dimensions roof_type (number of the type in the columns of the table, from
+    1; 0 is no roof), not_roof (a probability) and building (number of the file on the command line,
+    from 1). Exit code: 0 all buildings were labelled, 1 some were not, 2 unusable input.
     """
-    from ..segment.files import segment_files
-    from ..settings import Settings
+    with show_progress("label"):
+        from ..segment.files import segment_files
+        from ..settings import Settings
 
-    read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
-    settings = Settings().replace({"read": read, "segment": {"weights": weights, "device": device}})
-    failures = segment_files(clouds, out, settings)
+        read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
+        segment = {"weights": weights, "device": device}
+        settings = Settings().replace({"read": read, "segment": segment})
+        failures = segment_files(clouds, out, settings)
     for path, reason in failures.items():
         typer.echo(f"{path}: {reason}", err=True)
     if failures:

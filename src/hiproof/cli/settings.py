@@ -12,12 +12,13 @@ from ..settings import Settings
 
 
 def settings(
-    config: Annotated[Path | None, typer.Option(help="start from this settings file")] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="write the TOML here instead of printing it")
-    ] = None,
+    config: Annotated[Path | None, typer.Option(help="settings file whose values to print")] = None,
+    write: Annotated[Path | None, typer.Option(help="file to write instead of printing")] = None,
 ) -> None:
-    """Print every setting as TOML, with default, unit, bounds and meaning."""
+    """Print every setting as TOML, with its default, unit, bounds and meaning.
+
+    Keep the file as hiproof.toml next to your data, or pass it with `--config`.
+    """
     text = (Settings.from_toml(config) if config else Settings()).to_toml()
     if write is None:
         typer.echo(text, nl=False)

@@ -10,25 +10,33 @@ import typer
 
 def train(
     data: Annotated[
-        list[str], typer.Option(help="simulated, denhaag:FILE or roofn3d:DIR; give it again to mix")
+        list[str],
+        typer.Option(
+            help="simulated, denhaag:FILE or roofn3d:DIR; repeat the option to mix several"
+        ),
     ],
     out: Annotated[
         Path,
         typer.Option(
-            help="folder for weights, checkpoints, curve and model card; a run in it goes on"
+            help="folder for weights, checkpoints, curve and model card; resumes a run in it"
         ),
     ],
     types: Annotated[
-        str | None, typer.Option(help="roof types to tell apart, such as pyramid,gable,hip")
+        str | None, typer.Option(help="roof types to distinguish, such as pyramid,gable,hip")
     ] = None,
-    samples: Annotated[int | None, typer.Option(min=1, help="clouds to show in all")] = None,
-    epoch: Annotated[int | None, typer.Option(min=1, help="clouds between validations")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="every random draw follows from it")] = 1,
+    samples: Annotated[
+        int | None, typer.Option(min=1, help="total number of clouds to train on")
+    ] = None,
+    epoch: Annotated[
+        int | None, typer.Option(min=1, help="number of clouds between two validations")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="seed of all random numbers")] = 1,
     device: Annotated[str, typer.Option(help="auto, cpu or cuda")] = "auto",
-    threads: Annotated[int, typer.Option(min=1, help="processor threads")] = 1,
+    threads: Annotated[int, typer.Option(min=1, help="number of threads")] = 1,
 ) -> None:
-    """Train the network on labelled clouds; name the result in the setting segment.weights to use
-    it.
+    """Train the network that recognises roof types (extra `train`).
+
+    To use the result, name it in the setting segment.weights.
     """
     from ..learn import TrainSettings, train
 

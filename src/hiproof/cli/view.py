@@ -22,16 +22,16 @@ def view(
         typer.Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote"),
     ],
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="port on this machine [default: any that is free]")
+        int, typer.Option(min=0, max=65535, help="port on this machine (default: a free one)")
     ] = 0,
     browser: Annotated[
-        bool, typer.Option(help="open the browser, or only tell the address")
+        bool, typer.Option(help="open the browser; otherwise only print the address")
     ] = True,
 ) -> None:
-    """Show the models of a run in the browser, without a network: 3D Tiles are made of them first,
-    where they are not yet.
+    """Show the models of a run in your browser, without a network.
 
-    Turn, zoom, click on a building for its attributes. Ctrl-C ends it.
+    hiproof makes 3D Tiles of them first. Click a building to see its attributes. Ctrl-C ends the
+    page.
     """
     import webbrowser
 

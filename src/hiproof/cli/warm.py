@@ -6,21 +6,24 @@ from typing import Annotated
 
 import typer
 
+from .progress import show_progress
+
 
 def warm(
     everything: Annotated[
         bool,
         typer.Option(
             "--all",
-            help="also what only runs without footprints, with --parts one or the network call",
+            help="compile also what only runs without footprints, with --parts one or with the "
+            "network use",
         ),
     ] = False,
 ) -> None:
-    """Compile what runs call, once for each version, for this machine's own processor, so that the
-    first run starts at once.
+    """Compile for the processor of this machine, so that the first run starts at once.
+
+    This takes a minute or two, once for each version.
     """
     from ..city.tasks import ALL, MAIN_JOB, make_ready
-    from .running import Bar
 
-    with Bar():
+    with show_progress("compile"):
         make_ready(ALL if everything else MAIN_JOB, own=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,18 +9,13 @@ from typing import Any
 import numpy as np
 import shapely
 
+from .. import METHODS
 from ..errors import NoModelError
 from ..settings import ComposeSettings
 from ..status import Grade, Status
 from .roof import Part, Roof
 from .shown import compute_visible_areas, measure_visible_areas
 from .solid import Solid
-
-METHODS: dict[str, Callable[..., Any]] = {}
-"""Functions of the packages above that methods of a Building call.
-
-`hiproof/__init__.py` registers them by name.
-"""
 
 
 @dataclass(frozen=True)

@@ -407,7 +407,7 @@ def fit_within(
     ground: np.ndarray | None,
 ) -> Building:
     """The building fitted with what is given held."""
-    from ..reconstruct import reconstruct
+    from ..method import reconstruct
 
     types = override.types or ((override.type,) if override.type else ())
     changes = {"types": types} if types else {}

@@ -1,0 +1,192 @@
+"""What a command shows while it works: bars on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import functools
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from ..compiled import news
+from ..log import Level, console_level, count_things
+
+Update = Callable[..., None]
+"""Called with a stage, how much of it is done, and how much there is; None where nobody knows."""
+
+FIRST_S = 0.5  # seconds until the first line: a command that ends sooner needs none
+LINE_S = 10.0  # seconds between two lines about one stage: enough to see that it goes on
+RATE_S = 2.0  # seconds of a stage before a rate is shown: the first ones say little
+
+
+class Stage(NamedTuple):
+    """What happens in a stage, and what is counted there, empty where nothing is."""
+
+    text: str
+    unit: str = ""
+
+
+STAGES = {
+    "plan": Stage("reading inputs"),
+    "read": Stage("reading points", "point"),
+    "ground": Stage("finding ground and roofs", "square"),
+    "split": Stage("splitting touching houses", "block"),
+    "compile": Stage("compiling, once for each version", "function"),
+    "sort": Stage("sorting points by building", "file"),
+    "solve": Stage("fitting roofs", "building"),
+    "merge": Stage("writing files", "work tile"),
+    "build": Stage("building models", "building"),
+    "measure": Stage("measuring models"),
+    "classify": Stage("classifying points"),
+    "fetch": Stage("fetching footprints"),
+    "check": Stage("checking solids", "solid"),
+    "label": Stage("labelling points"),
+    "repeat": Stage("running the building again"),
+}
+
+
+@contextmanager
+def show_progress(stage: str) -> Iterator[Update]:
+    """Show that `stage` has begun, and yield the function that further news goes to."""
+    if console_level() is Level.error:
+        yield lambda *_: None
+        return
+    with StageBars(stage) if sys.stderr.isatty() else StageLines(stage) as shown:
+        yield shown.update
+
+
+class StageLines:
+    """A line when a stage begins, and one every LINE_S seconds while it goes on; none before the
+    command has run for FIRST_S.
+    """
+
+    def __init__(self, stage: str):
+        self.stage, self.finished, self.first, self.start = stage, 0, 0, time.monotonic()
+        self.total: int | None = None
+
+    def __enter__(self) -> StageLines:
+        self.is_shown, self.is_over = False, threading.Event()
+        self.thread = threading.Thread(target=self.repeat, daemon=True)
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.is_over.set()
+        self.thread.join()
+
+    def update(self, stage: str, finished: int = 0, total: int | None = None) -> None:
+        self.finished, self.total = finished, total
+        if stage != self.stage:
+            self.stage, self.first, self.start = stage, finished, time.monotonic()
+            if self.is_shown:
+                self.show_stage()
+
+    def show_stage(self) -> None:
+        total, unit = self.total, STAGES[self.stage].unit
+        print_line(self.stage, count_things(total, unit) if total else "")
+
+    def repeat(self) -> None:
+        if self.is_over.wait(FIRST_S):
+            return
+        self.is_shown = True
+        self.show_stage()
+        while not self.is_over.wait(LINE_S):
+            seconds = time.monotonic() - self.start
+            if seconds > LINE_S / 2:
+                unit = STAGES[self.stage].unit
+                text = describe(self.finished, self.total, seconds, unit, self.first)
+                print_line(self.stage, text)
+
+
+def print_line(stage: str, text: str) -> None:
+    about = f": {text}" if text else ""
+    print(f"hiproof: {STAGES[stage].text}{about}", file=sys.stderr, flush=True)
+
+
+class StageBars:
+    """A bar a stage on a terminal, gone when the command is done."""
+
+    def __init__(self, stage: str):
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn
+        from rich.text import Text
+
+        class Details(ProgressColumn):
+            """How much is done, how fast, and how long the rest takes."""
+
+            def render(self, task: Any) -> Text:
+                seconds, total = task.elapsed or 0.0, task.total
+                return Text(
+                    describe(
+                        int(task.completed),
+                        None if total is None else int(total),
+                        seconds,
+                        task.fields["unit"],
+                        task.fields["first"],
+                    )
+                )
+
+        columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), Details())
+        self.bars = Progress(*columns, console=Console(stderr=True), transient=True)
+        self.tasks: dict[str, Any] = {}
+        self.stage = ""
+        self.update(stage)
+
+    def __enter__(self) -> StageBars:
+        self.bars.start()
+        self.lines = news.listener
+        news.listener = functools.partial(self.update, "compile")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        news.listener = self.lines
+        self.bars.stop()
+
+    def update(self, stage: str, finished: int = 0, total: int | None = None) -> None:
+        if stage not in self.tasks:
+            fields: dict[str, Any] = {"unit": STAGES[stage].unit, "first": finished}
+            self.tasks[stage] = self.bars.add_task(STAGES[stage].text, total=total, **fields)
+        if stage not in (self.stage, "compile"):
+            self.end_stage()
+            self.stage = stage
+        self.bars.update(self.tasks[stage], completed=finished, total=total)
+
+    def end_stage(self) -> None:
+        """Fill the bar of the stage that another one follows."""
+        if self.stage:
+            task = self.tasks[self.stage]
+            total = self.bars.tasks[self.bars.task_ids.index(task)].total or 1
+            self.bars.update(task, completed=total, total=total)
+            self.bars.stop_task(task)
+
+
+def describe(finished: int, total: int | None, seconds: float, unit: str, first: int = 0) -> str:
+    """Describe in words how far a stage is, that began at `first` of `total` so many `seconds` ago.
+
+    >>> describe(120, 1000, 10.0, "building")
+    '120 of 1,000 buildings, 12 a second, 73 s left'
+    >>> describe(0, None, 31.4, "")
+    '31 s'
+    """
+    if total is None:
+        counted = [count_things(finished, unit)] if finished else []
+        return ", ".join([*counted, *([f"{seconds:.0f} s"] if seconds >= 1 else [])])
+    text = f"{finished:,} of {count_things(total, unit)}"
+    if not first < finished < total or seconds < RATE_S:
+        return text
+    rate = (finished - first) / seconds
+    remainder = format_seconds((total - finished) / rate)
+    return f"{text}, {rate:,.{0 if rate >= 10 else 1}f} a second, {remainder} left"
+
+
+def format_seconds(seconds: float) -> str:
+    """Write a duration in the largest unit that leaves two digits.
+
+    >>> format_seconds(73.4), format_seconds(400), format_seconds(10000)
+    ('73 s', '7 min', '2.8 h')
+    """
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,153 @@
+"""The command line itself: groups, help, examples, completion, progress, `--quiet` and `--json`."""
+
+import json
+import shlex
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from hiproof.cli import progress
+from hiproof.cli.app import app
+from hiproof.cli.command import choose_level
+from hiproof.cli.commands import COMMANDS, FIRST_OPTIONS
+from hiproof.cli.progress import show_progress
+from hiproof.errors import SettingsError
+from hiproof.log import Level, start
+from sample_models import sample_points, write_sample_run
+
+GROUPS = ["Reconstruct", "Inspect", "Edit", "Export", "Network"]
+COMMAND_LINE = typer.main.get_command(app).commands
+
+
+def invoke(*arguments, **options):
+    return CliRunner().invoke(app, arguments, prog_name="hiproof", **options)
+
+
+def list_options(text):
+    return {word for word in text.replace("│", " ").split() if word.startswith("--")}
+
+
+def test_commands_stand_in_groups():
+    lines = [line for line in invoke("--help").output.splitlines() if line.endswith(":")]
+    assert lines == [f"{group}:" for group in GROUPS] + ["Options:"]
+
+
+def test_the_help_imports_no_package_that_computes():
+    code = (
+        "import sys; from hiproof.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "print([m for m in ('numpy', 'shapely', 'rich', 'numba') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, "--help"], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_ends_with_an_example_that_can_be_run(name):
+    program, command, *arguments = shlex.split(COMMANDS[name].example.partition(" > ")[0])
+    assert (program, command) == ("hiproof", name)
+    text = invoke(name, "--help", env={"COLUMNS": "200"}).output.rstrip()
+    assert text.endswith(f"Example: {COMMANDS[name].example}")
+    COMMAND_LINE[name].make_context(name, arguments)
+
+
+def test_reconstruct_shows_ten_options_first_and_all_on_request():
+    first = list_options(invoke("reconstruct", "--help").output)
+    every = list_options(invoke("reconstruct", "--help-all", env={"COLUMNS": "200"}).output)
+    shown = {"--" + name.replace("_", "-") for name in FIRST_OPTIONS}
+    assert len(shown - {"--help-all"}) == 10
+    assert first - {"--help"} == shown
+    assert {opt for param in COMMAND_LINE["reconstruct"].params for opt in param.opts} - {
+        "clouds"
+    } <= every
+
+
+def test_a_shell_completes_commands_and_options():
+    def complete(words):
+        environment = {
+            "_HIPROOF_COMPLETE": "complete_bash",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(words.count(" ")),
+        }
+        return invoke(env=environment).output.split()
+
+    assert sorted(complete("hiproof rep")) == ["report", "repro"]
+    assert complete("hiproof reconstruct --building") == ["--building-class"]
+
+
+def test_quiet_and_verbose_choose_what_is_shown():
+    assert choose_level(True, False) is Level.error
+    assert choose_level(False, True) is Level.debug
+    assert choose_level(False, False) is Level.warning
+    with pytest.raises(SettingsError, match="got both"):
+        choose_level(True, True)
+
+
+@pytest.fixture
+def show_stages(monkeypatch, capsys):
+    """Lines on standard error of the stages that a function goes through, without a wait."""
+    monkeypatch.setattr(progress, "FIRST_S", 0.0)
+
+    def show(work, level=Level.warning):
+        start(level)
+        with show_progress("plan") as update:
+            time.sleep(0.05)
+            work(update)
+        return capsys.readouterr().err.splitlines()
+
+    return show
+
+
+def test_a_line_says_when_a_stage_begins(show_stages):
+    def work(update):
+        for stage, total in (("sort", 2), ("solve", 1000)):
+            for finished in range(3):
+                update(stage, finished, total)
+
+    assert show_stages(work) == [
+        "hiproof: reading inputs",
+        "hiproof: sorting points by building: 2 files",
+        "hiproof: fitting roofs: 1,000 buildings",
+    ]
+
+
+def test_a_line_says_how_far_a_long_stage_is(show_stages, monkeypatch):
+    monkeypatch.setattr(progress, "LINE_S", 0.02)
+
+    def work(update):
+        update("solve", 0, 100)
+        update("solve", 25, 100)
+        time.sleep(0.2)
+
+    assert "hiproof: fitting roofs: 25 of 100 buildings" in show_stages(work)
+
+
+def test_quiet_shows_nothing(show_stages):
+    assert show_stages(lambda update: update("solve", 1, 2), Level.error) == []
+
+
+def test_a_command_that_ends_at_once_shows_no_progress(capsys):
+    start()
+    with show_progress("plan") as update:
+        update("solve", 0, 10)
+    assert capsys.readouterr().err == ""
+
+
+def test_check_and_evaluate_print_json(tmp_path):
+    """A gable and a block with a courtyard, measured on points drawn from themselves."""
+    write_sample_run(tmp_path)
+    np.savetxt(tmp_path / "points.xyz", sample_points())
+    checked = json.loads(invoke("check", str(tmp_path / "buildings.city.jsonl"), "--json").stdout)
+    assert checked["valid"]
+    assert [(file["solids"], file["invalid"]) for file in checked["files"]] == [(2, 0)]
+    figures = json.loads(
+        invoke("evaluate", str(tmp_path), str(tmp_path / "points.xyz"), "--json").stdout
+    )
+    assert {kind: row["buildings"] for kind, row in figures.items()}["gable"] == 1
+    assert figures["all"]["share_within_20cm"]["median"] > 0.99
