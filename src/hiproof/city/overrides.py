@@ -20,7 +20,7 @@ from ..masking import mask
 from ..parametric.file import HEAD_KEY, objects
 from ..parametric.override import KEYS, Override, read_override
 from ..read.attribute_columns import make_known_condition, restore_declared_types
-from ..read.footprints import attribute_rows, translate_read_errors
+from ..read.footprints import attribute_rows
 from ..write.files import atomic
 from .ledger import Ledger
 from .merge import tile_parts
@@ -129,6 +129,8 @@ def is_other_line(record: Any) -> bool:
 def table_records(path: str) -> list[dict[str, Any]]:
     """The rows of a table; numbers that a CSV holds as text become numbers."""
     import pyogrio
+
+    from ..read.vector_file import translate_read_errors
 
     def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
         meta, _, _, columns = translate_read_errors(

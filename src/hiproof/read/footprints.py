@@ -1,4 +1,4 @@
-"""Building footprints from whatever pyogrio reads: every feature becomes one Footprint or more,
+"""Building footprints from files and databases: every feature becomes one Footprint or more,
 none is lost.
 """
 
@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyogrio
 import shapely
-from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from pyproj import CRS
 
 from ..errors import InputError, InputWarning
@@ -22,7 +20,6 @@ from ..log import count_things
 from ..masking import remember
 from ..model import Footprint
 from ..settings import Settings
-from .attribute_columns import make_known_condition, restore_declared_types
 from .crs import (
     describe_crs,
     find_units,
@@ -33,15 +30,12 @@ from .crs import (
     same_horizontal,
 )
 from .database import is_database, read_table, table_crs
-from .features import read_layer
 from .geoparquet import is_parquet
-from .layers import find_source, list_layers
 from .operations import find_operation, warn_if_coarse
 from .overlap import format_box, refuse_degrees
-from .parquet_table import parquet_crs, read_parquet
+from .plain_geopackage import Features, is_geopackage, read_plain_crs, read_plain_geopackage
 from .polygons import is_surface, simple_polygons
 from .remote import is_url
-from .wkb import decode_geometries
 
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
 """What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
@@ -122,13 +116,14 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     if is_database(path):
         return plan_crs(table_crs(str(path)))
     if is_parquet(path):
+        from .parquet_table import parquet_crs
+
         return plan_crs(parquet_crs(path))
-    source, layer = translate_read_errors(
-        lambda: find_source(str(path), choose_layer(path, layer)), path
-    )
-    return plan_crs(
-        translate_read_errors(lambda: pyogrio.read_info(source, layer=layer), path)["crs"]
-    )
+    if is_geopackage(path) and (code := read_plain_crs(path, layer)) is not None:
+        return plan_crs(code)
+    from .vector_file import vector_file_crs
+
+    return plan_crs(vector_file_crs(path, layer))
 
 
 def plan_crs(text: str | CRS | None) -> CRS | None:
@@ -139,33 +134,15 @@ def plan_crs(text: str | CRS | None) -> CRS | None:
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
 
-def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
-    """`layer`, or the only layer of a file that holds geometries.
-
-    Raises InputError, listing them, where several do.
-    """
-    if layer is not None:
-        return layer
-    layer_names = translate_read_errors(lambda: list_layers(str(path)), path)
-    layers = [name for name, geometry in layer_names if geometry is not None]
-    if len(layers) > 1:
-        raise InputError(
-            f"expected one layer of footprints in {path}, got {len(layers)}: "
-            f"{', '.join(map(str, layers))}; "
-            "name one with --layer"
-        )
-    return layers[0] if layers else None
-
-
 def read_features(
     path: str | Path,
     layer: str | int | None,
     where: str | None = None,
     bbox: Box | None = None,
     bbox_crs: CRS | None = None,
-) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
-    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and
-    attribute columns.
+) -> Features:
+    """Metadata (fields, crs), feature numbers, shapely geometries (None where a feature has none)
+    and attribute columns.
 
     Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
     """
@@ -173,53 +150,32 @@ def read_features(
     if is_database(path):
         return read_table(str(path), where)
     refuse_missing(path)
-    if is_parquet(path):
-        parquet = read_parquet(
-            path, layer, where, lambda crs: bbox and box_in(plan_crs(crs), bbox, bbox_crs)
-        )
-        refuse_nothing(path, len(parquet[1]), parquet[0]["total_bounds"], where, bbox)
-        refuse_lines(parquet[2], path)
-        return parquet
-    source, layer = translate_read_errors(
-        lambda: find_source(str(path), choose_layer(path, layer)), path
+    features = read_file(
+        path, layer, where, lambda crs: bbox and box_in(plan_crs(crs), bbox, bbox_crs)
     )
-    info = translate_read_errors(lambda: pyogrio.read_info(source, layer=layer), path)
-    selection = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
-    meta, numbers, wkb, columns, as_text = translate_read_errors(
-        lambda: read_layer(source, layer, **selection), path, info
-    )
-    if as_text:
-        names = ", ".join(as_text)
-        warnings.warn(
-            f"{path}: read as text, for a value does not fit the attribute's type: {names}",
-            InputWarning,
-        )
-    if wkb is None:
-        raise InputError(
-            f"expected polygons in {path}, got a table without geometry; name another file or layer"
-        )
-    refuse_nothing(path, len(wkb), info["total_bounds"], where, bbox)
-    geometries = decode_geometries(wkb)
+    meta, _, geometries, _ = features
+    refuse_nothing(path, len(geometries), meta["total_bounds"], where, bbox)
     refuse_lines(geometries, path)
+    return features
 
-    def read_column(name: str) -> np.ndarray:
-        # of all columns: in some formats those left out are empty to the condition as well
-        known_values: dict[str, Any] = {
-            **selection,
-            "layer": layer,
-            "where": make_known_condition(name, where),
-        }
-        entries, *_, values, _ = translate_read_errors(
-            lambda: read_layer(source, read_geometry=False, **known_values), path, info
-        )
-        return values[list(entries["fields"]).index(name)]
 
-    return (
-        meta,
-        numbers,
-        geometries,
-        restore_declared_types(meta["fields"], meta["dtypes"], columns, read_column),
-    )
+def read_file(
+    path: str | Path,
+    layer: str | int | None,
+    where: str | None,
+    make_box: Callable[[Any], Box | None],
+) -> Features:
+    """The features of a file, by its kind; `make_box` gives the box to read in the file's CRS."""
+    if is_parquet(path):
+        from .parquet_table import read_parquet
+
+        return read_parquet(path, layer, where, make_box)
+    if is_geopackage(path) and where is None and make_box(None) is None:
+        if (features := read_plain_geopackage(path, layer)) is not None:
+            return features
+    from .vector_file import read_vector_file  # GDAL, which the others do without
+
+    return read_vector_file(path, layer, where, make_box)
 
 
 def refuse_nothing(
@@ -275,45 +231,6 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
     if not names_place(crs):
         return tuple(np.array(bbox) * compare_units(bbox_crs, crs))
     return make_transformer(bbox_crs, crs).transform_bounds(*bbox)
-
-
-def translate_read_errors(
-    read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None
-) -> Any:
-    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that
-    helps; with the `info` of a layer, its attributes for a condition that does not go with them.
-    """
-    try:
-        with warnings.catch_warnings():
-            # pyogrio remarks on measured geometries and mixed layers, which are fine
-            warnings.simplefilter("ignore")
-            return read()
-    # ValueError: a condition on other files than databases
-    except (FeatureError, ValueError) as error:
-        if info is None or "SQL" not in str(error):
-            raise unreadable(path, error) from error
-        reason, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
-        raise InputError(
-            f"expected --where in SQL on the attributes of {path} ({names}), got: {reason}; use "
-            "these names"
-        ) from error
-    except DataLayerError as error:
-        layers = ", ".join(str(name) for name, _ in list_layers(str(path)))
-        raise InputError(
-            f"expected a layer of {path} (it has {layers}), got: {error}; use one of these"
-        ) from error
-    except (DataSourceError, OSError, RuntimeError) as error:
-        raise unreadable(path, error) from error
-
-
-def unreadable(path: str | Path, error: Exception) -> InputError:
-    # what follows is advice on GDAL's own options
-    reason = str(error).partition("; It might help")[0].rstrip(".")
-    return InputError(
-        f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, "
-        f"got: {reason}; "
-        "check the file, or convert it with ogr2ogr"
-    )
 
 
 def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:
