@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import sqlite3
 import warnings
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 import numpy as np
 import shapely
@@ -20,6 +23,7 @@ from ..errors import InputError, OutputError, SettingsError
 from ..log import LOGGER, count_things
 from ..masking import masked_values
 from ..read.overture import TYPES, OvertureFootprints, is_overture, read_overture
+from ..read.plain_geopackage import is_geopackage, open_database
 from ..write.files import atomic
 from .request import Request
 
@@ -140,13 +144,12 @@ def read_source(path: str | None) -> dict[str, Any] | None:
     """Where the footprints of a GeoPackage come from, None where it does not tell or is not
     there.
     """
-    import pyogrio
-    from pyogrio.errors import DataSourceError
-
-    if not path or not str(path).endswith(".gpkg") or not Path(path).is_file():
+    if not path or not is_geopackage(path):
         return None
     try:
-        told = pyogrio.read_info(path, layer=0)["dataset_metadata"] or {}
-        return json.loads(told[SOURCE])
-    except (DataSourceError, KeyError, ValueError):
+        with closing(open_database(path)) as database:
+            texts = database.execute("select metadata from gpkg_metadata").fetchall()
+        items = (item for (text,) in texts for item in ElementTree.fromstring(text).iter("MDI"))
+        return next(json.loads(item.text or "") for item in items if item.get("key") == SOURCE)
+    except (sqlite3.Error, ElementTree.ParseError, ValueError, StopIteration):
         return None
