@@ -1,10 +1,18 @@
 """What volumes have in common is equal in the model, and what they do not is not; a house that bends ends its wings on one line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from hiproof.fit.union import agree, fit_building
+from hiproof.fit.union.agree import hide_again, roof_misfit
+from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.finish import found_planes
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.scene import scene_of
+from hiproof.fit.union.volumes import LEVEL, OFFSET, base_only
 from hiproof.model import Roof
 from points_of_roofs import sample_heights
 
@@ -87,3 +95,21 @@ def test_a_bent_house_is_two_wings_that_meet_on_one_line(angle):
 def grid_over(outline):
     x0, y0, x1, y1 = outline.bounds
     return np.stack(np.meshgrid(np.arange(x0, x1, 0.25), np.arange(y0, y1, 0.25)), axis=-1).reshape(-1, 2)
+
+
+def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
+    """Of a church, the gable that showed over a third of the nave came out above the other's points."""
+    outline = shapely.box(0.0, 0.0, 20.0, 8.0)
+    points = sample_heights(lambda x, y: 5.0 + 0.0 * x, outline, 5.0, 0.02)
+    plan = lay_out_plan(points, outline)
+    scene = scene_of(plan, outline, [0.0], 3.0, 0.2, allowed_shapes(()))
+    volumes = np.repeat(base_only(5.0 - plan.frame.origin[2]), 3, axis=0)
+    volumes[0, OFFSET + LEVEL] -= 9.0
+    volumes[1, OFFSET + LEVEL] -= 0.01  # over all of it, hidden
+    found = [found_planes(volume, scene) for volume in volumes]
+    risen = replace(found[1], rows=found[1].rows + [0.0, 0.0, 0.4])
+    assert roof_misfit(volumes, [found[0], risen, found[2]], scene) > 0.5 * scene.n
+    planes = hide_again(volumes, [found[0], risen, found[2]], scene)
+    assert roof_misfit(volumes, planes, scene) == roof_misfit(volumes, found, scene)
+    shifted = replace(found[2], rows=found[2].rows + [0.0, 0.0, 0.02])
+    assert hide_again(volumes, [*found[:2], shifted], scene)[2] is shifted

@@ -23,6 +23,7 @@ from .finish import (
     SIGN,
     Planes,
     cost_of,
+    found_planes,
     normal_equations,
     proper,
     weighted_moments,
@@ -43,6 +44,8 @@ HELD = 1e-6  # an equation that the others leave so little of holds by them
 # Share of the points that agreement may leave unexplained besides. Steep planes that agree below their neighbours may
 # rise above these, which only the whole roof's misfit shows: each volume's own points lie where it shows alone.
 MOST_WORSE_SHARE = 0.02
+# by which the points over which one volume shows may cost more under its fitted planes
+RISEN_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -105,16 +108,41 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
 
 def roof_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
     """Sum up what all points cost (points) under `planes`, each volume within its rectangle."""
+    return float(misfits_under(volumes, planes, scene)[0].sum())
+
+
+def misfits_under(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return what each point costs under `planes`, and which volume shows there: two arrays (n,)."""
     n = scene.n
-    heights = np.full(n, -np.inf)
-    for volume, own in zip(volumes, planes, strict=True):
+    heights, top = np.full(n, -np.inf), np.zeros(n, int)
+    for k, (volume, own) in enumerate(zip(volumes, planes, strict=True)):
         u, v = scene.U[int(volume[DIRECTION]), :n], scene.V[int(volume[DIRECTION]), :n]
         inside = (u >= volume[U0]) & (u <= volume[U1]) & (v >= volume[V0]) & (v <= volume[V1])
         within = np.flatnonzero(inside)
         rows = own.rows[np.isfinite(own.rows[:, 2])]
         z = (rows @ np.array([u[within], v[within], np.ones(len(within))])).min(axis=0)
-        heights[within] = z if volume[REPLACES] else np.maximum(heights[within], z)
-    return float(misfits(scene.z[:n], heights, scene).sum())
+        shows = np.full(len(within), True) if volume[REPLACES] else z > heights[within]
+        heights[within[shows]], top[within[shows]] = z[shows], k
+    return misfits(scene.z[:n], heights, scene), top
+
+
+def hide_again(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> list[Planes]:
+    """Return the planes, as the search found them where a volume rises above others and fits less.
+
+    Planes are fitted to the points over which their volume shows. Where it lies hidden, such as one
+    of two gables of nearly the same slopes, they may come out above the other.
+    """
+    planes = list(planes)
+    found = [found_planes(row, scene) for row in volumes]
+    before, _ = misfits_under(volumes, found, scene)
+    while True:
+        after, top = misfits_under(volumes, planes, scene)
+        worse = np.bincount(top, after - before, len(planes))
+        worse[[own is as_found for own, as_found in zip(planes, found, strict=True)]] = 0.0
+        k = int(np.argmax(worse - RISEN_SHARE * np.bincount(top, minlength=len(planes))))
+        if worse[k] <= RISEN_SHARE * np.count_nonzero(top == k):
+            return planes
+        planes[k] = found[k]
 
 
 def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked], scene: Scene) -> Fit | None:

@@ -149,6 +149,12 @@ def planes_as_found(volume: np.ndarray, there: list[int], points: np.ndarray, sc
     return Planes(rows, cost, np.zeros((SIDES + 1, 3, 0)), np.zeros((0, 0)))
 
 
+def found_planes(volume: np.ndarray, scene: Scene) -> Planes:
+    """The planes of a volume as the search left them."""
+    there = np.flatnonzero(np.isfinite(volume[OFFSET : OFFSET + LEVEL + 1])).tolist()
+    return planes_as_found(volume, there, np.zeros((3, 0)), scene)
+
+
 def facings(found: np.ndarray, sides: list[Side], there: list[int], pair: int) -> list[tuple[float, float]]:
     """Ways (2 leans each) for planes `pair` and the next to face other than along the axis: as `found` (4,), square to their
     sides or both to one of them. A plane that is not `there` has no lean."""

@@ -11,15 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from .agree import Agreement, agreed
+from .agree import Agreement, agreed, hide_again
 from .box import Box, box_around
 from .cants import Known
-from .finish import Planes, planes_as_found
+from .finish import Planes, found_planes
 from .regions import Site
 from .scene import Scene
 from .sides import Side
 from .unite import Drawn, Ends, drawn, ends_within
-from .volumes import OFFSET, PLANES, U0, V1
+from .volumes import U0, V1
 from .whole import PLACE, Whole
 from .window import forget_settled, open_window, restore
 
@@ -89,7 +89,8 @@ def draw_in_groups(volumes: np.ndarray, ends: Ends, site: Site, known: Known) ->
     """
     if len(volumes) <= MOST_AT_ONCE:
         roof = drawn(volumes, ends, site.scene, known)
-        agreement = agreed(volumes, roof.sides, roof.planes, site.scene)
+        planes = hide_again(volumes, roof.planes, site.scene)
+        agreement = agreed(volumes, roof.sides, planes, site.scene)
         return replace(roof, planes=agreement.planes), agreement
     whole = Whole(site.scene, site.plan, site.outline, volumes)
     sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
@@ -106,14 +107,9 @@ def draw_in_groups(volumes: np.ndarray, ends: Ends, site: Site, known: Known) ->
         for k in group:
             at = numbers.index(k)
             sides[k], planes[k] = roof.sides[at], together[at]
+    planes = hide_again(volumes, planes, site.scene)
     agreement = Agreement(planes, {}, np.zeros((0, 0)), np.zeros(0))
     return Drawn(volumes, sides, planes, sum(own.cost + own.price for own in planes)), agreement
-
-
-def found_planes(volume: np.ndarray, scene: Scene) -> Planes:
-    """The planes of a volume as the search left them."""
-    there = np.flatnonzero(np.isfinite(volume[OFFSET : OFFSET + PLANES])).tolist()
-    return planes_as_found(volume, there, np.zeros((3, 0)), scene)
 
 
 def hold(planes: Planes) -> Planes:
