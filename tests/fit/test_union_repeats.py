@@ -20,7 +20,7 @@ from hiproof.fit.union.volumes import (
     base_only,
     roof_heights,
 )
-from points_of_roofs import sampled
+from points_of_roofs import sample_heights
 from union_scenes import random_volume
 
 OUTLINE = shapely.box(-12, -5, 12, 5)
@@ -55,7 +55,7 @@ def volumes_with_one(base_m):
 
 @pytest.mark.parametrize("dormers", [DORMERS, DORMERS[:1], (DORMERS[0], DORMERS[4])])
 def test_each_dormer_of_a_row_is_found_from_one_of_them(dormers):
-    points = sampled(height_with(dormers), OUTLINE, 4.0, 0.02)
+    points = sample_heights(height_with(dormers), OUTLINE, 4.0, 0.02)
     plan = lay_out_plan(points, OUTLINE)
     scene = scene_of(plan, OUTLINE, [0.0], 3.0, 0.2, allowed_shapes(()))
     found = repeat_volumes(volumes_with_one(plan.frame.origin[2]), scene)
