@@ -162,14 +162,10 @@ class ClassifiedPoints:
         places = np.column_stack([grid_x.ravel(), grid_y.ravel()])
         inside = shapely.intersects_xy(outline, places[:, 0], places[:, 1])
         value = np.zeros(len(places))
-        from scipy.spatial import cKDTree  # a tenth of a second, which most runs need not spend
-
-        to_roof = cKDTree(roof).query(places[inside], distance_upper_bound=FARTHEST_ROOF_M)[0]
-        to_ground = cKDTree(ground).query(places[inside], distance_upper_bound=BARE_REACH_M)[0]
         spacing = float(np.clip(estimate_spacing(roof), NEAREST_ROOF_M, FARTHEST_ROOF_M))
-        is_roof = to_roof < spacing
-        bare = np.where(is_roof, -ROOF_COST, np.where(np.isfinite(to_ground), 1.0, -UNSEEN_COST))
-        value[inside] = bare
+        is_roof = mark_near(roof, spacing, x, y).ravel()[inside]
+        is_seen = mark_near(ground, BARE_REACH_M, x, y).ravel()[inside]
+        value[inside] = np.where(is_roof, -ROOF_COST, np.where(is_seen, 1.0, -UNSEEN_COST))
         return cls(outline, roof, ground, spacing, node, x, y, value.reshape(grid_x.shape))
 
     def pieces(self) -> Iterator[shapely.Polygon]:
@@ -225,6 +221,37 @@ def first_dense(sorted_along: np.ndarray, spacing: float, largest: float) -> flo
     width = sorted_along[largest - 1 :] - sorted_along[: len(sorted_along) - largest + 1]
     dense = np.flatnonzero(width <= spacing)
     return float(sorted_along[dense[0]]) if len(dense) else None
+
+
+def mark_near(points: np.ndarray, distance_m: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Whether each place (rows, columns) of an even grid lies less than `distance_m` from any of
+    the `points` (n, 2).
+
+    `x` (columns,) and `y` (rows,) are the places' coordinates.
+    """
+    marks = np.zeros((len(y), len(x)), bool)
+    columns, x_squares = list_near(points[:, 0], distance_m, x)
+    rows, y_squares = list_near(points[:, 1], distance_m, y)
+    near = y_squares[:, :, None] + x_squares[:, None, :] < distance_m**2
+    point, row, column = np.nonzero(near)
+    marks[rows[point, row], columns[point, column]] = True
+    return marks
+
+
+def list_near(
+    values: np.ndarray, distance_m: float, places: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of the even `places` on an axis those that may lie within `distance_m` of each of the
+    `values` (n,), by their numbers (n, k), and the squares of their distances, infinite beyond an
+    end.
+    """
+    step = places[1] - places[0] if len(places) > 1 else distance_m
+    reach = math.ceil(distance_m / step)
+    nearest = np.rint((values - places[0]) / step).astype(np.int64)
+    numbers = nearest[:, None] + np.arange(-reach, reach + 1)
+    selection = np.clip(numbers, 0, len(places) - 1)
+    squares = np.where(selection == numbers, (places[selection] - values[:, None]) ** 2, np.inf)
+    return selection, squares
 
 
 def estimate_spacing(roof: np.ndarray) -> float:

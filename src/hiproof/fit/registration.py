@@ -64,6 +64,9 @@ SQUARE_M = 50.0
 RASTER_MARGIN = round((FARTHEST_SHIFT_M + 1.2) / RASTER_PITCH_M)
 """Pitches of raster around the points, so that no shift leads out of it."""
 
+ROWS_AT_ONCE = 100
+"""Rows of a raster that are smoothed at once: some megabytes."""
+
 MOST_SAMPLE_POINTS = 30_000
 """Points of a cell that are used, evenly thinned: more do not change a shift by a centimetre."""
 
@@ -256,7 +259,9 @@ def make_cell(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
     inside = blur(rasterise(polygons, lower, shape), BLUR_M / RASTER_PITCH_M)
     i, j = (np.rint(xy / RASTER_PITCH_M) - lower).astype(int).T
     _, squares = number_cells(np.floor(xy / SQUARE_M))
-    costs = -np.log(STRAY + (1.0 - STRAY) * inside)
+    inside *= 1.0 - STRAY
+    inside += STRAY
+    costs = np.negative(np.log(inside, out=inside), out=inside)
     return Cell(
         (float(lower[0]), float(lower[1])),
         squares,
@@ -274,16 +279,27 @@ def blur(raster: np.ndarray, sigma: float) -> np.ndarray:
     reach = int(3.0 * sigma + 0.5)
     weights = np.exp(-0.5 / sigma**2 * np.arange(-reach, reach + 1) ** 2)
     weights /= weights.sum()
-    for axis in (0, 1):
-        raster = np.moveaxis(raster, axis, 0)
-        mirrored = np.pad(raster, ((reach, reach), (0, 0)), mode="symmetric").astype(float)
-        rows = [mirrored[first : first + len(raster)] for first in range(2 * reach + 1)]
-        smooth, pair = weights[reach] * rows[reach], np.empty(raster.shape)
+    for _ in range(2):
+        raster = blur_columns(raster, weights).T
+    return raster
+
+
+def blur_columns(raster: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Smooth each column of a raster by the symmetric `weights` (2 k + 1,), so many rows at once
+    that what they take stays small.
+    """
+    reach, smooth = len(weights) // 2, np.empty_like(raster)
+    mirrored = np.pad(np.arange(len(raster)), reach, mode="symmetric")
+    for first in range(0, len(raster), ROWS_AT_ONCE):
+        last = min(first + ROWS_AT_ONCE, len(raster))
+        block = raster[mirrored[first : last + 2 * reach]].astype(float)
+        rows = [block[k : k + last - first] for k in range(2 * reach + 1)]
+        total, pair = weights[reach] * rows[reach], np.empty(rows[0].shape)
         for k in range(reach):
             np.add(rows[k], rows[2 * reach - k], out=pair)
-            smooth += np.multiply(pair, weights[k], out=pair)
-        raster = np.moveaxis(smooth.astype(raster.dtype), 0, axis)
-    return raster
+            total += np.multiply(pair, weights[k], out=pair)
+        smooth[first:last] = total
+    return smooth
 
 
 def rasterise(polygons: list[shapely.Polygon], lower: np.ndarray, shape: np.ndarray) -> np.ndarray:
