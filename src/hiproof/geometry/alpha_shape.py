@@ -1,5 +1,8 @@
-"""The 2D alpha shape: the outline of a set of points, concave where the points leave a bay wider
-than the radius.
+"""The 2D alpha shape: an outline of points that follows their concave bays.
+
+A bay is kept where it is wider than the radius.
+
+A bay is kept where it is wider than the radius.
 
 Edelsbrunner, Kirkpatrick and Seidel (1983): the triangles of the Delaunay triangulation whose
 circumradius is below alpha. Its boundary lies inside the true outline by about half the spacing of
@@ -20,8 +23,11 @@ bays fill up.
 
 
 def default_radius(xy: np.ndarray) -> float:
-    """Radius in metres for `xy` (n, 2): 2.5 spacings, those of the points spread evenly over their
-    hull.
+    """Return the radius (m) for points `xy` (n, 2): 2.5 mean spacings.
+
+    The mean spacing is that of the points spread evenly over their convex hull.
+
+    The mean spacing is that of the points spread evenly over their convex hull.
     """
     # one line through all: many points would be as many geometries
     hull_area = shapely.convex_hull(shapely.linestrings(xy)).area if len(xy) > 2 else 0.0
@@ -31,8 +37,13 @@ def default_radius(xy: np.ndarray) -> float:
 def alpha_shape(
     xy: np.ndarray, radius: float | None = None, holes: bool = False
 ) -> shapely.Polygon:
-    """Outline of `xy` (n, 2): the largest component of the alpha shape of `radius` metres, its
-    holes filled or kept.
+    """Return the outline of points `xy` (n, 2) by the alpha shape.
+
+    The outline is the largest component of the alpha shape of `radius` metres, with its holes
+    filled or kept.
+
+    The outline is the largest component of the alpha shape of `radius` metres, with its holes
+    filled or kept.
 
     Raises FitError for points that span no area.
 
@@ -73,7 +84,7 @@ def alpha_shape(
 
 
 def circumradii(triangles: np.ndarray) -> np.ndarray:
-    """The radii (n,) of the circles through the corners of `triangles` (n, 3, 2)."""
+    """Return the circumradii (n,) of `triangles` (n, 3, 2)."""
     a, b, c = (
         np.hypot(*(triangles[:, i] - triangles[:, j]).T) for i, j in ((1, 2), (0, 2), (0, 1))
     )

@@ -1,5 +1,8 @@
-"""Roof shapes: the contract (contract.py), one shape a file, halves of others (halves.py), the
-catalogue.
+"""Roof shapes: their contract, one shape a file, and the catalogue.
+
+contract.py has the contract. halves.py makes halves of other shapes.
+
+contract.py has the contract. halves.py makes halves of other shapes.
 """
 
 from .catalogue import CATALOGUE, get

@@ -1,5 +1,4 @@
-"""Sums of monomials in a primitive's shape parameters: a roof's planes written as formulas, usable
-as data.
+"""Planes of a roof as formulas: sums of monomials in its shape parameters.
 
 `q0 - q1 * V + q2 * U` builds a `Formula`, a sum of terms factor * V^a U^b q0^c q1^d q2^e q3^f with
 integer (also negative) exponents. The compiled fit reads the terms, so that one kernel evaluates
@@ -29,11 +28,16 @@ class Formula:
     terms: tuple[tuple[float, tuple[int, ...]], ...]
 
     def __call__(self, V: float, U: float, q0: float, q1: float, q2: float, q3: float) -> float:
-        """Value at the six shape parameters."""
+        """Return the value at the six shape parameters."""
         return self.at((V, U, q0, q1, q2, q3))
 
     def at(self, shape: Sequence[Any] | np.ndarray) -> Any:
-        """Value at `shape` (6,): V, U, q0, q1, q2, q3; values (m,) where these are arrays (m,)."""
+        """Return the value at `shape` (6,): V, U, q0, q1, q2, q3.
+
+        Values are (m,) where the parameters are arrays (m,).
+
+        Values are (m,) where the parameters are arrays (m,).
+        """
         total: Any = 0.0
         for factor, powers in self.sparse:
             value: Any = factor
@@ -51,7 +55,7 @@ class Formula:
         )
 
     def gradient(self, shape: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""
+        """Return the derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""
         return np.array([derivative.at(shape) for derivative in self.derivatives])
 
     @property
@@ -69,7 +73,7 @@ class Formula:
         return tuple(result)
 
     def with_multiple(self, symbol: str, factor: float) -> Formula:
-        """The formula in which `factor` times a symbol stands for it.
+        """Replace a symbol by `factor` times that symbol.
 
         >>> (q1 * V / U).with_multiple("V", 2.0)(V=3.0, U=4.0, q0=0.0, q1=1.0, q2=0.0, q3=0.0)
         1.5
@@ -92,8 +96,11 @@ class Formula:
         return product
 
     def __truediv__(self, other: Formula | float) -> Formula:
-        """Division by one monomial; a sum in the denominator has no finite form and raises
-        ValueError.
+        """Divide by one monomial.
+
+        A sum in the denominator has no finite form and raises ValueError.
+
+        A sum in the denominator has no finite form and raises ValueError.
         """
         (term,) = formula(other).terms
         return self * Formula(((1 / term[0], tuple(-power for power in term[1])),))
@@ -112,7 +119,7 @@ class Formula:
 
 
 def formula(value: Formula | float) -> Formula:
-    """`value` as a Formula; a number becomes a constant."""
+    """Convert `value` to a Formula; a number becomes a constant."""
     if isinstance(value, Formula):
         return value
     return Formula(((float(value), (0,) * len(SYMBOLS)),) if value else ())

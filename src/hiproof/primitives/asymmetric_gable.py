@@ -1,5 +1,8 @@
-"""Asymmetric gable (saltbox): two planes of different slope from a ridge that need not lie in the
-middle.
+"""Asymmetric gable (saltbox): two planes of different slope.
+
+The ridge need not lie in the middle.
+
+The ridge need not lie in the middle.
 """
 
 from collections.abc import Mapping
@@ -34,8 +37,11 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """As the gable's v1..v6, with the ridge v3 v4 moved by the offset and the eave v5 v6 raised by
-    the step.
+    """Return the gable's v1..v6 with the ridge moved and the back eave raised.
+
+    The ridge is v3 v4, moved by the offset. The eave is v5 v6, raised by the step.
+
+    The ridge is v3 v4, moved by the offset. The eave is v5 v6, raised by the step.
     """
     u, v, h, offset, step = (
         p["length"] / 2,
@@ -48,7 +54,12 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The lower eave lies at -v, of equal ones that of the steeper slope."""
+    """Turn the gable so that its lower eave lies at -v.
+
+    Of equal eaves, that of the steeper slope lies there.
+
+    Of equal eaves, that of the steeper slope lies there.
+    """
     # the eave at +v
     higher = theta[HALF_WIDTH] * (theta[Q1] * (1 + theta[Q3]) - theta[Q2] * (1 - theta[Q3]))
     if higher > SAME_M or (higher > -SAME_M and theta[Q3] <= 0):
@@ -61,7 +72,12 @@ def canonical(theta: np.ndarray) -> np.ndarray:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """The ridge a tenth of the width off the middle, the higher eave at 30 % of the height."""
+    """Return a ridge a tenth of the width off the middle, and a raised eave.
+
+    The higher eave lies at 30 % of the height.
+
+    The higher eave lies at 30 % of the height.
+    """
     return {
         "width": width,
         "length": length,

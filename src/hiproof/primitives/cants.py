@@ -1,5 +1,8 @@
-"""Cants: further planes of a member, over walls that cut a corner of its rectangle off, as those of
-a bay or of an eight-sided tower.
+"""Cants: further planes of a member, over walls that cut corners off.
+
+Bays and eight-sided towers have such walls.
+
+Bays and eight-sided towers have such walls.
 
 Each rises square from its own wall:
 
@@ -32,7 +35,7 @@ def no_cants() -> np.ndarray:
 
 
 def compute_cant_planes(cants: np.ndarray) -> list[tuple[float, float, float]]:
-    """Planes a, b, c over u, v about the middle of the rectangle.
+    """Return the planes a, b, c of cants over u, v about the rectangle's middle.
 
     >>> compute_cant_planes(np.array([[0.0], [4.0], [3.0], [0.5]]))
     [(-0.5, -0.0, 5.0)]
@@ -44,14 +47,14 @@ def compute_cant_planes(cants: np.ndarray) -> list[tuple[float, float, float]]:
 
 
 def turn_cants(cants: np.ndarray, quarters: int) -> np.ndarray:
-    """The cants seen from axes turned by so many times 90 degrees."""
+    """Return the cants in axes that are turned by `quarters` times 90 degrees."""
     turned = cants.copy()
     turned[0] -= 0.5 * np.pi * quarters
     return turned
 
 
 def name_cant_values(cants: np.ndarray, base: Any) -> dict[str, Any]:
-    """Parameters by name, with T_L at the height `base`."""
+    """Return the cants' parameters by name, with T_L at the height `base`."""
     words: dict[str, Any] = {}
     for cant, (facing, distance, eave, slope) in zip(CANTS, cants.swapaxes(0, 1), strict=False):
         once_round = 180.0 - np.remainder(180.0 - np.degrees(facing), 360.0)
@@ -63,7 +66,7 @@ def name_cant_values(cants: np.ndarray, base: Any) -> dict[str, Any]:
 
 
 def read_cants(parameters: Mapping[str, float], base: float) -> np.ndarray:
-    """The cants (4, c) that parameters tell of, with T_L at the height `base`.
+    """Read cants (4, c) from parameters by name, with T_L at the height `base`.
 
     Raises KeyError where one is missing.
     """
@@ -77,8 +80,11 @@ def read_cants(parameters: Mapping[str, float], base: float) -> np.ndarray:
 def keep_cants_in_place(
     parameters: Mapping[str, float], along: float, across: float
 ) -> dict[str, float]:
-    """The parameters of a part whose rectangle's middle went so far along and across it while its
-    walls stayed.
+    """Return parameters that keep the cants' walls where they are.
+
+    The middle of the part's rectangle went `along` and `across`.
+
+    The middle of the part's rectangle went `along` and `across`.
 
     >>> keep_cants_in_place({"facing_cant1": 90.0, "distance_cant1": 5.0}, 2.0,
     ...     1.0)["distance_cant1"]
@@ -92,7 +98,7 @@ def keep_cants_in_place(
 
 
 def list_cants(parameters: Iterable[str]) -> list[str]:
-    """The cants of which parameters tell anything, in order.
+    """Return the names of the cants that occur in parameters, in order.
 
     >>> list_cants(["width", "pitch_cant2", "pitch_cant1"])
     ['cant1', 'cant2']

@@ -46,7 +46,11 @@ CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
 
 
 def get(name: str) -> Primitive:
-    """The primitive called `name`. Raises SettingsError, naming the known ones, for any other.
+    """Return the primitive called `name`.
+
+    Raises SettingsError, which lists the known names, for any other.
+
+    Raises SettingsError, which lists the known names, for any other.
 
     >>> get("gable").parameters
     ('width', 'length', 'height')

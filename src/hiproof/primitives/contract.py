@@ -1,4 +1,4 @@
-"""What a roof shape has to say about itself, and what follows from it for every shape alike.
+"""The contract of a roof shape, and all that follows from it.
 
 Two descriptions of the same surface meet here:
 
@@ -47,8 +47,11 @@ Corners = Sequence[tuple[float, float, float]] | np.ndarray  # (n, 3)
 
 
 class Sides(Protocol):
-    """What a member of the family (family.py) tells of its planes: by side their eaves (m) and
-    slopes, a level top (m).
+    """A member's planes (family.py): eave heights (m) and slopes by side.
+
+    `top` is the height (m) of a level plane.
+
+    `top` is the height (m) of a level plane.
     """
 
     @property
@@ -65,8 +68,13 @@ class Sides(Protocol):
 
 @dataclass(frozen=True)
 class DerivedStart:
-    """Start values from the fit of a simpler type: `q` are formulas of the `source`'s V, U and q,
-    in axes that are turned by so many quarters from its own.
+    """Start values from the fit of a simpler type.
+
+    `q` are formulas of the `source`'s V, U and q, in axes that are turned by so many quarters from
+    its own.
+
+    `q` are formulas of the `source`'s V, U and q, in axes that are turned by so many quarters from
+    its own.
     """
 
     source: str
@@ -74,7 +82,7 @@ class DerivedStart:
     quarters: int = 0
 
     def theta(self, source_theta: np.ndarray) -> np.ndarray:
-        """theta (9,) with the plan of `source_theta` (9,) and its q by the formulas."""
+        """Return theta (9,) with the plan of `source_theta` (9,) and q by formulas."""
         theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
         for _ in range(self.quarters):
             theta = turn_quarter(theta)
@@ -87,14 +95,22 @@ class DerivedStart:
 def at_quarters(
     source: str, q: tuple[Formula | float, ...], quarters: tuple[int, ...] = (0, 1, 2, 3)
 ) -> tuple[DerivedStart, ...]:
-    """The same start in several directions, for roofs of which a half turn makes another."""
+    """Return the same start in several directions.
+
+    Roofs that a half turn changes need it.
+
+    Roofs that a half turn changes need it.
+    """
     return tuple(DerivedStart(source, q, quarter) for quarter in quarters)
 
 
 @dataclass(frozen=True)
 class Vote:
-    """Start values by a vote of the points: which quarter turns, slopes and shifts of the ridge
-    (shares of V) are tried.
+    """Start values from a vote of the points.
+
+    The points vote on quarter turns, slopes and shifts of the ridge (shares of V).
+
+    The points vote on quarter turns, slopes and shifts of the ridge (shares of V).
     """
 
     turns: int = 2
@@ -182,14 +198,20 @@ class Primitive:
 
     @property
     def is_of_family(self) -> bool:
-        """Whether it has at most one plane a side and a level one, so that a volume can have its
-        shape.
+        """Whether it has at most one plane a side and one level plane.
+
+        Then a volume can have its shape.
+
+        Then a volume can have its shape.
         """
         return self.strips == 1 and len(set(self.sides)) == len(self.sides)
 
     def variant(self, theta_p: Mapping[str, float]) -> Primitive:
-        """The variant with the tooth count or the parameters of `theta_p`; itself where these tell
-        of no other.
+        """Return the variant with the number of teeth or the parameters of `theta_p`.
+
+        Returns the primitive itself where these name no other.
+
+        Returns the primitive itself where these name no other.
         """
         if self.strips == 1:
             matching = [
@@ -205,7 +227,7 @@ class Primitive:
         )
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
-        """The paper's S = f(theta_p): vertices (n, 3) in the primitive frame.
+        """Return the vertices (n, 3) in the primitive frame, S = f(theta_p).
 
         Raises FitError where one is missing.
         """
@@ -220,7 +242,7 @@ class Primitive:
         return np.asarray(shape.corners(theta_p), float)
 
     def draw_parameters(self, rng: np.random.Generator, width: float) -> dict[str, float]:
-        """theta_p of a roof made up at random, `width` (m) wide."""
+        """Draw theta_p of a random roof that is `width` metres wide."""
         if self.draw is not None:
             return self.draw(rng, width)
         return self.typical(
@@ -228,7 +250,7 @@ class Primitive:
         )
 
     def from_member(self, member: Sides) -> tuple[float, ...]:
-        """q of the shape with the slopes of a member's front and right.
+        """Return q of the shape with the slopes of a member's front and right.
 
         Raises FitError for a shape that is of no family.
         """
@@ -245,8 +267,11 @@ class Primitive:
         kappa: float = 0.0,
         translation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     ) -> np.ndarray:
-        """theta (9,) of the roof with `theta_p`, turned by `kappa` and moved to `translation` T_L
-        (3,).
+        """Return theta (9,) of a roof from its named parameters.
+
+        The roof is turned by `kappa` and moved to `translation`, T_L (3,).
+
+        The roof is turned by `kappa` and moved to `translation`, T_L (3,).
         """
         theta = np.zeros(9)
         theta[[CX, CY, KAPPA]] = translation[0], translation[1], kappa
@@ -255,19 +280,26 @@ class Primitive:
         return theta
 
     def from_theta(self, theta: np.ndarray) -> tuple[dict[str, float], float, np.ndarray]:
-        """(theta_p by name, kappa, T_L (3,)) of `theta` (9,)."""
+        """Return the named theta_p, kappa and T_L (3,) of `theta` (9,)."""
         *measures, eave = self.measures_at(np.asarray(theta, float)[HALF_WIDTH:].tolist())
         theta_p = dict(zip(self.measures, measures, strict=True))
         return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], eave])
 
     def measures_at(self, shape: Sequence[Any]) -> list[Any]:
-        """theta_p in order and the lowest eave's height at a `shape` (V, U, q0..q3), or at several:
-        arrays (m,).
+        """Return theta_p in order and the lowest eave's height at a `shape`.
+
+        `shape` is V, U, q0..q3, or several of them as arrays (m,).
+
+        `shape` is V, U, q0..q3, or several of them as arrays (m,).
         """
         return [measure.at(shape) for measure in (*self.measures.values(), self.eave)]
 
     def is_proper(self, theta: np.ndarray) -> bool:
-        """Whether all lengths are positive, and rounded parameters make the same slopes.
+        """Return whether all lengths are positive and survive rounding.
+
+        Rounded parameters have to make the same slopes.
+
+        Rounded parameters have to make the same slopes.
 
         Slopes over a run of less than a millimetre do not follow from lengths in micrometres.
         """
@@ -289,8 +321,11 @@ class Primitive:
         )
 
     def canonical_theta(self, theta: np.ndarray) -> np.ndarray:
-        """The same surface's one theta: axes in their fixed roles, kappa in (-pi/2, pi/2] or (-pi,
-        pi].
+        """Return the one theta of the same surface with axes in fixed roles.
+
+        kappa lies in (-pi/2, pi/2] or (-pi, pi].
+
+        kappa lies in (-pi/2, pi/2] or (-pi, pi].
         """
         theta = self.canonical(np.array(theta, float))
         period = math.pi if self.half_turn_symmetric else 2 * math.pi
@@ -298,7 +333,12 @@ class Primitive:
         return theta
 
     def plane_values(self, theta: np.ndarray) -> np.ndarray:
-        """Planes (k, 3), z = a u + b v + c, at `theta` (9,), in the order of `faces`."""
+        """Return the planes (k, 3) over u, v at `theta` (9,), in the order of `faces`.
+
+        A plane is z = a u + b v + c.
+
+        A plane is z = a u + b v + c.
+        """
         shape = np.asarray(theta, float)[HALF_WIDTH:].tolist()
         return np.array(
             [[coefficient.at(shape) for coefficient in plane] for plane in self.plane_formulas]
@@ -310,7 +350,12 @@ class Primitive:
         return tuple(tuple(formula(coefficient) for coefficient in plane) for plane in self.planes)
 
     def height_at(self, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
-        """Height (n,) of the roof `theta` at `xy` (n, 2), continued beyond its plan rectangle."""
+        """Return the height (n,) of the roof `theta` at `xy` (n, 2).
+
+        The roof is continued beyond its plan rectangle.
+
+        The roof is continued beyond its plan rectangle.
+        """
         c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
         xy_centred = np.asarray(xy, float) - theta[:2]
         u, v = xy_centred @ (c, s), xy_centred @ (-s, c)
@@ -324,7 +369,7 @@ class Primitive:
         return heights[np.arange(len(u)), strip.astype(int)]
 
     def planes_at(self, theta: np.ndarray) -> np.ndarray:
-        """Planes (k, 3) over x, y in theta's own frame, in the order of `faces`."""
+        """Return planes (k, 3) over x, y in theta's frame, in the order of `faces`."""
         c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
         planes = np.array(
             [(a * c - b * s, a * s + b * c, z) for a, b, z in self.plane_values(theta).tolist()]
@@ -333,8 +378,11 @@ class Primitive:
         return planes
 
     def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
-        """The roof part of `theta` (9,) in theta's own frame: plan rectangle (one a tooth) and
-        planes over x, y.
+        """Return the roof part of `theta` (9,), in theta's own frame.
+
+        It has one plan rectangle a tooth, and planes over x, y.
+
+        It has one plan rectangle a tooth, and planes over x, y.
         """
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
@@ -358,7 +406,11 @@ class Primitive:
 
 
 def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:
-    """Vertices (n, 3) turned by `kappa` about Z and moved by `translation` (3,): R V + T_L, eq.
+    """Turn vertices (n, 3) by `kappa` about Z and move them: R V + T_L, eq. 9.
+
+    `translation` is T_L (3,).
+
+    `translation` is T_L (3,).
 
     9.
     """
@@ -369,15 +421,23 @@ def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) 
 def rectangle(
     theta_p: Mapping[str, float], lower: float = 0.0, upper: float = 0.0
 ) -> list[tuple[float, float, float]]:
-    """Corners v1..v4 of the plan, clockwise from (+u, -v), at height `lower` on the -v side and
-    `upper` on the +v side.
+    """Return the corners v1..v4 of the plan, clockwise from (+u, -v).
+
+    They lie at height `lower` on the -v side and at `upper` on the +v side.
+
+    They lie at height `lower` on the -v side and at `upper` on the +v side.
     """
     u, v = theta_p["length"] / 2, theta_p["width"] / 2
     return [(u, -v, lower), (-u, -v, lower), (-u, v, upper), (u, v, upper)]
 
 
 def turn_quarter(theta: np.ndarray) -> np.ndarray:
-    """Plan axes exchanged by a quarter turn; the caller exchanges the q that belong to them."""
+    """Exchange the plan axes by a quarter turn.
+
+    The caller exchanges the q that belong to them.
+
+    The caller exchanges the q that belong to them.
+    """
     theta = theta.copy()
     theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]
     theta[KAPPA] += math.pi / 2

@@ -1,4 +1,4 @@
-"""Corner: two adjacent slopes that meet in a hip, as on a wing around which a roof turns."""
+"""Corner: two adjacent slopes that meet in a hip, as on a wing's corner."""
 
 from collections.abc import Mapping
 
@@ -21,8 +21,13 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """The eaves' v1 (at +u and -v), v2, v3, the hip's upper end v4, and the far corner as the front
-    has it, v5, and the end, v6.
+    """Return v1 to v6: the eaves, the hip's upper end and the far corners.
+
+    The eaves are v1 (at +u and -v), v2 and v3; the hip ends in v4; the far corner is v5 as the
+    front has it, v6 as the end has it.
+
+    The eaves are v1 (at +u and -v), v2 and v3; the hip ends in v4; the far corner is v5 as the
+    front has it, v6 as the end has it.
 
     The hip runs out at the back or, of a steeper front, at the left: then the far corner belongs to
     the end, and to the front else; where it is not a slope's own, v4 stands for it.
@@ -44,7 +49,7 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """Equal slopes."""
+    """Return parameters of equal slopes."""
     return {
         "width": width,
         "length": length,

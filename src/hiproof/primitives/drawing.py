@@ -8,12 +8,12 @@ import numpy as np
 
 
 def drawn_slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> float:
-    """A slope (rise by run) of an angle between two, in degrees."""
+    """Draw a slope (rise by run) whose angle lies between two, in degrees."""
     return math.tan(math.radians(rng.uniform(low_deg, high_deg)))
 
 
 def drawn_plan(
     rng: np.random.Generator, width: float, lower: float = 1.05, upper: float = 2.2
 ) -> dict[str, float]:
-    """A plan of that width (m), `lower` to `upper` times as long."""
+    """Draw a plan of that width (m), `lower` to `upper` times as long."""
     return {"width": width, "length": width * float(rng.uniform(lower, upper))}

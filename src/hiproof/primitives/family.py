@@ -1,5 +1,8 @@
-"""One family of roof shapes: a rectangle, its direction, and at most five planes along its two
-axes.
+"""One family of roof shapes: a rectangle with at most five planes.
+
+The planes rise along the rectangle's two axes.
+
+The planes rise along the rectangle's two axes.
 
 A member has a plane rising from its eave on some of the four sides of its rectangle, and perhaps a
 level top:
@@ -58,13 +61,18 @@ HALF_HIP_SHARE = 0.15
 
 
 def describe_sides(shape: Primitive) -> tuple[bool, int, int]:
-    """Whether a shape of the family has a top, and how many planes along u and across v."""
+    """Return whether a shape has a top, and its numbers of planes along u and v.
+
+    The numbers count planes that rise along u and across v.
+
+    The numbers count planes that rise along u and across v.
+    """
     along = sum(side in (LEFT, RIGHT) for side in shape.sides)
     return LEVEL in shape.sides, along, sum(side in (FRONT, BACK) for side in shape.sides)
 
 
 def list_eaves(shape: Primitive) -> tuple[int, ...]:
-    """The sides from which a shape has planes."""
+    """Return the sides from which a shape has planes."""
     return tuple(sorted(side for side in shape.sides if side != LEVEL))
 
 
@@ -86,12 +94,21 @@ COMPONENTS = {
 
 @dataclass(frozen=True)
 class Member:
-    """A shape of the family: `kappa` (rad), `centre` (2,) and `half` (2,) extents along u and v,
-    heights of the eaves (4,) at their own sides, infinite where a side has no plane, `slopes` (4,),
-    and the height of the level `top`, infinite without one. `leans` (4,) are what the planes rise
-    along their sides, as shares of their slopes, `cants` (4, c) further planes. Several of one
-    `kappa` that have planes on the same sides may be one `Member`: its arrays then have a further
-    axis, and its `top` is an array, of one place for each.
+    """A shape of the family: a rectangle, eaves, slopes and a level top.
+
+    `kappa` (rad) is its direction, `centre` (2,) its middle, `half` (2,) its extents along u and v.
+    `eaves` (4,) are heights at their own sides, infinite where a side has no plane. `slopes` is
+    (4,), and the height of the level `top` is infinite without one. `leans` (4,) are what the
+    planes rise along their sides, as shares of their slopes, and `cants` (4, c) further planes.
+    Several of one `kappa` that have planes on the same sides may be one `Member`: its arrays then
+    have a further axis, and its `top` is an array, with one place for each.
+
+    `kappa` (rad) is its direction, `centre` (2,) its middle, `half` (2,) its extents along u and v.
+    `eaves` (4,) are heights at their own sides, infinite where a side has no plane. `slopes` is
+    (4,), and the height of the level `top` is infinite without one. `leans` (4,) are what the
+    planes rise along their sides, as shares of their slopes, and `cants` (4, c) further planes.
+    Several of one `kappa` that have planes on the same sides may be one `Member`: its arrays then
+    have a further axis, and its `top` is an array, with one place for each.
 
     >>> gable = Member(0.0, np.zeros(2), np.array([6.0, 4.0]), np.array([np.inf, np.inf, 5.0,
     ...     5.0]), np.array([0, 0, 0.5, 0.5]))
@@ -137,7 +154,7 @@ class Member:
         return np.minimum.reduce(eaves) if any(self.has) else self.top
 
     def those(self, which: int | list[int]) -> Member:
-        """One or some of several."""
+        """Select one or some of several."""
         centre, half, eaves, slopes = (
             of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes)
         )
@@ -147,8 +164,11 @@ class Member:
         )
 
     def compute_local_planes(self) -> list[tuple[float, float, float]]:
-        """Planes a, b, c over u, v about the centre: those of the sides in order, of the cants,
-        then the top.
+        """Return the planes a, b, c over u, v about the centre.
+
+        They are those of the sides in order, of the cants, then the top.
+
+        They are those of the sides in order, of the cants, then the top.
         """
         planes: list[tuple[float, float, float]] = []
         for side in self.sides:
@@ -159,7 +179,7 @@ class Member:
         return [*planes, (0.0, 0.0, self.top)] if self.has_top else planes
 
     def planes(self) -> np.ndarray:
-        """Planes (k, 3) over x, y of the frame that `kappa` and `centre` are given in."""
+        """Return planes (k, 3) over x, y in the frame of `kappa` and `centre`."""
         c, s = math.cos(self.kappa), math.sin(self.kappa)
         planes = np.array(self.compute_local_planes()) @ np.array(
             [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
@@ -168,8 +188,11 @@ class Member:
         return planes
 
     def apex(self, axis: int) -> Any:
-        """Height at which the planes of the two sides across `axis` meet, infinite where one is
-        missing.
+        """Return the height at which the planes of the two sides across `axis` meet.
+
+        It is infinite where one of them is missing.
+
+        It is infinite where one of them is missing.
         """
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
@@ -185,11 +208,21 @@ class Member:
         return lower + item * run
 
     def resize(self, half: np.ndarray) -> Member:
-        """The member with its eaves and slopes over a rectangle of other half extents (2,)."""
+        """Return the member with its eaves and slopes over another rectangle.
+
+        `half` (2,) are the new half extents.
+
+        `half` (2,) are the new half extents.
+        """
         return replace(self, half=half)
 
     def turn(self, quarters: int = 1) -> Member:
-        """The same surface with its axes turned by so many times 90 degrees, 0 to 3."""
+        """Return the same surface with axes turned by `quarters` times 90 degrees.
+
+        `quarters` is 0 to 3.
+
+        `quarters` is 0 to 3.
+        """
         if quarters == 0:
             return self
         kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
@@ -212,8 +245,11 @@ class Member:
         )
 
     def canonical(self) -> Member:
-        """The same surface in the direction in which it is named: the ridge along u, planes on the
-        sides that SHAPES says.
+        """Return the same surface in the direction in which it is named.
+
+        The ridge runs along u, and the planes lie on the sides that SHAPES says.
+
+        The ridge runs along u, and the planes lie on the sides that SHAPES says.
         """
         return self.turn(self.quarter_turns)
 
@@ -234,9 +270,15 @@ class Member:
         return min(names, default=((), 0))[1]
 
     def order(self, turns: int, places: list[int]) -> tuple[float, ...]:
-        """Of members of the same surface the least comes first: steeper, then lower, in front and
-        on the left. Of this one after so many `turns`, which bring its sides `places` to the left,
-        right, front and back.
+        """Return a key that orders members of the same surface.
+
+        The least comes first: steeper, then lower, in front and on the left. The key is that of
+        this member after so many `turns`, which bring its sides `places` to the left, right, front
+        and back.
+
+        The least comes first: steeper, then lower, in front and on the left. The key is that of
+        this member after so many `turns`, which bring its sides `places` to the left, right, front
+        and back.
         """
         slopes = [float(self.slopes[place]) for place in places]
         eaves = [float(self.eaves[place]) if self.has[place] else 0.0 for place in places]
@@ -254,8 +296,11 @@ class Member:
         return (*(round(x, 6) for x in gap), not ahead)
 
     def lies_along(self, axis: int) -> bool:
-        """Whether `axis` is the longer way: along the ridge of the sides that meet lower, else of
-        the rectangle.
+        """Return whether `axis` is the longer way.
+
+        The longer way is the ridge of the sides that meet lower, else that of the rectangle.
+
+        The longer way is the ridge of the sides that meet lower, else that of the rectangle.
         """
         lower, upper = self.apex(1 - axis), self.apex(axis)
         if math.isfinite(lower) and math.isfinite(upper) and abs(lower - upper) > SAME:
@@ -288,8 +333,11 @@ class Member:
 
     @cached_property
     def in_catalogue(self) -> tuple[Primitive, np.ndarray] | None:
-        """The catalogue's shape that is the same surface, and its canonical theta (9,), of a member
-        in its canonical direction.
+        """The catalogue's shape of the same surface, and its canonical theta (9,).
+
+        The member has to be in its canonical direction.
+
+        The member has to be in its canonical direction.
         """
         if self.leans.any() or self.cants.shape[1]:
             return None
@@ -312,8 +360,11 @@ class Member:
         return None
 
     def theta(self, shape: Primitive) -> np.ndarray:
-        """theta (9,) of the catalogue's `shape`, by the front and the right side where the others
-        are as these; (9, m) of several.
+        """Return theta (9,) of the catalogue's `shape`, (9, m) of several.
+
+        The front and the right side count where the others equal these.
+
+        The front and the right side count where the others equal these.
         """
         theta = np.zeros((9, *self.eaves.shape[1:]))
         theta[:KAPPA], theta[KAPPA] = self.centre, self.kappa
@@ -323,23 +374,23 @@ class Member:
         return theta
 
     def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
-        """(parameters by name, kappa, T_L (3,)) of this member in its canonical direction."""
+        """Return named parameters, kappa and T_L (3,), in the canonical direction."""
         return self.canonical().in_words(as_catalogue)
 
     def in_words(self, as_catalogue: bool) -> tuple[dict[str, float], float, np.ndarray]:
-        """`describe` of a member in its canonical direction."""
+        """Describe a member that is in its canonical direction."""
         if not as_catalogue or self.in_catalogue is None:
             return self.side_by_side()
         shape, theta = self.in_catalogue
         return shape.from_theta(theta)
 
     def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
-        """(parameters by name, kappa, T_L (3,)) of this member, each side's own."""
+        """Return each side's own named parameters, kappa and T_L (3,)."""
         parameters = {name: float(value) for name, value in self.list_side_measures().items()}
         return parameters, self.kappa, np.array([*self.centre, self.base])
 
     def list_side_measures(self) -> dict[str, Any]:
-        """Parameters by name, each side's own."""
+        """Return each side's own parameters by name."""
         parameters, base = {"width": 2.0 * self.half[1], "length": 2.0 * self.half[0]}, self.base
         if self.has_top:
             parameters["height"] = self.top - base
@@ -351,9 +402,13 @@ class Member:
         return parameters | name_cant_values(self.cants, base)
 
     def measure_as(self, shape: Primitive | None, kappa: float) -> list[Any]:
-        """The parameters and t_z that this member, or each of several, has as `shape`, side by side
-        without one; seen from `kappa` or its opposite, so that a small change does not turn it
-        round.
+        """Return the parameters and t_z that this member has as `shape`.
+
+        Each of several has its own. Without a shape they are side by side. They are seen from
+        `kappa` or its opposite, so that a small change does not turn the member round.
+
+        Each of several has its own. Without a shape they are side by side. They are seen from
+        `kappa` or its opposite, so that a small change does not turn the member round.
         """
         if shape is None:
             return [*self.list_side_measures().values(), self.base]
@@ -370,8 +425,11 @@ class Member:
         changes: Member | None = None,
         untold: int = 0,
     ) -> Part:
-        """A part of this shape that roofs `outlines`, in the frame of `kappa` and `centre`; called
-        `name` if that is its kin.
+        """Return a part of this shape that roofs `outlines`.
+
+        It is in the frame of `kappa` and `centre`, and called `name` if that is its kin.
+
+        It is in the frame of `kappa` and `centre`, and called `name` if that is its kin.
 
         This member must be its canonical one; `changes` are, in the same direction, several: this
         one after independent changes of one standard deviation each. The last of them, `untold`,
@@ -391,8 +449,11 @@ class Member:
         as_catalogue: bool,
         words: tuple[dict[str, float], float, np.ndarray],
     ) -> dict[str, float]:
-        """Standard deviations by parameter (and t_z) of `part`, which describes this member in
-        these `words`.
+        """Return the standard deviations of a part's parameters and t_z by name.
+
+        `words` are the parameters by which the part describes this member.
+
+        `words` are the parameters by which the part describes this member.
         """
         parameters, kappa, translation = words
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
@@ -414,12 +475,16 @@ class Member:
 
 
 def degrees(rise: Any) -> Any:
-    """The angle under a `rise` over run, of one or of several (m,)."""
+    """Return the angle (degrees) of a `rise` over run, of one or several (m,)."""
     return np.degrees(np.arctan(rise)) if np.ndim(rise) else math.degrees(math.atan(rise))
 
 
 def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
-    """`name` or, where it is not `allowed`, that of its kin which is;
+    """Return `name` if it is allowed, else the allowed name of its kin, or None.
+
+    All names are allowed where `allowed` is empty.
+
+    All names are allowed where `allowed` is empty.
 
     None where none is. All are where `allowed` is empty.
 
@@ -434,8 +499,11 @@ def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
 def compute_planes(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> np.ndarray:
-    """Planes (k, 3) over x, y of the roof type `name` with its parameters: the inverse of
-    `Member.describe`.
+    """Return the planes (k, 3) over x, y of a roof type with its parameters.
+
+    This is the inverse of `Member.describe`.
+
+    This is the inverse of `Member.describe`.
 
     Raises FitError for a name that is no type or parameters that are not its own.
 
@@ -453,7 +521,7 @@ def compute_planes(
 def read_member(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> Member:
-    """The member with these parameters, the catalogue's or each side's own.
+    """Return the member of parameters: the catalogue's, or each side's own.
 
     Raises FitError where one is missing.
     """
@@ -486,7 +554,7 @@ def read_member(
 def convert_to_member(
     shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> Member:
-    """The member that is the same surface as the catalogue's `shape` with its own parameters."""
+    """Return the member of the same surface as the catalogue's `shape`."""
     theta = shape.to_theta(parameters, kappa, translation)
     half = theta[[HALF_LENGTH, HALF_WIDTH]]
     eaves, slopes, top = np.full(4, np.inf), np.zeros(4), math.inf

@@ -8,7 +8,7 @@ from .drawing import drawn_plan
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The longer side is the length."""
+    """Turn the roof so that its longer side is the length."""
     return turn_quarter(theta) if theta[HALF_WIDTH] > theta[HALF_LENGTH] else theta
 
 

@@ -1,4 +1,8 @@
-"""Gable (saddleback): two planes falling equally from a level ridge, the paper's Figure 3.
+"""Gable (saddleback): two equal planes from a level ridge.
+
+It is the paper's Figure 3.
+
+It is the paper's Figure 3.
 
 Where the ridge lies off the middle, towards the back, `ridge_offset` says how far, and the back's
 eave is the higher one: a catslide is a gable too.
@@ -18,7 +22,7 @@ FACES = ((3, 2, 1, 0), (2, 3, 4, 5))  # S1 {v4 v3 v2 v1}, S2 {v3 v4 v5 v6}
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """v1..v6 of the paper's Figure 3: eave, ridge, eave."""
+    """Return v1..v6 of the paper's Figure 3: eave, ridge, eave."""
     u, v, h, offset = p["length"] / 2, p["width"] / 2, p["height"], p.get("ridge_offset", 0)
     step = 2 * offset * h / (v + offset)
     return [(u, -v, 0), (-u, -v, 0), (-u, offset, h), (u, offset, h), (u, v, step), (-u, v, step)]
@@ -38,7 +42,7 @@ def shape_off_the_middle(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def ridge_at_the_back(theta: np.ndarray) -> np.ndarray:
-    """The lower eave lies at -v."""
+    """Turn the gable so that its lower eave lies at -v."""
     if theta[Q2] >= 0:
         return theta
     turned = theta.copy()

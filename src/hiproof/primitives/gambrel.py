@@ -1,4 +1,4 @@
-"""Gambrel (two-sided mansard): a gable whose slopes break into a steeper lower part."""
+"""Gambrel (two-sided mansard): a gable with steeper lower slopes."""
 
 from collections.abc import Mapping
 
@@ -31,7 +31,12 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """Pairs at +u and -u from the eave at -v over break, ridge and break to the eave at +v."""
+    """Return pairs at +u and -u over eave, break, ridge, break and eave.
+
+    They run from the eave at -v to the eave at +v.
+
+    They run from the eave at -v to the eave at +v.
+    """
     u, v, b = p["length"] / 2, p["width"] / 2, p["break_width"] / 2
     h, z = p["height"], p["break_height"]
     lower_and_break = [(u, -v, 0), (-u, -v, 0), (-u, -b, z), (u, -b, z)]
@@ -39,7 +44,7 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """The break at 60 % of the width and of the height."""
+    """Return a break at 60 % of the width and of the height."""
     return {
         "width": width,
         "length": length,

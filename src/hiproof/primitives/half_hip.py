@@ -1,5 +1,8 @@
-"""Half-hip (jerkinhead): a gable whose ends are cut by small hips that start part-way down the
-slopes.
+"""Half-hip (jerkinhead): a gable with ends cut by small hips.
+
+The hips start part-way down the slopes.
+
+The hips start part-way down the slopes.
 """
 
 from collections.abc import Mapping
@@ -29,7 +32,12 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """The hip's v1..v6, then the ends of the hips' eaves: v7 v9 at +u, v8 v10 at -u."""
+    """Return the hip's v1..v6, then the ends of the hips' eaves.
+
+    They are v7 and v9 at +u, v8 and v10 at -u.
+
+    They are v7 and v9 at +u, v8 and v10 at -u.
+    """
     u, v, h, r = p["length"] / 2, p["width"] / 2, p["height"], p["ridge_length"] / 2
     b, z = v * p["hip_height"] / h, h - p["hip_height"]
     slopes = [(u, -v, 0), (-u, -v, 0), (-r, 0, h), (r, 0, h), (u, v, 0), (-u, v, 0)]
@@ -37,7 +45,12 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """Hips of 40 % of the height, as steep as the slopes where the length allows."""
+    """Return hips of 40 % of the height.
+
+    They are as steep as the slopes where the length allows.
+
+    They are as steep as the slopes where the length allows.
+    """
     ridge = max(length - 0.4 * width, 0.2 * length)
     return {
         "width": width,

@@ -1,4 +1,4 @@
-"""Halves of other roofs, such as the roof of one of two houses under one hipped roof.
+"""Halves of other roofs, such as that of one of two houses under one hip.
 
 A cut through the middle of the whole roof makes the half. Its planes keep their slopes and are
 given about the middle of the half. Lengths that the cut crosses are halved.
@@ -25,7 +25,7 @@ AXES = (("U", U), ("V", V))
 
 
 def cut_half(whole: Primitive, axis: int, **own: Any) -> Primitive:
-    """The half of `whole` beyond a cut across `axis`: at +u, or at -v."""
+    """Return the half of `whole` beyond a cut across `axis`: at +u, or at -v."""
     selection = [k for k, side in enumerate(whole.sides) if side != (LEFT, BACK)[axis]]
     in_use = sorted({corner for k in selection for corner in whole.faces[k]})
     symbol, crossed = AXES[axis][0], CROSSED[axis]
@@ -79,8 +79,11 @@ def cut_half(whole: Primitive, axis: int, **own: Any) -> Primitive:
 
 
 def shift_plane_to_half(plane: tuple[Formula, ...], axis: int) -> Plane:
-    """The plane over u, v about the half's middle, which lies half of its extent at +u, or -v, of
-    the whole's.
+    """Return a plane over u, v about the half's middle.
+
+    The half's middle lies half of its extent at +u, or at -v, of the whole's.
+
+    The half's middle lies half of its extent at +u, or at -v, of the whole's.
     """
     symbol, extent = AXES[axis]
     a, b, c = (formula(coefficient).with_multiple(symbol, 2.0) for coefficient in plane)
@@ -88,8 +91,11 @@ def shift_plane_to_half(plane: tuple[Formula, ...], axis: int) -> Plane:
 
 
 def cut_vertices(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
-    """Vertices (n, 3) of the whole about the half's middle, those beyond the cut moved onto it,
-    straight across.
+    """Return vertices (n, 3) of the whole about the half's middle.
+
+    Those beyond the cut move straight across onto it.
+
+    Those beyond the cut move straight across onto it.
 
     A face whose edges run across the cut is the half's face then; one that lies beyond is left
     without area.

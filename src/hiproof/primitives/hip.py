@@ -37,13 +37,13 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """As the gable's v1..v6, with the ridge v3 v4 shortened."""
+    """Return the gable's v1..v6 with a shorter ridge v3 v4."""
     u, v, h, r = p["length"] / 2, p["width"] / 2, p["height"], p["ridge_length"] / 2
     return [(u, -v, 0), (-u, -v, 0), (-r, 0, h), (r, 0, h), (u, v, 0), (-u, v, 0)]
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The ridge runs along u.
+    """Turn the hip so that its ridge runs along u.
 
     Where the ends meet below the sides' ridge, the lowest planes form a ridge along v instead and
     theta's q0 is above the roof: the same surface with the axes exchanged.
@@ -58,7 +58,7 @@ def canonical(theta: np.ndarray) -> np.ndarray:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """Equal slopes all round where the length allows a ridge."""
+    """Return equal slopes all round where the length allows a ridge."""
     return {
         "width": width,
         "length": length,

@@ -33,7 +33,7 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """The plan's v1..v4, then the top's v5..v8 above them."""
+    """Return the plan's v1..v4, then the top's v5..v8 above them."""
     return [
         *rectangle(p),
         *rectangle({"width": p["top_width"], "length": p["top_length"]}, p["height"], p["height"]),
@@ -41,7 +41,7 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The longer side is the length."""
+    """Turn the roof so that its longer side is the length."""
     if theta[HALF_WIDTH] <= theta[HALF_LENGTH]:
         return theta
     turned = turn_quarter(theta)
@@ -51,7 +51,12 @@ def canonical(theta: np.ndarray) -> np.ndarray:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """Slopes that take a quarter of the width on each side, and as much of the length."""
+    """Return slopes over a quarter of the width on each side.
+
+    They take as much of the length.
+
+    They take as much of the length.
+    """
     return {
         "width": width,
         "length": length,

@@ -24,8 +24,11 @@ MOST_SHOWN_NAMES = 8  # names in a sentence; more would hide what is said
 
 
 def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> None:
-    """Raise InputError where `parameters` (finite numbers by name) make no shape of the type
-    `kind`.
+    """Raise InputError where `parameters` make no shape of the type `kind`.
+
+    `parameters` are finite numbers by name.
+
+    `parameters` are finite numbers by name.
 
     >>> refuse_no_shape("gable", {"width": -8.0, "length": 12.0, "height": 3.0}, "part 0")
     Traceback (most recent call last):
@@ -76,9 +79,7 @@ def refuse_other_names(
 
 
 def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> None:
-    """Raise InputError where a shape of the catalogue has a plane that falls from its eave or
-    stands upright.
-    """
+    """Raise InputError where a plane falls from its eave or stands upright."""
     shape = CATALOGUE[kind]
     try:
         theta = shape.variant(parameters).to_theta(parameters)
@@ -100,7 +101,7 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
 
 
 def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> None:
-    """Raise InputError where parameters given side by side make no member of the family."""
+    """Raise InputError where each side's parameters make no member of the family."""
     if kind in COMPONENTS:
         refuse_other_names(kind, parameters, list(CATALOGUE[kind].parameters), [], where)
     side_parameters = list_side_parameters(kind)
@@ -117,7 +118,7 @@ def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> 
 
 
 def list_parameters(kind: str) -> tuple[str, ...]:
-    """The parameters of an ordinary roof of a type.
+    """Return the names of the parameters of an ordinary roof of a type.
 
     >>> list_parameters("hip"), list_parameters("corner")
     (('width', 'length', 'height', 'ridge_length'), ('width', 'length', 'height', 'end_height'))
@@ -126,8 +127,11 @@ def list_parameters(kind: str) -> tuple[str, ...]:
 
 
 def list_side_parameters(kind: str) -> tuple[str, ...]:
-    """The parameters of a member of the family, each side's own; skews and cants, which are seldom
-    there, left out.
+    """Return the names of each side's own parameters of a family member.
+
+    Skews and cants, which are rare, are left out.
+
+    Skews and cants, which are rare, are left out.
     """
     shape = CATALOGUE[kind]
     of_sides = [

@@ -24,12 +24,12 @@ END_SLOPE = q1 * V / U
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """The plan's v1..v4, then the apex v5."""
+    """Return the plan's v1..v4, then the apex v5."""
     return [*rectangle(p), (0, 0, p["height"])]
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The longer side is the length."""
+    """Turn the pyramid so that its longer side is the length."""
     if theta[HALF_WIDTH] <= theta[HALF_LENGTH]:
         return theta
     turned = turn_quarter(theta)

@@ -1,5 +1,8 @@
-"""Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches side by side, each rising towards +v to
-a vertical step.
+"""Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches in a row.
+
+Each rises towards +v to a vertical step.
+
+Each rises towards +v to a vertical step.
 """
 
 from collections.abc import Mapping
@@ -15,7 +18,12 @@ TEETH = range(2, 7)
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """Four corners a tooth as a monopitch's v1..v4, from the tooth at -v to the one at +v."""
+    """Return four corners a tooth, v1..v4 as a monopitch has them.
+
+    Teeth run from -v to +v.
+
+    Teeth run from -v to +v.
+    """
     teeth = round(p["teeth"])
     tooth = {"width": p["width"] / teeth, "length": p["length"]}
     centres = [(2 * k + 1 - teeth) * tooth["width"] / 2 for k in range(teeth)]
@@ -36,7 +44,12 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
 
 
 def saw_tooth(teeth: int, additions: tuple[Primitive, ...] = ()) -> Primitive:
-    """The saw-tooth roof with `teeth` teeth; q0 is the height at each tooth's foot."""
+    """Return the saw-tooth roof with `teeth` teeth.
+
+    q0 is the height at each tooth's foot.
+
+    q0 is the height at each tooth's foot.
+    """
     return Primitive(
         name="shed",
         citygml_code="1100",

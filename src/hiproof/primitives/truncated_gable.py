@@ -25,7 +25,7 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """Pairs at +u and -u: the eave at -v, the top's two edges, the eave at +v."""
+    """Return pairs at +u and -u: eave at -v, the top's two edges, eave at +v."""
     u, v, t, h = p["length"] / 2, p["width"] / 2, p["top_width"] / 2, p["height"]
     return [
         (u, -v, 0),
@@ -40,7 +40,7 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
-    """Slopes that take a quarter of the width on each side."""
+    """Return slopes over a quarter of the width on each side."""
     return {"width": width, "length": length, "height": height, "top_width": 0.5 * width}
 
 
