@@ -1,5 +1,6 @@
-"""Ground and buildings of clouds that come without these classes, from nothing but where their
-points lie.
+"""Ground and buildings of clouds without these classes.
+
+Nothing is used but where the points lie.
 
 cells       points counted by square cells, and their density
 ground      what stands on the ground is taken away (a morphological filter)

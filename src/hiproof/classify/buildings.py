@@ -1,4 +1,4 @@
-"""Which points are a building's: those on smooth and large surfaces that stand above the ground."""
+"""The points of buildings: smooth, large surfaces above the ground."""
 
 from __future__ import annotations
 
@@ -43,7 +43,9 @@ def raise_error(inside: np.ndarray, error: Exception) -> None:
 def classify(
     xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error
 ) -> np.ndarray:
-    """Class (n,) uint8 of each point (n, 3) in world metres: BUILDING, GROUND or UNKNOWN.
+    """Return the class (n,) uint8 of each point (n, 3) in world metres.
+
+    Classes are BUILDING, GROUND and UNKNOWN.
 
     Points within 40 m decide, and so the answer for a place is much the same whatever else the
     cloud holds. `on_error` is called with the indices of the points of a square that fails; they
@@ -65,15 +67,16 @@ def classify(
 
 
 def choose_cell_size(xyz: np.ndarray) -> float:
-    """Side of the cells that buildings are put together of: the smallest that most often holds a
-    point where any are.
+    """Return the side of the cells from which buildings are put together.
+
+    It is the smallest that most often holds a point where there are any.
     """
     density = plan_density(xyz)
     return next((cell for cell in CELLS_M if density * cell**2 >= 1.0), CELLS_M[-1])
 
 
 def classify_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
-    """Class (n,) of all points of a small cloud (n, 3), n > 0."""
+    """Return the class (n,) of all points of a small cloud (n, 3), n > 0."""
     ground = ground_grid(xyz)
     rise = 0.5 * ground.cell_m * ground.slope_at(xyz)
     # the ground's cells lie as low as their lowest point
@@ -86,8 +89,9 @@ def classify_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
 
 
 def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
-    """Which (n,) of points (n, 3) within one building's outline lie on a surface, and not among
-    leaves.
+    """Return which (n,) of points (n, 3) lie on a surface, not among leaves.
+
+    The points are those within one building's outline.
 
     `more_odds` are the log odds of a roof there by what is known besides.
     """
@@ -98,7 +102,10 @@ def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
 
 
 def log_odds(surfaces: Surfaces) -> np.ndarray:
-    """Log odds (v,) of each voxel of being a roof's or a wall's, as far as its surface tells."""
+    """Return each voxel's log odds (v,) of belonging to a roof or wall.
+
+    They follow from its surface alone.
+    """
     extent = np.log(surfaces.extent_m2)
     return (
         LOG_ROUGHNESS * np.log(surfaces.roughness_m + 0.02)
@@ -117,7 +124,10 @@ def smooth_odds(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
 
 
 def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.ndarray:
-    """Which (n,) of the points (n, 3), `height` (n,) above ground, are a building's."""
+    """Return which (n,) of the points (n, 3) are a building's.
+
+    `height` (n,) is above ground.
+    """
     cells, mask = SquareCells(xyz, cell_m), height > HIGH_OBJECT_M
     odds, is_large = np.zeros(len(xyz)), np.zeros(len(xyz), bool)
     if mask.sum() < 4:
@@ -143,8 +153,10 @@ def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.nd
 def building_cells(
     solid: np.ndarray, upper: np.ndarray, core: np.ndarray, cell_m: float
 ) -> np.ndarray:
-    """Which cells (c, r) are buildings', from the points in each that are high, those of them that
-    are solid, and whether it holds a large surface.
+    """Return which cells (c, r) are buildings'.
+
+    The counts are of high points in each cell, and of solid ones among them. `core` tells whether
+    the cell holds a large surface.
     """
     likely = close_gaps((solid > 0) & (2 * solid >= upper))
     core = close_gaps(core & likely)
@@ -166,5 +178,5 @@ def building_cells(
 
 
 def close_gaps(cells: np.ndarray) -> np.ndarray:
-    """`cells` (c, r) and those narrow gaps between them that are wholly surrounded."""
+    """Return `cells` (c, r) with the narrow gaps that they surround."""
     return cells | ndimage.binary_closing(np.pad(cells, 2), SQUARE)[2:-2, 2:-2]

@@ -9,8 +9,9 @@ from ..read.thin import cell_range
 
 
 class SquareCells:
-    """The cells of side `cell_m` (m) that points (n, 3) lie in; tables are (columns, rows), `index`
-    (n,) is flat.
+    """The cells of side `cell_m` (m) that points (n, 3) lie in.
+
+    Tables are (columns, rows), `index` (n,) is flat.
     """
 
     def __init__(self, xyz: np.ndarray, cell_m: float):
@@ -19,35 +20,39 @@ class SquareCells:
         self.index = self.of(xyz)
 
     def of(self, xyz: np.ndarray) -> np.ndarray:
-        """Flat index (k,) of the cells that hold the points `xyz` (k, 3), which lie among those
-        given before.
+        """Return the flat index (k,) of the cells that hold the points `xyz` (k, 3).
+
+        The points have to lie among those given before.
         """
         column, row = (np.floor(xyz[:, :2] / self.cell_m).astype(np.int64) - self.first).T
         return column * self.shape[1] + row
 
     def count(self, selection: np.ndarray) -> np.ndarray:
-        """Table of how many of the points `selection` (n,) each cell holds."""
+        """Return a table of the number of points `selection` (n,) in each cell."""
         return np.bincount(self.index[selection], minlength=self.shape[0] * self.shape[1]).reshape(
             self.shape
         )
 
     def top(self, values: np.ndarray) -> np.ndarray:
-        """Table of the largest of the `values` (n,) of all points in each cell, minus infinity
-        where there is none.
+        """Return a table of the largest of the `values` (n,) in each cell.
+
+        It is minus infinity where the cell has no point.
         """
         table = np.full(self.shape[0] * self.shape[1], -np.inf)
         np.maximum.at(table, self.index, values)
         return table.reshape(self.shape)
 
     def highest(self, values: np.ndarray, selection: np.ndarray) -> np.ndarray:
-        """Table of the largest of the `values` (n,) of points `selection` (n,) in each cell and
-        those around it.
+        """Return a table of the largest value in each cell and those around it.
+
+        `values` (n,) are those of the points `selection` (n,).
         """
         return ndimage.maximum_filter(self.top(np.where(selection, values, -np.inf)), 3)
 
     def compute_local_share(self, selection: np.ndarray, width_m: float) -> np.ndarray:
-        """Share, flat by cells, of the points in a window of `width_m` about each cell that are
-        `selection` (n,).
+        """Return the share of `selection` (n,) among the points near each cell.
+
+        The share is flat by cells. A window of `width_m` about the cell counts as near.
         """
         size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
         mean = [
@@ -58,8 +63,9 @@ class SquareCells:
 
 
 def plan_density(xy: np.ndarray) -> float:
-    """Points a square metre where there are points: the median over occupied cells, large enough
-    for four points.
+    """Return the points a square metre where there are points.
+
+    It is the median over occupied cells that are large enough for four points.
     """
     xy = np.asarray(xy, float)[:, :2]
     for cell_m in (1.0, 2.0, 4.0, 8.0):

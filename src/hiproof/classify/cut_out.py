@@ -1,4 +1,4 @@
-"""Roofs cut out beforehand, told from a scene with its ground: by where what is high ends.
+"""Roofs cut out beforehand, told from a scene by where high surfaces end.
 
 A scene's houses end in walls, down to the ground around them. What somebody cut out along its
 outline ends where the cloud does, or in a roof's own slopes.
@@ -26,9 +26,9 @@ SMOOTH_SHARE = 0.6  # of the points of roofs; woods have less
 
 
 def is_cut_out(xyz: np.ndarray) -> bool | None:
-    """Whether points (n, 3), n > 0, are roofs alone and not a scene with its ground;
+    """Return whether points (n, 3), n > 0, are roofs alone, without ground.
 
-    None where nothing on their surface is high.
+    Returns None where nothing on their surface is high.
 
     >>> x, y = (axis.ravel() for axis in np.mgrid[0:20, 0:20] / 2)
     >>> gable, house = 8 - abs(x - 5), (abs(x - 5) < 3) & (abs(y - 5) < 3)
@@ -54,8 +54,9 @@ def is_cut_out(xyz: np.ndarray) -> bool | None:
 
 
 def find_next_heights(height: np.ndarray, axis: int, way: int) -> np.ndarray:
-    """Of each cell (c, r) the height of the next one with points within REACH_CELLS on one side;
-    minus infinity where there is none.
+    """Return for each cell (c, r) the height of the next cell with points.
+
+    The search goes REACH_CELLS to one side. It is minus infinity where there is none.
     """
     wide = np.pad(height, REACH_CELLS, constant_values=-np.inf)
     result = np.full(wide.shape, -np.inf)

@@ -1,5 +1,6 @@
-"""`hiproof classify`: a LAS or LAZ file's points get classes, and everything else in it stays as it
-is.
+"""`hiproof classify`: the points of a LAS or LAZ file get classes.
+
+Everything else in the file stays as it is.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ LEFT_ALONE = (7, 9, 17, 18)  # noise, water, bridges
 
 
 def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
-    """Write `path` to `out` with its ground and buildings as classes 2 and 6; how many "points",
-    "ground", "building".
+    """Write `path` to `out` with ground as class 2 and buildings as class 6.
+
+    Returns the numbers of "points", "ground" and "building".
 
     Raises InputError for a file that cannot be read or holds nothing but noise, water and bridges,
     OutputError for one that cannot be written.
@@ -61,7 +63,7 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
 
 
 def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
-    """Units of the file's coordinates.
+    """Return the units of the file's coordinates.
 
     Raises InputError for degrees, also where no CRS says that they are.
     """
@@ -81,15 +83,19 @@ def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
 
 
 def merge_classes(previous: np.ndarray, result: np.ndarray) -> np.ndarray:
-    """Classes (n,) from those `previous` and those `result`: neither ground nor building keeps its
-    own, unless it was one.
+    """Merge classes (n,) of the file, `previous`, with the classes found.
+
+    A point that is neither ground nor building keeps its class, unless it was one of these.
     """
     classes = np.where(np.isin(previous, (GROUND_CLASS, BUILDING)), UNKNOWN, previous)
     return np.where(result == UNKNOWN, classes, result).astype(np.uint8)
 
 
 def read_whole(path: Path) -> laspy.LasData:
-    """Everything in the file. Raises InputError where it cannot be read, is empty, or is no LAS."""
+    """Read everything in the file.
+
+    Raises InputError where it cannot be read, is empty, or is no LAS.
+    """
     if file_kind(path) != "las":
         raise InputError(
             f"expected a LAS, LAZ or COPC file at {path}, got another kind of point cloud; convert "
@@ -104,8 +110,9 @@ def read_whole(path: Path) -> laspy.LasData:
 
 
 def write_whole(las: laspy.LasData, out: Path) -> None:
-    """The file under its name, whole or not at all; an octree of COPC is left out, as the copy has
-    none.
+    """Write the file under its name, whole or not at all.
+
+    An octree of COPC is left out, as the copy has none.
     """
     header = las.header
     header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]

@@ -1,5 +1,6 @@
-"""The ground under a cloud: what stands on it is taken away by openings of growing windows, the
-gaps are filled.
+"""The ground under a cloud.
+
+Openings of growing windows take away what stands on the ground, and the gaps are filled.
 
 A simple morphological filter after Pingel, Clarke and McBride (An improved simple morphological
 filter for the terrain classification of airborne LIDAR data, ISPRS Journal 77, 2013), with two
@@ -30,8 +31,9 @@ SMOOTHINGS = 30  # passes of a mean over neighbours that smooth what fills a gap
 
 @dataclass(frozen=True)
 class GroundGrid:
-    """Heights `z` (columns, rows) of the ground at the centres of square cells; the first cell's
-    corner is `corner` (2,).
+    """Heights `z` (columns, rows) of the ground at the centres of square cells.
+
+    The first cell's corner is `corner` (2,).
     """
 
     corner: np.ndarray
@@ -39,14 +41,15 @@ class GroundGrid:
     cell_m: float
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy` (n, 2 or more), bilinear between cells' centres; the border's beyond
-        them.
+        """Return the height (n,) at `xy` (n, 2 or more), bilinear between centres.
+
+        Beyond the border it is that of the border.
         """
         place = (np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m - 0.5
         return ndimage.map_coordinates(self.z, place.T, order=1, mode="nearest")
 
     def slope_at(self, xy: np.ndarray) -> np.ndarray:
-        """Steepness (n,), a ratio, of the cell that holds each of `xy`."""
+        """Return the steepness (n,), a ratio, of the cell that holds each of `xy`."""
         place = ((np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m).astype(int)
         column, row = np.clip(place, 0, np.array(self.z.shape) - 1).T
         padded = np.pad(self.z, 1, mode="edge")
@@ -56,7 +59,9 @@ class GroundGrid:
 
 
 def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
-    """The ground under points (n, 3), n > 0, in world metres, on cells of the world's own grid.
+    """Find the ground under points (n, 3), n > 0, on the world's grid.
+
+    Coordinates are world metres.
 
     >>> x, y = np.mgrid[0:40, 0:40] + 0.5
     >>> house = (abs(x - 20) < 5) & (abs(y - 20) < 4)
@@ -69,15 +74,16 @@ def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
 
 
 def bare_points(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
-    """Those of the points (m, 3), at most one a cell, that are the ground's."""
+    """Return the ground's points among (m, 3), which are at most one a cell."""
     first, table = lowest_in_cells(lowest, cell_m)
     column, row = (np.floor(lowest[:, :2] / cell_m).astype(np.int64) - first).T
     return lowest[np.isfinite(remove_objects(table, cell_m))[column, row]]
 
 
 def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
-    """The first cell of the world's grid, and the lowest height of points (n, 3) a cell (c, r), NaN
-    where there is none.
+    """Return the lowest height of points (n, 3) in each cell (c, r).
+
+    It is NaN where there is none. The first cell of the world's grid comes first.
     """
     first, size = cell_range(xyz, cell_m)
     column, row = (np.floor(xyz[:, :2] / cell_m).astype(np.int64) - first).T
@@ -87,8 +93,9 @@ def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np
 
 
 def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
-    """The lowest heights of cells (c, r), NaN where no point is, with NaN also where they are not
-    the ground's.
+    """Replace heights that are not the ground's by NaN.
+
+    `lowest` are the lowest heights of cells (c, r), NaN where there is no point.
     """
     lowest = np.where(lowest < np.nanmedian(lowest) - ABYSS_M, np.nan, lowest)
     level = lowest - fit_plane(lowest, cell_m)
@@ -104,8 +111,9 @@ def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
 
 
 def fit_plane(z: np.ndarray, cell_m: float) -> np.ndarray:
-    """Heights at every cell of the plane through the known cells of `z`: of all, then twice of the
-    half farthest below.
+    """Return the heights at every cell of the plane through known cells of `z`.
+
+    The plane is fitted to all of them, then twice to the half farthest below.
     """
     column, row = (index * cell_m for index in np.indices(z.shape))
     terms, mask = np.stack([column, row, np.ones(z.shape)], axis=-1), np.isfinite(z)
@@ -116,8 +124,9 @@ def fit_plane(z: np.ndarray, cell_m: float) -> np.ndarray:
 
 
 def open_heights(z: np.ndarray, half: int) -> np.ndarray:
-    """The opening of `z` by squares of 2 half + 1 cells whose middles are known cells; unknown ones
-    (NaN) take no part.
+    """Return the opening of `z` by squares of 2 half + 1 cells.
+
+    The middles of the squares are known cells. Unknown ones (NaN) take no part.
     """
     mask, size = np.isfinite(z), 2 * half + 1
     eroded = ndimage.grey_erosion(
@@ -129,8 +138,9 @@ def open_heights(z: np.ndarray, half: int) -> np.ndarray:
 
 
 def fill_gaps(z: np.ndarray) -> np.ndarray:
-    """`z` with the nearest known height in unknown cells (NaN), smoothed there; zeros where nothing
-    is known.
+    """Fill unknown cells (NaN) of `z` with the nearest known height, smoothed.
+
+    They are zero where nothing is known.
     """
     mask = np.isfinite(z)
     if not mask.any():

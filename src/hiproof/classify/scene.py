@@ -19,7 +19,9 @@ def roofs_by_shape(
     ground_classes: tuple[int, ...],
     on_error: Callable[[np.ndarray, Exception], None],
 ) -> np.ndarray:
-    """Ascending indices of the roofs' points. Raises InputError where there are none.
+    """Return ascending indices of the roofs' points.
+
+    Raises InputError where there are none.
 
     `on_error` is called with the indices of the points of a square in which the search fails.
     """
@@ -41,7 +43,7 @@ def roofs_by_shape(
 
 
 def select_roof_candidates(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
-    """Ascending indices of all points but those of classes that hold no roofs.
+    """Return ascending indices of all points whose class may hold roofs.
 
     Raises InputError where there are none.
     """
@@ -52,7 +54,7 @@ def select_roof_candidates(cloud: PointCloud, ground_classes: tuple[int, ...]) -
 
 
 def require_roofs(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndarray:
-    """The `roofs`, or InputError where there are none."""
+    """Return the `roofs`, or raise InputError where there are none."""
     if len(roofs):
         return roofs
     where = ", ".join(cloud.sources) or "the cloud"

@@ -1,5 +1,6 @@
-"""A cloud without footprints becomes buildings: roof points connected in plan, and touching houses
-told apart.
+"""Buildings of a cloud without footprints.
+
+Roof points are connected in plan, and touching houses are separated.
 """
 
 from __future__ import annotations
@@ -56,8 +57,9 @@ class FoundBuilding:
 
 
 class RoofPoints(NamedTuple):
-    """Points (ascending indices) of one building with their area; or of a place where the search
-    failed.
+    """The points of one building (ascending indices), with their area.
+
+    It may also be a place where the search failed.
     """
 
     members: np.ndarray
@@ -66,8 +68,10 @@ class RoofPoints(NamedTuple):
 
 
 def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
-    """The buildings of `cloud`, from the points of its building class, or where it has none from
-    roofs found by shape.
+    """Split `cloud` into its buildings.
+
+    They come from the points of its building class or, where it has none, from roofs found by
+    shape.
 
     A small file that holds one roof alone is one building; one of several roofs cut out beforehand
     is as if their class were known. Houses that touch are told apart where their roofs say so
@@ -104,8 +108,9 @@ def divide_roof_points(
 def select_large_groups(
     groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings
 ) -> list[np.ndarray]:
-    """Those of the groups that are large enough for a building; an InputWarning counts the
-    others.
+    """Select the groups that are large enough for a building.
+
+    An InputWarning counts the others.
     """
     large = [
         group
@@ -127,8 +132,10 @@ def select_large_groups(
 def select_roof_points(
     cloud: PointCloud, read: ReadSettings
 ) -> tuple[np.ndarray, bool, list[RoofPoints]]:
-    """Ascending indices of the points that may be roofs, whether they are roofs alone, cut out
-    beforehand, and the places where the search for them failed.
+    """Return ascending indices of the points that may be roofs.
+
+    With them come whether they are roofs alone, cut out beforehand, and the places where the search
+    for them failed.
     """
     if read.roofs == "alone":
         return select_roof_candidates(cloud, read.ground_classes), True, []
@@ -165,7 +172,7 @@ def classes_text(classes: tuple[int, ...]) -> str:
 
 
 def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray | None:
-    """Ascending indices of the points of the building classes, None where there are none."""
+    """Return ascending indices of the points of the building classes, or None."""
     if cloud.classification is None:
         return None
     index = np.flatnonzero(np.isin(cloud.classification, classes))
@@ -173,15 +180,18 @@ def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray |
 
 
 def select_unclassified(cloud: PointCloud) -> np.ndarray | None:
-    """Ascending indices of all points that are no noise, None where there are none, or any has a
-    class.
+    """Return ascending indices of all points but noise.
+
+    Returns None where there are none, or any has a class.
     """
     index = np.flatnonzero(~np.isin(cloud.classes, NOISE))
     return index if len(index) and np.isin(cloud.classes, NEVER_CLASSIFIED + NOISE).all() else None
 
 
 def is_single(xy: np.ndarray) -> bool:
-    """Whether points (n, 2) are few and close enough for one building, the paper's case.
+    """Return whether points (n, 2) are few and close enough for one building.
+
+    This is the paper's case.
 
     They are at most 60 m wide and 200,000, a drone's of a large house, nine tenths of them
     connected.
@@ -192,8 +202,9 @@ def is_single(xy: np.ndarray) -> bool:
 
 
 def is_roofs_only(xyz: np.ndarray) -> bool:
-    """Whether the points (n, 3) are one roof or several, each a group by itself, that were cut out
-    beforehand.
+    """Return whether the points (n, 3) are roofs that were cut out beforehand.
+
+    They may be one roof or several, each a group by itself.
 
     Of several most are known for roofs, and hardly any is none; what has nothing high on it may be
     either.
@@ -230,23 +241,26 @@ def without_building_class(cloud: PointCloud, targets: tuple[int, ...]) -> str:
 
 
 def adapted_gap(xy: np.ndarray) -> float:
-    """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points
-    are sparse.
+    """Return the gap (m) that separates buildings at the density of `xy` (n, 2).
+
+    It is 1 m, and more where points are sparse.
     """
     required = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
     return next((gap for gap in GAPS_M if gap >= required), GAPS_M[-1])
 
 
 def group_roughly(xy: np.ndarray) -> list[np.ndarray]:
-    """The groups of `xy` (n, 2) that are connected across twice the gap between buildings: a roof
-    may have holes.
+    """Return groups of `xy` (n, 2), connected across twice the buildings' gap.
+
+    A roof may have holes.
     """
     return connected_groups(xy, 2 * adapted_gap(xy))
 
 
 def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
-    """Ascending indices of each group of `xy` (n, 2) that is connected across gaps up to about
-    `gap_m`.
+    """Return groups of `xy` (n, 2), connected across gaps up to about `gap_m`.
+
+    Groups are ascending indices.
 
     Occupied cells of half the gap, on the world's own grid, are connected where their centres are
     at most the gap apart; groups come in the order of their first cell, by rows.
@@ -284,7 +298,7 @@ def name_places(places: list[RoofPoints], xyz: np.ndarray) -> list[FoundBuilding
 def houses_or_error(
     group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
 ) -> list[RoofPoints]:
-    """Divide a group of points into houses, or keep it whole with the error that this ended in."""
+    """Divide a group of points into houses, or keep it whole with the error."""
     try:
         return [
             RoofPoints(index, shapely.make_valid(area))
@@ -295,7 +309,7 @@ def houses_or_error(
 
 
 def failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> RoofPoints:
-    """The box of the points `index` with the error that happened there."""
+    """Make the box of the points `index` with the error that happened there."""
     xy = xyz[index, :2]
     return RoofPoints(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
 
@@ -303,7 +317,10 @@ def failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> RoofPo
 def find_houses(
     group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
 ) -> list[tuple[np.ndarray, shapely.Geometry]]:
-    """Points (indices) and area of each house of a group of points, or of the whole group."""
+    """Return points (indices) and area of each house of a group of points.
+
+    It may be the whole group.
+    """
     area = cell_area(xyz[group, :2], gap_m / 2)
     if not split_houses:
         return [(group, area)]
@@ -316,8 +333,9 @@ def find_houses(
 
 
 def hull_area(xy: np.ndarray) -> float:
-    """Plan area of the points' convex hull, wider by what a roof is expected to reach beyond its
-    outermost points.
+    """Return the area of the points' convex hull, widened.
+
+    A roof is expected to reach a little beyond its outermost points.
     """
     return (
         shapely.multipoints(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
@@ -325,7 +343,7 @@ def hull_area(xy: np.ndarray) -> float:
 
 
 def cell_area(xy: np.ndarray, cell_m: float) -> shapely.Geometry:
-    """Union of the cells of the world's grid that hold points of `xy` (n, 2)."""
+    """Return the union of the world's grid cells that hold points `xy` (n, 2)."""
     distinct = np.unique(np.floor(xy / cell_m), axis=0)
     return shapely.coverage_union_all(
         shapely.box(*(distinct * cell_m).T, *((distinct + 1) * cell_m).T)

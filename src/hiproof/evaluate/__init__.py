@@ -1,4 +1,4 @@
-"""How well models stand for points, footprints and other models, and the page that tells it.
+"""Quality of models against points, footprints and others, and the report.
 
 models             finished models read back from CityJSON
 distance           exact distances from points to polygons; compiled

@@ -1,5 +1,6 @@
-"""The figures of finished models against points, footprints and a reference model: a row a
-building, and summaries.
+"""Figures of finished models, one row a building, and summaries.
+
+Models are measured against points, footprints and a reference model.
 
 A building's points are those of the building classes inside its footprint; without footprints,
 inside the plan outline of its own roof (which then cannot show points that the outline left out,
@@ -31,8 +32,9 @@ TEXT_COLUMNS = ("id", "type", "status", "quality", "ref_id")
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model minus its reference: metres, degrees and cubic metres, NaN where either has no such
-    figure.
+    """The differences of a model from its reference.
+
+    They are in metres, degrees and cubic metres, NaN where either has no such figure.
     """
 
     reference_id: str
@@ -57,7 +59,7 @@ class BuildingFigures:
     grade: str = ""
 
     def row(self) -> dict[str, Any]:
-        """One flat record, the comparison's columns prefixed with `ref_`."""
+        """Return one flat record, the comparison's columns prefixed with `ref_`."""
         row = {
             "id": self.id,
             "type": self.type,
@@ -80,8 +82,10 @@ def evaluate_building(
     footprint: shapely.Polygon | None = None,
     reference: BuildingModel | None = None,
 ) -> BuildingFigures:
-    """Figures of one model against its `points` (n, 3), its footprint and another model, all in
-    world metres.
+    """Return the figures of one model.
+
+    It is measured against its `points` (n, 3), its footprint and another model, all in world
+    metres.
     """
     if model.solid is None:
         share = compute_share_within_20cm(
@@ -109,7 +113,10 @@ def evaluate_building(
 
 
 def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
-    """Differences of two solids in one frame; the azimuth's is the smaller angle, signed."""
+    """Return the differences of two solids in one frame.
+
+    The azimuth's difference is the smaller angle, signed.
+    """
     from ..write.roof_figures import roof_figures
 
     if not (solid.select_faces(ROOF) and reference.select_faces(ROOF)):
@@ -131,8 +138,9 @@ def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
 def points_by_outline(
     points: np.ndarray, outlines: Sequence[shapely.Geometry | None]
 ) -> list[np.ndarray]:
-    """For each outline (None is empty) the points (m, 3) inside it, in the order of `points` (n,
-    3).
+    """Return for each outline the points (m, 3) inside it.
+
+    Points keep the order of `points` (n, 3). An outline of None is empty.
     """
     areas = np.array(
         [outline if outline is not None else shapely.Polygon() for outline in outlines],
@@ -150,9 +158,10 @@ def points_by_outline(
 def match_by_id_or_overlap(
     models: Sequence[BuildingModel], neighbours: Sequence[tuple[str, shapely.Geometry]]
 ) -> list[int | None]:
-    """Index of the other area that stands for each model: the one of the same id, unless another
-    overlaps it in plan more than twice as much: ids that are numbers name other buildings in
-    another file.
+    """Return the index of the area that stands for each model.
+
+    It is the one of the same id, unless another overlaps the model in plan more than twice as much:
+    ids that are numbers name other buildings in another file.
     """
     by_id = {id: i for i, (id, _) in enumerate(neighbours)}
     areas = np.array([area for _, area in neighbours], dtype=object)
@@ -171,8 +180,9 @@ def match_by_id_or_overlap(
 
 
 def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
-    """Overall and per roof type: number of buildings, and mean, median and 90th percentile of every
-    figure.
+    """Summarise figures, overall and per roof type.
+
+    A summary has the number of buildings, and mean, median and 90th percentile of every figure.
     """
     groups = {"all": list(figures)}
     for kind in sorted({f.type for f in figures}):
@@ -199,13 +209,13 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
 
 
 def figure_names(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Numeric columns, in the order of the fullest row."""
+    """Return the numeric columns, in the order of the fullest row."""
     names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     return [name for name in names if name not in TEXT_COLUMNS]
 
 
 def to_csv(figures: Sequence[BuildingFigures]) -> str:
-    """A header and a line a building; empty where there is no figure."""
+    """Format figures as a header and a line a building; empty without figures."""
     rows = [f.row() for f in figures]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     if not columns:
@@ -220,7 +230,7 @@ def to_csv(figures: Sequence[BuildingFigures]) -> str:
 
 
 def to_json(figures: Sequence[BuildingFigures]) -> str:
-    """The summary and every row; null where there is no figure."""
+    """Format the summary and every row as JSON; null where there is no figure."""
     rows = [{name: round_figure(value) for name, value in f.row().items()} for f in figures]
     return (
         json.dumps({"summary": summarise(figures), "buildings": rows}, indent=1, allow_nan=False)
@@ -229,7 +239,7 @@ def to_json(figures: Sequence[BuildingFigures]) -> str:
 
 
 def round_figure(value: Any) -> Any:
-    """A figure rounded, None where it is none; text as it is."""
+    """Round a figure; None where it is NaN, text as it is."""
     if isinstance(value, float):
         return round_value(value) if np.isfinite(value) else None
     return value

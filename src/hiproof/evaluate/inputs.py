@@ -1,5 +1,6 @@
-"""Where what a run was made from lies now: run.json keeps names as they were typed, and the folder
-in which they were.
+"""The present place of the files from which a run was made.
+
+run.json keeps names as they were typed, and the folder in which they were.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from ..read.remote import is_url
 
 @dataclass(frozen=True)
 class RunInputs:
-    """What a run was made from, each where it lies now, None for what was not asked for or is not
-    there.
+    """The inputs of a run at their present places.
+
+    An input is None where it was not given or does not exist.
 
     `gone` are those of the clouds that are not there, as the run named them. `id_attribute`,
     `where` and `bbox` say how the run read its footprints: read otherwise, ids may be those of
@@ -38,8 +40,9 @@ class RunInputs:
 
     @property
     def footprint_file(self) -> str | None:
-        """The footprints, where they are a file of this machine: an address in run.json has lost
-        its password.
+        """The footprints, where they are a file of this machine.
+
+        An address in run.json has lost its password.
         """
         return None if self.footprints is None or is_url(self.footprints) else self.footprints
 
@@ -55,8 +58,9 @@ class RunInputs:
 
 
 def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInputs:
-    """The inputs told of in run.json's `record`; files in the folder `moved_to` go before those
-    where the run found them.
+    """Return the inputs that run.json's `record` names.
+
+    Files in the folder `moved_to` go before those where the run found them.
 
     >>> found = found_inputs({"inputs": {"clouds": ["no/such.laz", "https://example.org/a.laz"]}})
     >>> found.clouds, found.gone, found.footprints
@@ -84,9 +88,11 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
 
 
 def locate_input(path: str, started_in: str | None, moved_to: Path | None) -> str | None:
-    """Where a file lies that a run started in the folder `started_in` called `path`;
+    """Return the present place of a file that a run called `path`.
 
-    None where it is not there.
+    The run started in the folder `started_in`.
+
+    Returns None where it does not exist.
 
     A whole project may have moved, and be worked in as before: so names are also tried as they
     stand.

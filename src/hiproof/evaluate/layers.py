@@ -1,5 +1,6 @@
-"""Do the points of a building lie all over it, and on one roof, or on two, one over the other: two
-flights, two dates, glass?
+"""Checks that points cover a building, and lie on one surface.
+
+Two surfaces, one over the other, come from two flights, two dates or glass.
 
 Heights over the modelled roof, so that slopes do not matter, are split in small plan cells at the
 place that leaves the least variance within the two groups (Otsu 1979). Where a cell holds two
@@ -56,8 +57,9 @@ thousand has none.
 
 
 def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the outline that none of the `points` (n, 2 or 3) are near, whatever their
-    density.
+    """Return the share of the outline that has no `points` (n, 2 or 3) near.
+
+    It does not depend on their density.
     """
     if not len(points):
         return 1.0
@@ -78,7 +80,7 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
 
 
 def places_in(outline: shapely.Polygon) -> np.ndarray:
-    """Some PLACES places (m, 2), evenly spread over the outline."""
+    """Return some PLACES places (m, 2), evenly spread over the outline."""
     gap = math.sqrt(outline.area / PLACES)
     west, south, east, north = outline.bounds
     x, y = np.meshgrid(
@@ -91,8 +93,9 @@ def places_in(outline: shapely.Polygon) -> np.ndarray:
 def find_second_surface(
     points: np.ndarray, roof: Roof, inner: Inner | None = None
 ) -> tuple[float, float]:
-    """Share of the `points` (n, 3), in the roof's frame, where they lie on two surfaces, and how
-    far apart these are [m]; zeros where that is not clear.
+    """Return the share of points on two surfaces, and the surfaces' distance [m].
+
+    `points` (n, 3) are in the roof's frame. Both are zero where the evidence is not clear.
 
     Those less than 0.3 m inside the outline do not count, `inner` are the others, where that is
     known. The distance is the median of the cells'.
@@ -121,8 +124,9 @@ def find_second_surface(
 def split_cells(
     xy: np.ndarray, values: np.ndarray, cell_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The `values` (n,) at `xy` (n, 2 or 3) of each plan cell in two groups, lower and higher, with
-    the least variance within them.
+    """Split the `values` (n,) in each plan cell into lower and higher ones.
+
+    Values are at `xy` (n, 2 or 3). The split has the least variance within its two groups.
 
     Returns by cell (m,): how many values, how many in the lesser group, the distance of the groups'
     means, and the share of the variance that is within the groups (1 where all values are one).

@@ -1,5 +1,6 @@
-"""How well a model stands for its points: point-surface distance (PSD), outline IoU and the shares
-users ask for.
+"""Measures of how well a model fits its points.
+
+They are point-surface distance (PSD), outline IoU and shares of points.
 """
 
 from __future__ import annotations
@@ -43,8 +44,9 @@ Polygons = Sequence[np.ndarray | Sequence[np.ndarray]]
 
 
 class Inner(NamedTuple):
-    """Which (n,) of some points lie FACADE_M or more inside an outline, where walls do not answer,
-    and the area there.
+    """The points well inside an outline, and the area there.
+
+    They (n,) lie FACADE_M or more inside, where walls do not reflect.
     """
 
     holds: np.ndarray
@@ -52,15 +54,16 @@ class Inner(NamedTuple):
 
 
 def well_inside(points: np.ndarray, outline: shapely.Geometry) -> Inner:
-    """Of the points (n, 2 or 3) those well inside the outline."""
+    """Return the points of (n, 2 or 3) that lie well inside the outline."""
     area = shapely.buffer(outline, -FACADE_M)
     shapely.prepare(area)
     return Inner(shapely.intersects_xy(area, points[:, 0], points[:, 1]), area.area)
 
 
 def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
-    """Roof surfaces of a model as lists of rings (m, 3), the outer first, in the model's
-    own frame.
+    """Return a model's roof surfaces as lists of rings (m, 3), the outer first.
+
+    They are in the model's own frame.
     """
     if isinstance(model, Solid):
         return [
@@ -72,9 +75,7 @@ def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
 
 
 def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
-    """The roof's outline in plan: the union of its roof surfaces seen from above (empty without
-    any).
-    """
+    """Return the union of a model's roof surfaces in plan, empty without any."""
     polygons = [
         shapely.polygons(
             outer[:, :2], holes=[shapely.linearrings(hole[:, :2]) for hole in holes] or None
@@ -90,14 +91,17 @@ def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
 
 
 def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:
-    """Distance (n,) in metres of `points` (n, 3) to the nearest bounded roof surface of `model`, in
-    the same frame.
+    """Return the distance (n,) in metres of `points` (n, 3) to the roof.
+
+    It is that to the nearest bounded roof surface of `model`, in the same frame.
     """
     return point_surface_distances(points, roof_polygons(model))
 
 
 def iou(a: shapely.Geometry, b: shapely.Geometry) -> float:
-    """Area of the intersection over the area of the union; NaN when neither has an area.
+    """Return the area of the intersection over that of the union.
+
+    It is NaN when neither has an area.
 
     >>> iou(shapely.box(0, 0, 2, 1), shapely.box(1, 0, 3, 1))
     0.3333333333333333
@@ -113,8 +117,9 @@ def quality(
     outline: shapely.Polygon | None = None,
     inner: Inner | None = None,
 ) -> Quality:
-    """Every residual figure of one model against the `points` (n, 3) it stands for, all in one
-    frame.
+    """Return every residual figure of one model on its `points` (n, 3).
+
+    All are in one frame.
 
     `outline` is the plan polygon asked for (a footprint); without one the alpha shape of the points
     takes its place, as in the paper; `inner` are the finite points well inside it, where that is
@@ -148,9 +153,9 @@ def quality(
 
 
 def compute_share_within_20cm(dz: np.ndarray, inner: Inner) -> float:
-    """Share of the points well inside an outline with |dz| (n,) below 0.2 m;
+    """Return the share of inner points with |dz| (n,) below 0.2 m.
 
-    NaN for fewer than ten.
+    It is NaN for fewer than ten.
     """
     well_inside = dz[inner.holds]
     return (
@@ -161,7 +166,9 @@ def compute_share_within_20cm(dz: np.ndarray, inner: Inner) -> float:
 
 
 def percentile(values: np.ndarray, share: float) -> float:
-    """The level that `share` of `values` (n,) lie below, linear between two values;
+    """Return the level that `share` of `values` (n,) lie below.
+
+    It is linear between two values.
 
     NumPy's own takes ten times as long.
     """
@@ -174,9 +181,11 @@ def percentile(values: np.ndarray, share: float) -> float:
 
 
 def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2 or 3);
+    """Return the share of 1 m cells in `outline` without points.
 
-    NaN without cells.
+    Cells count whose centre is in the outline. `xy` is (n, 2 or 3).
+
+    It is NaN without cells.
     """
     west, south, east, north = np.array(outline.bounds) / CELL_M
     west, south = math.floor(west), math.floor(south)
@@ -196,8 +205,9 @@ def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
 
 
 def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
-    """Area (m2) of the 1 m cells of `xy` (n, 2 or 3) most of whose points lie more than half a
-    metre off the roof.
+    """Return the area (m2) of 1 m cells whose points lie off the roof.
+
+    Most of their points `xy` (n, 2 or 3) lie more than half a metre off.
     """
     xy = np.ascontiguousarray(xy, float)
     lower, (columns, rows) = cell_range(xy, CELL_M)
@@ -207,7 +217,7 @@ def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
 
 
 def observed_outline(points: np.ndarray) -> shapely.Polygon | None:
-    """The alpha shape of points in plan, None where they have none."""
+    """Return the alpha shape of points in plan, None where they have none."""
     from ..errors import FitError
     from ..geometry.alpha_shape import alpha_shape
 

@@ -1,5 +1,7 @@
-"""Finished models read back from CityJSON: what evaluation, the report and the conversions start
-from."""
+"""Finished models, read back from CityJSON.
+
+Evaluation, the report and the conversions start from them.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +37,12 @@ MOST_PART_NUMBER = 2**31
 
 @dataclass(frozen=True)
 class BuildingModel:
-    """One building of a file: its `attributes`, its `solid` in world metres (None where the file
-    has none), and the roof types of its parts by number (`Face.part`). `is_damaged` where the
-    file's text of it cannot be read."""
+    """One building of a file.
+
+    It has `attributes`, its `solid` in world metres (None where the file has none), and the roof
+    types of its parts by number (`Face.part`). `is_damaged` where the file's text of it cannot be
+    read.
+    """
 
     id: str
     attributes: dict[str, Any] = field(default_factory=dict)
@@ -63,13 +68,16 @@ class BuildingModel:
         return self.text(f"{OWN}quality")
 
     def text(self, name: str) -> str:
-        """An attribute that is text, else ""."""
+        """Return an attribute that is text, else ""."""
         value = self.attributes.get(name)
         return value if isinstance(value, str) else ""
 
 
 def run_models(folder: Path) -> Path:
-    """Path of the models in the output folder of a run. Raises InputError where there are none."""
+    """Return the path of the models in a run's output folder.
+
+    Raises InputError where there are none.
+    """
     path, tiles = Path(folder) / RUN_MODELS, Path(folder) / TILE_FOLDER
     if not path.is_file() and any(tiles.glob(f"*{FORMATS['cityjson'].tile_ending}")):
         raise InputError(
@@ -93,8 +101,9 @@ def read_models(
     damaged: Damaged = refuse,
     must_be_valid: bool = False,
 ) -> Iterator[BuildingModel]:
-    """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts
-    joined, in metres.
+    """Yield the buildings of a CityJSON or CityJSONSeq file in its order.
+
+    The solids of their parts are joined. Coordinates are metres.
 
     Solids of the highest level of detail count, and building parts that hiproof cut come as the
     whole that they were. `alternative` are the units of a file that names no CRS, `crs_units`
@@ -156,8 +165,10 @@ def plain_attributes(attributes: Any) -> dict[str, Any]:
 
 
 def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
-    """Return the model. Raises ValueError if its solid cannot be drawn, or must be valid and is
-    not."""
+    """Return the model if it can be used.
+
+    Raises ValueError if its solid cannot be drawn, or must be valid and is not.
+    """
     if model.solid is None:
         return model
     findings = check_solid(model.solid) if must_be_valid else []
@@ -172,8 +183,10 @@ def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
 
 
 def join_shells(solid: Solid, family: list[dict[str, Any]]) -> Solid:
-    """`solid` as one shell where it is several, those of building parts that hiproof cut: without
-    the walls between them."""
+    """Join the shells of building parts that hiproof cut into one.
+
+    The walls between them go.
+    """
     part_solids = [
         member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})
     ]
@@ -207,7 +220,7 @@ def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> li
 
 
 def read_part_number(surface: ShellSurface) -> int:
-    """The number of the part that a roof surface belongs to, 0 where the file does not tell."""
+    """Return the number of a roof surface's part, 0 where there is none."""
     number = surface.semantics.get(PART_ATTRIBUTE, 0)
     if type(number) is not int or not 0 <= number < MOST_PART_NUMBER:
         raise ValueError(f"{excerpt(number)} as the number of a part")
@@ -223,8 +236,10 @@ def read_level(geometry: dict[str, Any]) -> float:
 
 
 def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
-    """A solid with only the vertices its faces use, each of which must be a place; ValueError
-    otherwise."""
+    """Return a solid with only the vertices that its faces use.
+
+    Each of these must be a place; raises ValueError otherwise.
+    """
     rings = [ring for face in faces for ring in (face.rings or ((),))]
     smallest = min(len(set(ring)) for ring in rings)
     if smallest < 3:

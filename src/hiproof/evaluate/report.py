@@ -1,5 +1,6 @@
-"""One self-contained HTML page about a run: map, 3D view, distributions, the worst buildings,
-settings.
+"""One self-contained HTML page about a run.
+
+It has a map, a 3D view, distributions, the worst buildings and settings.
 
 The page opens from the file system and asks nothing of the network: styles, scripts and data are in
 it.
@@ -53,7 +54,7 @@ def write_report(
 
 
 def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> str:
-    """The page as text.
+    """Return the page as text.
 
     Tables and distributions count every building; of more than `most_shown`, map and 3D view show
     the worst and an even selection of the others.
@@ -86,12 +87,12 @@ def read_asset(name: str) -> str:
 
 
 def embed_json(data: Any) -> str:
-    """JSON that may stand inside a script element."""
+    """Return JSON that may stand inside a script element."""
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
 def lead(run: EvaluatedRun, visible: int) -> str:
-    """The sentences at the top."""
+    """Return the sentences at the top."""
     version = run.record.get("hiproof") or run.record.get("version") or __version__
     modelled = sum(model.solid is not None for model in run.models)
     points = sum(map(len, run.points))
@@ -119,7 +120,7 @@ def status_table(run: EvaluatedRun) -> str:
 
 
 def grade_table(run: EvaluatedRun) -> str:
-    """How many models are good, fair and poor; empty for models without a verdict."""
+    """Return how many models are good, fair and poor; empty without verdicts."""
     counts = Counter(model.grade for model in run.models)
     rows = "".join(
         f"<tr><td>{counts[grade.code]}</td><td>{grade.code}: {escape(grade.value)}</td></tr>"
@@ -140,7 +141,7 @@ def sentence(code: str) -> str:
 
 
 def figure_table(run: EvaluatedRun) -> str:
-    """Mean figures by roof type."""
+    """Return the table of mean figures by roof type."""
     head = head_row("type", "buildings", *(name.replace("_", " ") for name in TABLE_FIGURES))
     rows = ""
     for kind, figures in summarise(run.figures).items():
@@ -162,8 +163,10 @@ def distributions(run: EvaluatedRun) -> str:
 
 
 def worst_indices(run: EvaluatedRun) -> list[int]:
-    """Twenty models, the poor ones first, then those that explain the least of their points (of
-    equals the larger RMSE first).
+    """Return the indices of the twenty worst models.
+
+    Poor ones come first, then those that explain the least of their points (of equals the larger
+    RMSE first).
     """
     worst_first = [grade.code for grade in reversed(Grade)]
     grades = np.array(
@@ -178,7 +181,7 @@ def worst_indices(run: EvaluatedRun) -> list[int]:
 
 
 def choose_buildings(run: EvaluatedRun, worst: list[int], limit: int) -> list[int]:
-    """Indices in order: all buildings, or the worst and an even selection of all."""
+    """Choose all buildings, or the worst and an even selection, in order."""
     count = len(run.models)
     if count <= limit:
         return list(range(count))
@@ -187,7 +190,10 @@ def choose_buildings(run: EvaluatedRun, worst: list[int], limit: int) -> list[in
 
 
 def worst_buildings(run: EvaluatedRun, worst: list[int], visible: list[int]) -> str:
-    """A card for each of the worst; a click selects it by its place among the shown."""
+    """Return a card for each of the worst buildings.
+
+    A click selects the building by its place among those shown.
+    """
     place = {index: position for position, index in enumerate(visible)}
     cards = "".join(worst_card(run, index, place[index]) for index in worst)
     return cards or "<p>No points were given, so there are no residuals.</p>"

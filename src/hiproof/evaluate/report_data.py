@@ -1,4 +1,7 @@
-"""What the report's page draws, as plain values and packed float32 arrays about a local origin."""
+"""The data of the report's page.
+
+These are plain values and packed float32 arrays about a local origin.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ MOST_REPORT_POINTS = 600_000  # points in the page, 7 MB: what a browser still o
 
 
 def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
-    """JSON-ready content of the page.
+    """Return the page's data, ready for JSON.
 
     `outlines` are plan polygons (world), None where nothing is known of the place.
     """
@@ -40,7 +43,10 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
 
 
 def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> np.ndarray:
-    """Whole-metre corner (3,) below everything, so that float32 keeps millimetres over a city."""
+    """Return a whole-metre corner (3,) below everything.
+
+    With it, float32 keeps millimetres over a city.
+    """
     corners = [model.solid.vertices.min(axis=0) for model in run.models if model.solid is not None]
     corners += [
         np.array([*outline.bounds[:2], np.inf]) for outline in outlines if outline is not None
@@ -52,8 +58,9 @@ def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None])
 def building_data(
     run: EvaluatedRun, index: int, outline: shapely.Geometry | None, origin: np.ndarray
 ) -> dict[str, Any]:
-    """What the map and the panel show of one building; the residual is from the points given, else
-    as the model says.
+    """Return what the map and the panel show of one building.
+
+    The residual is from the points given, else as the model has it.
     """
     model, figures = run.models[index], run.figures[index]
     status = Status.__members__.get(model.status.upper())
@@ -79,8 +86,9 @@ def building_data(
 
 
 def finite(value: Any) -> Any:
-    """`value` as JSON can hold it: rounded numbers, None for NaN, text for what is neither number
-    nor text.
+    """Convert `value` to one that JSON can hold.
+
+    Numbers are rounded, NaN becomes None, and anything else text.
     """
     if isinstance(value, (bool, str, int)) or value is None:
         return value
@@ -90,8 +98,9 @@ def finite(value: Any) -> Any:
 
 
 def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[list[float]]:
-    """Rings of a polygon or multipolygon as flat x, y lists in centimetres' precision about the
-    origin.
+    """Return the rings of a polygon or multipolygon as flat x, y lists.
+
+    They are about the origin, to the centimetre.
     """
     if outline is None:
         return []
@@ -106,8 +115,9 @@ def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[
 
 
 def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[str, str]:
-    """Triangles of roofs and walls: corners (t, 3, 3), building (t,), `roof_places` (t,); roof
-    edges (e, 2, 3).
+    """Return triangles of roofs and walls, and roof edges.
+
+    They are corners (t, 3, 3), building (t,), `roof_places` (t,), and edges (e, 2, 3).
     """
     solids = [
         (index, model.solid) for index, model in enumerate(run.models) if model.solid is not None
@@ -133,9 +143,11 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
 
 
 def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> list[int]:
-    """The place among `types`, from 1 on, of the roof type of triangles by their `part` (t,);
+    """Return each triangle's roof type as its place among `types`, from 1 on.
 
-    0 of walls.
+    `part` (t,) is the triangle's part.
+
+    It is 0 for walls.
     """
     return [
         0 if k < 0 else 1 + types.index(model.part_types.get(k, model.roof_type))
@@ -144,8 +156,9 @@ def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> lis
 
 
 def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
-    """Points (n, 3) thinned to every k-th of each building, with their distances to the roof in
-    metres (n,).
+    """Return points (n, 3) with their distances to the roof in metres (n,).
+
+    They are every k-th point of each building.
     """
     largest = max(1, min(POINTS_PER_BUILDING, MOST_REPORT_POINTS // max(len(run.models), 1)))
     places, distances = [np.empty((0, 3))], [np.empty(0)]
@@ -163,8 +176,9 @@ def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
 
 
 def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:
-    """The plan outline of every model; of a building without a model its footprint, None where it
-    has neither.
+    """Return the plan outline of every model.
+
+    It is the footprint of a building without a model, None where it has neither.
     """
     footprints = run.footprints or (None,) * len(run.models)
     return [

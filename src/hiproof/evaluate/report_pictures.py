@@ -1,4 +1,4 @@
-"""Small SVG pictures for the report: histograms, and one building's model with its points."""
+"""Small SVG pictures for the report: histograms, and models with points."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ def residual_bins(distances: np.ndarray) -> np.ndarray:
 
 
 def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
-    """A histogram of the finite `values`, the last bar holding all above the 98th percentile."""
+    """Draw a histogram of the finite `values`.
+
+    The last bar holds all above the 98th percentile.
+    """
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     heading = f"{title} ({unit})" if unit else title
@@ -74,8 +77,9 @@ def short(value: float) -> str:
 def building_pictures(
     solid: Solid, points: np.ndarray, distances: np.ndarray, part_types: Mapping[int, str]
 ) -> str:
-    """The model with its points (n, 3), coloured by their distances (n,): from above at an angle,
-    and from the side.
+    """Draw the model with its points from above at an angle, and from the side.
+
+    Points (n, 3) are coloured by their distances (n,).
 
     The side view looks along the level direction of the largest roof face, so that slopes show as
     lines. Roofs have the colour of their part's type, by number in `part_types`.
@@ -99,8 +103,9 @@ def building_pictures(
 
 
 def slope_direction(solid: Solid) -> np.ndarray:
-    """Level unit vector (3,) in which the largest sloped roof face falls; east where all
-    are level.
+    """Return the level unit vector (3,) in which the largest slope falls.
+
+    It is east where all roof faces are level.
     """
     normals = np.array(
         [ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.select_faces(ROOF)]
@@ -122,8 +127,10 @@ def projection(
     vertical: np.ndarray,
     label: str,
 ) -> str:
-    """An SVG of faces, each in its colour, and points seen along one direction, `right` and
-    `vertical` (3,) being the picture's axes. Screen readers read its `label`.
+    """Draw faces and points as an SVG, seen along one direction.
+
+    Each face has its colour. `right` and `vertical` (3,) are the picture's axes. Screen readers
+    read its `label`.
     """
     axes = np.column_stack([right, -vertical])
     corners, dots = solid.vertices @ axes, points @ axes
@@ -168,7 +175,7 @@ def dot_paths(xy: np.ndarray) -> str:
 
 
 def ring_paths(xy: np.ndarray, rings: Sequence[Sequence[int]]) -> str:
-    """SVG path data of a face."""
+    """Return SVG path data of a face."""
     return "".join(
         "M" + "L".join(f"{xy[i, 0]:.1f} {xy[i, 1]:.1f}" for i in ring) + "Z" for ring in rings
     )

@@ -1,4 +1,4 @@
-"""A finished run with its points: what `hiproof evaluate` and `hiproof report` both start from."""
+"""A finished run with its points, for `hiproof evaluate` and `report`."""
 
 from __future__ import annotations
 
@@ -56,8 +56,9 @@ RECORD: dict[tuple[str, ...], Any] = {
 
 @dataclass(frozen=True)
 class EvaluatedRun:
-    """Models in the run's order, the points (n, 3) of each in world metres, and their figures;
-    `record` is run.json.
+    """Models in the run's order, with their points and figures.
+
+    Points (n, 3) are in world metres; `record` is run.json.
 
     `footprints` are plan polygons in world metres, None where a building has none; `clouds` the
     files measured against.
@@ -71,7 +72,7 @@ class EvaluatedRun:
     clouds: tuple[str, ...] = ()
 
     def only(self, indices: Sequence[int]) -> EvaluatedRun:
-        """The same run with only these buildings."""
+        """Return the same run with only these buildings."""
         models = tuple(self.models[i] for i in indices)
         points, figures = (
             tuple(self.points[i] for i in indices),
@@ -90,9 +91,10 @@ def evaluate_run(
     damaged: Damaged = refuse,
     must_be_valid: bool = False,
 ) -> EvaluatedRun:
-    """Read the models of `folder` and measure them against `clouds` and `footprints`; where none
-    are named, against those that the run was made from, as far as they are there. Without any
-    clouds no residual figures come out.
+    """Measure the models of `folder` against `clouds` and `footprints`.
+
+    Where none are named, they are those that the run was made from, as far as they exist. Without
+    any clouds there are no residual figures.
 
     The building classes, the CRS and the units are those the run was made with; `layer` is that of
     the footprints. A damaged building, with `must_be_valid` one with an invalid solid too, is told
@@ -139,8 +141,10 @@ def evaluate_run(
 
 
 def run_record(folder: Path) -> dict[str, Any]:
-    """Content of run.json, empty where the folder has none. Raises InputError where it is no record
-    of a run."""
+    """Read run.json, empty where the folder has none.
+
+    Raises InputError where it is no record of a run.
+    """
     path = Path(folder) / "run.json"
     record = parse_object(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
     try:
@@ -156,7 +160,7 @@ def run_record(folder: Path) -> dict[str, Any]:
 
 
 def refuse_other_kinds(record: dict[str, Any]) -> None:
-    """Raise InputError where a value of the record is of another kind than RECORD has it."""
+    """Raise InputError where a value of the record has another kind than RECORD."""
     for names, kind in RECORD.items():
         value: Any = record
         for name in names:
@@ -177,22 +181,24 @@ def name_kind(kind: Any) -> str:
 
 
 def run_settings(record: dict[str, Any]) -> Settings:
-    """The settings a run was made with, as far as this version knows them."""
+    """Return the settings of a run, as far as this version has them."""
     read = (record.get("settings") or {}).get("read") or {}
     overrides = {name: read[name] for name in ("building_classes", "crs", "unit") if read.get(name)}
     return Settings.from_dict({"read": overrides})
 
 
 def run_crs(record: dict[str, Any]) -> Any:
-    """The pyproj CRS of a run, None where it has none."""
+    """Return the pyproj CRS of a run, None where it has none."""
     return parse_crs(record.get("crs"))
 
 
 def building_points(
     clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]
 ) -> np.ndarray:
-    """Points (n, 3) of the building classes around `areas`; all points of clouds without
-    classes."""
+    """Return points (n, 3) of the building classes around `areas`.
+
+    Of clouds without classes they are all points.
+    """
     from ..read.pointcloud import expand_paths, read_points, refuse_other_crs
 
     settings = run_settings(record)
@@ -215,7 +221,7 @@ def match_footprints(
     record: dict[str, Any],
     options: dict[str, Any],
 ) -> list[Any]:
-    """The footprint polygon of each model, None without one;
+    """Return the footprint polygon of each model, None without one.
 
     `options` is what else `read_footprints` is told.
     """
@@ -232,28 +238,34 @@ def match_footprints(
 
 
 def run_units(record: dict[str, Any]) -> Units:
-    """Units of the coordinates a run was made from; metres where nothing is known of it."""
+    """Return the units of a run's coordinates; metres where they are unknown."""
     return find_units(run_crs(record), "the run", run_settings(record).read.unit)
 
 
 def way_to_models(record: dict[str, Any]) -> Units | None:
-    """From the world metres of a run's clouds to its models, where these are in another CRS; None
-    where they are not."""
+    """Return the units that lead from a run's world metres to its models.
+
+    It is None where the models are in the CRS of the clouds.
+    """
     out_crs = run_out_crs(record)
     return FileUnits.of(run_crs(record), run_units(record), out_crs).cityjson if out_crs else None
 
 
 def run_out_crs(record: dict[str, Any]) -> str:
-    """What the run was asked to write its coordinates in, empty where that is the CRS of its
-    clouds."""
+    """Return the CRS in which the run wrote coordinates.
+
+    It is empty where that is the CRS of its clouds.
+    """
     return ((record.get("settings") or {}).get("write") or {}).get("out_crs") or ""
 
 
 def match_references(
     models: Sequence[BuildingModel], path: str | None
 ) -> list[BuildingModel | None]:
-    """The building of the reference file that stands for each model; one line where none does for
-    any."""
+    """Return the reference building that stands for each model.
+
+    Logs one line where none does for any.
+    """
     if path is None:
         return [None] * len(models)
     neighbours = [

@@ -1,4 +1,4 @@
-"""How good is a model? Its points tell: good, fair or poor, and what speaks against it.
+"""The grade of a model: good, fair or poor, with reasons.
 
 A point off the roof that lies on one of the model's walls is a facade return and counts neither
 way. All other points are roof points. Five findings speak against a model:
@@ -58,8 +58,10 @@ POOR_UNSUPPORTED = 0.3
 
 
 class Cluster(NamedTuple):
-    """Points that lie off the roof together: how many, how far off the farthest lies, and the area
-    that they stand for."""
+    """Points that lie off the roof together.
+
+    It has their number, the distance of the farthest, and the area that they stand for.
+    """
 
     points: int = 0
     height_m: float = 0.0
@@ -67,8 +69,10 @@ class Cluster(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What the points say of a model: the number of roof points, shares of these and of the
-    outline, clusters, and the area of parts on few points.
+    """The points' evidence about a model.
+
+    It has the number of roof points, shares of these and of the outline, clusters, and the area of
+    parts on few points.
     """
 
     points: int
@@ -81,14 +85,16 @@ class Evidence(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """The grade of a model and what speaks against it, in words; nothing against a good one."""
+    """The grade of a model and the reasons against it; a good one has none."""
 
     grade: Grade
     reasons: tuple[str, ...] = ()
 
 
 def judge_model(model: Model, points: np.ndarray, unused: np.ndarray | None = None) -> Verdict:
-    """The verdict on a model by its `points` (n, 3) inside the outline, in the frame of its roof.
+    """Return the verdict on a model by its `points` (n, 3) inside the outline.
+
+    They are in the frame of its roof.
 
     `unused` (m, 3) are further points that were thinned out or called noise. They count where they
     lie together off the roof.
@@ -99,7 +105,7 @@ def judge_model(model: Model, points: np.ndarray, unused: np.ndarray | None = No
 
 
 def judge_evidence(evidence: Evidence) -> Verdict:
-    """The verdict by the evidence.
+    """Return the verdict on evidence.
 
     >>> judge_evidence(Evidence(100, 0.99, 0.0, Cluster(41, 30.2, 6.0), Cluster(), 0.0,
     ...     80.0)).reasons
@@ -117,7 +123,7 @@ Finding = tuple[bool, str]
 
 
 def share_findings(evidence: Evidence) -> list[Finding]:
-    """Points off the roof, and places without points."""
+    """Return findings on points off the roof and places without points."""
     result = []
     if not evidence.points:
         result.append((True, "all its points lie on its walls, none on its roof"))
@@ -137,7 +143,7 @@ def share_findings(evidence: Evidence) -> list[Finding]:
 
 
 def cluster_findings(evidence: Evidence) -> list[Finding]:
-    """Points that lie off the roof together."""
+    """Return findings on points that lie off the roof together."""
     sides = ((evidence.above, Doubt.POINTS_ABOVE), (evidence.below, Doubt.POINTS_BELOW))
     return [
         (
@@ -152,7 +158,7 @@ def cluster_findings(evidence: Evidence) -> list[Finding]:
 
 
 def part_findings(evidence: Evidence) -> list[Finding]:
-    """Parts of the roof on hardly any point."""
+    """Return findings on parts of the roof on hardly any point."""
     area, share = evidence.unsupported_m2, evidence.unsupported_m2 / evidence.area_m2
     return (
         [(share > POOR_UNSUPPORTED, f"{area:.0f} m² of its roof {Doubt.UNSUPPORTED.value}")]
@@ -162,7 +168,10 @@ def part_findings(evidence: Evidence) -> list[Finding]:
 
 
 def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidence:
-    """What `points` (n, 3) and `unused` ones (m, 3) say of a model; see `judge_model`."""
+    """Collect the evidence of `points` (n, 3) and `unused` ones (m, 3).
+
+    See `judge_model`.
+    """
     roof, everything = model.roof, np.concatenate([points, unused])
     z_roof, part = find_highest(roof.parts, everything[:, :2])
     dz = everything[:, 2] - z_roof
@@ -192,7 +201,7 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
 
 
 def wall_rings(model: Model) -> list[list[np.ndarray]]:
-    """The walls of a model as lists of rings (m, 3), in the frame of its roof."""
+    """Return the walls of a model as lists of rings (m, 3), in its roof's frame."""
     vertices = model.solid.vertices - model.roof.frame.origin
     return [
         [vertices[list(ring)] for ring in face.rings] for face in model.solid.select_faces(WALL)
@@ -200,8 +209,9 @@ def wall_rings(model: Model) -> list[list[np.ndarray]]:
 
 
 def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) -> Cluster:
-    """The largest cluster, tall or a level, of points (n, 3) so far off a roof (n,); empty if there
-    is none.
+    """Return the largest cluster, tall or level, of points (n, 3) off a roof.
+
+    `height_m` (n,) is how far off they are. It is empty if there is none.
 
     Tall and lower points are apart, so that a bird over a chimney makes no tower of it.
     """
@@ -218,7 +228,10 @@ def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) 
 
 
 def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[list[int]]:
-    """Indices of points (n, 3), in groups whose plan cells touch, at corners too."""
+    """Return indices of points (n, 3), in groups whose plan cells touch.
+
+    Cells also touch at corners.
+    """
     members: dict[tuple[int, int], list[int]] = {}
     for index, (column, row) in enumerate(np.floor(points[:, :2] / cell_m).astype(int).tolist()):
         members.setdefault((column, row), []).append(index)

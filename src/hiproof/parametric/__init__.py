@@ -1,5 +1,6 @@
-"""The parameters are the model: what is written of a building is enough to build it again, by hand
-or by program.
+"""Buildings from their written parameters.
+
+The parameters are the model: they are enough to build it again, by hand or by program.
 
 file        parameters.jsonl read line by line, its head and its errors by line and column
 schema      the JSON schema of that file

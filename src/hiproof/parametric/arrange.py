@@ -35,9 +35,10 @@ BLOCK_SIDE_M, BLOCK_HEIGHT_M = 3.0, 2.5  # m; a lift's or a staircase's head
 def split_part(
     part: dict[str, Any], side: str = "length", share: float = 0.5
 ) -> list[dict[str, Any]]:
-    """The part cut in two across its `side` ("length" or "width") at a share of it: both keep type,
-    eave and height, and roof what lies on their side of the cut. Raises InputError for a cut
-    outside the part.
+    """Cut a part in two across its `side` at a share of it.
+
+    `side` is "length" or "width". Both halves keep type, eave and height, and roof what lies on
+    their side of the cut. Raises InputError for a cut outside the part.
 
     >>> house = {"width": 8.0, "length": 12.0, "height": 3.0}
     >>> ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
@@ -73,8 +74,10 @@ def split_part(
 
 
 def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """One part in place of two: of the larger's type, direction and heights, over the rectangle
-    around both, roofing what both roofed.
+    """Merge two parts into one.
+
+    It has the type, direction and heights of the larger one, over the rectangle around both, and
+    roofs what both roofed.
     """
     main, side = sorted(map(with_sizes, (item, other)), key=compute_part_area, reverse=True)
     along, across = find_axis(main, "length"), find_axis(main, "width")
@@ -99,9 +102,10 @@ def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
 
 
 def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None) -> dict[str, Any]:
-    """A gable dormer on part `index`, its middle at `place` (x, y about the roof's origin) or
-    half-way up a slope, its ridge running into the slope; where the part is level a flat block,
-    turned as the part is.
+    """Return a gable dormer on part `index`, its ridge running into the slope.
+
+    Its middle is at `place` (x, y about the roof's origin) or half-way up a slope. Where the part
+    is level it is a flat block, turned as the part is.
     """
     part = roof.parts[index]
     x, y = place if place is not None else place_on_slope(part)
@@ -127,7 +131,7 @@ def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None)
 
 
 def place_on_slope(part: Any) -> tuple[float, float]:
-    """A place half-way between the ridge and the front eave."""
+    """Return a place half-way between the ridge and the front eave."""
     width = part.parameters.get("width", 0.0)
     x, y = part.translation[:2] - 0.25 * width * np.array(
         [-math.sin(part.kappa), math.cos(part.kappa)]
@@ -136,13 +140,13 @@ def place_on_slope(part: Any) -> tuple[float, float]:
 
 
 def find_axis(part: dict[str, Any], side: str) -> np.ndarray:
-    """Direction (2,) of a side of the part's rectangle."""
+    """Return the direction (2,) of a side of the part's rectangle."""
     turn = math.radians(part.get("rotation", 0.0)) + (0.0 if side == "length" else 0.5 * math.pi)
     return np.array([math.cos(turn), math.sin(turn)])
 
 
 def resize_rectangle(parameters: dict[str, float], side: str, size: float) -> dict[str, float]:
-    """Parameters whose rectangle has another `side`, what lies within it grown alike."""
+    """Return parameters with another `side`, scaling all that lies within it."""
     grown = {
         name: parameters[name] * size / parameters[side]
         for name in INNER[side]
@@ -152,7 +156,7 @@ def resize_rectangle(parameters: dict[str, float], side: str, size: float) -> di
 
 
 def compute_corners(part: dict[str, Any]) -> np.ndarray:
-    """Corners (4, 2) of the part's rectangle."""
+    """Return the corners (4, 2) of the part's rectangle."""
     u = 0.5 * part["parameters"]["length"] * find_axis(part, "length")
     v = 0.5 * part["parameters"]["width"] * find_axis(part, "width")
     return np.array(part["position"][:2]) + np.array([-u - v, u - v, u + v, v - u])
@@ -163,7 +167,7 @@ def compute_part_area(part: dict[str, Any]) -> float:
 
 
 def cut_outlines(outlines: list, place: np.ndarray, direction: np.ndarray) -> list:
-    """What of the outlines lies beyond a line through `place` (2,), seen along `direction` (2,)."""
+    """Keep what lies beyond a line through `place` (2,), along `direction` (2,)."""
     perpendicular = np.array([-direction[1], direction[0]])
     ring = place + FAR_M * np.array(
         [-perpendicular, perpendicular, perpendicular + direction, direction - perpendicular]
@@ -182,7 +186,7 @@ def cut_outlines(outlines: list, place: np.ndarray, direction: np.ndarray) -> li
 
 
 def list_rings(geometry: shapely.Geometry) -> list:
-    """The polygons of a geometry as rings, the outer first."""
+    """Return the polygons of a geometry as rings, the outer first."""
     return [
         [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]
         for polygon in shapely.get_parts(geometry)

@@ -1,4 +1,4 @@
-"""One building from its parameters: `build` composes, checks and says what came of it."""
+"""One building from its parameters: composed, checked and described."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from .record import read_building, require_mapping
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:
-    """The building of `parameters`, an object of a parameters.jsonl (`read_parameters` reads them);
-    the run's own give the run's own.
+    """Build the building of `parameters`, an object of a parameters.jsonl.
+
+    `read_parameters` reads such objects. A run's own parameters give the run's own building.
 
     compose: how solids are composed, as the file's head says. Raises InputError for parameters that
     make no roof and CompositionError for a roof that makes no valid solid; each is one sentence.
@@ -33,7 +34,10 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
 
 
 def with_model(building: Building, roof: Roof, compose: ComposeSettings | None = None) -> Building:
-    """The building with a model of its `roof`. Raises CompositionError as `build` does."""
+    """Return the building with a model of its `roof`.
+
+    Raises CompositionError as `build` does.
+    """
     from ..compose import compose as composed
 
     settings = dataclasses.replace(Settings(), compose=compose or ComposeSettings())

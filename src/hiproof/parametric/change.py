@@ -1,4 +1,4 @@
-"""One part changed: another type of the same size, a ridge or an eave at a height, sides moved.
+"""Changes of one part: another type, a ridge or eave height, moved sides.
 
 Parts are JSON objects here.
 
@@ -27,7 +27,9 @@ STEEPEST_SLOPE = math.tan(math.radians(85.0))  # rise over run; a steeper plane 
 
 
 def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) -> dict[str, Any]:
-    """The part after a change: `type`, `position` (x, y, z about the origin), `rotation` (degrees),
+    """Return a part after a change.
+
+    A change may name `type`, `position` (x, y, z about the origin), `rotation` (degrees),
     `ridge_height` and `eave_height` (world metres, the origin at `z_origin`), `outlines`, and any
     parameter by name.
 
@@ -59,8 +61,9 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
 
 
 def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
-    """The part with its position at its lowest eave, where sides have their own: all its heights
-    count from there.
+    """Return the part with its position at its lowest eave.
+
+    Where sides have their own eaves, all its heights count from there.
     """
     parameters = part["parameters"]
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
@@ -75,8 +78,9 @@ def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
-    """The part with a width and a length; one that has none gets those of the smallest rectangle
-    around its outlines.
+    """Return the part with a width and a length.
+
+    A part without these gets those of the smallest rectangle around its outlines.
     """
     if all(name in part["parameters"] for name in PLAN_SIZES):
         return part
@@ -97,23 +101,26 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def make_polygon(rings: list) -> shapely.Geometry:
-    """The area of a part's outline, rings of (x, y), the outer first; a spike of no width
-    is none.
+    """Return the area of a part's outline, rings of (x, y), the outer first.
+
+    A spike without width has no area.
     """
     return repair_polygons(shapely.Polygon(rings[0], rings[1:]))
 
 
 def read_sizes(change: dict[str, Any]) -> dict[str, float]:
-    """The width and length that a change gives, those that make no rectangle left to be refused
-    with the whole part.
+    """Read the width and length of a change.
+
+    Sizes that make no rectangle are left to be refused with the whole part.
     """
     sizes = {name: measure(change[name], name) for name in PLAN_SIZES if name in change}
     return {name: size for name, size in sizes.items() if size > 0.0}
 
 
 def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
-    """The part as another roof type over the same rectangle, or one of other `sizes`, with the same
-    lowest eave and the same rise.
+    """Return the part as another roof type with the same eave and rise.
+
+    It has the same rectangle, or one of other `sizes`.
     """
     if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
@@ -123,7 +130,9 @@ def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dic
 
 
 def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
-    """The part with each side's own pitch and eave in place of the catalogue's parameters.
+    """Return the part with each side's own pitch and eave.
+
+    They replace the catalogue's parameters.
 
     Raises InputError where it has none.
     """
@@ -142,7 +151,7 @@ def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def measure_rise(part: dict[str, Any]) -> float:
-    """Height of the part's ridge or top over its lowest eave [m]."""
+    """Return the height of the part's ridge or top over its lowest eave [m]."""
     if part["type"] == "flat":
         return 0.0
     if not CATALOGUE[part["type"]].is_of_family:
@@ -151,8 +160,9 @@ def measure_rise(part: dict[str, Any]) -> float:
 
 
 def measure_member_rise(member: Member) -> float:
-    """Height of a member's highest place over its base, within its rectangle, skews and cants left
-    aside.
+    """Return a member's greatest height over its base, within its rectangle.
+
+    Skews and cants do not count.
     """
     reach = []
     for axis in (0, 1):
@@ -170,7 +180,10 @@ def measure_member_rise(member: Member) -> float:
 
 
 def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
-    """The part with its ridge or top at `z_ridge` about the origin, its eaves where they are."""
+    """Return the part with its ridge or top at `z_ridge` about the origin.
+
+    Its eaves stay.
+    """
     if part["type"] == "flat":
         return {**part, "position": [*part["position"][:2], z_ridge]}
     if not measure_rise(part) > 0.0:  # a roof without any slope has none that could be made steeper
@@ -195,13 +208,14 @@ def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
 
 
 def steeper_by(factor: float, pitch_deg: float) -> float:
-    """A pitch whose slope is `factor` times as much [degrees]."""
+    """Return the pitch [degrees] whose slope is `factor` times as much."""
     return math.degrees(math.atan(factor * math.tan(math.radians(pitch_deg))))
 
 
 def scale_pitches(parameters: dict[str, float], kind: str, rise: float) -> dict[str, float]:
-    """Pitches, all slopes changed by one factor, with which the ridge comes to `rise` over the
-    lowest eave.
+    """Return pitches with which the ridge comes to `rise` over the lowest eave.
+
+    All slopes change by one factor.
     """
     arguments = {name: value for name, value in parameters.items() if name.startswith("pitch_")}
 

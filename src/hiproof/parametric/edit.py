@@ -1,4 +1,4 @@
-"""A building with another part, or without one: what `Building.with_part` and `without_part` do."""
+"""`Building.with_part` and `without_part`: parts changed, added, removed."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ BY_HAND = "changed by hand"
 
 
 def with_part(building: Building, index: int, **change: Any) -> Building:
-    """The building with part `index` changed, or with one more where `index` is their number; see
-    `Building.with_part`.
+    """Return the building with part `index` changed or added.
+
+    See `Building.with_part`.
     """
     z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
     parts, change = (
@@ -39,8 +40,9 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
 
 
 def convert_to_plain(value: Any) -> Any:
-    """A value as a file of parameters holds it: arrays and tuples as lists, NumPy's numbers as
-    Python's.
+    """Convert a value to the form of a file of parameters.
+
+    Arrays and tuples become lists, NumPy's numbers Python's.
 
     >>> convert_to_plain((np.int64(1), np.array([2.5, 3.0])))
     [1, [2.5, 3.0]]
@@ -51,7 +53,7 @@ def convert_to_plain(value: Any) -> Any:
 
 
 def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
-    """A part of its own: its type, position, width and length at least are given."""
+    """Return a new part, given at least its type, position, width and length."""
     missing = [name for name in ("type", "position", "width", "length") if change.get(name) is None]
     if missing:
         raise InputError(
@@ -64,7 +66,10 @@ def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
 
 
 def without_part(building: Building, index: int) -> Building:
-    """The building without part `index`; what it roofed alone is roofed by the part beside it."""
+    """Return the building without part `index`.
+
+    The part beside it roofs what this part alone roofed.
+    """
     count, record = len(building.roof.parts), building_record(building)
     if count < 2 or not 0 <= index < count:
         raise InputError(
@@ -76,8 +81,9 @@ def without_part(building: Building, index: int) -> Building:
 
 
 def rebuild(building: Building, record: dict[str, Any]) -> Building:
-    """The building of a changed record, composed as `building` was: no figure of the earlier model
-    stays.
+    """Return the building of a changed record, composed as `building` was.
+
+    No figure of the earlier model stays.
     """
     result = build(
         {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND},

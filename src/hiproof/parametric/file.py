@@ -1,5 +1,7 @@
-"""parameters.jsonl read line by line: its head, its buildings, and its errors by line and
-column."""
+"""parameters.jsonl, read line by line.
+
+It gives the head, the buildings, and errors by line and column.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,7 @@ DAMAGED: dict[str, Any] = {"damaged": True}
 
 
 def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
-    """The objects of all buildings in a parameters.jsonl, in its order.
+    """Read the objects of all buildings in a parameters.jsonl, in its order.
 
     Raises InputError when it cannot be read or is no such file, naming line and column where its
     JSON is broken.
@@ -39,7 +41,9 @@ def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
 def opened_parameters(
     path: str | os.PathLike, damaged: Damaged = refuse
 ) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
-    """The head of the parameters.jsonl at `path`, and its buildings one by one.
+    """Yield the head of the parameters.jsonl at `path`, and its buildings.
+
+    Buildings come one by one.
 
     A line that cannot be read is told to `damaged`, which refuses the file by default, and comes as
     DAMAGED. Raises InputError for a file that is no parameters.jsonl.
@@ -60,8 +64,10 @@ def opened_parameters(
 def objects(
     file: Any, path: str | os.PathLike, damaged: Damaged = refuse
 ) -> Iterator[tuple[int, Any]]:
-    """(line, JSON value) of every line that is not blank; DAMAGED in place of one that is told to
-    `damaged`."""
+    """Yield (line, JSON value) of every line that is not blank.
+
+    A line that is reported to `damaged` comes as DAMAGED.
+    """
     for number, line in enumerate(file, 1):
         if line.strip():
             try:
@@ -73,7 +79,7 @@ def objects(
 
 
 def parse_object(line: str, place: str) -> Any:
-    """The JSON value of a line. Raises InputError, one sentence, where it is none."""
+    """Parse the JSON value of a line. Raises InputError where it is none."""
     try:
         value = json.loads(line)
     except json.JSONDecodeError as error:
@@ -95,7 +101,7 @@ def quote_line(line: str, place: int) -> str:
 
 
 def read_head(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
-    """The head, from the first line."""
+    """Read the head from the first line."""
     where = os.fspath(path)
     record = first[1] if first else None
     if not isinstance(record, dict) or HEAD_KEY not in record:
@@ -139,7 +145,7 @@ def read_head(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHea
 
 
 def is_place(value: Any) -> bool:
-    """Whether a value is three numbers that can be coordinates."""
+    """Return whether a value is three numbers that can be coordinates."""
     is_three = (
         isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
     )
@@ -149,7 +155,7 @@ def is_place(value: Any) -> bool:
 def records(
     lines: Iterator[tuple[int, Any]], path: str | os.PathLike, damaged: Damaged = refuse
 ) -> Iterator[dict[str, Any]]:
-    """The buildings after the head."""
+    """Yield the buildings after the head."""
     for number, record in lines:
         if record is not DAMAGED and not (
             isinstance(record, dict) and isinstance(record.get("id"), str)

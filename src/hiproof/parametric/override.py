@@ -1,5 +1,6 @@
-"""What a person says of one building, obeyed by the fit: the points determine the rest, and what
-they contradict is said, not refused.
+"""Overrides: what a person fixes of one building, and the fit keeps.
+
+The points determine the rest. Where they contradict an override, a remark says so.
 
 An override is an object with the building's `id` and any of
 
@@ -76,7 +77,7 @@ RANGES = {
 
 @dataclass(frozen=True)
 class Override:
-    """An override checked;
+    """A checked override; None or empty where it fixes nothing.
 
     None or empty where it says nothing. `fixed` holds ridge_height and eave_height too.
     """
@@ -96,7 +97,7 @@ class Override:
 
 
 def read_override(record: Mapping[str, Any]) -> Override:
-    """The override that an object tells of.
+    """Read an override from an object.
 
     Raises InputError, one sentence, where it cannot be or contradicts itself.
 
@@ -156,12 +157,15 @@ def read_override(record: Mapping[str, Any]) -> Override:
 
 
 def possible_range(key: str) -> tuple[float, float] | None:
-    """Least and largest value that a building can have of a key, None where it is no number."""
+    """Return the least and largest possible value of a key.
+
+    It is None where the key is no number.
+    """
     return RANGES.get(key)
 
 
 def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
-    """The number that `record` has of `key`, None without one.
+    """Return the number that `record` has of `key`, None without one.
 
     Raises InputError for one that no building can have.
     """
@@ -177,8 +181,9 @@ def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
 
 
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
-    """Raise InputError where two things are said of which only one can be, or neither yes
-    nor no.
+    """Raise InputError where an override contradicts itself.
+
+    Two of its values exclude each other, or one is neither yes nor no.
     """
     if record.get("leave_out", False) not in (True, False):
         raise InputError(
@@ -205,8 +210,9 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
 
 
 def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
-    """Types that parts may have, none where nothing is said of them; a text names several by
-    commas.
+    """Read the types that parts may have, none where the override names none.
+
+    A text names several by commas.
     """
     given_types = record.get("types")
     names = given_types.split(",") if isinstance(given_types, str) else given_types
@@ -233,7 +239,7 @@ def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
 
 
 def describe_override(record: Mapping[str, Any], has_list: bool) -> str:
-    """The override in words, for the building's detail."""
+    """Describe the override in words, for the building's detail."""
     phrases = [
         f"{name} {record[name]}"
         for name in (*SHAPING, "z_ground", "block_height")
@@ -259,8 +265,9 @@ def overridden(
     id: str = "building",
     ground: np.ndarray | None = None,
 ) -> Building:
-    """The building reconstructed as its override says; arguments and outcome as of
-    `hiproof.reconstruct`.
+    """Reconstruct a building with its override.
+
+    Arguments and result are those of `hiproof.reconstruct`.
     """
     points, settings = as_xyz(points), settings or Settings()
     building = stages.start_building(footprint, id)
@@ -280,8 +287,9 @@ def overridden(
 
 
 def lies_under(building: Building, z_ground: float | None) -> bool:
-    """Whether walls had to begin below the ground given: composing puts it under the lowest
-    eave.
+    """Return whether walls had to begin below the given ground.
+
+    Composing puts it under the lowest eave.
     """
     if z_ground is None or building.built is None:
         return False
@@ -289,8 +297,9 @@ def lies_under(building: Building, z_ground: float | None) -> bool:
 
 
 def remark_given_ground(building: Building, z_ground: float | None, terrain: Any) -> str:
-    """A remark where the ground given lies far from what the terrain says under the building's
-    outline. Empty otherwise.
+    """Return a remark where the given ground is far from the terrain's.
+
+    The terrain counts under the building's outline. The remark is empty otherwise.
     """
     if z_ground is None or terrain is None or building.built is None:
         return ""
@@ -311,8 +320,9 @@ def remark_given_ground(building: Building, z_ground: float | None, terrain: Any
 def build_given(
     override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings
 ) -> Building:
-    """The building of the parts or the block given, measured on its points where there are any; its
-    footprint is moved as a run does.
+    """Return the building of the given parts or block.
+
+    It is measured on its points where there are any, and its footprint is moved as a run moves it.
     """
     building, footprint, of_footprint = stages.align_footprint(building, points, settings)
     points, outline, status = stages.usable(points, footprint)
@@ -367,7 +377,7 @@ def build_given(
 
 
 def choose_frame(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
-    """The frame about the points, where there are none about the outline."""
+    """Return the frame about the points, about the outline without points."""
     if len(points):
         return LocalFrame.around(points)
     if outline is None:
@@ -383,7 +393,7 @@ def choose_ground(
     frame: LocalFrame,
     terrain: Any,
 ) -> stages.Ground:
-    """The ground: as given, else as the terrain says."""
+    """Return the ground: as given, else the terrain's."""
     ground = stages.find_ground(
         outline, points if len(points) else np.zeros((1, 3)), frame, terrain
     )
@@ -406,7 +416,7 @@ def fit_within(
     id: str,
     ground: np.ndarray | None,
 ) -> Building:
-    """The building fitted with what is given held."""
+    """Fit the building and hold what is given."""
     from ..method import reconstruct
 
     types = override.types or ((override.type,) if override.type else ())
@@ -444,7 +454,7 @@ def fit_within(
 def try_refit(
     building: Building, points: np.ndarray, fixed: dict[int, tuple[str, ...]]
 ) -> Building:
-    """The building fitted again; as it is where its points are too few."""
+    """Refit the building; return it as it is where its points are too few."""
     try:
         return building.refit(points, fixed)
     except FitError:

@@ -1,4 +1,4 @@
-"""A recess: a level part lower than what it lies in, whose parts leave its place to it.
+"""Recesses: level parts lower than the parts around them.
 
 Parts are JSON objects here, as in change.py.
 
@@ -28,8 +28,9 @@ CLEAR = 0.02  # of what they share: a part that roofs no more of it leaves it to
 def with_recess(
     parts: list, roof: Roof, index: int, position: tuple[float, float] | None = None
 ) -> list:
-    """The parts with a recess at `position` (x, y about the roof's origin), else in the middle of
-    part `index`, turned as that part is.
+    """Return the parts with a recess, turned as part `index` is.
+
+    It lies at `position` (x, y about the roof's origin), else in the middle of part `index`.
 
     Raises InputError for a part of which nothing is left.
     """
@@ -48,8 +49,9 @@ def with_recess(
 
 
 def replace_part(parts: list, index: int, changed: dict[str, Any]) -> list:
-    """The parts with `changed` in place of part `index`; those that left out its old place leave
-    out its new one instead.
+    """Return the parts with `changed` in place of part `index`.
+
+    Parts that left out its old place leave out its new one instead.
     """
     old = roofed_by(parts[index])
     rectangle = cover_rectangle(changed) if "outlines" not in changed else roofed_by(changed)
@@ -62,7 +64,7 @@ def replace_part(parts: list, index: int, changed: dict[str, Any]) -> list:
 def moved_along(
     part: dict[str, Any], old: shapely.Geometry, new: shapely.Geometry
 ) -> dict[str, Any]:
-    """The part, which leaves out `new` in place of `old` if it left that out."""
+    """Return the part, leaving out `new` if it left out `old`."""
     if "outlines" not in part or old.equals(new):
         return part
     shared = with_area(
@@ -75,7 +77,10 @@ def moved_along(
 
 
 def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
-    """The part without what it roofs of `area`. Raises InputError where nothing is left of it."""
+    """Return the part without what it roofs of `area`.
+
+    Raises InputError where nothing is left of it.
+    """
     if not roofed_by(part).intersection(area).area > 0.0:
         return part
     rings = list_rings(shapely.difference(roofed_by(part), area, grid_size=GRID_M))
@@ -88,7 +93,7 @@ def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
 
 
 def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
-    """What a part roofs in plan: its outlines, else its rectangle."""
+    """Return what a part roofs in plan: its outlines, else its rectangle."""
     if part.get("outlines") is None:
         return cover_rectangle(part)
     outlines = [
@@ -98,7 +103,10 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
 
 
 def cover_rectangle(part: dict[str, Any]) -> shapely.Polygon:
-    """The rectangle of a part in plan. Raises InputError for numbers that are none."""
+    """Return the rectangle of a part in plan.
+
+    Raises InputError for values that are no numbers.
+    """
     numbers_by_name(part.get("parameters") or {}, "the parameters")
     place(part.get("position"), "position")
     number(part.get("rotation", 0.0), "rotation")

@@ -43,8 +43,9 @@ RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline
 
 
 def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
-    """The building that a JSON object tells of, without a model yet, and the roof made of its
-    parts, None where it has none.
+    """Read the building of a JSON object, without a model, and its roof.
+
+    The roof is made of its parts, None where it has none.
 
     Raises InputError, one sentence, for an object that makes none.
     """
@@ -78,7 +79,7 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
 
 
 def read_status(record: Mapping[str, Any], has_parts: bool) -> Status:
-    """The status told; that of a building which has parts by hand is a model's."""
+    """Read the status; a building with parts by hand has that of a model."""
     code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
     by_code = {status.code: status for status in Status}
     if not isinstance(code, str) or code not in by_code:
@@ -96,9 +97,9 @@ def read_status(record: Mapping[str, Any], has_parts: bool) -> Status:
 
 
 def read_outline(record: Mapping[str, Any]) -> shapely.Polygon | None:
-    """The outline, in world coordinates, of the roof that a building's object tells of;
+    """Read the outline of a building's roof, in world coordinates.
 
-    None where it tells of none.
+    Returns None where there is none.
     """
     if not record.get("parts") or record.get("outline") is None or record.get("origin") is None:
         return None
@@ -107,7 +108,10 @@ def read_outline(record: Mapping[str, Any]) -> shapely.Polygon | None:
 
 
 def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
-    """The outline as solids are composed on it. Raises InputError where its rings cross."""
+    """Return the outline on the grid of solids.
+
+    Raises InputError where its rings cross.
+    """
     try:
         return settled_outline(outline)
     except shapely.GEOSException as error:
@@ -118,7 +122,7 @@ def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
 
 
 def read_roof(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
-    """The roof of a building's parts over its outline, about its origin."""
+    """Return the roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
         raise InputError(
             "expected an outline and an origin of a building with parts, got null; give both"
@@ -132,8 +136,9 @@ def read_roof(parts: list, outline: shapely.Polygon | None, origin: np.ndarray |
 
 
 def read_part(record: Any, outline: shapely.Polygon, where: str) -> Part:
-    """A part with its planes; without outlines of its own it roofs what its rectangle covers of the
-    building's.
+    """Read a part with its planes.
+
+    Without outlines of its own it roofs what its rectangle covers of the building's.
     """
     refuse_other_keys(require_mapping(record, where), PART_KEYS, where)
     kind = text_at(record, "type")
@@ -163,8 +168,9 @@ def read_part_outlines(
     outline: shapely.Polygon,
     where: str,
 ) -> list[shapely.Polygon]:
-    """Where a part roofs the building: the outlines given, else its rectangle's share of the
-    building's outline.
+    """Return the area that a part roofs.
+
+    It is the outlines given, else its rectangle's share of the building's outline.
     """
     if record.get("outlines") is None:
         return clip_rectangle(parameters, position, kappa, outline, where)
@@ -178,7 +184,7 @@ def clip_rectangle(
     outline: shapely.Polygon,
     where: str,
 ) -> list[shapely.Polygon]:
-    """The polygons that the rectangle of a part covers of the outline."""
+    """Return the polygons that the rectangle of a part covers of the outline."""
     if "width" not in parameters or "length" not in parameters:
         raise InputError(
             f"expected width and length, or outlines, of {where}, got neither; give the rectangle"
@@ -200,7 +206,7 @@ def by_teeth(
     position: np.ndarray,
     kappa: float,
 ) -> list[shapely.Polygon]:
-    """The outlines of a saw-tooth, those that reach over several teeth cut between them."""
+    """Return the outlines of a saw-tooth, cut between teeth."""
     teeth, width = round(parameters["teeth"]), parameters["width"]
     c, s = math.cos(kappa), math.sin(kappa)
     edges = width * (np.arange(teeth + 1) / teeth - 0.5)
@@ -234,7 +240,7 @@ def by_teeth(
 
 
 def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
-    """The terrain's lines (m, 3) along the outline."""
+    """Read the terrain's lines (m, 3) along the outline."""
     lines = [
         np.array(
             [
@@ -248,7 +254,7 @@ def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
 
 
 def read_grade(record: Mapping[str, Any]) -> Grade | None:
-    """The verdict told, None where there is none."""
+    """Read the grade, None where there is none."""
     code, by_code = text_at(record, "quality"), {grade.code: grade for grade in Grade}
     if code and code not in by_code:
         raise InputError(
@@ -260,7 +266,7 @@ def read_grade(record: Mapping[str, Any]) -> Grade | None:
 
 
 def read_quality(record: Mapping[str, Any]) -> Quality:
-    """The figures that were measured when the building was reconstructed."""
+    """Read the figures that were measured at the reconstruction."""
     residuals = require_mapping(record.get("residuals") or {}, "residuals")
     figures = {name: figure(residuals, name) for name in RESIDUALS} | {
         name: figure(record, name) for name in FIGURES
@@ -270,8 +276,9 @@ def read_quality(record: Mapping[str, Any]) -> Quality:
 
 
 def refuse_other_kinds(record: Mapping[str, Any]) -> None:
-    """Raise InputError where a value of a building's object is of another kind than a run writes;
-    no geometry is made.
+    """Raise InputError where a value is of another kind than a run writes.
+
+    No geometry is made.
     """
     parts = [
         require_mapping(part, f"part {index}")
@@ -340,7 +347,7 @@ def text_at(record: Mapping[str, Any], name: str) -> str:
 
 
 def number(value: Any, where: str) -> float:
-    """A finite number that a building can have."""
+    """Check a finite number that a building can have."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not abs(value) < LARGEST_NUMBER:
         raise InputError(
@@ -351,7 +358,7 @@ def number(value: Any, where: str) -> float:
 
 
 def measure(value: Any, where: str) -> float:
-    """A size, a height or an angle that something on Earth can have.
+    """Check a size, a height or an angle that something on Earth can have.
 
     >>> measure(1e9, "z_ground")
     Traceback (most recent call last):
@@ -366,7 +373,7 @@ def measure(value: Any, where: str) -> float:
 
 
 def coordinate(value: Any, where: str) -> float:
-    """A coordinate of a place on Earth."""
+    """Check a coordinate of a place on Earth."""
     result = number(value, where)
     if abs(result) > FARTHEST_WORLD_M:
         raise InputError(
@@ -381,7 +388,7 @@ def round_values(values: np.ndarray, digits: int) -> np.ndarray:
 
 
 def figure(record: Mapping[str, Any], name: str) -> float:
-    """A number, NaN where it is null or left out."""
+    """Read a number, NaN where it is null or left out."""
     return math.nan if record.get(name) is None else number(record[name], name)
 
 
@@ -393,7 +400,7 @@ def numbers_by_name(values: Any, where: str) -> dict[str, float]:
 
 
 def read_shift(record: Mapping[str, Any]) -> tuple[float, float]:
-    """How far the footprint was moved; of a building made by hand not at all."""
+    """Read how far the footprint was moved; one made by hand was not."""
     value = record.get("shift", [0.0, 0.0])
     if not isinstance(value, list) or len(value) != 2:
         raise InputError(f"expected two numbers [x, y] as shift, got {excerpt(value)}; give metres")
@@ -401,7 +408,7 @@ def read_shift(record: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def place(value: Any, where: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
-    """Three numbers (3,), each read by `read`."""
+    """Read three numbers (3,), each by `read`."""
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(
             f"expected three numbers [x, y, z] as {where}, got {excerpt(value)}; give metres"
@@ -410,7 +417,7 @@ def place(value: Any, where: str, read: Callable[[Any, str], float] = number) ->
 
 
 def polygon(rings: Any, where: str) -> shapely.Polygon:
-    """A polygon of rings, the outer first."""
+    """Read a polygon of rings, the outer first."""
     result = []
     for ring in as_list(rings, where):
         corners = as_list(ring, where)

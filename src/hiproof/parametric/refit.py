@@ -1,5 +1,6 @@
-"""The parameters of given parts fitted to points: types, rectangles and what is held stay, the
-points determine the rest.
+"""The fit of given parts to points.
+
+Types, rectangles and fixed values stay, and the points determine the rest.
 
 One robust least squares over all parts at once (Levenberg and Marquardt, re-weighted by Tukey's
 biweight from coarse to fine): the residual of a point is its height over the roof, which is the
@@ -42,8 +43,9 @@ UNBOUNDED_M = 100.0  # m; larger than any length of a roof: as good as no bound
 
 @dataclasses.dataclass(frozen=True)
 class Unknowns:
-    """Which numbers are fitted: `names` (part, parameter or "z"), their start values and bounds
-    (p,).
+    """The numbers that are fitted.
+
+    `names` are (part, parameter or "z"); start values and bounds are (p,).
     """
 
     names: tuple[tuple[int, str], ...]
@@ -57,7 +59,7 @@ def refit(
     points: np.ndarray,
     fixed: Mapping[int, Collection[str]] | None = None,
 ) -> Building:
-    """The building with its parts fitted to `points` again; see `Building.refit`."""
+    """Fit the parts of the building to `points` again; see `Building.refit`."""
     record, local = building_record(building), select_inside(building.roof, points)
     parts = refit_parts(building.roof, record["parts"], local, fixed or {})
     return measure_building(
@@ -66,13 +68,14 @@ def refit(
 
 
 def refit_parts_freely(building: Building) -> Building:
-    """The building with its detail saying that its parts were fitted."""
+    """Return the building with a detail that its parts were fitted."""
     return dataclasses.replace(building, detail=f"{building.detail}, fitted to its points")
 
 
 def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
-    """Those of the world `points` (n, 3) that are finite and lie inside the outline, about the
-    origin of the roof.
+    """Return the `points` (n, 3) inside the outline, about the roof's origin.
+
+    They are given in world coordinates, and have to be finite.
     """
     local = roof.frame.to_local(as_xyz(points))
     local = local[np.isfinite(local).all(axis=1)]
@@ -82,7 +85,9 @@ def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
 def refit_parts(
     roof: Roof, parts: list, points: np.ndarray, fixed: Mapping[int, Collection[str]]
 ) -> list:
-    """The objects `parts` that `roof` was made of, fitted to `points` (n, 3) about its origin.
+    """Fit the objects `parts`, of which `roof` was made, to `points` (n, 3).
+
+    Points are about the roof's origin.
 
     Raises FitError for fewer than three.
     """
@@ -107,15 +112,19 @@ def refit_parts(
 
 
 def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
-    """The points (n, 3) that are no returns of walls, where they are enough; else all."""
+    """Return the points (n, 3) that are no returns of walls.
+
+    Returns all points where too few are left.
+    """
     inner = shapely.buffer(outline, -FACADE_M)
     selection = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
     return selection if len(selection) >= ENOUGH else points
 
 
 def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:
-    """All parameters of all parts but their rectangles, where their planes face and those `fixed`
-    by part; the position's z is "z".
+    """List the parameters of all parts that are fitted.
+
+    Rectangles, the directions of planes and those `fixed` by part are not. The position's z is "z".
     """
     rows = []
     for index, part in enumerate(parts):
@@ -139,7 +148,7 @@ def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]])
 
 
 def find_bounds(name: str, parameters: Mapping[str, float]) -> tuple[float, float]:
-    """Within which a parameter makes a roof over its rectangle."""
+    """Return the bounds in which a parameter makes a roof over its rectangle."""
     width, length = parameters.get("width", UNBOUNDED_M), parameters.get("length", UNBOUNDED_M)
     return {
         "ridge_length": (0.0, 0.98 * length),
@@ -160,8 +169,10 @@ def find_bounds(name: str, parameters: Mapping[str, float]) -> tuple[float, floa
 
 @dataclasses.dataclass(frozen=True)
 class RefitSurface:
-    """The roof over the points: their heights (n,) above it, the part (n,) that it is there and the
-    row (n,) among that part's planes, and all planes (k, 3) of every part.
+    """The roof at the points.
+
+    It has their heights (n,) above it, the part (n,) there, the row (n,) among that part's planes,
+    and all planes (k, 3) of every part.
     """
 
     gaps: np.ndarray
@@ -191,7 +202,10 @@ class Heights:
         ]
 
     def planes(self, index: int, x: np.ndarray) -> list[np.ndarray] | None:
-        """The planes (k, 3) of each piece of a part; None where its parameters make none."""
+        """Return the planes (k, 3) of each piece of a part.
+
+        It is None where the part's parameters make none.
+        """
         part = self.parts[index]
         values = {
             self.unknowns.names[column][1]: float(x[column]) for column in self.columns[index]
@@ -207,7 +221,7 @@ class Heights:
         return [piece.planes for piece in pieces]
 
     def at(self, x: np.ndarray) -> RefitSurface:
-        """The roof that the unknowns make; far from all points where they make none."""
+        """Return the roof of the unknowns, far from all points where there is none."""
         count = len(self.z)
         top, part, row = np.full(count, -np.inf), np.zeros(count, int), np.zeros(count, int)
         result: list[np.ndarray] = []
@@ -231,7 +245,7 @@ class Heights:
         return RefitSurface(np.clip(self.z - top, -UNBOUNDED_M, UNBOUNDED_M), part, row, result)
 
     def jacobian(self, x: np.ndarray, surface: RefitSurface) -> np.ndarray:
-        """By how much the roof's height (n, p) at each point grows with each unknown."""
+        """Return the derivatives (n, p) of the roof's heights by the unknowns."""
         result = np.zeros((len(self.z), len(x)))
         covered = np.abs(surface.gaps) < UNBOUNDED_M
         for index, columns in enumerate(self.columns):
@@ -253,7 +267,7 @@ class Heights:
 def fit_unknowns(
     parts: tuple[Part, ...], points: np.ndarray, unknowns: Unknowns
 ) -> tuple[np.ndarray, list[dict[str, float]]]:
-    """Values (p,) of the unknowns, and standard deviations by name of every part."""
+    """Return the unknowns' values (p,) and all parts' standard deviations."""
     heights = Heights(parts, points[:: max(1, -(-len(points) // MOST_REFIT_POINTS))], unknowns)
     finest = SCALES_M[-1]
     x = descend(heights, unknowns.start, finest)
@@ -277,8 +291,9 @@ def fit_unknowns(
 
 
 def descend(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
-    """The unknowns at the foot of the hill: damped steps that each lessen the misfit at
-    this scale.
+    """Return the unknowns at the minimum of the misfit at this scale.
+
+    Damped steps each lessen it.
     """
     unknowns, damping = heights.unknowns, 1e-3
     surface = heights.at(x)
@@ -303,13 +318,17 @@ def descend(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
 
 
 def misfit(gaps: np.ndarray, scale: float) -> float:
-    """What the points (n,) cost at this scale: Tukey's biweight, at most 1 a point."""
+    """Return the cost of the points (n,) at this scale.
+
+    It is Tukey's biweight, at most 1 a point.
+    """
     return float((1.0 - np.clip(1.0 - (gaps / scale) ** 2, 0.0, None) ** 3).sum()) + 1e-9
 
 
 def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-    """Covariance (p, p) of the unknowns from the points near the roof; zero where they say
-    nothing.
+    """Return the covariance (p, p) of the unknowns from points near the roof.
+
+    It is zero where they say nothing.
     """
     if not len(gaps):
         return np.zeros((jacobian.shape[1],) * 2)
@@ -319,7 +338,10 @@ def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
 def with_values(
     part: dict[str, Any], values: Mapping[str, float], sigma: dict[str, float]
 ) -> dict[str, Any]:
-    """The part's object with fitted values; its position's z is that of its lowest eave again."""
+    """Return the part's object with fitted values.
+
+    Its position's z is that of its lowest eave again.
+    """
     parameters = {name: values.get(name, value) for name, value in part["parameters"].items()}
     x, y, z = part["position"]
     z = values.get(Z, z)
@@ -334,7 +356,10 @@ def with_values(
 
 
 def measure_building(building: Building, points_local: np.ndarray) -> Building:
-    """The building with its quality on `points_local` (n, 3), and what that says of it."""
+    """Return the building with its quality on `points_local` (n, 3).
+
+    The verdict on it comes with the quality.
+    """
     from ..compose.settle import round_building
     from ..evaluate.metrics import quality
     from ..stages import grade_building

@@ -1,5 +1,6 @@
-"""`hiproof build`: a file of parameters into the files of a run, one building in memory
-at a time.
+"""`hiproof build`: a file of parameters becomes the files of a run.
+
+One building is in memory at a time.
 """
 
 from __future__ import annotations
@@ -44,8 +45,10 @@ MOST_REPORTED = 1000
 
 @dataclass
 class Built:
-    """What came of a file: where the models are, buildings by status, and (id, sentence) of those
-    that could not be built, the first MOST_TOLD.
+    """The result of building a file.
+
+    It says where the models are, counts buildings by status, and lists (id, sentence) of those that
+    could not be built, the first MOST_TOLD.
     """
 
     models: list[Path] = field(default_factory=list)
@@ -84,7 +87,9 @@ def build_file(
     progress: Callable[[int], None] = lambda done: None,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> Built:
-    """Write the files of a run into the folder `out` from the parameters.jsonl at `path`.
+    """Write a run's files into the folder `out` from a parameters.jsonl.
+
+    That file is `path`.
 
     What is written is as the file's head says, but for `changes` of the settings [write]. A
     building that cannot be built is written without a model, with a sentence, and keeps its
@@ -111,8 +116,9 @@ def build_file(
 
 
 def refuse_run_folder(out: Path) -> None:
-    """Raise OutputError for the folder of `hiproof reconstruct`, which would make all its files
-    again.
+    """Raise OutputError for a folder of `hiproof reconstruct`.
+
+    That command would make all its files again.
     """
     if (out / ".hiproof").exists():
         raise OutputError(
@@ -130,7 +136,7 @@ def chain_records(first: dict, remainder: Iterator[dict]) -> Iterator[dict]:
 def make_fragments(
     maker: Maker, records: Iterator[dict], built: Built, progress: Callable[[int], None]
 ) -> Iterator[Fragments]:
-    """The texts of every building, counted."""
+    """Yield the texts of every building, and count them."""
     for number, record in enumerate(records, 1):
         building, texts = maker.make(record)
         built.count(building)
@@ -146,13 +152,17 @@ class Maker:
         self.names = UniqueNames(), UniqueNames()
 
     def settle_offset(self, first: Mapping[str, Any] | None) -> None:
-        """The offset of the CityJSON file where the head tells none: by the first building."""
+        """Set the offset of the CityJSON file by the first building.
+
+        It is only set where the head names none.
+        """
         if self.head.offset is None:
             self.head = dataclasses.replace(self.head, offset=offset_by(first, self.head.units))
 
     def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
-        """The building of an object and its texts; where it cannot be built, without a model and
-        with its parameters kept.
+        """Return the building of an object, and its texts.
+
+        One that cannot be built has no model and keeps its parameters.
         """
         id = record["id"]
         names = self.names[0].take(plain_text(id)), self.names[1].take(gml_name(id))
@@ -179,7 +189,7 @@ class Maker:
 
 
 def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
-    """The offset (3,) of a CityJSON file whose first building is `record`."""
+    """Return the offset (3,) of a CityJSON file whose first building is `record`."""
     from .record import read_building
 
     try:
@@ -192,8 +202,9 @@ def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
 
 
 def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
-    """run.json: what was built of which file, and the clouds and footprints of the run that the
-    file came from.
+    """Write run.json: what was built from which file.
+
+    It has the clouds and footprints of the run that the file came from.
     """
     record = {
         "hiproof": __version__,
@@ -213,9 +224,10 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
 
 
 def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
-    """Settings and inputs of the run whose record lies in `folder`, as far as there is one; how and
-    in which units coordinates are written is as `head` says, with which whoever reads the models
-    finds their place.
+    """Return settings and inputs of the run in `folder`, if there is one.
+
+    The way in which coordinates are written, and their units, are those of `head`, so that whoever
+    reads the models finds their place.
     """
     try:
         record = run_record(folder)

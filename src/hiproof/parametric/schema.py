@@ -1,5 +1,6 @@
-"""The JSON schema (draft 2020-12) of parameters.jsonl: its first line is a `head`, every other a
-`building`.
+"""The JSON schema (draft 2020-12) of parameters.jsonl.
+
+Its first line is a `head`, every other a `building`.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ PART_KINDS = {
 
 
 def schema() -> dict[str, Any]:
-    """The schema of a line.
+    """Return the schema of a line.
 
     >>> schema()["$defs"]["head"]["properties"]["hiproof_parameters"]["const"]
     1
@@ -92,8 +93,9 @@ def schema() -> dict[str, Any]:
 def describe_attributes(
     attributes: tuple[Attribute, ...], kinds: dict[str, Any], required: tuple[str, ...]
 ) -> dict[str, Any]:
-    """An object with `attributes`, each with its meaning and unit; those of no other kind are
-    numbers or null.
+    """Return the schema of an object with `attributes`.
+
+    Each has its meaning and unit. Those of no other kind are numbers or null.
     """
     properties = {
         a.name: {
@@ -107,7 +109,10 @@ def describe_attributes(
 
 
 def parameters_by_type() -> list[dict[str, Any]]:
-    """What the parameters of a part of each type must hold, unless they are given side by side."""
+    """Return what the parameters of a part of each type must hold.
+
+    A part with each side's own parameters is free of this.
+    """
     sides, cants = (
         "(pitch|eave|skew)_(left|right|front|back)",
         f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]",
@@ -133,5 +138,5 @@ def parameters_by_type() -> list[dict[str, Any]]:
 
 
 def schema_text() -> str:
-    """The schema as the published file holds it."""
+    """Return the schema as the published file holds it."""
     return json.dumps(schema(), indent=1) + "\n"

@@ -1,5 +1,6 @@
-"""Which points belong to which footprint: points sorted once into grid cells, then looked up
-building by building.
+"""Which points belong to which footprint, by a grid of sorted points.
+
+Points are sorted once into grid cells, and then looked up building by building.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ INDEX_CELL_M = 4.0  # m; a house covers a few dozen cells, and a cell holds few 
 
 
 class PointGrid:
-    """Plan points sorted into square cells, row by row, so that any box is a few slices of one
-    sorted array.
+    """Plan points sorted into square cells, row by row.
+
+    Any box is then a few slices of one sorted array.
 
     >>> grid = PointGrid(np.array([[0.5, 0.5], [9.0, 9.0], [1.5, 0.5]]))
     >>> grid.inside(shapely.box(0, 0, 1, 1)).tolist()
@@ -31,8 +33,9 @@ class PointGrid:
     """
 
     def __init__(self, xy: np.ndarray, cell_m: float = INDEX_CELL_M):
-        """Index `xy` (n, 2 or more; further columns are ignored), world or local metres, all
-        finite.
+        """Index `xy` (n, 2 or more) by square cells.
+
+        Coordinates are world or local metres, all finite. Further columns are ignored.
         """
         self.xy, self.cell_m = np.ascontiguousarray(xy, float), float(cell_m)
         self.origin, (self.columns, self.rows) = (
@@ -51,7 +54,10 @@ class PointGrid:
         return cell_m * x, cell_m * y, cell_m * (x + self.columns), cell_m * (y + self.rows)
 
     def candidates(self, bounds: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Indices of the points in the cells that the box (xmin, ymin, xmax, ymax) meets."""
+        """Return the indices of the points in all cells that a box meets.
+
+        `bounds` is (xmin, ymin, xmax, ymax).
+        """
         first, last = (
             self.cell_range(bounds[0], bounds[2], 0),
             self.cell_range(bounds[1], bounds[3], 1),
@@ -74,7 +80,7 @@ class PointGrid:
         return math.floor(lower / self.cell_m) - start, math.floor(upper / self.cell_m) - start
 
     def inside(self, polygon: shapely.Polygon) -> np.ndarray:
-        """Ascending indices of the points inside `polygon` or on its border."""
+        """Return ascending indices of the points inside `polygon` or on its border."""
         if polygon.is_empty:
             return np.empty(0, np.int64)
         result = self.candidates(polygon.bounds)
@@ -83,7 +89,10 @@ class PointGrid:
         return np.sort(result[shapely.intersects_xy(polygon, x, y)])
 
     def find_within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
-        """Ascending indices of the points at most `distance_m` from `polygon` or inside it."""
+        """Return ascending indices of the points at most `distance_m` from `polygon`.
+
+        Points inside the polygon are among them.
+        """
         if polygon.is_empty:
             return np.empty(0, np.int64)
         return self.inside(
@@ -92,8 +101,9 @@ class PointGrid:
 
 
 def grow_polygon(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapely.Geometry:
-    """What lies at most `distance_m` from a polygon or inside it; of one with MANY_VERTICES to
-    within a tenth of the distance.
+    """Return the area at most `distance_m` from a polygon, the polygon included.
+
+    A polygon with MANY_VERTICES grows to within a tenth of the distance.
 
     Small teeth that grow by much take GEOS the square of their number.
     """
@@ -105,8 +115,9 @@ def grow_polygon(polygon: shapely.Polygon, distance_m: float, **options: int) ->
 def assign_points(
     cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]
 ) -> list[np.ndarray]:
-    """For each footprint the ascending indices into `cloud_xyz` (n, 2 or 3) of the points inside or
-    on its border.
+    """Return for each footprint the ascending indices of its points.
+
+    Indices are into `cloud_xyz` (n, 2 or 3). Points on the border count as inside.
 
     Pass the building-class points only. A point in the overlap of two footprints belongs to both:
     what a building gets never depends on its neighbours.

@@ -1,6 +1,7 @@
-"""Attributes of a vector file as its columns declare them: pyogrio makes decimals of whole numbers
-and of booleans where a feature has none, so that a year became 1950.0, a yes 1.0, and an id of 17
-digits its neighbour's.
+"""Attributes of a vector file in the types that its columns declare.
+
+pyogrio makes decimals of whole numbers and of booleans where a feature has none. A year became
+1950.0, a yes 1.0, and an id of 17 digits its neighbour's.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ def restore_declared_types(
     columns: list[np.ndarray],
     known_of: Callable[[str], np.ndarray],
 ) -> list[np.ndarray]:
-    """The `columns` (n,), whole numbers and booleans again where they are `declared` so, None where
-    a feature has none.
+    """Return the `columns` (n,) in their `declared` types, None for no value.
+
+    These are whole numbers and booleans.
 
     `known_of` reads the values (k,) of one column again, of the features that have one and in their
     order, for numbers that decimals do not hold.
@@ -46,8 +48,9 @@ def restore_declared_types(
 
 
 def shortest(column: np.ndarray) -> np.ndarray:
-    """Single precision (n,) as the decimals that it is written by: 0.2, where doubling its digits
-    makes 0.20000000298.
+    """Return single precision (n,) as the decimals that it is written by.
+
+    Doubling the digits of 0.2 would make 0.20000000298.
 
     >>> shortest(np.array([0.2, np.nan], np.float32)).tolist()
     [0.2, nan]
@@ -56,7 +59,7 @@ def shortest(column: np.ndarray) -> np.ndarray:
 
 
 def make_known_condition(name: str, where: str | None) -> str:
-    """The condition `where`, if any, and that the attribute `name` is set.
+    """Return the condition `where`, if any, and that the attribute `name` is set.
 
     >>> make_known_condition("year", "year < 1950 or listed")
     '(year < 1950 or listed) and "year" is not null'

@@ -1,5 +1,7 @@
-"""CityJSON and CityJSONSeq files document by document, with their vertices in place, or a sentence
-that says why not."""
+"""CityJSON and CityJSONSeq files, document by document.
+
+Vertices come in place. An InputError says why a file cannot be read.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,11 @@ ESCAPED = re.compile(
 
 
 class Feature(NamedTuple):
-    """A CityJSON document or a line of CityJSONSeq: its city `objects` by id, their vertices (n, 3)
-    in world metres, its place in the file, and what its coordinates count in. One that `is_damaged`
-    cannot be read and has no objects."""
+    """A CityJSON document or a line of CityJSONSeq.
+
+    It has the city `objects` by id, their vertices (n, 3) in world metres, its place in the file,
+    and the units of its coordinates. A feature that `is_damaged` cannot be read and has no objects.
+    """
 
     objects: dict[str, Any]
     vertices: np.ndarray
@@ -44,8 +48,9 @@ def features(
     crs_units: Units | None = None,
     damaged: Damaged = refuse,
 ) -> Iterator[Feature]:
-    """Yield every document of a file, each by the transform and the CRS of the line before it that
-    has them.
+    """Yield every document of a file, placed by its transform and CRS.
+
+    A line without these has those of the line before.
 
     `alternative` are the units where no CRS is named, `crs_units` those of one of which more is
     known than a name tells, if there is one. A feature that cannot be read is told to `damaged` and
@@ -74,7 +79,7 @@ def features(
 
 
 def read_transform(document: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Read the scale (3,) and the translation (3,) of a document, None where it has none."""
+    """Read a document's scale (3,) and translation (3,), None if it has none."""
     transform = document.get("transform")
     if transform is None:
         return None
@@ -126,8 +131,9 @@ def explain_error(error: Exception) -> str:
 
 
 def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield (document, its place in the file): of CityJSON the one, of CityJSONSeq (`.jsonl`) each
-    line, the header first.
+    """Yield each document of a file with its place in the file.
+
+    CityJSON has one document. CityJSONSeq (`.jsonl`) has one a line, the header first.
 
     A line after the header that cannot be read is told to `damaged` and comes as an empty document.
     Raises InputError for what is no text, no JSON, no object, or of another type.
@@ -164,8 +170,10 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
 
 
 def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
-    """Read a line of CityJSONSeq. Raises InputError for what is no header, or no feature after
-    one."""
+    """Read a line of CityJSONSeq.
+
+    Raises InputError unless it is a header, or a feature after one.
+    """
     document = parse_object(line, place)
     kind = document.get("type")
     if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
@@ -184,7 +192,7 @@ def name_place(document: dict[str, Any], place: str) -> str:
 
 
 def parse_object(text: str, place: str) -> dict[str, Any]:
-    """A JSON object. Raises InputError naming the place."""
+    """Parse a JSON object. Raises InputError naming the place."""
     try:
         value = json.loads(text, parse_constant=refuse_constant)
     # A ValueError too for numbers of thousands of digits.
@@ -205,7 +213,7 @@ def parse_object(text: str, place: str) -> dict[str, Any]:
 
 
 def refuse_constant(name: str) -> None:
-    """NaN and Infinity, which Python reads but JSON does not know."""
+    """Refuse NaN and Infinity, which Python reads but JSON does not know."""
     raise ValueError(f"{name}, which is no number")
 
 
@@ -217,13 +225,13 @@ def read_text(path: Path) -> str:
 
 
 def unreadable(path: Path, error: Exception) -> InputError:
-    """What to say of a file that is not there, or whose bytes are no text."""
+    """Make the error for a file that is missing or whose bytes are no text."""
     text = "none" if isinstance(error, FileNotFoundError) else f"one that is not: {error}"
     return InputError(f"expected a readable text file at {path}, got {text}; check the path")
 
 
 def reference_system(document: dict[str, Any]) -> str | None:
-    """The CRS that a document's metadata name."""
+    """Return the CRS that a document's metadata name."""
     metadata = document.get("metadata")
     name = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
     return name if isinstance(name, str) and name else None

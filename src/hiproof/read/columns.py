@@ -13,9 +13,11 @@ NAMES = {
 
 
 def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:
-    """Indices of x, y, z and, where there is one, classification among column names;
+    """Return the indices of x, y, z and classification among column names.
 
-    None unless x, y and z are named.
+    Classification is left out where there is none.
+
+    Returns None unless x, y and z are named.
 
     >>> find_columns(["Intensity", "X", "Y", "Z", "Classification"])
     (1, 2, 3, 4)

@@ -1,5 +1,6 @@
-"""Points of a COPC file: of the octree's nodes whose cubes meet a box, each node held against its
-own cube.
+"""Points of a COPC file, from the octree's nodes that meet a box.
+
+The points of each node are checked against the node's cube.
 
 Only those nodes are fetched and decoded. The nodes themselves were found, once a file, when its
 header was checked.
@@ -27,8 +28,9 @@ def copc_record(
     box: Box,
     selection: laspy.DecompressionSelection,
 ):
-    """laspy's record of all points in the nodes that meet `box` (xmin, ymin, xmax, ymax), and the
-    first of each node.
+    """Read the points in all nodes that meet `box`, as laspy's record.
+
+    `box` is (xmin, ymin, xmax, ymax). Returns also the first point of each node.
     """
     header = laspy.LasHeader.read_from(file, read_evlrs=False)
     nodes = find_nodes(facts, octree, box)
@@ -54,8 +56,9 @@ def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:
 
 
 def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
-    """The nodes that hold points and meet `box` in plan, in the order in which they stand in the
-    file.
+    """Return the nodes that hold points and meet `box` in plan.
+
+    They are in the order in which they stand in the file.
     """
     lower, upper = cubes(facts, octree, octree.nodes)
     meets = (lower[:, :2] <= box[2:]).all(axis=1) & (upper[:, :2] >= box[:2]).all(axis=1)
@@ -64,8 +67,9 @@ def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
 
 
 def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners (n, 3) of the nodes' cubes, wider by what rounding may move a
-    point.
+    """Return the lower and upper corners (n, 3) of the nodes' cubes.
+
+    Cubes are wider by what rounding may move a point.
     """
     level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
     side = np.ldexp(2 * octree.half, -level)
@@ -74,8 +78,9 @@ def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarra
 
 
 def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
-    """Raise Implausible where a node's points, which follow one another in `xyz` (n, 3), leave its
-    cube.
+    """Raise Implausible where a node's points leave its cube.
+
+    The nodes' points follow one another in `xyz` (n, 3).
     """
     if not len(nodes):
         return

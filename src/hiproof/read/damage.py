@@ -1,5 +1,6 @@
-"""What becomes of a damaged building in a file of many: refuse the file, or leave it out and say
-so.
+"""The treatment of damaged buildings in a file of many.
+
+A reader refuses the file, or leaves the building out with a remark.
 
 Readers call `damaged(error)` with one sentence for each building that they cannot read, and go on
 with the next one when that returns.
@@ -29,7 +30,10 @@ def refuse(error: InputError) -> None:
 
 
 class SkippedBuildings:
-    """Tells of the damaged buildings of a file, the first MOST_TOLD in full, and counts them."""
+    """Counts and reports a file's damaged buildings, the first few in full.
+
+    These are the first MOST_TOLD.
+    """
 
     def __init__(self) -> None:
         self.count = 0
@@ -40,8 +44,10 @@ class SkippedBuildings:
             LOGGER.warning("left out: %s", error)
 
     def iterate_sound(self, buildings: Iterator[T]) -> Iterator[T]:
-        """Yield `buildings`, those that could be read. Raises InputError where damage left none of
-        them."""
+        """Yield the `buildings` that could be read.
+
+        Raises InputError where damage left none of them.
+        """
         is_empty = True
         for building in buildings:
             is_empty = False

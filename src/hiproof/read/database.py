@@ -1,4 +1,6 @@
-"""Footprints from PostGIS:
+"""Footprints from PostGIS.
+
+An address is
 `postgresql://user:password@host/database?table=schema.name[&geometry=column][&where=condition]`.
 
 GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg and their geometries
@@ -30,15 +32,16 @@ ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")
 
 
 def is_database(source: Any) -> bool:
-    """Whether a footprint source names a database rather than a file."""
+    """Return whether a footprint source names a database rather than a file."""
     return isinstance(source, str) and source.partition(":")[0].lower() in SCHEMES
 
 
 def read_table(
     source: str, where: str | None = None
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
-    """The table a source names, in the shape pyogrio gives files: metadata (fields, crs), row
-    numbers, geometries, columns.
+    """Read the table that a source names, in the shape that pyogrio gives.
+
+    That is metadata (fields, crs), row numbers, geometries and columns.
 
     `where` is a condition beside the source's own. Raises InputError in a full sentence when the
     database, the table or the geometry column cannot be used.
@@ -64,8 +67,9 @@ def read_table(
 
 
 def table_crs(source: str) -> str | None:
-    """The reference system of the table a source names, without reading its rows; raises InputError
-    as `read_table`.
+    """Return the reference system of a source's table, without reading its rows.
+
+    Raises InputError as `read_table` does.
     """
     with open_source(source) as table:
         return find_crs(table.srids(), table.name)
@@ -84,7 +88,7 @@ def find_crs(srids: set[int], table: str) -> str | None:
 
 @dataclass(frozen=True)
 class DatabaseTable:
-    """A table with geometries in an open database, and the rows of it that are asked for."""
+    """A table with geometries in an open database, and its selected rows."""
 
     cursor: Any
     name: str
@@ -92,8 +96,9 @@ class DatabaseTable:
     where: str | None
 
     def query(self, text: str) -> None:
-        """Run `text` with {g}, {n} and {t} for the geometry column, its name as a value and the
-        table.
+        """Run `text` with {g}, {n} and {t} filled in.
+
+        They stand for the geometry column, its name as a value, and the table.
         """
         from psycopg import sql
 
@@ -106,8 +111,9 @@ class DatabaseTable:
         self.cursor.execute(sql.SQL(text).format(t=table, **names), binary=True)
 
     def rows(self) -> Iterator[tuple]:
-        """(geometry or None, attributes) ordered by their own content, so that storage does not
-        matter.
+        """Yield each row's geometry (or None) and attributes.
+
+        Rows are ordered by their content, so that storage does not matter.
         """
         self.query(
             "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, to_jsonb(t) - {n} as attributes from "
@@ -126,8 +132,9 @@ class DatabaseTable:
 
 @contextmanager
 def open_source(source: str, condition: str | None = None) -> Iterator[DatabaseTable]:
-    """The table of a source in a database that stays open for the block, whose errors become
-    InputErrors.
+    """Open the table of a source for the block.
+
+    Errors of the database become InputErrors.
     """
     dsn, table, geometry, where = parse_source(source)
     # each on lines of its own: a comment at its end must not swallow the bracket
@@ -150,7 +157,10 @@ def open_source(source: str, condition: str | None = None) -> Iterator[DatabaseT
 
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
-    """(dsn, table, geometry column or None, condition or None) of a source."""
+    """Split a source into dsn, table, geometry column and condition.
+
+    Column and condition may be None.
+    """
     try:
         url = urlsplit(refuse_half_a_password(source))
         query = parse_qs(url.query)
@@ -168,8 +178,9 @@ def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
 
 
 def refuse_half_a_password(address: str) -> str:
-    """`address`, unless its password ends at a / ? or # of its own: the rest would be taken for a
-    host and shown.
+    """Return `address`, unless its password ends at a / ? or # of its own.
+
+    The rest of such a password would be taken for a host and shown.
     """
     remember(address)
     if ADDRESS.match(mask(address)) and not ADDRESS.match(address):
@@ -197,5 +208,5 @@ def geometry_column(cursor: Any, table: str, source: str) -> str:
 
 
 def import_psycopg() -> Any:
-    """What speaks to PostgreSQL. Raises InputError where it is missing."""
+    """Import psycopg. Raises InputError where it is missing."""
     return import_extra("psycopg", "postgis", "databases")

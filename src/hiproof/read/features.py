@@ -1,4 +1,4 @@
-"""The features of a layer through pyogrio; attributes that it cannot read come as text.
+"""The features of a layer through pyogrio, odd attributes as text.
 
 One value can make pyogrio give up a whole layer: the 30th of February, text in no encoding, a list
 of booleans. GDAL itself reads all of these, so the attribute is read again through its virtual
@@ -29,8 +29,9 @@ too.
 def read_layer(
     path: str, layer: str | int | None, **chosen: Any
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray], list[str]]:
-    """pyogrio's metadata, numbers, WKB and columns of a layer, and the names of the attributes read
-    as text.
+    """Read pyogrio's metadata, numbers, WKB and columns of a layer.
+
+    The names of the attributes that were read as text come with them.
 
     `chosen` are pyogrio's own options that choose among the features.
     """
@@ -61,7 +62,7 @@ def read_layer(
 
 
 def is_readable(path: str, layer: str | int | None, name: str) -> bool:
-    """Whether pyogrio can represent every value of an attribute."""
+    """Return whether pyogrio can represent every value of an attribute."""
     try:
         pyogrio.raw.read(
             path, layer=layer, columns=[name], read_geometry=False, datetime_as_string=True
@@ -72,8 +73,9 @@ def is_readable(path: str, layer: str | int | None, name: str) -> bool:
 
 
 def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.ndarray:
-    """An attribute of the features with these numbers as text (n,); what is no UTF-8 has
-    replacement characters.
+    """Return an attribute (n,) of the features with these numbers as text.
+
+    Bytes that are no UTF-8 become replacement characters.
     """
     source = virtual_layer(path, layer, text=name)
     try:
@@ -88,7 +90,7 @@ def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.
 
 
 def tidy_value(value: str | None) -> str | None:
-    """Text read as Latin-1 in the encoding that it has; a date in ISO's order of signs.
+    """Decode text that was read as Latin-1, and write dates in ISO's way.
 
     >>> tidy_value("1950/00/00"), tidy_value("Stra\\u00c3\\u009fe")
     ('1950-00-00', 'Straße')

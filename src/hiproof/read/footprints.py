@@ -1,5 +1,6 @@
-"""Building footprints from files and databases: every feature becomes one Footprint or more,
-none is lost.
+"""Building footprints from any source that pyogrio reads.
+
+Every feature becomes one Footprint or more; none is lost.
 """
 
 from __future__ import annotations
@@ -66,8 +67,9 @@ def read_footprints(
     where: str | None = None,
     bbox: Box | None = None,
 ) -> tuple[Footprint, ...]:
-    """Footprints of a file, URL or data source name in world metres, in `target_crs` (the cloud's)
-    where one is given.
+    """Read footprints from a file, URL or data source, in world metres.
+
+    They come in `target_crs` (the cloud's) where one is given.
 
     `layer` names one of a file's layers, which may be left out where only one holds geometries.
     Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the
@@ -102,14 +104,14 @@ def read_footprints(
 
 
 def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
-    """Whether a polygon in world metres meets a box in coordinates of `units`."""
+    """Return whether a polygon in world metres meets a box in `units`."""
     return bool(
         shapely.intersects(polygon, shapely.box(*units.to_metres(np.reshape(bbox, (2, 2))).ravel()))
     )
 
 
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
-    """CRS that a footprint file names, None where it names none.
+    """Return the CRS that a footprint file names, None where it names none.
 
     Raises InputError as `read_footprints` does.
     """
@@ -127,8 +129,9 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
 
 
 def plan_crs(text: str | CRS | None) -> CRS | None:
-    """The CRS that a vector file names, None for one of heights alone and for GeoPackage's
-    "undefined".
+    """Return the CRS that a vector file names, None if it has no plan.
+
+    GeoPackage's "undefined" is None too.
     """
     crs = parse_crs(text)
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
@@ -141,8 +144,9 @@ def read_features(
     bbox: Box | None = None,
     bbox_crs: CRS | None = None,
 ) -> Features:
-    """Metadata (fields, crs), feature numbers, shapely geometries (None where a feature has none)
-    and attribute columns.
+    """Read pyogrio's metadata, feature numbers, geometries and columns.
+
+    Geometries are shapely's, None where a feature has none.
 
     Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
     """
@@ -185,8 +189,10 @@ def refuse_nothing(
     where: str | None,
     bbox: Box | None,
 ) -> None:
-    """Raise InputError where `count` is 0: no features in a layer that lies in `bounds`, or none
-    that a condition or a box lets through.
+    """Raise InputError where no feature is left.
+
+    `count` is then 0: the layer that lies in `bounds` is empty, or a condition or box lets none
+    through.
     """
     if count:
         return
@@ -225,7 +231,10 @@ def refuse_missing(path: str | Path) -> None:
 
 
 def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
-    """A box in `crs` around all of `bbox` in `bbox_crs`; as it is where either is unknown."""
+    """Return a box in `crs` around all of `bbox`, which is in `bbox_crs`.
+
+    Where either is unknown, the box stays as it is.
+    """
     if crs is None or bbox_crs is None or same_horizontal(crs, bbox_crs):
         return bbox
     if not names_place(crs):
@@ -234,7 +243,10 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
 
 
 def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:
-    """One dictionary a feature of plain Python values; what is not set (None, NaN) is left out."""
+    """Return one dictionary of plain Python values a feature.
+
+    Values that are not set (None, NaN) are left out.
+    """
     values = [[plain_value(value) for value in column.tolist()] for column in columns]
     return [
         {
@@ -247,8 +259,9 @@ def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> l
 
 
 def plain_value(value: Any) -> Any:
-    """A value as JSON knows it: NaN becomes None, dates ISO text, bytes hexadecimal, arrays
-    lists.
+    """Convert a value to one that JSON has.
+
+    NaN becomes None, dates ISO text, bytes hexadecimal text, arrays lists.
     """
     if isinstance(value, np.ndarray):
         return value.tolist()
@@ -262,8 +275,9 @@ def plain_value(value: Any) -> Any:
 def feature_ids(
     rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: str | Path
 ) -> list[str]:
-    """The id of each feature as text: by the attribute asked for, a usual one, or the feature's
-    number.
+    """Return the id of each feature as text.
+
+    It is that of the requested attribute, of a usual one, or the feature's number.
     """
     by_number = [str(number) for number in numbers]
     names = {name.lower(): name for row in rows for name in row}
@@ -304,8 +318,9 @@ def feature_ids(
 
 
 def id_text(value: Any) -> str:
-    """An id as text, empty where there is none; whole numbers that a format stores as floats lose
-    their decimal point.
+    """Return an id as text, empty where there is none.
+
+    Whole numbers that a format stores as floats lose their decimal point.
     """
     if value is None or not str(value).strip():
         return ""
@@ -315,7 +330,7 @@ def id_text(value: Any) -> str:
 def transform_geometries(
     geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path
 ) -> np.ndarray:
-    """Geometries in plan in the target CRS.
+    """Transform geometries in plan to the target CRS.
 
     Raises InputError where that is impossible or leads to no numbers.
     """
@@ -355,12 +370,12 @@ def transform_geometries(
 
 
 def compare_units(source: CRS, target: CRS) -> float:
-    """How many units of `target` one of `source` is in plan."""
+    """Return how many plan units of `target` make one of `source`."""
     return find_units(source, "the footprints").plan / find_units(target).plan
 
 
 def find_middle(geometries: np.ndarray) -> tuple[float, float]:
-    """The middle (x, y) of the geometries, by the medians of their boxes;
+    """Return the middle (x, y) of the geometries, by the medians of their boxes.
 
     (0, 0) where none has any.
     """
@@ -371,7 +386,7 @@ def find_middle(geometries: np.ndarray) -> tuple[float, float]:
 
 
 def advise(source: CRS) -> str:
-    """What to do about coordinates that the CRS `source` cannot have."""
+    """Return advice about coordinates that the CRS `source` cannot have."""
     if source.is_geographic:
         return (
             "they are no degrees: name their CRS in the file, for a GeoJSON that names none counts "
@@ -387,7 +402,7 @@ def split_features(
     attributes: list[dict[str, Any]],
     path: str | Path,
 ) -> list[Footprint]:
-    """Footprints of features, several of one whose polygons stand apart;
+    """Make footprints of features, several of one whose polygons stand apart.
 
     `surfaces` (n,) are faces of one body each.
     """
@@ -432,8 +447,9 @@ def split_features(
 
 
 def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footprint]:
-    """Ids made unique by a suffix `_2`, `_3`; a copy of an earlier polygon names it in its
-    attribute `copy_of`.
+    """Make ids unique by a suffix `_2`, `_3`.
+
+    A copy of an earlier polygon names it in its attribute `copy_of`.
     """
     ids = {footprint.id for footprint in footprints}
     in_use: set[str] = set()
@@ -468,8 +484,9 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
 
 
 def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
-    """One line where footprints lie on larger ones: each gets a model of the same points, and the
-    models overlap.
+    """Warn once of footprints that lie on larger ones.
+
+    Each gets a model of the same points, and the models overlap.
     """
     polygons = np.array([footprint.polygon for footprint in footprints])
     pairs = shapely.STRtree(polygons).query(shapely.point_on_surface(polygons), predicate="within")

@@ -1,5 +1,6 @@
-"""The CRS that the GeoTIFF keys of a LAS file define: by EPSG's codes, or by a unit alone where the
-rest is the file's own.
+"""The CRS that the GeoTIFF keys of a LAS file define.
+
+Keys name it by EPSG's codes, or only its unit where the rest is the file's own.
 
 Key numbers are those of GeoTIFF 1.1 (OGC 19-008r4), section 7.
 """
@@ -78,14 +79,14 @@ class GeoKeys:
         )
 
     def code(self, key: int) -> int:
-        """The value of a key that holds a code, UNDEFINED where it is missing."""
+        """Return the value of a key that holds a code, UNDEFINED if it is missing."""
         value = self.values.get(key, UNDEFINED)
         return value if isinstance(value, int) else UNDEFINED
 
     def plan(self) -> CRS | None:
-        """The CRS of the plan, local where only its unit is defined.
+        """Return the CRS of the plan, a local one if only its unit is defined.
 
-        Raises CRSError where not even that is.
+        Raises CRSError where even that is not.
         """
         code, model = self.code(PROJECTED_CRS), self.code(MODEL)
         if code in EPSG_CODES:
@@ -100,14 +101,14 @@ class GeoKeys:
         return self.local_plan() if self.code(PLAN_UNIT) else None
 
     def local_plan(self) -> CRS:
-        """A local CRS in the unit of a projection of the file's own."""
+        """Return a local CRS in the unit of a projection of the file's own."""
         name, unit = self.citation(), self.plan_unit()
         if unit is None:
             raise CRSError(f"{name}, a projection of its own without a unit")
         return local_crs(name, *unit)
 
     def citation(self) -> str:
-        """What the file calls its projection."""
+        """Return the file's name for its projection."""
         citation = self.values.get(PROJECTED_CITATION) or self.values.get(CITATION)
         return str(citation or "a projection of its own").replace('"', "'")
 
@@ -120,7 +121,7 @@ class GeoKeys:
         return None if code == UNDEFINED else decode_unit(code)
 
     def heights(self) -> CRS | None:
-        """The CRS of the heights, None without any.
+        """Return the CRS of the heights, None without any.
 
         Where code and unit disagree the unit counts.
         """
@@ -138,7 +139,10 @@ class GeoKeys:
 
 
 def value_at(place: int, length: int, position: int, doubles: bytes, texts: bytes) -> Any:
-    """The value of one entry of a directory, None where it points beyond its record."""
+    """Return the value of one entry of a directory.
+
+    It is None where the entry points beyond its record.
+    """
     if place == 0:
         return position
     if place == DOUBLES and 8 * (position + 1) <= len(doubles):
@@ -149,7 +153,10 @@ def value_at(place: int, length: int, position: int, doubles: bytes, texts: byte
 
 
 def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CRS | None:
-    """The CRS of plan and heights, of heights alone where there is no plan, None without either.
+    """Return the CRS of plan and heights that the keys define.
+
+    It is that of the heights alone where there is no plan, and None without either. Raises CRSError
+    for keys that cannot be understood.
 
     Raises CRSError where the keys define one that cannot be understood.
     """
@@ -159,7 +166,7 @@ def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CR
 
 
 def decode_vertical_crs(code: int) -> CRS:
-    """A vertical CRS by EPSG's code or by one of GeoTIFF 1.0's own."""
+    """Return a vertical CRS by EPSG's code or by one of GeoTIFF 1.0's own."""
     if code in GEOTIFF_HEIGHTS:
         return CRS.from_epsg(GEOTIFF_HEIGHTS[code])
     if code in ELLIPSOIDAL:
@@ -183,14 +190,20 @@ def linear_units() -> dict[int, tuple[str, float]]:
 
 
 def decode_unit(code: int) -> tuple[str, float]:
-    """Name and length (m) of a unit. Raises CRSError for a code that is no unit of length."""
+    """Return the name and length (m) of a unit.
+
+    Raises CRSError for a code that is no unit of length.
+    """
     if code not in linear_units():
         raise CRSError(f"a unit of the code {code}, which is no unit of length")
     return linear_units()[code]
 
 
 def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
-    """A projected CRS whose coordinates count in `unit` (name, metres), whatever its code says."""
+    """Return a projected CRS whose coordinates are in `unit` (name, metres).
+
+    The unit overrides that of the CRS's code.
+    """
     if unit is None or abs(crs.axis_info[0].unit_conversion_factor / unit[1] - 1) < 1e-9:
         return crs
     name, factor = unit
@@ -202,14 +215,14 @@ def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
 
 
 def local_crs(name: str, unit: str, factor: float) -> CRS:
-    """A local CRS of axes east and north in a unit of `factor` metres."""
+    """Make a local CRS of axes east and north in a unit of `factor` metres."""
     return CRS.from_wkt(
         f'LOCAL_CS["{name}",LOCAL_DATUM["unknown",0],UNIT["{unit}",{factor!r}],AXIS["X",EAST],AXIS["Y",NORTH]]'
     )
 
 
 def heights_in(name: str, unit: str, factor: float) -> CRS:
-    """A vertical CRS in a unit of `factor` metres."""
+    """Make a vertical CRS in a unit of `factor` metres."""
     return CRS.from_wkt(
         f'VERT_CS["{name} '
         f'({unit})",VERT_DATUM["{name}",2005],UNIT["{unit}",{factor!r}],AXIS["Up",UP]]'

@@ -1,5 +1,6 @@
-"""GeoParquet files through pyarrow, local or by address: of a file with boxes for its rows, only
-the row groups that meet an extent are fetched.
+"""GeoParquet files through pyarrow, local or by address.
+
+Where a file has boxes for its rows, only the row groups that meet an extent are fetched.
 
 Reads the versions 0.4 to 1.1 of the format: geometries as WKB, or as polygons and multipolygons in
 Arrow's own lists.
@@ -62,8 +63,9 @@ class GeometryColumn:
 
 
 def is_parquet(path: str | Path) -> bool:
-    """Whether a footprint source is a Parquet file: by its first bytes, at an address by its
-    suffix.
+    """Return whether a footprint source is a Parquet file.
+
+    A file is recognised by its first bytes, an address by its suffix.
 
     >>> is_parquet("https://example.org/a.parquet?token=1"), is_parquet("postgresql://host/db")
     (True, False)
@@ -104,7 +106,10 @@ def open_parquet(path: str | Path) -> Iterator[Any]:
 
 
 def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
-    """The main geometry of an open file. Raises InputError where it has none of a known kind."""
+    """Return the main geometry column of an open file.
+
+    Raises InputError where it has none of a known kind.
+    """
     try:
         geo = json.loads((file.metadata.metadata or {})[b"geo"])
         name = geo["primary_column"]
@@ -132,8 +137,10 @@ def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
 
 
 def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], ...] | None:
-    """The columns of a row's box: those that the metadata name, else the fields of a column `bbox`,
-    as files from before version 1.1 have it.
+    """Return the columns that hold the rows' boxes.
+
+    They are those that the metadata name, else the fields of a column `bbox`, as files before
+    version 1.1 have it.
     """
     from pyarrow import types
 
@@ -148,7 +155,7 @@ def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], .
 
 
 def attribute_names(file: Any, column: GeometryColumn) -> list[str]:
-    """The columns of an open file that are neither geometries nor their boxes."""
+    """Return the columns of an open file other than geometries and their boxes."""
     boxes = {way[0] for way in column.sides or ()}
     without = {column.name, *column.others, *boxes}
     return [name for name in file.schema_arrow.names if name not in without]
@@ -160,8 +167,10 @@ def read_rows(
     names: Sequence[str],
     extent: shapely.Geometry | None = None,
 ) -> tuple[Any, np.ndarray]:
-    """The columns `names` and the geometry of the rows whose boxes meet `extent` (in the file's
-    CRS; None for all) as Arrow's table, and the numbers of these rows in the file.
+    """Read the columns `names` and the geometry of rows that meet `extent`.
+
+    `extent` is in the file's CRS; None is for all rows. Returns Arrow's table, and the numbers of
+    the rows in the file.
     """
     import pyarrow
 
@@ -181,7 +190,10 @@ def read_rows(
 
 
 def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> list[int]:
-    """The row groups that may hold rows in `extent`, by what the file tells of their boxes."""
+    """Return the row groups that may hold rows in `extent`.
+
+    The file's statistics of the boxes decide.
+    """
     groups = range(file.num_row_groups)
     if extent is None or column.sides is None:
         return list(groups)
@@ -199,8 +211,9 @@ def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry |
 
 
 def read_bound(file: Any, group: int, leaf: Any, side: int) -> float:
-    """The least (of xmin and ymin) or greatest value of a column in a row group; NaN where the file
-    does not tell.
+    """Return the least or greatest value of a column in a row group.
+
+    It is the least for xmin and ymin, and NaN where the file has no statistics.
     """
     told = file.metadata.row_group(group).column(leaf).statistics
     if told is None or not told.has_min_max:
@@ -209,7 +222,7 @@ def read_bound(file: Any, group: int, leaf: Any, side: int) -> float:
 
 
 def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> np.ndarray:
-    """Numbers of the rows of `table` whose boxes meet `extent`, in ascending order."""
+    """Return ascending numbers of the rows of `table` whose boxes meet `extent`."""
     if extent is None:
         return np.arange(len(table))
     if column.sides is None:
@@ -224,8 +237,9 @@ def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | 
 
 
 def numbers_at(table: Any, way: Sequence[str]) -> np.ndarray:
-    """The numbers (n,) of the column that the names on the `way` lead to, NaN where there is
-    none.
+    """Return the numbers (n,) of the column to which the names of `way` lead.
+
+    They are NaN where a row has none.
     """
     import pyarrow.compute
 
@@ -236,7 +250,7 @@ def numbers_at(table: Any, way: Sequence[str]) -> np.ndarray:
 
 
 def geometries_in(table: Any, column: GeometryColumn) -> np.ndarray:
-    """The geometries (n,) of a table, None where a row has none."""
+    """Return the geometries (n,) of a table, None where a row has none."""
     values = table.column(column.name)
     if column.encoding not in LISTS:
         bodies = np.empty(len(table), object)
@@ -249,7 +263,7 @@ def geometries_in(table: Any, column: GeometryColumn) -> np.ndarray:
 
 
 def convert_surfaces(lists: Any, kind: shapely.GeometryType) -> np.ndarray:
-    """Surfaces (n,) of Arrow's lists of coordinates, none of them null."""
+    """Convert Arrow's lists of coordinates, none of them null, to surfaces (n,)."""
     from pyarrow import types
 
     offsets = []
@@ -264,11 +278,11 @@ def convert_surfaces(lists: Any, kind: shapely.GeometryType) -> np.ndarray:
 
 
 def import_pyarrow() -> Any:
-    """What reads and writes GeoParquet. Raises InputError where it is missing."""
+    """Import pyarrow. Raises InputError where it is missing."""
     import_extra("pyarrow", "parquet", "GeoParquet")
     return import_extra("pyarrow.parquet", "parquet", "GeoParquet")
 
 
 def import_fsspec() -> Any:
-    """What reads GeoParquet by address. Raises InputError where it is missing."""
+    """Import fsspec. Raises InputError where it is missing."""
     return import_extra("fsspec", "parquet", "GeoParquet by address")

@@ -1,5 +1,6 @@
-"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk; by path or by address (see
-remote.py).
+"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk.
+
+Files are read by path or by address (remote.py).
 
 Before laspy opens a file, `las_header` has held its header against its size; what is decoded is
 held against the header.
@@ -59,7 +60,7 @@ def translate_errors(path: str | Path) -> Iterator[None]:
 
 
 def read_las_header(path: str | Path) -> laspy.LasHeader:
-    """The header of a LAS, LAZ or COPC file.
+    """Return the header of a LAS, LAZ or COPC file.
 
     Raises InputError when it cannot be read or cannot be true.
     """
@@ -69,15 +70,19 @@ def read_las_header(path: str | Path) -> laspy.LasHeader:
 
 
 def read_checked_facts(path: str | Path) -> LasFacts:
-    """What the header says, once it has been found possible. Raises InputError otherwise."""
+    """Return the facts of a header that passed its checks.
+
+    Raises InputError otherwise.
+    """
     with translate_errors(path):
         return facts_at(str(path), None if is_url(path) else Path(path).stat().st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=64)
 def facts_at(path: str, changed: int | None) -> LasFacts:
-    """Found once a process for the file that was `changed` then: an indexed file is opened for each
-    of its squares.
+    """Return the header's facts, read once a process for each state of a file.
+
+    `changed` is the file's time of change. An indexed file is opened for each of its squares.
     """
     with open_binary(path) as file:
         return read_facts(file)
@@ -90,8 +95,9 @@ def las_chunks(
     runs: np.ndarray | None = None,
     noted: list[np.ndarray] | None = None,
 ) -> Iterator[Chunk]:
-    """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the
-    box are decoded.
+    """Yield the chunks of `path`.
+
+    Of a COPC file with a `box` only the octree's nodes that meet the box are decoded.
 
     `runs` (k, 2) of points, [first, end), limit what is read of another file. To `noted` go the
     boxes (k, 4) of the runs of each chunk (runs.py), of all its points.
@@ -123,8 +129,9 @@ def las_chunks(
 
 
 def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Any]:
-    """laspy's records of the `runs` of points, [first, end), at most `chunk_points` at a time and
-    none empty.
+    """Yield laspy's records of the `runs` of points, [first, end).
+
+    A record has at most `chunk_points` points, and none is empty.
     """
     with (
         open_binary(path) as file,
@@ -144,7 +151,7 @@ def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) ->
 
 
 def is_copc(path: str | Path) -> bool:
-    """Whether the file is cloud-optimised: the first VLR is COPC's by its standard."""
+    """Return whether the file is cloud-optimised: its first VLR is COPC's."""
     with translate_errors(path), open_binary(path) as file:
         head = file.read(400)
     return head[375 + 2 : 375 + 6] == b"copc"
@@ -169,7 +176,7 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
 
 
 def coordinates(record) -> np.ndarray:
-    """World coordinates (n, 3) of a laspy record."""
+    """Return the world coordinates (n, 3) of a laspy record."""
     xyz = np.empty((len(record), 3))
     for axis, name in enumerate("XYZ"):
         np.multiply(record.array[name], record.scales[axis], out=xyz[:, axis])
@@ -178,8 +185,9 @@ def coordinates(record) -> np.ndarray:
 
 
 def drop_withheld(xyz: np.ndarray, record) -> Chunk:
-    """Coordinates (n, 3) and classes of a record without the points flagged as withheld, that is,
-    deleted.
+    """Return coordinates (n, 3) and classes without withheld points.
+
+    Withheld points are flagged as deleted.
     """
     classification = np.asarray(record["classification"], np.uint8)
     withheld = np.asarray(record["withheld"], bool)
@@ -187,8 +195,9 @@ def drop_withheld(xyz: np.ndarray, record) -> Chunk:
 
 
 def log_withheld(count: int, path: str | Path) -> None:
-    """Say once how many points of a file were left out as withheld: by the chunk, a tile of a
-    country takes a thousand lines.
+    """Log once how many points of a file were left out as withheld.
+
+    By the chunk, a tile of a country would take a thousand lines.
     """
     if count:
         warnings.warn(

@@ -1,5 +1,6 @@
-"""The CRS that a LAS file's records define: WKT, or GeoTIFF keys where there is no WKT that can be
-understood.
+"""The CRS that a LAS file's records define.
+
+It is WKT, or GeoTIFF keys where there is no WKT that can be understood.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ WKT = 2112
 
 
 def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
-    """The CRS of the records of user LASF_Projection by number, None where they define none.
+    """Return the CRS that the records of user LASF_Projection define, or None.
+
+    Records come by number.
 
     Heights may come from the keys beside a WKT.
     """
@@ -44,7 +47,10 @@ def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
 
 
 def decode_wkt(content: bytes) -> str:
-    """The text of a record of WKT: UTF-8 by the standard, Latin-1 where a writer did not know."""
+    """Decode a record of WKT.
+
+    It is UTF-8 by the standard, and Latin-1 from writers that did not know.
+    """
     try:
         text = content.decode()
     except UnicodeDecodeError:

@@ -1,6 +1,6 @@
-"""Is what a LAS, LAZ or COPC file says of itself possible?
+"""Checks of the header of a LAS, LAZ or COPC file.
 
-Asked before any number in it is believed.
+They run before any number of the header is used.
 
 Every count is held against the file's size: of records, of points, of LASzip's chunks, of COPC's
 pages and nodes. Scales, offsets and bounds are held against each other. The layouts are those of
@@ -31,8 +31,10 @@ NODES = np.dtype([("key", "<i4", 4), ("start", "<u8"), ("bytes", "<i4"), ("point
 
 
 class Octree(NamedTuple):
-    """COPC's: the `nodes` (n,) that hold points, of NODES, `centre` (3,) and half the width of the
-    cube around all.
+    """COPC's octree: its nodes, its centre and its extent.
+
+    `nodes` (n,) hold points and are of NODES, `centre` is (3,), and half the width of the cube
+    around all comes with them.
     """
 
     nodes: np.ndarray
@@ -42,8 +44,9 @@ class Octree(NamedTuple):
 
 @dataclass(frozen=True)
 class LasFacts:
-    """What the public header block says, and the file's `size` in bytes; the arrays are (3,): x, y,
-    z.
+    """The fields of the public header block, and the file's `size` in bytes.
+
+    Arrays are (3,): x, y, z.
 
     `points_end` is the first byte that no point may take: of waveforms, of extended records, or the
     end. `laszip` is the record that tells how points are compressed; only COPC has an `octree`;
@@ -72,14 +75,15 @@ class LasFacts:
 
     @property
     def rounding(self) -> np.ndarray:
-        """How far (3,) a point may lie outside the bounds: writers take them before or after
-        rounding, some to 1 cm.
+        """How far (3,) rounding may put a point outside the bounds.
+
+        Writers take bounds before or after rounding, some to 1 cm.
         """
         return 0.01 + self.scales
 
 
 def read_facts(file: BinaryIO) -> LasFacts:
-    """The header of an open file, held against everything it can be held against.
+    """Read the header of an open file, and check all that can be checked.
 
     Raises Implausible with the reason.
     """
@@ -106,7 +110,7 @@ def read_facts(file: BinaryIO) -> LasFacts:
 
 
 def parse_header(head: bytes, size: int) -> LasFacts:
-    """The fields of the public header block in `head`, the file's first bytes."""
+    """Parse the public header block from `head`, the file's first bytes."""
     if head[:4] != b"LASF" or len(head) < HEADER_BYTES[0]:
         raise Implausible(f"it ends after {size} bytes, inside its header; it is truncated")
     major, minor = head[24], head[25]
@@ -154,7 +158,7 @@ def parse_header(head: bytes, size: int) -> LasFacts:
 
 
 def check_layout(facts: LasFacts) -> None:
-    """The header, the records and the points follow one another inside the file."""
+    """Check that header, records and points follow one another in the file."""
     if not HEADER_BYTES[facts.minor] <= facts.header_bytes <= facts.data_start <= facts.points_end:
         raise Implausible(
             f"its header of {facts.header_bytes} bytes tells of points from byte "
@@ -172,8 +176,9 @@ def check_layout(facts: LasFacts) -> None:
 
 
 def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:
-    """Variable length records as ((user id, number), content), none of which may reach beyond its
-    place.
+    """Yield variable length records as ((user id, number), content).
+
+    None of them may reach beyond its place.
     """
     far_start, far_count = facts.far_records
     for start, end, count, form in (
@@ -204,7 +209,9 @@ def room_for_points(facts: LasFacts) -> int:
 
 
 def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
-    """How many points LASzip's chunks hold; as the header says where older versions leave it open.
+    """Return the number of points in LASzip's chunks.
+
+    It is the header's number where older versions leave it open.
 
     Raises Implausible for a table of chunks that does not fit the file: a decoder would make room
     for what it says.
@@ -254,8 +261,9 @@ def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
 
 
 def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
-    """(points, bytes) of each chunk; the points are the full number where chunks are of one
-    size.
+    """Return (points, bytes) of each chunk.
+
+    The points are the full number where chunks are of one size.
     """
     file.seek(facts.data_start)
     start, table = facts.data_start + 8, struct.unpack("<q", file.read(8).ljust(8, b"\xff"))[0]
@@ -283,16 +291,18 @@ def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
 
 
 def count_last_chunk(file: BinaryIO, facts: LasFacts, chunks: list[tuple[int, int]]) -> int:
-    """How many points the last chunk says it holds: after its first point, since LAS 1.4's
-    formats.
+    """Return the number of points that the last chunk declares.
+
+    It stands after the chunk's first point, since LAS 1.4's formats.
     """
     file.seek(facts.data_start + 8 + sum(length for _, length in chunks[:-1]) + facts.point_bytes)
     return struct.unpack("<I", file.read(4).ljust(4, b"\0"))[0]
 
 
 def check_coordinates(facts: LasFacts) -> None:
-    """Scales, offsets and bounds that belong together: whole numbers of 32 bits must reach the
-    bounds.
+    """Check that scales, offsets and bounds belong together.
+
+    Whole numbers of 32 bits must reach the bounds.
     """
     if not ((facts.scales > 0) & (facts.scales <= COARSEST_SCALE)).all():
         raise Implausible(
@@ -314,8 +324,9 @@ def check_coordinates(facts: LasFacts) -> None:
 
 
 def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
-    """The facts with COPC's octree, whose cube holds the bounds and whose nodes hold as many points
-    as the header says.
+    """Return the facts with COPC's octree, once it is checked.
+
+    Its cube holds the bounds, and its nodes hold as many points as the header says.
     """
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
@@ -339,7 +350,10 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
 
 
 def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> np.ndarray:
-    """All nodes that hold points; every page is visited once, so the walk ends."""
+    """Return all nodes that hold points.
+
+    Every page is visited once, so the walk ends.
+    """
     waiting, visited, result = [(page, page_bytes)], set(), [np.empty(0, NODES)]
     while waiting:
         start, length = waiting.pop()
@@ -373,8 +387,9 @@ def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> n
 
 
 def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest and highest coordinates, (3,) each, of decoded points (n, 3), those of the header
-    where there is none.
+    """Return the lowest and highest coordinates, (3,) each, of points (n, 3).
+
+    They are the header's where there are no points.
 
     Raises Implausible where points lie outside the header's bounds.
     """
@@ -391,8 +406,9 @@ def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarr
 
 
 def check_all_points(lower: np.ndarray, upper: np.ndarray, facts: LasFacts) -> None:
-    """Raise Implausible where all points together, from `lower` (3,) to `upper` (3,), fall short of
-    the header's bounds.
+    """Raise Implausible where all points together fall short of the bounds.
+
+    They reach from `lower` (3,) to `upper` (3,).
     """
     if not ((lower <= facts.mins + SHORT) & (upper >= facts.maxs - SHORT)).all():
         raise Implausible(

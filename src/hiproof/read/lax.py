@@ -1,5 +1,6 @@
-"""The spatial index that LAStools writes beside a LAS or LAZ file (`.lax`): a quadtree whose cells
-name runs of points.
+"""The spatial index that LAStools writes beside a LAS or LAZ file.
+
+A `.lax` file is a quadtree whose cells name runs of points.
 
 All of the file are little-endian words of four bytes: "LASX" and a version; "LASS" and a type (0:
 quadtree); "LASQ", a version, levels, level_index, implicit_levels (0 here), min_x, max_x, min_y,
@@ -24,7 +25,7 @@ from .runs import RunIndex
 
 
 def read_lax(path: str | Path) -> RunIndex | None:
-    """The index beside the LAS or LAZ file at `path`; None where there is none.
+    """Read the index beside the LAS or LAZ file at `path`, None without one.
 
     One that cannot be understood, or that tells of another number of points than the file, is left
     aside with an InputWarning. Raises InputError where the file's own header cannot be read.
@@ -51,9 +52,9 @@ def read_lax(path: str | Path) -> RunIndex | None:
 
 
 def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
-    """The index in a file's words, and how many points its cells hold;
+    """Parse the index from a file's words, and count the points in its cells.
 
-    ValueError or IndexError for another file.
+    Raises ValueError or IndexError for another file.
     """
     for place, mark in ((0, b"LASX"), (2, b"LASS"), (4, b"LASQ"), (13, b"LASV")):
         if words[place : place + 1].tobytes() != mark:
@@ -75,8 +76,9 @@ def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
 
 
 def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
-    """Box of a cell, halved in float32 as the writer does, and wider by what float32 cannot tell
-    apart.
+    """Return the box of a cell, halved in float32 as the writer does.
+
+    It is wider by what float32 cannot tell apart.
     """
     level = 0
     while index >= 4**level:

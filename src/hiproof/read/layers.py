@@ -1,4 +1,4 @@
-"""The layers of a vector file, those that pyogrio refuses by their declaration included.
+"""The layers of a vector file, those included that pyogrio refuses.
 
 pyogrio opens no layer that is declared as TIN or PolyhedralSurface. GDAL's virtual format gives the
 same layer without that declaration, so its features can be read.
@@ -30,7 +30,7 @@ def list_layers(path: str) -> list[tuple[str, str | None]]:
 
 
 def find_source(path: str, layer: str | int | None) -> tuple[str, str | int | None]:
-    """What pyogrio can open in place of `path`, and the layer there."""
+    """Return what pyogrio can open in place of `path`, and the layer there."""
     try:
         pyogrio.read_info(path, layer=layer)
     except GeometryError:
@@ -41,8 +41,9 @@ def find_source(path: str, layer: str | int | None) -> tuple[str, str | int | No
 
 
 def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> str:
-    """GDAL's virtual format of one layer, its `geometry` declared anew, or with one attribute
-    alone, as text.
+    """Return GDAL's virtual format of one layer.
+
+    The layer's `geometry` is declared anew, or it has one attribute alone, as text.
 
     `path` may be what this function made.
     """

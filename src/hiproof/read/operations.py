@@ -1,5 +1,6 @@
-"""Which operation PROJ uses between two CRSs, how accurate it is, and which missing grid would be
-more accurate.
+"""The operation that PROJ uses between two CRSs, and its accuracy.
+
+A missing grid that would be more accurate is named.
 
 PROJ transforms between datums by the best operation whose grids are installed. Where the grid of a
 better one is missing it takes a coarser one without a word, and everything moves by metres.
@@ -30,8 +31,9 @@ neighbours' roofs.
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation of PROJ from the CRS `source` to `target` near `place` (x, y in `source`), used
-    for `subject`.
+    """An operation of PROJ from the CRS `source` to `target`.
+
+    It is used near `place` (x, y in `source`) for `subject`.
 
     `accuracy_m` is PROJ's, None where it states none. `missing_grids` are those of the best
     operation that cannot be used because they are not installed, and `missing_accuracy_m` is its
@@ -54,9 +56,7 @@ class Operation:
 
     @property
     def remark(self) -> str:
-        """What a user should know of a coarse operation, with what to do about it; empty for an
-        accurate one.
-        """
+        """Advice on a coarse operation for the user; empty for an accurate one."""
         if not self.is_coarse:
             return ""
         accuracy = (
@@ -90,8 +90,9 @@ class Operation:
 
 
 def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, float]) -> Operation:
-    """Find the operation that `Transformer.from_crs(source, target)` uses at `place` (x, y in
-    `source`).
+    """Find the operation of `Transformer.from_crs(source, target)` at `place`.
+
+    `place` is x, y in `source`.
     """
     x, y = (float(value) for value in place)
     return dataclasses.replace(
@@ -100,8 +101,9 @@ def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, f
 
 
 def is_current(operation: Operation) -> bool:
-    """Check whether PROJ still uses this operation: not where a grid has been installed or removed
-    since.
+    """Check whether PROJ still uses this operation.
+
+    It does not where a grid has been installed or removed since.
     """
     current = operation_at(operation.source, operation.target, operation.place)
     return (current.name, current.accuracy_m) == (operation.name, operation.accuracy_m)
@@ -115,7 +117,7 @@ def warn_if_coarse(operation: Operation) -> None:
 
 @functools.lru_cache(maxsize=32)
 def operation_at(source: str, target: str, place: tuple[float, float]) -> Operation:
-    """The operation between CRSs given as text, for no subject."""
+    """Return the operation between CRSs given as text, for no subject."""
     transformer = Transformer.from_crs(source, target, always_xy=True)
     transformer.transform(*place)
     try:
@@ -135,7 +137,7 @@ def operation_at(source: str, target: str, place: tuple[float, float]) -> Operat
 
 
 def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:
-    """PROJ's operations near `place` whose grids are not installed, its best first."""
+    """Return PROJ's operations near `place` whose grids are missing, best first."""
     lon, lat = Transformer.from_crs(source, "EPSG:4326", always_xy=True).transform(*place)
     area = AreaOfInterest(lon, lat, lon, lat) if math.isfinite(lon) and math.isfinite(lat) else None
     with warnings.catch_warnings():
@@ -147,5 +149,8 @@ def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:
 
 
 def is_better(accuracy: float, than: float | None) -> bool:
-    """Whether a stated accuracy (m) is finer than another, None and negative ones being unknown."""
+    """Return whether a stated accuracy (m) is finer than another.
+
+    None and negative ones are unknown.
+    """
     return than is None or 0 <= accuracy < than

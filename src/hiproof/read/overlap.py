@@ -1,6 +1,6 @@
-"""Do footprints lie where the cloud does?
+"""Checks that footprints lie where the cloud does.
 
-Where not, the usual slips are tried, to say what it looks like.
+Where they do not, the usual mistakes are tried, so that the message can name the likely one.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ def check_overlap(
     cloud_crs: CRS | None = None,
     units: Units = METRES,
 ) -> None:
-    """Raise InputError when no footprint meets the cloud's `bounds`, of one file or of several; all
-    in world metres.
+    """Raise InputError when no footprint meets the cloud's `bounds`.
+
+    Bounds are of one file or of several. All are in world metres.
 
     Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax,
     ymax, zmax). The CRSs are those that the two sides name, `units` those of the CRS they are in;
@@ -79,8 +80,9 @@ def check_overlap(
 def slips(
     xy: np.ndarray, named_crs: CRS | None, cloud: CRS | None
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """What footprints at `xy` (n, 2), in their own CRS `named_crs`, may be instead, and where the
-    cloud's CRS has them then.
+    """Yield the usual mistakes that footprints may show, and their places then.
+
+    The footprints lie at `xy` (n, 2), in their own CRS `named_crs`. Places are in the cloud's CRS.
 
     Where only one side names a CRS the other is taken to be in it.
     """
@@ -134,7 +136,7 @@ def slips(
 
 
 def neighbours(crs: CRS | None) -> Iterator[CRS]:
-    """Projected CRSs of the codes next to that of `crs`."""
+    """Yield the projected CRSs of the codes next to that of `crs`."""
     code = None if crs is None else epsg_code(horizontal_crs(crs))
     if code is None:
         return
@@ -148,8 +150,9 @@ def neighbours(crs: CRS | None) -> Iterator[CRS]:
 
 
 def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
-    """The UTM zones that positions in degrees (n, 2) lie in: Europe's, North America's, the
-    world's.
+    """Yield the UTM zones in which positions in degrees (n, 2) lie.
+
+    They are Europe's, North America's and the world's.
     """
     lon, lat = np.median(lon_lat, axis=0)
     if np.isfinite((lon, lat)).all():
@@ -163,8 +166,9 @@ def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
 
 
 def reproject_positions(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
-    """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either
-    is unknown.
+    """Reproject positions (n, 2) from `source` to `target`.
+
+    They stay as they are where the two are one or either is unknown.
     """
     transformer = None if source is None or target is None else find_transformer(source, target)
     return xy if transformer is None else np.column_stack(transformer.transform(*xy.T))
@@ -172,8 +176,9 @@ def reproject_positions(xy: np.ndarray, source: CRS | None, target: CRS | None) 
 
 @functools.lru_cache(maxsize=8)
 def find_transformer(source: CRS, target: CRS) -> Transformer | None:
-    """From `source` to `target`, None where they are the same or PROJ knows no way; kept, for it
-    takes long to choose one.
+    """Return the cached transformer from `source` to `target`.
+
+    It is None where the two are the same or PROJ knows no way. Choosing one takes long.
     """
     if same_horizontal(source, target) or not (names_place(source) and names_place(target)):
         return None
@@ -189,9 +194,9 @@ def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
 
 
 def refuse_degrees(boxes: np.ndarray, subject: str, advice: str) -> None:
-    """Raise InputError where the `boxes` (n, 4) of things without a CRS look like degrees;
+    """Raise InputError where `boxes` (n, 4) without a CRS look like degrees.
 
-    NaN where one is empty.
+    Bounds of an empty one are NaN.
     """
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     lower, upper = boxes[:, :2], boxes[:, 2:]
@@ -205,8 +210,9 @@ def refuse_degrees(boxes: np.ndarray, subject: str, advice: str) -> None:
 
 
 def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
-    """Where on Earth positions (n, 2) in `crs` lie, where that is far from the area it is made for;
-    else None.
+    """Describe where positions (n, 2) lie if their CRS is not made for it.
+
+    Returns None where the place is inside the area of `crs`.
     """
     area = horizontal_crs(crs).area_of_use
     if area is None or area.west > area.east:
@@ -222,8 +228,9 @@ def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
 
 
 def stretch(crs: CRS, xy: np.ndarray) -> float:
-    """How many metres of `crs` a metre on the ground is at positions (n, 2), in the worse of its
-    directions; 1 where unknown.
+    """Return how many metres of `crs` a metre on the ground is.
+
+    It is taken at positions (n, 2), in the worse direction, and 1 where unknown.
     """
     plan = horizontal_crs(crs)
     lon, lat = np.median(convert_to_degrees(crs, xy), axis=0)
@@ -237,14 +244,14 @@ def stretch(crs: CRS, xy: np.ndarray) -> float:
 
 
 def extent(lower: np.ndarray, upper: np.ndarray) -> str:
-    """Where boxes from `lower` to `upper` (n, 2) lie, as text."""
+    """Describe where boxes from `lower` to `upper` (n, 2) lie."""
     (xmin, ymin), (xmax, ymax) = np.nanmin(lower, axis=0), np.nanmax(upper, axis=0)
     digits = 5 if max(map(abs, (xmin, ymin, xmax, ymax))) <= 180 else 1
     return f"x {xmin:.{digits}f} to {xmax:.{digits}f}, y {ymin:.{digits}f} to {ymax:.{digits}f}"
 
 
 def format_box(box: Sequence[float]) -> str:
-    """A box as `--bbox` takes it.
+    """Format a box as `--bbox` takes it.
 
     >>> format_box((84600, 447300.25, 85000, 447700))
     '84600,447300.25,85000,447700'

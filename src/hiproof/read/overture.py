@@ -1,5 +1,7 @@
-"""Building footprints of an Overture Maps release: its STAC catalogue lists GeoParquet files with
-their boxes, and of each file only the row groups that meet an extent are fetched.
+"""Building footprints of an Overture Maps release.
+
+Its STAC catalogue lists GeoParquet files with their boxes. Of each file only the row groups that
+meet an extent are fetched.
 
 Layout: a catalogue of releases, of which `latest` names one, holds a catalogue a release, that a
 catalogue a theme, that a collection a type, and that an item a file
@@ -34,8 +36,10 @@ ATTRIBUTION = "© OpenStreetMap contributors, Overture Maps Foundation"
 
 @dataclass(frozen=True)
 class OvertureFootprints:
-    """Outlines and attributes as Arrow's table (`id`, attributes, `geometry` as WKB in longitude
-    and latitude) in the order of their ids, and where they come from: `note`, ready for JSON.
+    """Outlines and attributes as Arrow's table, and their origin.
+
+    The table has `id`, attributes and `geometry` as WKB in longitude and latitude, in the order of
+    the ids. `note` is the origin, ready for JSON.
     """
 
     table: Any
@@ -43,15 +47,16 @@ class OvertureFootprints:
 
 
 def is_overture(source: Any) -> bool:
-    """Whether a footprint source stands for Overture's release."""
+    """Return whether a footprint source stands for Overture's release."""
     return source == KEYWORD
 
 
 def read_overture(
     catalogue: str, extent: shapely.Geometry, kind: str = TYPES[0]
 ) -> OvertureFootprints:
-    """The footprints of a type that meet `extent`, in longitude and latitude, those under ground
-    left out.
+    """Read the footprints of a type that meet `extent`.
+
+    `extent` is in longitude and latitude. Buildings under ground are left out.
 
     `catalogue` is the address of the catalogue of releases, the latest of which is read, or that of
     one release. Raises InputError where it cannot be read or has no footprints there.
@@ -81,8 +86,9 @@ def read_overture(
 
 
 def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
-    """The release that a catalogue names as its latest, or is itself, and its collection of a
-    type.
+    """Return a catalogue's release and its collection of a type.
+
+    The release is the one that the catalogue names as its latest, or the catalogue itself.
     """
     document = read_document(catalogue)
     if THEME not in document.children():
@@ -94,7 +100,10 @@ def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
 
 
 def find_child(document: Document, name: str) -> Document:
-    """The child of a document in the folder `name`. Raises InputError where there is none."""
+    """Return the child of a document in the folder `name`.
+
+    Raises InputError where there is none.
+    """
     children = document.children()
     if name not in children:
         raise InputError(
@@ -105,7 +114,7 @@ def find_child(document: Document, name: str) -> Document:
 
 
 def read_file(address: str, extent: shapely.Geometry) -> Any:
-    """The rows of a file of a release that meet `extent` and are not under ground."""
+    """Return the rows of a release's file that meet `extent` above ground."""
     import pyarrow
     from pyarrow import compute
 
@@ -125,7 +134,7 @@ def read_file(address: str, extent: shapely.Geometry) -> Any:
 
 
 def joined(tables: list[Any]) -> Any:
-    """All rows in the order of their ids, whichever file holds them."""
+    """Join all rows in the order of their ids, whichever file holds them."""
     import pyarrow
 
     table = pyarrow.concat_tables(tables, promote_options="default")
@@ -135,8 +144,9 @@ def joined(tables: list[Any]) -> Any:
 
 
 def summarise_sources(table: Any) -> list[dict[str, Any]]:
-    """The data sets from which the rows of a table come, with their licences where these are told
-    and how many rows each has a share in.
+    """Count the rows of each data set from which a table comes.
+
+    Licences are given where the release names them.
     """
     counts: Counter[tuple[str, str | None]] = Counter()
     for sources in table.column("sources").to_pylist():

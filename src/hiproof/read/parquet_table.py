@@ -1,4 +1,4 @@
-"""Footprints of a GeoParquet file in the shape in which pyogrio gives those of other files."""
+"""Footprints of a GeoParquet file, in pyogrio's shape."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ROW, FID = "hiproof_row", "hiproof_fid"
 
 
 def parquet_crs(path: str | Path) -> CRS | None:
-    """The CRS that a GeoParquet file names, None where it leaves it open."""
+    """Return the CRS that a GeoParquet file names, None where it leaves it open."""
     with open_parquet(path) as file:
         return geometry_column(file, path).crs
 
@@ -41,7 +41,9 @@ def read_parquet(
     where: str | None,
     box_in: Callable[[CRS | None], tuple[float, ...] | None],
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Metadata (fields, crs, total_bounds), row numbers, geometries and columns of a file.
+    """Read metadata, row numbers, geometries and columns of a file.
+
+    Metadata are fields, crs and total_bounds.
 
     `box_in` gives the box that rows have to meet, in the file's CRS, None for all rows. `where` is
     a condition in SQL. Raises InputError where the file or the condition cannot be read.
@@ -71,8 +73,9 @@ def refuse_layer(path: str | Path, layer: str | int | None) -> None:
 
 
 def convert_values(column: Any) -> np.ndarray:
-    """Plain values (n,) of a column, None where a row has none; lists and fields of fields as JSON
-    text.
+    """Return plain values (n,) of a column, None where a row has none.
+
+    Lists and fields of fields become JSON text.
     """
     from pyarrow import types
 
@@ -100,7 +103,10 @@ def convert_values(column: Any) -> np.ndarray:
 
 
 def select_rows(table: Any, where: str, path: str | Path) -> np.ndarray:
-    """Numbers of the rows of `table` that meet a condition in SQL, as SQLite understands it."""
+    """Return the numbers of the rows of `table` that meet a condition in SQL.
+
+    SQLite evaluates the condition.
+    """
     import pyarrow
 
     known = {name: plain_column(table.column(name)) for name in table.column_names}
@@ -125,7 +131,7 @@ def select_rows(table: Any, where: str, path: str | Path) -> np.ndarray:
 
 
 def plain_column(column: Any) -> Any:
-    """A column of a type that GDAL's tables know: nested and rare ones as text."""
+    """Convert a column of a nested or rare type to text, as GDAL's tables do."""
     import pyarrow
     from pyarrow import types
 

@@ -31,8 +31,10 @@ BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">
 
 @dataclass(frozen=True)
 class PlyLayout:
-    """The header: byte order ("" is ascii), vertices, their properties (name, NumPy type), columns
-    of x y z class.
+    """The header of a PLY file.
+
+    It has the byte order ("" is ascii), vertices, their properties (name, NumPy type), and the
+    columns of x, y, z and class.
     """
 
     byte_order: str
@@ -73,14 +75,17 @@ def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) ->
 
 
 def record_type(layout: PlyLayout) -> np.dtype:
-    """A vertex of a binary file."""
+    """Return the NumPy type of a vertex of a binary file."""
     return np.dtype([(name, layout.byte_order + kind) for name, kind in layout.properties])
 
 
 def read_vertices(
     file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int
 ) -> np.ndarray:
-    """The next `count` vertices as a float64 table of x, y, z and, where there is one, class."""
+    """Read the next `count` vertices as a float64 table.
+
+    Columns are x, y, z and, where there is one, class.
+    """
     if layout.byte_order == "":
         table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
         result = len(table)

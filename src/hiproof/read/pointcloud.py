@@ -1,5 +1,6 @@
-"""Point clouds from files: LAS, LAZ, COPC, text and PLY, found by their content and ending, read in
-chunks.
+"""Point clouds from LAS, LAZ, COPC, text and PLY files, in chunks.
+
+The kind of a file is found by its content and ending.
 """
 
 from __future__ import annotations
@@ -37,9 +38,10 @@ from .runs import RUN_POINTS
 
 
 class Reader(NamedTuple):
-    """A kind of point file: what it is called, its endings, the bytes that its files start with
-    (none in text), and how it is read: chunks of a file's coordinates (n, 3) and classes (n,) or
-    None, of so many points at most.
+    """A kind of point file: its name, its endings, and its reader.
+
+    Files start with given bytes (none in text). They are read in chunks of coordinates (n, 3) and
+    classes (n,) or None, of so many points at most.
     """
 
     name: str
@@ -86,7 +88,7 @@ Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metre
 
 @dataclass(frozen=True)
 class PointFileHeader:
-    """What a point file says of itself;
+    """The count, bounds and CRS that a point file states.
 
     `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit.
 
@@ -105,8 +107,9 @@ class PointFileHeader:
 def read_points(
     *paths: str | Path, settings: Settings | None = None, box: Box | None = None
 ) -> PointCloud:
-    """All points of the files, folders or wildcards `paths` in world metres, those outside `box` in
-    plan left out.
+    """Read all points of the files, folders or wildcards `paths`.
+
+    They are in world metres. Those outside `box` in plan are left out.
 
     Classes are kept, NaN and infinite coordinates dropped with an InputWarning. The CRS is
     `settings.read.crs` where that is given, else the files' own; coordinates in feet are made
@@ -142,8 +145,9 @@ def iter_points(
     units: Units = METRES,
     noted: list[np.ndarray] | None = None,
 ) -> Iterator[PointCloud]:
-    """Yield the points of one file, at most `chunk_points` (CHUNK_POINTS) at a time, without their
-    CRS: memory stays bounded.
+    """Yield the points of one file in chunks, so that memory stays bounded.
+
+    A chunk has at most `chunk_points` (CHUNK_POINTS) points and no CRS.
 
     `units` are those of the file's coordinates; the points, and `box`, are in world metres.
 
@@ -169,8 +173,9 @@ def iter_points(
 
 
 def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[las.Chunk]:
-    """The chunks of a file without points that have no numbers as coordinates; it may hold none
-    that no place has.
+    """Yield the chunks of a file without points that have no coordinates.
+
+    Raises for points that lie at no possible place.
     """
     dropped = 0
     for xyz, classes in chunks:
@@ -189,8 +194,9 @@ def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[
 
 
 def as_input_error(error: Exception, path: str | Path) -> InputError:
-    """What reading one file came to, as that file's error: where a run reads many, none may end the
-    others' work.
+    """Turn an exception of reading one file into that file's InputError.
+
+    Where a run reads many files, none may end the others' work.
     """
     if isinstance(error, InputError):
         return error
@@ -215,8 +221,9 @@ def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
 
 
 def read_header(path: str | Path) -> PointFileHeader:
-    """Bounds, count and CRS of one file: from the header of LAS, LAZ and COPC, by one pass over
-    text and PLY.
+    """Return bounds, count and CRS of one file.
+
+    They come from the header of LAS, LAZ and COPC, and from one pass over text and PLY.
     """
     header = las_file_header(path)
     if header is not None:
@@ -231,7 +238,7 @@ def read_header(path: str | Path) -> PointFileHeader:
 
 
 def las_file_header(path: str | Path) -> PointFileHeader | None:
-    """What the header of a LAS, LAZ or COPC file says; None for a file of another kind."""
+    """Return the header of a LAS, LAZ or COPC file, None for another kind."""
     if file_kind(path) != "las":
         return None
     header = las.read_las_header(path)
@@ -248,9 +255,11 @@ def las_file_header(path: str | Path) -> PointFileHeader | None:
 
 
 def find_steps(xyz: np.ndarray) -> tuple[float, float]:
-    """The largest of STEPS in which coordinates (n, 3) come, in plan and in height;
+    """Return the largest of STEPS in which coordinates (n, 3) come.
 
-    0 where they are finer or too few.
+    One is for plan, one for height.
+
+    It is 0 where coordinates are finer or too few.
 
     >>> find_steps(np.arange(600.0).reshape(-1, 3) * [0.5, 1.0, 0.01])
     (0.5, 0.0)
@@ -274,8 +283,9 @@ def find_steps(xyz: np.ndarray) -> tuple[float, float]:
 
 
 def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
-    """One line where coordinates, in `units`, come in larger steps than COARSE_M: roofs are then no
-    finer.
+    """Warn once of coordinates in steps larger than COARSE_M.
+
+    Coordinates are in `units`. Roofs are then no finer.
     """
     coarse = {}
     for header in headers:
@@ -298,8 +308,9 @@ def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
 
 
 def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
-    """The files that paths, folders and wildcards name, each once, in the order given; folders are
-    sorted.
+    """Return the files that paths, folders and wildcards name, each once.
+
+    They come in the order given; folders are sorted.
     """
     if not paths:
         raise InputError(
@@ -338,8 +349,9 @@ def expand_path(path: str | Path) -> list[str | Path]:
 
 
 def drop_other_text(files: list[Path]) -> list[str | Path]:
-    """The point files of a folder without text that holds no points, as long as there are others: a
-    delivery's notes and lists.
+    """Drop the text files of a folder that hold no points.
+
+    A delivery's notes and lists are such files. They stay where there are no others.
     """
     points = [
         file
@@ -357,7 +369,9 @@ def drop_other_text(files: list[Path]) -> list[str | Path]:
 
 
 def file_kind(path: str | Path) -> str:
-    """One of READERS, by the first bytes, else the ending. Raises InputError for anything else.
+    """Return one of READERS, by the first bytes, else by the ending.
+
+    Raises InputError for anything else.
 
     An address is not opened for it: it goes by its ending, and is LAS without one of the others'.
     """
@@ -400,16 +414,18 @@ def file_kind(path: str | Path) -> str:
 
 
 def file_crs(path: str | Path) -> Any:
-    """The CRS that a point file names, None where it names none that can be understood: text and
-    PLY never do.
+    """Return the CRS that a point file names, None where it names none.
+
+    Text and PLY never name one. One that cannot be understood counts as none.
     """
     header = las_file_header(path)
     return None if header is None or isinstance(header.crs, UnknownCRS) else header.crs
 
 
 def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto") -> Any:
-    """The one CRS of point files, from what each names: `arguments` where that is a CRS, else the
-    files' own.
+    """Return the one CRS of point files, from what each names.
+
+    It is `arguments` where that is a CRS, else the files' own.
 
     Files that name none go with those that do, and files overruled by `arguments` go with it, with
     an InputWarning each. Raises InputError, naming both files, where two disagree, and for a CRS
@@ -447,8 +463,9 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
 
 
 def refuse_unknown(crs_of: dict[str, Any]) -> None:
-    """Raise InputError where a file defines a CRS that cannot be understood: its unit might
-    be any.
+    """Raise InputError where a file's CRS cannot be understood.
+
+    Its unit might be any.
     """
     for path, crs in crs_of.items():
         if isinstance(crs, UnknownCRS):
@@ -460,8 +477,9 @@ def refuse_unknown(crs_of: dict[str, Any]) -> None:
 
 
 def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
-    """Raise InputError where one of the files names another CRS than `crs`, that of `source`;
-    unknown goes with any.
+    """Raise InputError where a file names another CRS than `crs`.
+
+    `source` named `crs`. An unknown CRS goes with any.
     """
     for file in files if crs is not None else ():
         own_crs = file_crs(file)
@@ -485,9 +503,9 @@ def format_others(paths: list[str]) -> str:
 
 
 def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
-    """Classes of all clouds one after the other;
+    """Return the classes of all clouds one after the other.
 
-    0 (never classified) where a file has none; None where no file has.
+    They are 0 (never classified) for a file without any, and None where no file has any.
     """
     if all(cloud.classification is None for cloud in clouds):
         return None
@@ -501,8 +519,9 @@ def select_classes(
 
 
 def box_in_file(box: Box, units: Units) -> Box:
-    """A box in the file's unit that holds all of `box`: a trifle wider where rounding could cut its
-    border off.
+    """Return a box in the file's unit that holds all of `box`.
+
+    It is a little wider where rounding could cut its border off.
     """
     if units.are_metres:
         return box

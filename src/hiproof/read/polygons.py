@@ -26,8 +26,9 @@ EDGES_A_LOOK = 256  # edges looked up at once: memory stays small for outlines o
 def simple_polygons(
     geometry: shapely.Geometry | None, is_body: bool = False
 ) -> list[shapely.Polygon]:
-    """The valid polygons of any geometry, heights left out; one empty polygon where it encloses no
-    area.
+    """Return the valid polygons of any geometry, without heights.
+
+    One empty polygon stands for a geometry that encloses no area.
 
     A self-intersecting polygon is repaired (its holes and loops kept as areas), and slivers of the
     repair dropped. Polygons that overlap are one, and so are all that touch where they are faces of
@@ -49,7 +50,10 @@ def simple_polygons(
 
 
 def is_surface(geometry: shapely.Geometry | None) -> bool:
-    """Whether the polygons of a geometry are faces in space: several, and not all at one height."""
+    """Return whether the polygons of a geometry are faces in space.
+
+    There are several then, not all at one height.
+    """
     if (
         geometry is None
         or not shapely.has_z(geometry)
@@ -62,7 +66,7 @@ def is_surface(geometry: shapely.Geometry | None) -> bool:
 
 
 def overlap(polygons: list[shapely.Polygon]) -> bool:
-    """Whether any two valid polygons share more than a border."""
+    """Return whether any two valid polygons share more than a border."""
     if len(polygons) < 2:
         return False
     first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
@@ -71,8 +75,9 @@ def overlap(polygons: list[shapely.Polygon]) -> bool:
 
 
 def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
-    """What polygons cover together, without the hairline gaps that rounding leaves between
-    faces.
+    """Return the union of polygons without hairline gaps.
+
+    Rounding leaves such gaps between faces.
     """
     whole = shapely.simplify(shapely.union_all(polygons, grid_size=JOIN_M), JOIN_M)
     parts = [part for part in polygons_in(whole) if part.area > SLIVER_M2]
@@ -83,13 +88,14 @@ def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
 
 
 def is_hole(ring: shapely.LinearRing) -> bool:
-    """Whether a hole is larger than what gaps between faces leave."""
+    """Return whether a hole is larger than the gaps between faces."""
     return shapely.Polygon(ring).area > SLIVER_M2
 
 
 def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
-    """Polygons of a geometry, those of multipolygons and collections one by one; points and lines
-    are left out.
+    """Return the polygons of a geometry, those of collections one by one.
+
+    Points and lines are left out.
     """
     if geometry is None:
         return []
@@ -100,9 +106,10 @@ def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
 
 
 def repair_polygon(polygon: shapely.Polygon) -> list[shapely.Polygon]:
-    """`polygon` itself where it is valid, else the valid polygons that make_valid finds, without
-    slivers; none where it is no building's: without numbers, wider than WIDEST_M, or tangled beyond
-    MOST_MEETINGS.
+    """Return `polygon`, or the valid polygons that make_valid finds in it.
+
+    Slivers are left out. There are none where it is no building's: without numbers, wider than
+    WIDEST_M, or tangled beyond MOST_MEETINGS.
     """
     if not is_buildings_size(polygon):
         return []
@@ -117,8 +124,9 @@ def repair_polygon(polygon: shapely.Polygon) -> list[shapely.Polygon]:
 
 
 def is_buildings_size(polygon: shapely.Polygon) -> bool:
-    """Whether all coordinates are numbers on this Earth and no farther apart than the widest
-    building is wide.
+    """Return whether all coordinates can be those of one building.
+
+    They are numbers on this Earth, no farther apart than the widest building is wide.
     """
     xy = shapely.get_coordinates(polygon)
     return len(xy) > 0 and bool(
@@ -127,9 +135,11 @@ def is_buildings_size(polygon: shapely.Polygon) -> bool:
 
 
 def fill_rings(polygon: shapely.Polygon) -> shapely.Geometry | None:
-    """The area its rings enclose, what they enclose twice counted once;
+    """Return the area that the rings of a polygon enclose.
 
-    None where too many edges meet to say.
+    Area that they enclose twice counts once.
+
+    Returns None where too many edges meet.
     """
     if meetings(polygon) > MOST_MEETINGS:
         return None
@@ -137,8 +147,9 @@ def fill_rings(polygon: shapely.Polygon) -> shapely.Geometry | None:
 
 
 def meetings(polygon: shapely.Polygon) -> int:
-    """How many pairs of edges may cross, by their boxes and without neighbours; counted to a little
-    above the most.
+    """Count the pairs of edges that may cross, by their boxes.
+
+    Neighbours do not count. Counting stops a little above the most that is allowed.
     """
     xy, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
     edges = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]])

@@ -1,5 +1,6 @@
-"""Files by address: whatever fsspec knows (http, https, s3, gs, ...), read in ranges as far as the
-server allows.
+"""Files by address (http, https, s3, gs, ...), through fsspec.
+
+They are read in ranges as far as the server allows.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ SILENCE_S = 60.0  # s that a server may be silent; fsspec waits for five minutes
 
 
 def is_url(path: str | Path) -> bool:
-    """Whether `path` is an address rather than a file of this machine.
+    """Return whether `path` is an address rather than a file of this machine.
 
     >>> is_url("https://example.org/tile.laz"), is_url("tiles/a.laz")
     (True, False)
@@ -31,7 +32,7 @@ def is_url(path: str | Path) -> bool:
 def open_binary(
     path: str | Path, expected: str = "a point cloud", **reading: Any
 ) -> Iterator[BinaryIO]:
-    """A seekable binary file at a path or an address.
+    """Open a seekable binary file at a path or an address.
 
     `reading` are options of fsspec's files. Raises InputError, which says what was `expected`,
     where an address cannot be opened.
@@ -62,7 +63,7 @@ def open_address(url: str, expected: str = "a point cloud", **reading: Any) -> B
 
 
 def choose_options(url: str) -> dict[str, Any]:
-    """What fsspec's file system for an address is told, beside its defaults."""
+    """Return the options of fsspec's file system for an address."""
     if not url.lower().startswith(("http://", "https://")):
         return {}
     from aiohttp import ClientTimeout
@@ -72,5 +73,5 @@ def choose_options(url: str) -> dict[str, Any]:
 
 
 def import_fsspec() -> Any:
-    """What reads files by address. Raises InputError where it is missing."""
+    """Import fsspec. Raises InputError where it is missing."""
     return import_extra("fsspec", "city", "files by address")

@@ -31,9 +31,11 @@ ROOFN3D_UNITS_PER_M = 1000  # points are matched to surfaces by their millimetre
 
 @dataclass(frozen=True)
 class RoofN3DRecord:
-    """One building: `type` a name of our catalogue (None for a class we do not know, in
-    `class_name`), `points` (n, 3) in metres of EPSG:26918, `outline` its plan polygon, empty where
-    the file has none.
+    """One building of RoofN3D.
+
+    `type` is a name of our catalogue (None for an unknown class, which `class_name` names),
+    `points` (n, 3) are in metres of EPSG:26918, and `outline` is the plan polygon, empty where the
+    file has none.
     """
 
     id: str
@@ -44,8 +46,9 @@ class RoofN3DRecord:
 
 
 def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
-    """Yield the buildings of `roofn3d_buildings.csv`, each id once (the first row counts), one row
-    in memory at a time.
+    """Yield the buildings of `roofn3d_buildings.csv`, each id once.
+
+    The first row of an id counts. One row is in memory at a time.
 
     Raises InputError for a file of another layout and for coordinates that are no numbers, naming
     the row.
@@ -73,8 +76,9 @@ def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
 def read_roofn3d_labels(
     path: str | Path, records: Iterator[RoofN3DRecord]
 ) -> Iterator[tuple[RoofN3DRecord, np.ndarray]]:
-    """Yield each record with its points' labels (n,): the surface (0, 1, ...) of each, -1 where no
-    surface has it.
+    """Yield each record with its points' labels (n,).
+
+    A label is the number of a surface (0, 1, ...), -1 where no surface has the point.
 
     `path` is `roofn3d_surfacegrowing.csv`; it has no label per point, so points are matched by
     their coordinates, to the millimetre. Surfaces count in the order of the file. Only where the
@@ -94,8 +98,9 @@ def read_roofn3d_labels(
 
 
 def surface_offsets(path: str | Path) -> dict[str, list[int]]:
-    """Where in the file (bytes) the rows of each building start; a row is a line, as no field holds
-    a line break.
+    """Return where in the file (bytes) the rows of each building start.
+
+    A row is a line, as no field holds a line break.
     """
     # refuses another layout before the pass over the whole file
     next(rows(path, ("points", "fk_buildings")), None)
@@ -151,9 +156,11 @@ def naming_row(path: str | Path, number: int) -> Iterator[None]:
 
 
 def coordinates(wkt: str) -> np.ndarray:
-    """Points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`, with or without inner parentheses;
+    """Return points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`.
 
-    (0, 3) of an empty field.
+    Inner parentheses are optional.
+
+    An empty field gives (0, 3).
 
     >>> coordinates("MULTIPOINT Z (1 2 3,4 5 6.5)").tolist()
     [[1.0, 2.0, 3.0], [4.0, 5.0, 6.5]]
@@ -173,7 +180,7 @@ def coordinates(wkt: str) -> np.ndarray:
 
 
 def polygon(wkt: str) -> shapely.Polygon:
-    """The largest polygon of a WKT field; empty for an empty field."""
+    """Return the largest polygon of a WKT field, empty for an empty field."""
     if not wkt.strip():
         return shapely.Polygon()
     from .polygons import simple_polygons
@@ -182,6 +189,9 @@ def polygon(wkt: str) -> shapely.Polygon:
 
 
 def point_keys(points: np.ndarray) -> np.ndarray:
-    """Coordinates (n, 3) as one comparable value (n,) each, to the millimetre."""
+    """Return one comparable value (n,) for each of the points (n, 3).
+
+    Coordinates count to the millimetre.
+    """
     units = np.ascontiguousarray(np.rint(points * ROOFN3D_UNITS_PER_M).astype(np.int64))
     return units.view([("", np.int64)] * 3).ravel()

@@ -1,7 +1,8 @@
-"""Where the points of a file lie, run by run: which runs hold the points of some boxes, so that the
-rest need not be decoded.
+"""The runs of a file's points that lie in given boxes.
 
-Told by an index that stands beside a file (lax.py), or noted while the file was read from end to
+The rest of the file need not be decoded.
+
+They come from an index beside the file (lax.py), or were noted while the file was read from end to
 end: airborne scanners leave points in the order of their flight, so that neighbours in a file are
 neighbours on the ground.
 """
@@ -20,7 +21,7 @@ RUN_POINTS = 50_000
 
 @dataclass(frozen=True)
 class RunIndex:
-    """`boxes` (c, 4) of the cells (xmin, ymin, xmax, ymax);
+    """The boxes of cells, and the runs of points that each cell holds.
 
     `runs` (r, 2) of points, [first, end), of cells `cell_of` (r,).
     """
@@ -30,8 +31,9 @@ class RunIndex:
     runs: np.ndarray
 
     def find_runs(self, boxes: np.ndarray) -> np.ndarray:
-        """Runs (k, 2) in ascending order that hold every point inside any of `boxes` (m, 4), and
-        others.
+        """Return ascending runs (k, 2) that hold every point inside any of `boxes`.
+
+        `boxes` is (m, 4). The runs hold other points too.
         """
         cells = shapely.STRtree(shapely.box(*self.boxes.T))
         met = np.zeros(len(self.boxes), bool)
@@ -40,8 +42,9 @@ class RunIndex:
 
 
 def join_runs(runs: np.ndarray) -> np.ndarray:
-    """Runs (k, 2) in ascending order, those that overlap or are less than RUN_POINTS apart made
-    one.
+    """Join ascending runs (k, 2) that overlap or are close.
+
+    Runs are close where they are less than RUN_POINTS apart.
     """
     if not len(runs):
         return runs
@@ -52,7 +55,9 @@ def join_runs(runs: np.ndarray) -> np.ndarray:
 
 
 def compute_run_boxes(xyz: np.ndarray) -> np.ndarray:
-    """Boxes (k, 4) in plan of every RUN_POINTS of the points (n, 3), in their order.
+    """Return plan boxes (k, 4) of every RUN_POINTS of the points (n, 3).
+
+    Points are in their order in the file.
 
     >>> compute_run_boxes(np.array([[3.0, 4.0, 0.0], [1.0, 9.0, 0.0]])).tolist()
     [[1.0, 4.0, 3.0, 9.0]]
@@ -65,8 +70,10 @@ def compute_run_boxes(xyz: np.ndarray) -> np.ndarray:
 
 
 def make_index(boxes: np.ndarray, points: int) -> RunIndex | None:
-    """The index of a file of so many `points` whose every RUN_POINTS lie in one of `boxes` (k, 4),
-    in their order; None where there are more or fewer boxes than that.
+    """Make the index of a file of so many `points`, in runs of RUN_POINTS.
+
+    The runs lie in `boxes` (k, 4), in their order. Returns None where there are more or fewer boxes
+    than runs.
     """
     if not len(boxes) == math.ceil(points / RUN_POINTS) > 0:
         return None

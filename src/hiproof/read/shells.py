@@ -18,7 +18,7 @@ Rings = tuple[tuple[int, ...], ...]
 
 
 class ShellSurface(NamedTuple):
-    """A face of a shell: its rings of vertex numbers, and what its semantics say of it."""
+    """A face of a shell: its rings of vertex numbers, and its semantics."""
 
     rings: Rings
     kind: str

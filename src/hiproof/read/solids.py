@@ -1,5 +1,6 @@
-"""Solids back from CityJSON, CityJSONSeq and CityGML 2.0 files, as they stand: for the validity
-check and for scanning.
+"""Solids from CityJSON, CityJSONSeq and CityGML 2.0 files, as they stand.
+
+The validity check and the simulated scanner use them.
 
 Each shell of each solid of a building or building part comes out by itself: a CompositeSolid or
 MultiSolid as several, the inner shells of a Solid turned inside out, so that each is a closed shell
@@ -38,7 +39,9 @@ SURFACES = {
 
 
 def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Yield (id, Solid) for each shell in a `.json`, `.jsonl` or `.gml` file, in metres.
+    """Yield (id, Solid) for each shell in a file, in metres.
+
+    Files end in `.json`, `.jsonl` or `.gml`.
 
     They are the file's coordinates, times the unit of the CRS that the file names.
 
@@ -72,7 +75,7 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
 
 
 def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
-    """The shells of one city object under its id."""
+    """Yield the shells of one city object under its id."""
     for k, solid in enumerate(solids):
         yield (name if k == 0 else f"{name}#{k + 1}"), solid
 
@@ -81,14 +84,16 @@ def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]
 
 
 def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Shells of a CityJSON 1.x or 2.0 file, or of a CityJSONSeq file: the transform is that of the
-    line before."""
+    """Yield the shells of a CityJSON 1.x or 2.0 file, or of CityJSONSeq.
+
+    A line without a transform has that of the line before.
+    """
     for feature in features(path, damaged=damaged):
         yield from feature_solids(feature, damaged)
 
 
 def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Shells of all city objects of one CityJSON object or feature."""
+    """Yield the shells of all city objects of one CityJSON object or feature."""
     for name, city_object in feature.objects.items():
         try:
             if isinstance(city_object, dict) and not str(city_object.get("type")).startswith(
@@ -108,7 +113,10 @@ def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tupl
 
 
 def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Solid]:
-    """Shells of one CityJSON geometry; points and lines have none, nor have templates."""
+    """Return the shells of one CityJSON geometry.
+
+    Points, lines and templates have none.
+    """
     kind, boundaries = geometry.get("type"), geometry.get("boundaries", [])
     semantics = geometry.get("semantics") or {}
     surfaces, values = semantics.get("surfaces", []), semantics.get("values")
@@ -129,7 +137,10 @@ def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Soli
 def shell_solid(
     shell: Any, values: Any, surfaces: Any, vertices: np.ndarray, inward: bool = False
 ) -> Solid:
-    """One shell (faces of rings of indices) with its semantics, on the vertices it uses."""
+    """Return one shell with its semantics, on the vertices it uses.
+
+    A shell is faces of rings of indices.
+    """
     result = read_shell(shell, values, surfaces, len(vertices))
     in_use = sorted({index for surface in result for ring in surface.rings for index in ring})
     number = {index: k for k, index in enumerate(in_use)}
@@ -149,7 +160,7 @@ def local_name(element: Any) -> str:
 
 
 def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Shells of all solids of a CityGML file, one cityObjectMember after the other.
+    """Yield the shells of all solids of a CityGML file, member by member.
 
     An object without a gml:Solid gives its boundary surfaces as one shell.
     """
@@ -193,7 +204,10 @@ def gml_id(element: Any) -> str | None:
 
 
 def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
-    """Shells of one cityObjectMember; a building and each of its parts under its own id."""
+    """Yield the shells of one cityObjectMember.
+
+    A building and each of its parts have their own id.
+    """
     polygons = {
         gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"
     }
@@ -212,15 +226,17 @@ def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
 
 
 def is_loose(element: Any) -> bool:
-    """Whether an element is a polygon of a boundary surface, not of one that is a footprint or a
-    roof's edge (LoD 0)."""
+    """Return whether an element is a polygon of a boundary surface.
+
+    Footprints and roof edges (LoD 0) do not count.
+    """
     if local_name(element) != "Polygon" or surface_kind(element, None) is None:
         return False
     return not any(local_name(ancestor).startswith("lod0") for ancestor in element.iterancestors())
 
 
 def iterate_own_descendants(owner: Any) -> Iterator[Any]:
-    """Elements below `owner` that do not belong to one of its building parts."""
+    """Yield the elements below `owner` outside its building parts."""
     for child in owner:
         if local_name(child) != "BuildingPart":
             yield child
@@ -236,7 +252,10 @@ def surface_kind(polygon: Any, default: str | None) -> str | None:
 
 
 def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[Solid]:
-    """Exterior and interior shells of a gml:Solid, surfaces by value or by xlink."""
+    """Return the shells of a gml:Solid, its surfaces by value or by xlink.
+
+    These are the exterior and the interior shells.
+    """
     shells = []
     for boundary in solid:
         if local_name(boundary) not in ("exterior", "interior"):
@@ -259,8 +278,10 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[
 
 
 def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Solid:
-    """One shell of gml:Polygons; equal coordinates become one vertex. A ring that is not closed is
-    noted as defect 103."""
+    """Return one shell of gml:Polygons; equal coordinates become one vertex.
+
+    A ring that is not closed is noted as defect 103.
+    """
     number: dict[tuple[float, ...], int] = {}
     faces: list[Face] = []
     defects: list[tuple[int, int]] = []
@@ -281,7 +302,7 @@ def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Sol
 
 
 def ring_points(ring: Any, place: str) -> list[tuple[float, ...]]:
-    """Points of a gml:LinearRing from posList or pos."""
+    """Return the points of a gml:LinearRing from posList or pos."""
     texts = [
         element.text or "" for element in ring.iter() if local_name(element) in ("posList", "pos")
     ]

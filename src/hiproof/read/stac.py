@@ -1,4 +1,4 @@
-"""Static STAC catalogues: documents of JSON, linked by address (https://stacspec.org)."""
+"""Static STAC catalogues: linked documents of JSON (https://stacspec.org)."""
 
 from __future__ import annotations
 
@@ -30,17 +30,20 @@ class Document:
     content: dict[str, Any]
 
     def links(self, relation: str) -> list[str]:
-        """The addresses of the documents that stand in this `relation` to it."""
+        """Return the addresses of the documents in this `relation` to it."""
         found = [link for link in self.content.get("links") or [] if link.get("rel") == relation]
         return [urljoin(self.address, link["href"]) for link in found if link.get("href")]
 
     def children(self) -> dict[str, str]:
-        """The addresses of its children by the name of their folders."""
+        """Return the addresses of its children by the name of their folders."""
         return {PurePosixPath(urlsplit(way).path).parent.name: way for way in self.links("child")}
 
 
 def read_document(address: str) -> Document:
-    """The document at an address or a path. Raises InputError where none can be read there."""
+    """Read the document at an address or a path.
+
+    Raises InputError where none can be read there.
+    """
     fsspec = import_fsspec()
     for left in reversed(range(TRIES)):
         try:
@@ -59,7 +62,7 @@ def read_document(address: str) -> Document:
 
 
 def unreadable(address: str, error: Exception) -> InputError:
-    """The sentence for a document that cannot be read."""
+    """Make the error for a document that cannot be read."""
     return InputError(
         f"expected a STAC catalogue at {address}, got: {str(error) or type(error).__name__}; check "
         "the address and the network"
@@ -67,8 +70,9 @@ def unreadable(address: str, error: Exception) -> InputError:
 
 
 def items_meeting(collection: Document, extent: shapely.Geometry) -> list[Document]:
-    """The items of a collection whose boxes meet `extent`, in longitude and latitude, in the order
-    of their ids.
+    """Return the items of a collection whose boxes meet `extent`, by their ids.
+
+    `extent` is in longitude and latitude.
     """
     with ThreadPoolExecutor(AT_ONCE) as pool:
         items = list(pool.map(read_document, collection.links("item")))
@@ -77,8 +81,9 @@ def items_meeting(collection: Document, extent: shapely.Geometry) -> list[Docume
 
 
 def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
-    """Whether a box of an item, of two or three dimensions, meets `extent`; one that is not told
-    does.
+    """Return whether a box of an item meets `extent`.
+
+    It has two or three dimensions. An item without a box meets any.
     """
     if not box:
         return True
@@ -87,7 +92,9 @@ def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
 
 
 def find_asset(item: Document, suffix: str) -> str:
-    """The address of the file of an item whose name ends in `suffix`, one by HTTP before others.
+    """Return the address of an item's file whose name ends in `suffix`.
+
+    One by HTTP comes before others.
 
     Raises InputError where it lists none.
     """

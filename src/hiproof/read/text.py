@@ -1,5 +1,6 @@
-"""Points as text: XYZ, CSV, TXT, ASC and PTS, with or without a header, the delimiter found from
-the first lines.
+"""Points as text: XYZ, CSV, TXT, ASC and PTS, with or without a header.
+
+The delimiter is found from the first lines.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ COMMENTS = ("#", "//")
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text file lays out points: lines to skip, delimiter (None: white space), columns of x,
-    y, z (and class).
+    """The layout of a text file of points.
+
+    It has the lines to skip, the delimiter (None: white space), and the columns of x, y, z (and
+    class).
     """
 
     skip: int
@@ -131,7 +134,7 @@ def sniff(path: str | Path) -> TextLayout:
 
 
 def is_of_points(path: str | Path) -> bool:
-    """Whether the first lines of a text file are points."""
+    """Return whether the first lines of a text file are points."""
     try:
         sniff(path)
     except (InputError, OSError):

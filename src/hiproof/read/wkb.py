@@ -1,5 +1,6 @@
-"""Geometries from WKB: surfaces in space, which GEOS does not know, become collections
-of polygons.
+"""Geometries from WKB.
+
+Surfaces in space, which GEOS does not know, become collections of polygons.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ Z_FLAG, M_FLAG, SRID_FLAG = 1 << 31, 1 << 30, 1 << 29
 
 
 def decode_geometries(wkb: np.ndarray) -> np.ndarray:
-    """Geometries (n,) of WKB (n,), None where there is none or it cannot be read; unclosed rings
-    are closed.
+    """Return the geometries (n,) of WKB (n,), None where one cannot be read.
+
+    Unclosed rings are closed.
     """
     decoded = np.array(
         [as_polygons(body) if body is not None else None for body in wkb], dtype=object
@@ -36,7 +38,7 @@ def decode_geometries(wkb: np.ndarray) -> np.ndarray:
 
 
 def decode_geometry(body: bytes | None) -> shapely.Geometry | None:
-    """One geometry, None where it cannot be read."""
+    """Decode one geometry, None where it cannot be read."""
     try:
         return shapely.from_wkb(body, on_invalid="fix")
     except (shapely.errors.ShapelyError, NotImplementedError, ValueError):
@@ -44,7 +46,7 @@ def decode_geometry(body: bytes | None) -> shapely.Geometry | None:
 
 
 def as_polygons(body: bytes) -> bytes:
-    """The same WKB with polygons in place of the faces of surfaces and of triangles.
+    """Return WKB with polygons in place of faces of surfaces and of triangles.
 
     >>> body = bytearray(shapely.to_wkb(shapely.box(0, 0, 1, 1)))
     >>> body[1] = TRIANGLE
@@ -62,8 +64,9 @@ def as_polygons(body: bytes) -> bytes:
 
 
 def decode_kind(body: bytes | bytearray, position: int) -> tuple[str, int, int, int]:
-    """Byte order, kind, dimensions and first byte of the content of the geometry at byte
-    `position`.
+    """Return byte order, kind, dimensions and first byte of the content.
+
+    They are of the geometry at byte `position`.
     """
     order = "<" if body[position] else ">"
     (code,) = struct.unpack_from(f"{order}I", body, position + 1)
