@@ -1,4 +1,4 @@
-"""Building footprints from any source that pyogrio reads.
+"""Building footprints from files and databases.
 
 Every feature becomes one Footprint or more; none is lost.
 """
@@ -144,9 +144,9 @@ def read_features(
     bbox: Box | None = None,
     bbox_crs: CRS | None = None,
 ) -> Features:
-    """Read pyogrio's metadata, feature numbers, geometries and columns.
+    """Read metadata, feature numbers, geometries and columns.
 
-    Geometries are shapely's, None where a feature has none.
+    Metadata are fields and crs. Geometries are shapely's, None where a feature has none.
 
     Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
     """
