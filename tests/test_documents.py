@@ -31,7 +31,7 @@ OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ", "projsync ", "docker ")
 
 ATTRIBUTES = {table.prefix + attribute.name for table in TABLES for attribute in table.attributes}
 # tables of a database, by the prefix that is the default
-ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}
+ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs", "hiproof_runs"}
 
 every_document = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 

@@ -3,6 +3,7 @@
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +13,17 @@ import shapely
 from shapely import affinity
 
 import hiproof
-from handmade import courtyard, gable_house, make_building, make_lost_building
+from handmade import make_lost_building
 from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
 from hiproof.parametric.run import build_file
 from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.view.loading import load_postgis
-from hiproof.write import write_all, write_attributes, write_cityjson, write_parameters
+from hiproof.write import write_all, write_parameters
 from hiproof.write.roof_figures import roof_figures
-from hiproof.write.tables.postgis import measure_plane
 from postgis_server import explain_absence, running
 from sample_models import write_sample_run
+from sample_parameters import RING, YARD
 
 DOCS = Path(__file__).parents[1] / "docs"
 psycopg = pytest.importorskip("psycopg", reason="the extra `postgis` is not installed")
@@ -191,14 +192,19 @@ def run_of_two(tmp_path):
     """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without
     model.
     """
+    part = {
+        "type": "flat",
+        "parameters": {"width": 8, "length": 12},
+        "position": [0, 0, 5],
+    }
+    yard = {"origin": [85040, 446000, 0], "outline": [RING, YARD], "z_ground": 0}
     buildings = [
-        make_building(gable_house(), "house"),
-        make_building(courtyard(), "yard", ("flat",)),
+        replace(reconstruct_gable(), id="house"),
+        hiproof.build({"id": "yard", **yard, "parts": [part]}),
         make_lost_building(),
     ]
     (tmp_path / "run").mkdir()
-    write_cityjson(tmp_path / "run" / "buildings.city.jsonl", buildings, "EPSG:7415")
-    write_attributes(tmp_path / "run" / "buildings.gpkg", buildings, "EPSG:7415")
+    write_all(tmp_path / "run", buildings, "EPSG:7415")
     return tmp_path / "run", buildings
 
 
@@ -207,7 +213,7 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
     load_postgis(folder, database, "told")
     with psycopg.connect(database) as connection:
         rows = connection.execute(
-            "select id, status, roof_type from told_buildings order by id"
+            "select id, hiproof_status, hiproof_roof_type from told_buildings order by id"
         ).fetchall()
         assert rows == sorted((b.id, b.status.code, b.type) for b in buildings)
         types = connection.execute(
@@ -302,8 +308,7 @@ def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_
 def test_loading_again_replaces_the_run_whatever_its_reference_system(database, run_of_two):
     folder, buildings = run_of_two
     load_postgis(folder, database, "again")
-    write_cityjson(folder / "buildings.city.jsonl", buildings[1:], "EPSG:25832")
-    write_attributes(folder / "buildings.gpkg", buildings[1:], "EPSG:25832")
+    write_all(folder, buildings[1:], "EPSG:25832")
     load_postgis(folder, database, "again")
     with psycopg.connect(database) as connection:
         tables = connection.execute(
@@ -323,14 +328,6 @@ def test_loading_needs_a_run_and_a_database(database, tmp_path):
         load_postgis(tmp_path / "run", f"postgresql://me@/postgres?host={tmp_path}")
     with pytest.raises(InputError, match="prefix"):
         load_postgis(tmp_path / "run", database, prefix="a; drop table")
-
-
-def test_slope_and_azimuth_of_a_plane_falling_north_east():
-    ring = [(0, 0, 2), (1, 0, 1), (1, 1, 0), (0, 1, 1)]
-    slope, azimuth, area = measure_plane([np.array(ring, float)])
-    assert azimuth == pytest.approx(45)
-    assert slope == pytest.approx(54.7356, abs=1e-3)
-    assert area == pytest.approx(3**0.5)
 
 
 @pytest.fixture
@@ -369,7 +366,7 @@ def test_the_longest_prefix_keeps_every_index_apart(database, tmp_path):
             "'%%pkey'",
             (longest + "%",),
         )
-        assert indexes.fetchone() == (4,)
+        assert indexes.fetchone() == (5,)
 
 
 @pytest.mark.parametrize("prefix", ["p" * 49, "größe", "a-b", "1st", "", "a b", "a\n"])
@@ -381,16 +378,11 @@ def test_other_prefixes_are_refused(database, tmp_path, prefix):
 
 def test_a_damaged_building_is_left_out_of_the_tables(database, run_of_two):
     folder, _ = run_of_two
-    path = folder / "buildings.city.jsonl"
-    head, *lines = (json.loads(line) for line in path.read_text().splitlines())
-    del lines[0]["CityObjects"]["house"]["geometry"][-1]["semantics"]  # which may be missing
-    lines[1]["vertices"][0][2] += 30_000
-    path.write_text("\n".join(map(json.dumps, [head, *lines])) + "\n")
+    path = folder / "parameters.jsonl"
+    path.write_text(path.read_text().replace('"type":"flat"', '"type":"onion"'))
     remarks = []
     assert load_postgis(folder, database, "damaged", remarks.append) == 2
-    assert (
-        len(remarks) == 1 and "building yard" in str(remarks[0]) and "not planar" in str(remarks[0])
-    )
+    assert len(remarks) == 1 and "building yard" in str(remarks[0]) and "onion" in str(remarks[0])
     with psycopg.connect(database) as connection:
         ids = connection.execute("select id from damaged_buildings order by id").fetchall()
         assert ids == [("house",), ("lost",)]
@@ -399,8 +391,123 @@ def test_a_damaged_building_is_left_out_of_the_tables(database, run_of_two):
         ]
 
 
-def test_tables_that_are_none_are_named(database, run_of_two):
-    folder, _ = run_of_two
-    (folder / "buildings.gpkg").write_bytes(b"SQLite format 3\0" + bytes(3000))
-    with pytest.raises(InputError, match=r"tables that hiproof wrote at .*buildings\.gpkg"):
-        load_postgis(folder, database, "junk")
+def list_columns(connection, table):
+    sql = (
+        "select column_name, data_type from information_schema.columns where table_name = %s "
+        "order by ordinal_position"
+    )
+    return dict(connection.execute(sql, (table,)).fetchall())
+
+
+def test_columns_are_typed_and_named_as_in_the_geopackage(database, run_of_two):
+    folder, buildings = run_of_two
+    load_postgis(folder, database, "typed")
+    with psycopg.connect(database) as connection:
+        for layer, table in (
+            ("buildings", "buildings"),
+            ("parts", "parts"),
+            ("roof_surfaces", "roofs"),
+        ):
+            info = pyogrio.read_info(folder / "buildings.gpkg", layer=layer)
+            columns = list_columns(connection, f"typed_{table}")
+            assert list(columns) == ["run", *info["fields"], "geom"]
+            sql_types = {"float64": "double precision", "int64": "bigint", "object": "text"}
+            assert [columns[name] for name in info["fields"]] == [
+                sql_types[kind] for kind in info["dtypes"]
+            ]
+        told = connection.execute(
+            "select run, id, rf_volume_lod22, hiproof_points from typed_buildings "
+            "where id = 'house'"
+        ).fetchone()
+    volume = next(b.volume for b in buildings if b.id == "house")
+    assert told == ("run", "house", pytest.approx(volume, abs=1e-3), 0)
+
+
+def write_run(folder, id, **attributes):
+    """A run of one gable with these attributes."""
+    folder.mkdir(parents=True)
+    write_all(folder, [replace(reconstruct_gable(), id=id, attributes=attributes)], "EPSG:7415")
+    return folder
+
+
+def list_runs(database, prefix):
+    with psycopg.connect(database) as connection:
+        sql = f"select run, id from {prefix}_buildings order by run, id"
+        return connection.execute(sql).fetchall()
+
+
+def test_another_run_is_replaced_only_when_asked(database, tmp_path):
+    first, second = (write_run(tmp_path / name, name) for name in ("first", "second"))
+    load_postgis(first, database, "kept")
+    with pytest.raises(OutputError, match=r"the run first of .*--replace .*--append"):
+        load_postgis(second, database, "kept")
+    assert list_runs(database, "kept") == [("first", "first")]
+    load_postgis(second, database, "kept", replace=True)
+    assert list_runs(database, "kept") == [("second", "second")]
+
+
+def test_tables_that_no_load_has_noted_are_not_replaced(database, tmp_path):
+    with psycopg.connect(database) as connection:
+        connection.execute("create table precious_buildings (id text)")
+    with pytest.raises(OutputError, match="another program"):
+        load_postgis(write_run(tmp_path / "a", "a"), database, "precious")
+
+
+def test_runs_are_added_beside_others_with_the_attributes_that_they_bring(database, tmp_path):
+    first = write_run(tmp_path / "first", "a", year=1905, level=3)
+    second = write_run(tmp_path / "second", "a", year="unknown", level=2.5, colour="red")
+    load_postgis(first, database, "both")
+    for _ in range(2):
+        load_postgis(second, database, "both", append=True)
+    with psycopg.connect(database) as connection:
+        sql = "select run, id, year, level, colour from both_buildings order by run"
+        assert connection.execute(sql).fetchall() == [
+            ("first", "a", "1905", 3.0, None),
+            ("second", "a", "unknown", 2.5, "red"),
+        ]
+        assert connection.execute("select count(*) from both_roofs").fetchone() == (4,)
+        assert connection.execute("select run from both_runs order by 1").fetchall() == [
+            ("first",),
+            ("second",),
+        ]
+
+
+def test_runs_of_one_name_are_told_apart_by_their_folders(database, tmp_path):
+    load_postgis(write_run(tmp_path / "north" / "models", "a"), database, "names")
+    south = write_run(tmp_path / "south" / "models", "b")
+    with pytest.raises(OutputError, match=r"the run models of .*north.*--run"):
+        load_postgis(south, database, "names", append=True)
+    load_postgis(south, database, "names", name="south", append=True)
+    assert list_runs(database, "names") == [("models", "a"), ("south", "b")]
+
+
+def test_more_columns_than_postgresql_has_are_refused_before_anything_changes(database, tmp_path):
+    many = {f"attribute_{k}": k for k in range(700)}
+    others = {f"other_{k}": k for k in range(950)}
+    load_postgis(write_run(tmp_path / "first", "a", **many), database, "wide")
+    with pytest.raises(OutputError, match=r"at most 1600 columns in wide_buildings.*got 16\d\d"):
+        load_postgis(write_run(tmp_path / "second", "b", **others), database, "wide", append=True)
+    assert list_runs(database, "wide") == [("first", "a")]
+
+
+def test_names_that_sql_does_not_like_are_columns(database, tmp_path):
+    names = {
+        'say "a"; --': 1,
+        "é" * 60: 2,
+        "é" * 60 + "x": 3,
+        "Year": 4,
+        "year": 5,
+        "100 %s": 6,
+        "run": 7,
+    }
+    load_postgis(write_run(tmp_path / "a", "a", **names), database, "odd")
+    with psycopg.connect(database) as connection:
+        row = connection.execute("select * from odd_buildings").fetchone()
+        columns = list(list_columns(connection, "odd_buildings"))
+    assert [row[columns.index(name)] for name in ('say "a"; --', "100 %s", "Year", "year_2")] == [
+        1,
+        6,
+        4,
+        5,
+    ]
+    assert row[columns.index("run_2")] == 7 and row[0] == "a"

@@ -24,6 +24,7 @@ __version__ = "0.1.0"
 _HOME = {
     "build": "parametric",
     "plot": "draw.plot",
+    "open_run": "parametric.finished",
     "read_parameters": "parametric",
     "reconstruct": "method",
     "reconstruct_area": "city.run",
@@ -46,6 +47,7 @@ _HOME = {
     "Face": "model",
     "Fit": "model",
     "Footprint": "model",
+    "Run": "parametric.finished",
     "Model": "model",
     "Part": "model",
     "Piece": "model",

@@ -2,15 +2,15 @@
 it.
 
 A run, its merge, `hiproof build`, `hiproof convert`, help and documents derive from FORMATS: a new
-format is a module and a line here. The module of a file that a run writes has
+format is a module and a line here. A module has either
 
-    writer(path, head, **given) the incremental writer (a write.writer.BuildingWriter) of the file
-    fragment(sheet)                  a building's part of it (a write.fragments.Fragment), made in a
-                                     worker
+    writer(path, head, **given)         the incremental writer (a write.writer.BuildingWriter)
+    write_models(path, buildings, crs)  of 3D viewers, which draw a write.meshes.viewed.ViewedModel;
+                                        returns how many it wrote
 
-and that of one that `hiproof convert` makes of finished models has
+and that of a file that a run writes has beside its writer
 
-    write_models(path, buildings, crs) write.meshes.viewed.ViewedModel; returns how many it wrote
+    fragment(sheet)  a building's part of it (a write.fragments.Fragment), made in a worker
 
 Modules are imported when a file of theirs is asked for.
 """
@@ -49,8 +49,8 @@ class Format:
     makes it, with `given`.
 
     `fragment` is the module that makes a building's part of it, empty for a format of `hiproof
-    convert`; `asked` whether a run of these settings writes it; `tile_ending` that of the files of
-    work tiles, empty where they have none.
+    convert` alone; `asked` whether a run of these settings writes it; `tile_ending` that of the
+    files of work tiles, empty where they have none.
     """
 
     file: str
@@ -63,7 +63,7 @@ class Format:
 
 
 FORMATS = {
-    "gml": Format(
+    "citygml2": Format(
         file="buildings.gml",
         what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection "
         "curves, roofType",
@@ -72,7 +72,7 @@ FORMATS = {
         asked=citygml2,
         tile_ending=".gml",
     ),
-    "gml3": Format(
+    "citygml3": Format(
         file="buildings.citygml3.gml",
         what="CityGML 3.0 with the same content (`--citygml 3.0` or `both`)",
         module="citygml.version3",
@@ -80,7 +80,7 @@ FORMATS = {
         asked=citygml3,
         tile_ending=".citygml3.gml",
     ),
-    "cityjson": Format(
+    "cityjsonseq": Format(
         file="buildings.city.jsonl",
         what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG "
         "use (`rf_...`)",
@@ -123,14 +123,26 @@ FORMATS = {
         asked=parquet,
         given={"layer": "roof_surfaces"},
     ),
+    "cityjson": Format(
+        file="buildings.city.json",
+        what="CityJSON 2.0 in one document, for programs that read no sequence",
+        module="cityjson.features",
+    ),
+    "fgb": Format(
+        file="buildings.fgb", what="the outlines as FlatGeobuf", module="tables.flatgeobuf"
+    ),
     "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="meshes.gltf"),
     "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="meshes.obj"),
+    "stl": Format(file="buildings.stl", what="binary STL, for printing", module="meshes.stl"),
     "3dtiles": Format(
         file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="meshes.tiles"
     ),
+    "ifc": Format(
+        file="buildings.ifc", what="IFC4X3 with map conversion (extra `ifc`)", module="meshes.ifc"
+    ),
 }
-OF_MODELS = {name: format for name, format in FORMATS.items() if not format.fragment}
-"""What `hiproof convert` makes of the models of a run."""
+CONVERTED = {name: format for name, format in FORMATS.items() if name != "parameters"}
+"""What `hiproof convert` writes: the parameters are what it reads."""
 
 OF_TILES = {name: format for name, format in FORMATS.items() if format.tile_ending}
 """What a work tile may have of its own."""
@@ -196,3 +208,21 @@ def requested_formats(write: WriteSettings) -> dict[str, Format]:
 def import_format(name: str) -> ModuleType:
     """The module of `write` of that name."""
     return import_module(f".write.{name}", __package__)
+
+
+def choose_format(file: str) -> str | None:
+    """The format that files named like `file` have: by all that ends the name, else by its last
+    suffix; None where that is none.
+
+    >>> [choose_format(name) for name in ("a.gml", "a.citygml3.gml", "b.json", "c.jsonl", "d.txt")]
+    ['citygml2', 'citygml3', 'cityjson', 'cityjsonseq', None]
+    """
+    endings = {file_ending(format): name for name, format in reversed(CONVERTED.items())}
+    suffixes = {Path(format.file).suffix: name for name, format in reversed(CONVERTED.items())}
+    candidates = [ending for ending in (endings | suffixes) if file.lower().endswith(ending)]
+    return (suffixes | endings)[max(candidates, key=len)] if candidates else None
+
+
+def file_ending(format: Format) -> str:
+    """All that follows the first word of its file's name."""
+    return format.file[format.file.index(".") :]

@@ -27,7 +27,7 @@ from unittest.mock import patch
 import typer
 
 from hiproof.cli import check
-from hiproof.cli.convert import Made, convert
+from hiproof.cli.convert import FormatName, convert
 from hiproof.cli.evaluate import evaluate
 from hiproof.cli.report import report
 from hiproof.cli.view import open_tiles
@@ -36,7 +36,9 @@ from hiproof.errors import HiproofError
 from hiproof.log import LOGGER
 from hiproof.parametric.run import build_file
 from hiproof.view.loading import load_postgis
-from hiproof.write.tables.postgis import DatabaseRow, polyhedral_wkt, roof_rows
+from hiproof.write.described import Described
+from hiproof.write.naming import FileUnits
+from hiproof.write.tables.postgis import Load, database_rows
 from sample_parameters import write_parameters_of_each_kind
 
 FILES = ("buildings.city.jsonl", "parameters.jsonl", "run.json")
@@ -194,23 +196,19 @@ def load(folder: Path) -> None:
     """All that is read for a database, and the values it would be sent."""
 
     def send(
-        dsn: str, rows: Iterable[DatabaseRow], parts: Iterable[list[tuple]], srid: int, prefix: str
+        dsn: str, buildings: Iterable[Described], units: FileUnits, run: Load, damaged: Any
     ) -> int:
-        for row in rows:
-            sent = [
-                row.id,
-                row.status or "",
-                json.dumps(row.attributes, allow_nan=False),
-                polyhedral_wkt(row) or "",
-            ]
-            assert (
-                "\0"
-                not in "".join([*sent, *(str(roof) for roof in roof_rows(row))]).encode().decode()
-            )
-        return sum(map(len, parts))
+        texts = [database_rows(described, units).to_text() for described in buildings]
+        assert not any(b"\\u0000" in text for text in texts)
+        return len(texts)
 
-    with patch("hiproof.view.loading.load_rows", send):
+    with patch("hiproof.view.loading.load_tables", send):
         load_postgis(folder, "", damaged=sentence)
+
+
+def convert_file(folder: Path) -> None:
+    """The models without their parameters."""
+    convert(folder / FILES[0], folder / "again.gml")
 
 
 READERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
@@ -218,15 +216,16 @@ READERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
         lambda folder: check.count_bad([check.check_file(folder / FILES[0], 0.01)]),
         FILES[:1],
     ),
-    "convert glb": (lambda folder: convert(folder, None, Made.glb), FILES),
-    "convert obj": (lambda folder: convert(folder, None, Made.obj), FILES),
-    "view": (view, FILES),
+    "convert glb": (lambda folder: convert(folder, None, FormatName.glb), FILES[1:]),
+    "convert obj": (lambda folder: convert(folder, None, FormatName.obj), FILES[1:]),
+    "convert a file": (convert_file, FILES[:1]),
+    "view": (view, FILES[1:]),
     "report": (lambda folder: report(folder, None, None, None, None), FILES[::2]),
     "evaluate": (
         lambda folder: evaluate(folder, [str(folder / "cloud.xyz")], None, None, None, None),
         FILES[::2],
     ),
-    "load": (load, FILES[::2]),
+    "load": (load, FILES[1:]),
     "edit": (edit, FILES[1:]),
     "build": (build, FILES[1:]),
 }

@@ -18,7 +18,7 @@ from fuzz.damaged_models import (
     sound_lines,
 )
 from hiproof.cli import check
-from hiproof.cli.convert import Made, convert
+from hiproof.cli.convert import FormatName, convert
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
 from hiproof.evaluate.models import read_models
@@ -27,8 +27,8 @@ from sample_models import SOLIDS, write_sample_run
 
 MODELS = "buildings.city.jsonl"
 COMMANDS = {
-    "convert to glb": lambda folder: convert(folder, None, Made.glb),
-    "convert to obj": lambda folder: convert(folder, None, Made.obj),
+    "convert to glb": lambda folder: convert(folder, None, FormatName.glb),
+    "convert to obj": lambda folder: convert(folder, None, FormatName.obj),
     "report": lambda folder: report(folder, None, None, None, None),
 }
 WRITTEN = {

@@ -3,7 +3,6 @@ list them.
 """
 
 import json
-import re
 from pathlib import Path
 
 from handmade import gable_house, make_building, make_lost_building
@@ -22,9 +21,6 @@ from hiproof.write.attribute_list import (
     PARAMETERS,
     PART,
     PARTS_LAYER,
-    POSTGIS_BUILDINGS,
-    POSTGIS_PARTS,
-    POSTGIS_ROOFS,
     PREFIX,
     ROOF_SURFACE,
     ROOFER,
@@ -32,7 +28,6 @@ from hiproof.write.attribute_list import (
 )
 from hiproof.write.building_attributes import building_attributes, measure_figures
 from hiproof.write.parameters import FileHead, building_record, head_record
-from hiproof.write.tables.postgis import MEASURE_COLUMNS, TABLE_SCHEMA
 
 DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
 KINDS = {"number": (int, float), "count": int, "text": str}
@@ -93,16 +88,6 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
     assert list(head_record(FileHead())) == names(HEAD)
     row = BuildingFigures("a", "gable", "modelled", comparison=Comparison("b")).row()
     assert sorted(row) == sorted(names(EVALUATION))
-
-
-def test_tables_of_the_database_are_as_declared():
-    tables = re.findall(r"create table if not exists \{(\w+)\} \((.*?)\);", TABLE_SCHEMA, re.DOTALL)
-    for (name, body), attributes in zip(
-        tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS, POSTGIS_PARTS), strict=True
-    ):
-        body = body.replace("{measures}", MEASURE_COLUMNS)
-        columns = re.findall(r"(?:^|,)\s*(\w+) (?=text|integer|double|jsonb|geometry)", body)
-        assert columns == names(attributes), name
 
 
 def test_the_table_of_parts_has_a_column_for_every_parameter():

@@ -9,6 +9,7 @@ import shapely
 
 from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.errors import InputError
+from hiproof.write.head import FileHead
 from hiproof.write.tables.geopackage import LAYERS, write_attributes
 from hiproof.write.tables.geoparquet import GeoParquetWriter
 
@@ -24,7 +25,7 @@ def street():
 def test_the_same_rows_as_the_geopackage(tmp_path, layer):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
     write_attributes(tmp_path / "b.gpkg", street(), "EPSG:7415")
-    with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415", layer=layer) as writer:
+    with GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415"), layer=layer) as writer:
         for building in street():
             writer.add(building)
     table = pq.read_table(tmp_path / "b.parquet")
@@ -41,7 +42,7 @@ def test_the_same_rows_as_the_geopackage(tmp_path, layer):
 
 def test_an_attribute_called_geometry_stands_beside_the_outline(tmp_path):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
-    with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415") as writer:
+    with GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415")) as writer:
         writer.add(make_building(gable_house(), attributes={"geometry": "poly", "Geometry": 1}))
     (row,) = pq.read_table(tmp_path / "b.parquet").to_pylist()
     assert (row["geometry_2"], row["Geometry_3"]) == ("poly", 1)
@@ -50,7 +51,7 @@ def test_an_attribute_called_geometry_stands_beside_the_outline(tmp_path):
 
 def test_the_file_describes_its_geometry(tmp_path):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
-    with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415"):
+    with GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415")):
         pass
     geo = json.loads(pq.read_schema(tmp_path / "b.parquet").metadata[b"geo"])
     assert geo["primary_column"] == "geometry"
@@ -61,5 +62,5 @@ def test_the_file_describes_its_geometry(tmp_path):
 def test_without_pyarrow_one_sentence_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     with pytest.raises(InputError, match=r"hiproof\[parquet\]"):
-        GeoParquetWriter(tmp_path / "b.parquet")
+        GeoParquetWriter(tmp_path / "b.parquet", FileHead())
     assert not list(tmp_path.iterdir())

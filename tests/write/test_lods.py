@@ -18,11 +18,11 @@ from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
 from hiproof.geometry.rings import ring_normal
 from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Quality, Roof
+from hiproof.parametric.finished import open_run
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
-from hiproof.view.loading import database_rows
 from hiproof.write import (
     FileHead,
     roof_figures,
@@ -35,7 +35,6 @@ from hiproof.write.citygml.roof_codes import CODE_SPACES
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter
 from hiproof.write.citygml.version3 import CityGML3Writer
 from hiproof.write.colours import ROOF_COLOURS, list_legend, type_colour
-from hiproof.write.tables.postgis import polyhedral_wkt
 from hiproof.write.tables.styles import STYLES, TABLE
 
 ALL = ("0", "1.2", "1.3", "2.2")
@@ -293,20 +292,20 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
 @pytest.mark.parametrize(
     ("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)]
 )
-def test_a_database_gets_one_shell_of_a_building_in_parts_at_every_level(tmp_path, lods, grounds):
+def test_a_building_in_parts_is_read_as_one_shell_at_every_level(tmp_path, lods, grounds):
     write_cityjson(
         tmp_path / "buildings.city.jsonl",
         [terrace()],
         "EPSG:7415",
         write=replace(IN_PARTS, lods=lods),
     )
-    (row,) = database_rows(tmp_path)
-    assert sum(face.kind == GROUND for face in (row.solid.faces if row.solid else ())) == grounds
-    assert (polyhedral_wkt(row) is not None) == bool(grounds)
+    (building,) = open_run(tmp_path)
+    assert len(building.solid.select_faces(GROUND) if building.built else ()) == grounds
 
 
 @pytest.mark.parametrize("kind", [CityGMLWriter, CityGML3Writer])
 def test_footprints_and_roof_edges_are_no_solids_to_be_checked(tmp_path, kind):
-    with kind(tmp_path / "a.gml", "EPSG:7415", write=WriteSettings(lods=("0",))) as writer:
+    head = FileHead("EPSG:7415", write=WriteSettings(lods=("0",)))
+    with kind(tmp_path / "a.gml", head) as writer:
         writer.add(terrace())
     assert list(read_solids(tmp_path / "a.gml")) == []

@@ -14,6 +14,7 @@ from lxml import etree
 from hiproof.city.plan import make_jobs
 from hiproof.city.prepare import warn_files_elsewhere
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli.convert import convert
 from hiproof.compose import compose
 from hiproof.errors import InputError
 from hiproof.evaluate.models import read_models
@@ -25,7 +26,6 @@ from hiproof.read.crs import find_units, parse_crs
 from hiproof.settings import Settings, WriteSettings
 from hiproof.simulate import COMPOUND_KINDS, random_compound
 from hiproof.status import Status
-from hiproof.view.run_models import run_crs_text
 from hiproof.write import write_cityjson
 from hiproof.write.building_attributes import building_attributes
 from hiproof.write.naming import FileUnits
@@ -193,9 +193,21 @@ def test_models_elsewhere_are_judged_where_their_points_are(town):
             second.quality.rmse == pytest.approx(first.quality.rmse, abs=1e-4)
             and first.quality.points > 50
         )
-    assert run_crs_text(town / "there").startswith(
-        "COMPOUNDCRS"
-    ) and "UTM zone 31N" in run_crs_text(town / "there")
+
+
+def test_what_is_converted_stands_where_the_models_do(town, tmp_path):
+    convert(town / "there", tmp_path / "a.obj")
+    convert(town / "there" / "buildings.city.jsonl", tmp_path / "b.obj")
+    first, second = ((tmp_path / name).read_text().splitlines() for name in ("a.obj", "b.obj"))
+    assert "COMPOUNDCRS" in first[1] and "UTM zone 31N" in first[1]
+    assert first[0] == second[0]
+    corners = [
+        np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
+        for lines in (first, second)
+    ]
+    (low, high), (again_low, again_high) = ((c.min(axis=0), c.max(axis=0)) for c in corners)
+    np.testing.assert_allclose(again_low, low, atol=2e-4)
+    np.testing.assert_allclose(again_high, high, atol=2e-4)
 
 
 def test_the_same_crs_is_no_other(tmp_path):

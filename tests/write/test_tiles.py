@@ -22,7 +22,8 @@ from hiproof.write.meshes.tiles.properties import NO_NUMBER, Found
 from hiproof.write.meshes.tiles.quadtree import quadtree
 from hiproof.write.meshes.viewed import ViewedModel
 from hiproof.write.naming import FileUnits
-from sample_models import ORIGIN, courtyard_solid, gable_solid, two_parts, write_sample_run
+from sample_models import ORIGIN, courtyard_solid, gable_solid, two_parts
+from sample_parameters import write_parameters_of_each_kind
 
 GEOID_M = 43.2
 PLACES = {  # a place on land in each CRS, in its own unit
@@ -343,38 +344,21 @@ def test_properties_have_ids_that_the_extension_allows():
     }
 
 
-def write_sample_parameters(folder, ids=("house-1", "block 2", "bare")):
-    part = {
-        "type": "gable",
-        "parameters": {"width": 8.0},
-        "position": [0, 0, 0],
-        "rotation": 0.0,
-        "outlines": [],
-    }
-    head = {
-        "hiproof_parameters": 1,
-        "crs": "EPSG:7415",
-        "unit": "auto",
-        "cityjson_offset": None,
-        "compose": {},
-    }
-    records = [
-        {"id": id, "origin": ORIGIN.tolist(), "parts": [part] if id != "bare" else []} for id in ids
-    ]
-    (folder / "parameters.jsonl").write_text("\n".join(map(json.dumps, [head, *records])) + "\n")
-
-
 def test_the_command_tells_id_type_and_parameters(tmp_path, capsys):
-    write_sample_run(tmp_path)
-    write_sample_parameters(tmp_path)
+    write_parameters_of_each_kind(tmp_path / "parameters.jsonl")
     convert(tmp_path, tmp_path / "city.3dtiles", geoid_height=43.2)
-    assert "2 buildings" in capsys.readouterr().out
+    assert "3 buildings" in capsys.readouterr().out
     tileset = json.loads((tmp_path / "city.3dtiles" / "tileset.json").read_text())
     assert "plus 43.2 m" in tileset["asset"]["extras"]["heights"]
-    rows = read_content(tmp_path / "city.3dtiles", tileset["root"])[2]
-    assert [(row["id"], row["type"]) for row in rows] == [("house-1", "gable"), ("block 2", "flat")]
-    assert json.loads(rows[0]["parameters"])["parts"][0]["parameters"] == {"width": 8.0}
-    assert rows[0]["rf_volume_lod22"] == 1.0 and rows[0]["note"] == ""
+    rows = {row["id"]: row for row in read_content(tmp_path / "city.3dtiles", tileset["root"])[2]}
+    assert {id: row["type"] for id, row in rows.items()} == {
+        "gable": "gable",
+        "hip and tower": "hip",
+        "yard": "flat",
+    }
+    (part,) = json.loads(rows["gable"]["parameters"])["parts"]
+    assert part["parameters"] == {"width": 8.0, "length": 12.0, "height": 3.0}
+    assert rows["gable"]["rf_volume_lod22"] == 624.0 and rows["gable"]["name"] == "mill"
 
 
 def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters(tmp_path, globe):
@@ -390,13 +374,6 @@ def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters
         "type_input": "church",
         "year": 1905.0,
     }
-
-
-def test_parameters_of_another_run_are_refused(tmp_path):
-    write_sample_run(tmp_path)
-    write_sample_parameters(tmp_path, ("someone", "else", "bare"))
-    with pytest.raises(InputError, match="of the same run as the models"):
-        convert(tmp_path, tmp_path / "city.3dtiles")
 
 
 def find_node_package(package):

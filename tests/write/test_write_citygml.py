@@ -14,6 +14,7 @@ from lxml import etree
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter, write_citygml
+from hiproof.write.head import FileHead
 from hiproof.write.naming import gml_name
 from hiproof.write.xml_text import xml_attribute, xml_text
 
@@ -196,7 +197,7 @@ def test_far_away_and_under_water(tmp_path, schema, origin):
 
 def test_incremental_equals_whole(tmp_path):
     write_citygml(tmp_path / "whole.gml", street(), "EPSG:7415")
-    with CityGMLWriter(tmp_path / "steps.gml", "EPSG:7415") as writer:
+    with CityGMLWriter(tmp_path / "steps.gml", FileHead("EPSG:7415")) as writer:
         for building in street():
             writer.add(building)
     assert (tmp_path / "whole.gml").read_bytes() == (tmp_path / "steps.gml").read_bytes()

@@ -1,8 +1,8 @@
-"""CityGML 3.0 against what 2.0 tells of the same buildings, and against the order that OGC's
-schemas ask for.
-"""
+"""CityGML 3.0 against what 2.0 tells of the same buildings, and against OGC's schemas."""
 
 import datetime
+import functools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,36 +15,9 @@ from hiproof.write.citygml.version2 import write_citygml
 from hiproof.write.citygml.version3 import ID, NAMESPACES_3, upgrade_member, write_citygml3
 from hiproof.write.fragments import Fragment
 
+SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml3" / "CityGML.xsd"
 HREF = f"{{{NAMESPACES_3['xlink']}}}href"
 
-# What may stand in a building, in its schemas' order: gml, core (feature, city object, space),
-# construction, building.
-BUILDING = {
-    "gml": "description descriptionReference identifier name boundedBy location",
-    "core": "creationDate terminationDate validFrom validTo externalReference generalizesTo "
-    "relativeToTerrain relativeToWater "
-    "relatedTo appearance genericAttribute dynamizer spaceType volume area boundary lod0Point "
-    "lod0MultiSurface lod0MultiCurve "
-    "lod1Solid lod2Solid lod2MultiSurface lod2MultiCurve lod3Solid lod3MultiSurface lod3MultiCurve "
-    "lod1TerrainIntersectionCurve lod2TerrainIntersectionCurve lod3TerrainIntersectionCurve "
-    "pointCloud",
-    "con": "conditionOfConstruction dateOfConstruction dateOfDemolition constructionEvent "
-    "elevation height occupancy",
-    "bldg": "class function usage roofType storeysAboveGround storeysBelowGround "
-    "storeyHeightsAboveGround "
-    "storeyHeightsBelowGround buildingConstructiveElement buildingInstallation buildingRoom "
-    "buildingFurniture "
-    "buildingSubdivision address buildingPart",
-}
-SURFACE = {
-    "gml": BUILDING["gml"],
-    "core": "creationDate terminationDate validFrom validTo externalReference generalizesTo "
-    "relativeToTerrain relativeToWater "
-    "relatedTo appearance genericAttribute dynamizer area lod0MultiCurve lod0MultiSurface "
-    "lod1MultiSurface "
-    "lod2MultiSurface lod3MultiSurface pointCloud",
-    "con": "fillingSurface",
-}
 WITH_ID = ("CityModel", "Building", "BuildingPart", "RoofSurface", "WallSurface", "GroundSurface")
 WITH_ID += ("MultiSurface", "Solid", "Polygon", "MultiCurve", "LineString")
 
@@ -56,7 +29,10 @@ TWO_PARTS = """<core:cityObjectMember><bldg:Building gml:id="bldg-x"><gml:name>x
 <bldg:consistsOfBuildingPart><bldg:BuildingPart gml:id="part-1-x">
 <gen:intAttribute name="k"><gen:value>3</gen:value></gen:intAttribute><gen:genericAttributeSet name="s">
 <gen:doubleAttribute name="width"><gen:value>8.5</gen:value></gen:doubleAttribute></gen:genericAttributeSet><bldg:roofType>1030</bldg:roofType>
-<bldg:lod1Solid><gml:Solid><gml:exterior><gml:CompositeSurface/></gml:exterior></gml:Solid></bldg:lod1Solid>
+<bldg:lod1Solid><gml:Solid><gml:exterior><gml:CompositeSurface>
+<gml:surfaceMember><gml:Polygon><gml:exterior><gml:LinearRing>
+<gml:posList>0 0 2 1 0 2 1 1 2 0 0 2</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon></gml:surfaceMember>
+</gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod1Solid>
 </bldg:BuildingPart></bldg:consistsOfBuildingPart></bldg:Building></core:cityObjectMember>"""  # noqa: E501
 
 
@@ -89,22 +65,14 @@ def new(root, path):
     return root.xpath(path, namespaces=NAMESPACES_3)
 
 
-def assert_in_order(element, sequence):
-    """The children of `element` are of the sequence's names, in its order."""
-    reference = [
-        f"{{{NAMESPACES_3[prefix]}}}{name}"
-        for prefix, names in sequence.items()
-        for name in names.split()
-    ]
-    places = [reference.index(child.tag) for child in element]
-    assert places == sorted(places)
+@functools.cache
+def load_schema():
+    if not SCHEMA.exists():
+        pytest.skip(f"needs the CityGML 3.0 schema at {SCHEMA}")
+    return etree.XMLSchema(etree.parse(SCHEMA, etree.XMLParser(no_network=True, huge_tree=True)))
 
 
 def assert_told_as_the_schemas_ask(root):
-    for building in new(root, "//bldg:Building | //bldg:BuildingPart"):
-        assert_in_order(building, BUILDING)
-    for surface in new(root, "//con:RoofSurface | //con:WallSurface | //con:GroundSurface"):
-        assert_in_order(surface, SURFACE)
     ids = new(root, "//@gml:id")
     assert len(set(ids)) == len(ids)
     for element in root.iter(etree.Element):
@@ -115,6 +83,7 @@ def assert_told_as_the_schemas_ask(root):
     assert {child.tag for child in new(root, "//gml:Solid/gml:exterior/*")} <= {
         f"{{{NAMESPACES_3['gml']}}}Shell"
     }
+    load_schema().assertValid(etree.fromstring(etree.tostring(root)))
 
 
 def test_order_names_and_ids_are_as_the_schemas_ask(roots):

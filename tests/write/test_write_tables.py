@@ -17,7 +17,8 @@ from hiproof import read_parameters
 from hiproof.errors import InputError
 from hiproof.parametric.run import build_file
 from hiproof.write import write_attributes, write_parameters
-from hiproof.write.tables import geopackage as attributes
+from hiproof.write.tables import waiting
+from hiproof.write.tables.geopackage import attributes_with_a_column
 
 
 def table(tmp_path, buildings, crs="EPSG:7415"):
@@ -59,7 +60,7 @@ def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(t
         tmp_path, [replace(building, attributes={**building.attributes, **large})]
     )
     assert set(columns_of_few) < set(columns) and len(columns) == 1998
-    room = attributes.attributes_with_a_column()
+    room = attributes_with_a_column()
     assert all(columns[f"a{i}"][0] == i for i in range(room)) and "a2499" not in columns
 
 
@@ -186,7 +187,7 @@ def test_names_that_clash(tmp_path):
 
 
 def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):
-    monkeypatch.setattr(attributes, "ROWS_AT_ONCE", 4)
+    monkeypatch.setattr(waiting, "ROWS_AT_ONCE", 4)
     columns, _, _ = table(
         tmp_path, [make_lost_building(str(n), attributes={"n": n}) for n in range(11)]
     )

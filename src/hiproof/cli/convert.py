@@ -1,36 +1,47 @@
-"""`hiproof convert`: the models of a run as files that 3D viewers open."""
+"""`hiproof convert`: models in another format."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..errors import InputError, OutputError
-from ..formats import OF_MODELS, import_format
+from ..formats import CONVERTED, choose_format
 from ..log import count_things
 from ..read.damage import SkippedBuildings
 from ..write.files import elsewhere
 
-Made = StrEnum("Made", {name: name for name in OF_MODELS})  # type: ignore[misc]
-FORMAT_HELP = ", ".join(f"{name} ({format.what})" for name, format in OF_MODELS.items())
+FormatName = StrEnum("FormatName", {name: name for name in CONVERTED})  # type: ignore[misc]
+FORMAT_HELP = ", ".join(CONVERTED)
+DEFAULT = "glb"
 
 
 def convert(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="output folder of a run, or a file: parameters.jsonl, CityJSON, CityJSONSeq, "
+            "CityGML 2.0"
+        ),
+    ],
     out: Annotated[
         Path | None,
         typer.Argument(
-            help="what to write [default: in the folder, named buildings as the run's own]"
+            help="file to write; its suffix chooses the format [default: beside the models]"
         ),
     ] = None,
     format: Annotated[
-        Made | None,
-        typer.Option(help=f"what to make: {FORMAT_HELP} [default: by the name to write, else glb]"),
+        FormatName | None,
+        typer.Option(
+            help=f"format to write: {FORMAT_HELP} [default: by the suffix of OUT, else {DEFAULT}]"
+        ),
     ] = None,
-    crs: Annotated[str | None, typer.Option(help="CRS of the models [default: the run's]")] = None,
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of the models [default: what they name]")
+    ] = None,
     geoid_height: Annotated[
         float | None,
         typer.Option(
@@ -39,48 +50,59 @@ def convert(
         ),
     ] = None,
 ) -> None:
-    """Convert the models of a run to a format of 3D viewers, with building ids, roof types and
-    parameters as properties.
+    """Convert models to another format: those of a run, with their parameters, or of a file.
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
-    name = format.value if format else choose_format(out)
-    arguments = {} if geoid_height is None else {"geoid_height_m": geoid_height}
-    if arguments and name != "3dtiles":
+    name = format.value if format else name_format(out)
+    given = {} if geoid_height is None else {"geoid_height_m": geoid_height}
+    if given and name != "3dtiles":
         raise InputError(
             f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out"
         )
-    path = out or Path(folder) / OF_MODELS[name].file
+    path = out or default_path(source, name)
     try:
-        left_out = convert_run(folder, path, name, crs, **arguments)
+        left_out = convert_models(source, path, name, crs, **given)
     except OutputError as error:
-        raise elsewhere(error, f"hiproof convert {folder} OUT") if out is None else error from error
+        raise elsewhere(error, f"hiproof convert {source} OUT") if out is None else error from error
     if left_out.exit_code:
         raise typer.Exit(left_out.exit_code)
 
 
-def convert_run(
-    folder: Path, path: Path, name: str, crs: str | None = None, **given: float
+def convert_models(
+    source: Path, path: Path, name: str, crs: str | None = None, **given: Any
 ) -> SkippedBuildings:
-    """Write the models of the run in `folder` to `path` in the format `name`; returns what damage
-    left out."""
-    from ..view.run_models import run_buildings, run_crs_text
+    """Write the models of `source` to `path` in the format `name`; returns what damage left
+    out."""
+    from ..parametric.finished import open_run
+    from ..write.described import write_format
 
-    left_out = SkippedBuildings()
-    buildings = left_out.iterate_sound(run_buildings(folder, left_out))
-    count = import_format(OF_MODELS[name].module).write_models(
-        path, buildings, crs or run_crs_text(folder), **given
-    )
+    run, left_out = open_run(source, crs), SkippedBuildings()
+    buildings = left_out.iterate_sound(run.describe(left_out))
+    count = write_format(name, path, buildings, run.head, **given)
     typer.echo(f"{path}: {count_things(count, 'building')}{left_out.describe()}")
     return left_out
 
 
-def choose_format(out: Path | None) -> str:
-    """The format that a name ends in, glb without a name. Raises InputError where that is none."""
-    ending = "glb" if out is None else out.suffix.lower().removeprefix(".")
-    if ending not in OF_MODELS:
-        endings = ", ".join(f".{name}" for name in OF_MODELS)
+def name_format(out: Path | None) -> str:
+    """The format that a name ends in. Raises InputError where that is none."""
+    name = DEFAULT if out is None else choose_format(out.name)
+    if name is None:
+        suffixes = ", ".join(dict.fromkeys(Path(f.file).suffix for f in CONVERTED.values()))
         raise InputError(
-            f"expected a name that ends in one of {endings}, got {out}; or say --format"
+            f"expected a name that ends in one of {suffixes}, got {out}; or pass --format"
         )
-    return ending
+    return name
+
+
+def default_path(source: Path, name: str) -> Path:
+    """Where a format is written that no name is given for. Raises InputError where a file of that
+    name is one of the run itself.
+    """
+    path = (source if source.is_dir() else source.parent) / CONVERTED[name].file
+    if CONVERTED[name].fragment and path.exists():
+        raise InputError(
+            f"expected a name for the new file, got none while {path} is there already; try: "
+            f"hiproof convert {source} OUT"
+        )
+    return path

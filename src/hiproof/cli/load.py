@@ -7,12 +7,15 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from ..log import count_things
 from ..read.damage import SkippedBuildings
 
 
 def load(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    folder: Annotated[
+        Path, typer.Argument(help="output folder of a run, or a file that `convert` reads")
+    ],
     database: Annotated[str, typer.Argument(help="postgresql://user@host/database")],
     prefix: Annotated[
         str,
@@ -20,15 +23,28 @@ def load(
             help="first part of the table names, at most 48 letters, digits and underscores"
         ),
     ] = "hiproof",
+    run: Annotated[
+        str | None,
+        typer.Option(help="name of the run in the column `run` [default: the folder's name]"),
+    ] = None,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="replace the runs that the tables hold")
+    ] = False,
+    append: Annotated[
+        bool, typer.Option("--append", help="add the run beside those that the tables hold")
+    ] = False,
 ) -> None:
-    """Load the models of a run into PostGIS tables; loading again replaces them.
+    """Load the models of a run into PostGIS tables; loading the same run again replaces it.
 
     Exit code: 0 all buildings were loaded, 2 damaged ones were left out, or unusable input.
     """
     from ..view.loading import load_postgis
 
+    if replace and append:
+        raise InputError("expected --replace or --append, got both; leave one out")
     left_out = SkippedBuildings()
-    count = load_postgis(folder, database, prefix, left_out)
+    how = {"replace": replace, "append": append}
+    count = load_postgis(folder, database, prefix, left_out, run, **how)
     tables = f"{prefix}_buildings, {prefix}_roofs and {prefix}_parts"
     typer.echo(f"{count_things(count, 'building')} loaded into {tables}{left_out.describe()}")
     if left_out.exit_code:

@@ -13,7 +13,7 @@ import typer
 from ..errors import OutputError
 from ..formats import FORMATS
 from ..log import LOGGER
-from .convert import convert_run
+from .convert import convert_models
 
 
 def view(
@@ -68,9 +68,9 @@ def open_tiles(folder: Path) -> Iterator[Path]:
             or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime
         ):
             try:
-                convert_run(folder, tiles, "3dtiles")
+                convert_models(folder, tiles, "3dtiles")
             except OutputError as error:
                 LOGGER.warning("%s. The tiles are made in a temporary folder instead", error)
                 tiles = Path(elsewhere) / tiles.name
-                convert_run(folder, tiles, "3dtiles")
+                convert_models(folder, tiles, "3dtiles")
         yield tiles

@@ -27,7 +27,7 @@ from ..read.shells import ShellSurface, read_geometries, read_shell, require_lis
 from ..write.attribute_list import OWN
 from ..write.meshes.triangles import faces_triangles
 
-RUN_MODELS = FORMATS["cityjson"].file
+RUN_MODELS = FORMATS["cityjsonseq"].file
 PART_ATTRIBUTE, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
 """What hiproof tells of a roof surface: its part's number and type."""
 

@@ -70,7 +70,7 @@ def list_planes(roof: Roof) -> np.ndarray:
             for piece in part.pieces
             for plane in piece.planes
         ]
-    )
+    ).reshape(-1, 4)
 
 
 def parts_in_plane(

@@ -7,6 +7,7 @@ schema      the JSON schema of that file
 record      the JSON object of one building checked, and its parts made
 building    the object built: composed, checked, measured, as a run does
 run         a file of parameters into the files of a run
+finished    finished models read building by building, of any file
 change      one part changed: another type, a height, a side
 arrange     parts put otherwise: cut in two, joined, a dormer set on a slope
 recess      a level part that takes the place of what it covers, and goes where it is moved

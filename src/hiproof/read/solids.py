@@ -28,6 +28,7 @@ from .shells import read_geometries, read_shell, require_list
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
+CITYGML_SUFFIXES = (".gml", ".xml", ".citygml")
 SURFACES = {
     "RoofSurface",
     "WallSurface",
@@ -55,9 +56,7 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
     readers = {
         ".json": cityjson_solids,
         ".jsonl": cityjson_solids,
-        ".gml": citygml_solids,
-        ".xml": citygml_solids,
-        ".citygml": citygml_solids,
+        **dict.fromkeys(CITYGML_SUFFIXES, citygml_solids),
     }
     if path.is_dir():
         raise InputError(
@@ -194,6 +193,22 @@ def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str,
         raise InputError(
             f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?"
         )
+
+
+def find_citygml_crs(path: Path) -> str | None:
+    """Find the name of the CRS of a CityGML file, that of its first envelope; None where there is
+    none before the first city object.
+    """
+    from lxml import etree
+
+    try:
+        for _, element in etree.iterparse(str(path), events=("start",), resolve_entities=False):
+            if local_name(element) in ("Envelope", "cityObjectMember", "featureMember"):
+                name = element.get("srsName")
+                return None if name is None else str(name)
+    except (etree.XMLSyntaxError, OSError):
+        return None  # who reads the solids says what is wrong
+    return None
 
 
 def gml_id(element: Any) -> str | None:

@@ -22,6 +22,7 @@ writer       a file is opened, given one building after another, finished
 files        files that appear whole or not at all
 head         what all files of a run have in common
 fragments    one building's texts, kept until they are joined
+described    a building with its attributes, into a file of any format
 run_files    all files of a run in one pass
 """
 

@@ -435,28 +435,20 @@ EVALUATION = (
     Attribute("ref_plan_iou", "number", "", "intersection over union of the outlines in plan"),
 )
 
-POSTGIS_BUILDINGS = (
-    Attribute("id", "text", "", "the building's id"),
-    Attribute("status", "text", "", "as hiproof_status"),
-    Attribute("quality", "text", "", "as hiproof_quality"),
-    Attribute("roof_type", "text", "", "as hiproof_roof_type"),
-    Attribute("attributes", "object", "", "all attributes of the building (jsonb)"),
-    Attribute("geom", "geometry", "of the CRS", "the solid as a polyhedral surface of triangles"),
-)
-
-POSTGIS_PARTS = (
-    *PARTS_LAYER,
-    Attribute("geom", "geometry", "of the CRS", "where the part shows, as a multipolygon in plan"),
-)
-
-POSTGIS_ROOFS = (
-    *SURFACES_LAYER,
-    Attribute("geom", "geometry", "of the CRS", "the face as a polygon"),
+POSTGIS = (
+    Attribute("run", "text", "", "the run's name, in all three tables"),
+    Attribute(
+        "geom",
+        "geometry",
+        "of the CRS",
+        "the solid as a polyhedral surface of triangles; of a part where it shows, of a roof "
+        "surface the face",
+    ),
 )
 
 EVERY_FORMAT = (
     "`buildings.gml`, `buildings.city.jsonl`, the layer `buildings` of `buildings.gpkg`, "
-    "`buildings.parquet`"
+    "`buildings.parquet`, `buildings.fgb`, PostGIS: PREFIX_buildings"
 )
 TABLES = (
     AttributeTable("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
@@ -488,7 +480,7 @@ TABLES = (
         SURFACES_LAYER,
     ),
     AttributeTable("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
-    AttributeTable("PostGIS: PREFIX_buildings", "`hiproof load`", POSTGIS_BUILDINGS),
+    AttributeTable("PostGIS, beside the columns of all tables", "`hiproof load`", POSTGIS),
 )
 
 PREFACE = """# Attributes

@@ -57,16 +57,19 @@ class ParametersWriter(BuildingWriter):
     def begin(self, stack: ExitStack) -> None:
         self.file.write(dump(head_record(self.head)) + b"\n")
 
-    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+    def add(
+        self,
+        building: Building,
+        figures: RoofFigures | None = None,
+        attributes: dict[str, Any] | None = None,
+    ) -> None:
         self.put(Fragment(parameters_line(building)))
 
     def put(self, fragment: Fragment) -> None:
         self.file.write(fragment.text)
 
 
-def writer(path: str | os.PathLike, head: FileHead) -> ParametersWriter:
-    """The writer of a run's file."""
-    return ParametersWriter(path, head)
+writer = ParametersWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:

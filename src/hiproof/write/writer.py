@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 from abc import abstractmethod
 from contextlib import AbstractContextManager, ExitStack
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from ..model import Building
 from .files import atomic_file
@@ -34,8 +34,15 @@ class BuildingWriter(AbstractContextManager):
         """
 
     @abstractmethod
-    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        """Write one building; `figures` of its solid if the caller has them already."""
+    def add(
+        self,
+        building: Building,
+        figures: RoofFigures | None = None,
+        attributes: dict[str, Any] | None = None,
+    ) -> None:
+        """Write one building; `figures` of its solid and its `attributes` if the caller has them
+        already.
+        """
 
     @abstractmethod
     def put(self, fragment: Fragment) -> None:

@@ -65,7 +65,8 @@ def write_citygml(
     solid is written without geometry. Coordinates are written in the unit of `crs`. Raises
     OutputError when the file cannot be written.
     """
-    with CityGMLWriter(path, crs, prefix, creation_date, write=write) as writer:
+    head = FileHead(crs, write=write or WriteSettings(), prefix=prefix, creation_date=creation_date)
+    with CityGMLWriter(path, head) as writer:
         for building in buildings:
             writer.add(building)
 
@@ -75,18 +76,9 @@ class CityGMLWriter(BuildingWriter):
 
     namespaces, root_id = NAMESPACES, ""
 
-    def __init__(
-        self,
-        path: str | os.PathLike,
-        crs: Any = None,
-        prefix: str = PREFIX,
-        creation_date: datetime.date | None = None,
-        write: WriteSettings | None = None,
-    ) -> None:
+    def __init__(self, path: str | os.PathLike, head: FileHead) -> None:
         super().__init__(path)
-        self.head = FileHead(
-            crs, write=write or WriteSettings(), prefix=prefix, creation_date=creation_date
-        )
+        self.head = head
         self.srs_name = srs_name(self.head.crs_of_files)
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.names = UniqueNames()
@@ -101,12 +93,18 @@ class CityGMLWriter(BuildingWriter):
         self.envelope_length = len(self.envelope(np.full(3, WIDEST), np.full(3, WIDEST)))
         self.file.write(b" " * self.envelope_length)
 
-    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+    def add(
+        self,
+        building: Building,
+        figures: RoofFigures | None = None,
+        attributes: dict[str, Any] | None = None,
+    ) -> None:
         figures = figures or measure_figures(building)
-        osm = self.head.write.osm_tags
-        attributes = building_attributes(
-            building, figures, self.head.prefix, self.head.units.gml, osm
-        )
+        if attributes is None:
+            osm = self.head.write.osm_tags
+            attributes = building_attributes(
+                building, figures, self.head.prefix, self.head.units.gml, osm
+            )
         name = self.names.take(gml_name(building.id))
         self.add_member(
             fragment(Sheet(building, figures, attributes, building.id, name, self.head))
@@ -140,9 +138,7 @@ class CityGMLWriter(BuildingWriter):
         ).encode()
 
 
-def writer(path: str | os.PathLike, head: FileHead) -> CityGMLWriter:
-    """The writer of a run's file."""
-    return CityGMLWriter(path, head.crs, write=head.write)
+writer = CityGMLWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:

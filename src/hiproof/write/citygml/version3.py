@@ -73,7 +73,8 @@ def write_citygml3(
     creation_date: datetime.date | None = None,
 ) -> None:
     """Write `buildings` to `path` as CityGML 3.0; all else as `write_citygml`."""
-    with CityGML3Writer(path, crs, prefix, creation_date) as writer:
+    head = FileHead(crs, prefix=prefix, creation_date=creation_date)
+    with CityGML3Writer(path, head) as writer:
         for building in buildings:
             writer.add(building)
 
@@ -87,9 +88,7 @@ class CityGML3Writer(CityGMLWriter):
         self.put(upgrade_member(member))
 
 
-def writer(path: str | os.PathLike, head: FileHead) -> CityGML3Writer:
-    """The writer of a run's file."""
-    return CityGML3Writer(path, head.crs, write=head.write)
+writer = CityGML3Writer
 
 
 def fragment(sheet: Sheet) -> Fragment:

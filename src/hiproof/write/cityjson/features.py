@@ -52,7 +52,8 @@ def write_cityjson(
     file's unit; `write` says what is drawn of a building. Raises OutputError when the file cannot
     be written; an older file then stays.
     """
-    with CityJSONWriter(path, crs, prefix, scale, write=write) as writer:
+    head = FileHead(crs, write=write or WriteSettings(), prefix=prefix)
+    with CityJSONWriter(path, head, scale) as writer:
         for building in buildings:
             writer.add(building)
 
@@ -60,24 +61,16 @@ def write_cityjson(
 class CityJSONWriter(BuildingWriter):
     """Incremental form of `write_cityjson`."""
 
-    def __init__(
-        self,
-        path: str | os.PathLike,
-        crs: Any = None,
-        prefix: str = PREFIX,
-        scale: float = SCALE,
-        translate: np.ndarray | None = None,
-        write: WriteSettings | None = None,
-    ) -> None:
+    def __init__(self, path: str | os.PathLike, head: FileHead, scale: float = SCALE) -> None:
         super().__init__(path)
-        self.head = FileHead(crs, write=write or WriteSettings(), prefix=prefix)
+        self.head = head
         self.units, self.reference_system = (
             self.head.units.cityjson,
             reference_system(self.head.crs_of_files),
         )
         self.is_document = str(path).endswith(".json")
         self.scale = scale
-        self.translate = translate
+        self.translate = head.offset
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.ids = UniqueNames()
         self.vertex_count = self.object_count = 0
@@ -90,13 +83,19 @@ class CityJSONWriter(BuildingWriter):
         if self.is_document:
             self.waiting = stack.enter_context(scratch(self.path))
 
-    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+    def add(
+        self,
+        building: Building,
+        figures: RoofFigures | None = None,
+        attributes: dict[str, Any] | None = None,
+    ) -> None:
         figures = figures or measure_figures(building)
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.choose_origin(building), self.scale, self.units)
-        attributes = building_attributes(
-            building, figures, self.head.prefix, self.units, self.head.write.osm_tags
-        )
+        if attributes is None:
+            attributes = building_attributes(
+                building, figures, self.head.prefix, self.units, self.head.write.osm_tags
+            )
         sheet = Sheet(building, figures, attributes, name, "", self.head)
         if self.is_document:
             self.add_to_document(city_objects(sheet, vertices), vertices)
@@ -168,9 +167,7 @@ class CityJSONWriter(BuildingWriter):
         return dump({**head, "CityObjects": {}, "vertices": []})
 
 
-def writer(path: str | os.PathLike, head: FileHead) -> CityJSONWriter:
-    """The writer of a run's file."""
-    return CityJSONWriter(path, head.crs, translate=head.offset, write=head.write)
+writer = CityJSONWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ...model import GROUND, ROOF, WALL, Face, Solid
+from ...frames import Units
+from ...model import GROUND, ROOF, WALL, Building, Face, Solid
 from ..colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
+from ..parameters import numbers, part_record
+
+SHOWN_PART_KEYS = ("type", "parameters", "position", "rotation")
 
 
 class Look(NamedTuple):
@@ -36,6 +41,31 @@ class ViewedModel(NamedTuple):
             for face in self.solid.select_faces(kind):
                 result.setdefault(choose_look(face, self.part_types), []).append(face)
         return result
+
+
+def view_building(building: Building, attributes: dict[str, Any], units: Units) -> ViewedModel:
+    """The model of a building with its `attributes`, and its parameters as JSON among them where
+    its parts have any; the solid in metres of the CRS of files, which count in `units`.
+    """
+    solid, text = building.solid, parameters_text(building)
+    there = Units(units.plan, units.height).to_metres(units.from_metres(solid.vertices))
+    return ViewedModel(
+        building.id,
+        building.type or "unknown",
+        Solid(there, solid.faces),
+        merge_values({"parameters": text}, attributes) if text else attributes,
+        {number: part.type for number, part in enumerate(building.parts)},
+    )
+
+
+def parameters_text(building: Building) -> str:
+    """The parts of a roof as JSON, without outlines; empty where none has parameters."""
+    records = [part_record(part) for part in building.parts]
+    if not any(record["parameters"] or record["type"] == "free" for record in records):
+        return ""
+    parts = [{name: record[name] for name in SHOWN_PART_KEYS} for record in records]
+    origin = numbers(building.roof.frame.origin)
+    return json.dumps({"origin": origin, "parts": parts}, separators=(",", ":"))
 
 
 def merge_values(members: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:

@@ -1,9 +1,11 @@
 """Tables of buildings, parts and roof surfaces.
 
 rows             the rows of one building
+waiting          rows that wait until the types of columns are settled
 geopackage_file  a GeoPackage in SQLite
 geopackage       the GeoPackage of a run
 styles           how QGIS draws its layers
 geoparquet       GeoParquet, made of the same columns
+flatgeobuf       FlatGeobuf of the outlines
 postgis          a PostGIS database
 """

@@ -9,11 +9,10 @@ import os
 from typing import Any
 
 from ...read.geoparquet import import_pyarrow
-from ...settings import WriteSettings
-from ..building_attributes import PREFIX
 from ..head import FileHead
-from .geopackage import BUILDINGS, AttributesWriter, column_names
+from .geopackage import BUILDINGS, AttributesWriter
 from .rows import Row
+from .waiting import column_names
 
 GEOMETRY = "geometry"
 PLAN_TYPES = ["Polygon", "MultiPolygon"]
@@ -27,23 +26,16 @@ class GeoParquetWriter(AttributesWriter):
 
     reserved = (*AttributesWriter.reserved, GEOMETRY)
 
-    def __init__(
-        self,
-        path: str | os.PathLike,
-        crs: Any = None,
-        prefix: str = PREFIX,
-        write: WriteSettings | None = None,
-        layer: str = BUILDINGS,
-    ) -> None:
+    def __init__(self, path: str | os.PathLike, head: FileHead, layer: str = BUILDINGS) -> None:
         import_pyarrow()
-        super().__init__(path, crs, prefix, write)
+        super().__init__(path, head)
         self.layers = (layer,)
 
     def finish(self) -> None:
         import pyarrow.parquet
 
         (waiting,) = self.waiting.values()
-        kinds = waiting.kinds(self.prefix)
+        kinds = waiting.kinds(self.head.prefix)
         schema = self.schema(kinds)
         with pyarrow.parquet.ParquetWriter(self.hidden, schema, compression="zstd") as file:
             for rows in waiting.batches():
@@ -77,9 +69,7 @@ class GeoParquetWriter(AttributesWriter):
         )
 
 
-def writer(path: str | os.PathLike, head: FileHead, layer: str = BUILDINGS) -> GeoParquetWriter:
-    """The writer of a run's file; buildings' parts of it are those of the GeoPackage."""
-    return GeoParquetWriter(path, head.crs, write=head.write, layer=layer)
+writer = GeoParquetWriter
 
 
 def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:

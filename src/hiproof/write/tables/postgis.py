@@ -1,123 +1,135 @@
 """Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof
-surface, the area where a part shows.
+surface, the area where a part shows; columns as in the GeoPackage.
 
 The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners
 of a face that are stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a
-table of their own. A prefix's tables hold one run: loading replaces what they held, in one
-transaction, so that readers see either run.
+table of their own. The tables of a prefix hold one run or, loaded with `append`, several, each
+under its name in the column `run`. A load is one transaction, so that readers see either state.
 """
 
 from __future__ import annotations
 
-import json
-import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import struct
+import tempfile
+from collections.abc import Iterable
+from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...errors import InputError, OutputError
-from ...frames import METRES, Units
-from ...geometry.rings import ring_normal
-from ...model import ROOF, Solid
+from ...frames import Units
+from ...model import Solid
+from ...read.damage import Damaged, refuse
 from ...read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
-from ..attribute_list import PARTS_LAYER
+from ..attribute_list import PREFIX
+from ..described import Described
 from ..meshes.triangles import faces_triangles
-from ..roof_figures import FLAT_SLOPE_DEG
+from ..naming import FileUnits
+from ..values import plain_text
+from .rows import Rows, split_lines, table_rows
+from .waiting import WaitingRows, column_kind, column_names
 
-BATCH = 500  # buildings sent at once
 # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the
 # extension
 LOCKS = 0x6869
 # Names of indexes add 15 characters, and PostgreSQL cuts at 63.
 TABLE_PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")
-COLUMN_TYPES = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
-MEASURE_COLUMNS = ", ".join(f"{a.name} {COLUMN_TYPES[a.kind]}" for a in PARTS_LAYER[3:])
-TABLE_SCHEMA = """
-create table if not exists {buildings} (
-    id text primary key, status text, quality text, roof_type text, attributes jsonb,
-    geom geometry(PolyhedralSurfaceZ, {srid}));
-alter table {buildings} add column if not exists quality text;
-create table if not exists {roofs} (
-    building_id text references {buildings} (id) on delete cascade,
-    number integer, part integer, type text,
-    slope_deg double precision, azimuth_deg double precision, area_m2 double precision,
-    geom geometry(PolygonZ, {srid}), primary key (building_id, number));
-create table if not exists {parts} (
-    building_id text references {buildings} (id) on delete cascade, part integer, type text,
-    {measures}, geom geometry(MultiPolygon, {srid}), primary key (building_id, part));
-create index if not exists {prefix}_buildings_geom on {buildings} using gist (geom);
-create index if not exists {prefix}_roofs_geom on {roofs} using gist (geom);
-create index if not exists {prefix}_roofs_type on {roofs} (type);
-create index if not exists {prefix}_parts_geom on {parts} using gist (geom);
-"""
+MOST_POSTGRES_COLUMNS = 1600  # of a table in PostgreSQL, those that were dropped included
+MOST_NAME_BYTES = 63  # of a column; PostgreSQL cuts longer names
+POSTGRES_TYPES: dict[type, str] = {
+    bool: "boolean",
+    int: "bigint",
+    float: "double precision",
+    str: "text",
+}
+KIND_OF_TYPE = {name: kind for kind, name in POSTGRES_TYPES.items()}
+OWN_COLUMNS = ("run", "geom")
+# Codes of well-known binary: ISO's of surfaces in space, those in plan, and PostGIS's flag
+WKB_POLYHEDRAL_Z, WKB_POLYGON_Z, WKB_POLYGON, WKB_MULTIPOLYGON, WKB_HAS_SRID = (
+    1015,
+    1003,
+    3,
+    6,
+    0x20000000,
+)
+
+
+class PostgisTable(NamedTuple):
+    """A table: the layer of the GeoPackage whose columns it has, the end of its name, the kind of
+    its geometry and the columns that name a row of a run.
+    """
+
+    layer: str
+    ending: str
+    geometry: str
+    key: tuple[str, ...]
+
+
+POSTGIS_TABLES = (
+    PostgisTable("buildings", "buildings", "PolyhedralSurfaceZ", ("id",)),
+    PostgisTable("parts", "parts", "MultiPolygon", ("building_id", "part")),
+    PostgisTable("roof_surfaces", "roofs", "PolygonZ", ("building_id", "number")),
+)
 
 
 @dataclass(frozen=True)
-class DatabaseRow:
-    """A building as the tables hold it: its `solid` in metres, None without a model, the types of
-    its parts by number, and the `units` in which the tables hold coordinates."""
+class Load:
+    """Which run is loaded, and into which tables: its `name`, the `folder` that it came from, the
+    `prefix` of the tables, the `srid` of its coordinates.
 
-    id: str
-    status: str | None
-    roof_type: str | None
-    attributes: dict[str, Any]
-    solid: Solid | None
-    part_types: Mapping[int, str]
-    units: Units = METRES
-    quality: str | None = None
-
-
-def load_rows(
-    dsn: str,
-    rows: Iterator[DatabaseRow],
-    parts: Iterable[Sequence[tuple]],
-    srid: int = 0,
-    prefix: str = "hiproof",
-) -> int:
-    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`;
-    returns the number of buildings.
-
-    `parts` are rows of values of PARTS_LAYER and a geometry as WKB, some at a time; those of
-    buildings that are not among `rows` are left out. Raises InputError for a prefix that makes no
-    names of tables, OutputError for a database that cannot be written.
+    Other runs in the tables are removed with `replace` and stay with `append`; without either they
+    are a reason to refuse.
     """
-    if not TABLE_PREFIX.fullmatch(prefix):
+
+    name: str
+    folder: str
+    prefix: str = "hiproof"
+    srid: int = 0
+    replace: bool = False
+    append: bool = False
+
+
+def load_tables(
+    dsn: str,
+    buildings: Iterable[Described],
+    units: FileUnits,
+    run: Load,
+    damaged: Damaged = refuse,
+) -> int:
+    """Load `buildings` of a `run` into the tables PREFIX_buildings, PREFIX_parts and PREFIX_roofs
+    of the database at `dsn`, coordinates in `units`; returns how many.
+
+    A building whose id comes again is told to `damaged` and left out. Raises InputError for a
+    prefix that makes no names of tables, OutputError for a database that cannot be written or holds
+    another run.
+    """
+    if not TABLE_PREFIX.fullmatch(run.prefix):
         raise InputError(
             "expected a table prefix of at most 48 letters (a to z), digits and underscores, got "
-            f"{prefix!r:.80}; "
+            f"{run.prefix!r:.80}; "
             "choose another --prefix"
         )
     psycopg = import_psycopg()
-    prefix = prefix.lower()  # as PostgreSQL reads names
-    names = {"prefix": prefix} | {
-        table: f"{prefix}_{table}" for table in ("buildings", "roofs", "parts")
-    }
-    try:
-        with (
-            psycopg.connect(refuse_half_a_password(dsn), connect_timeout=TIMEOUT_S) as connection,
-            connection.cursor() as cursor,
-        ):
+    with ExitStack() as stack:
+        try:
+            connection = stack.enter_context(
+                psycopg.connect(refuse_half_a_password(dsn), connect_timeout=TIMEOUT_S)
+            )
+            cursor = stack.enter_context(connection.cursor())
             add_extension(connection, cursor)
-            cursor.execute("select pg_advisory_xact_lock(%s, hashtext(%s))", (LOCKS, prefix))
-            empty_tables(cursor, names, srid)
-            loaded: set[str] = set()
-            while batch := list(islice(rows, BATCH)):
-                insert(cursor, batch, names, srid)
-                loaded |= {row.id for row in batch}
-            insert_parts(cursor, parts, loaded, names["parts"], srid)
-            return len(loaded)
-    except psycopg.OperationalError as error:
-        raise explain_not_written(error, "; check the address") from error
-    except (psycopg.Error, UnicodeError) as error:
-        raise explain_not_written(error, "") from error
+            return Loading(cursor, run).load(stack, buildings, units, damaged)
+        except (psycopg.Error, UnicodeError) as error:
+            raise explain_not_written(error) from error
 
 
-def explain_not_written(error: Exception, advice: str) -> OutputError:
+def explain_not_written(error: Exception) -> OutputError:
+    """What a database says, with advice where it could not be reached."""
     reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    is_reached = isinstance(error, UnicodeError) or getattr(error, "sqlstate", None)
+    advice = "" if is_reached else "; check the address"
     return OutputError(f"expected a PostGIS database that can be written, got: {reason}{advice}")
 
 
@@ -129,103 +141,255 @@ def add_extension(connection: Any, cursor: Any) -> None:
     connection.commit()
 
 
-def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
-    """Make the tables, or empty those that are there and give them the run's reference system."""
-    cursor.execute(TABLE_SCHEMA.format(srid=srid, measures=MEASURE_COLUMNS, **names))
-    cursor.execute("delete from {buildings}".format(**names))
-    for key, kind in (
-        ("buildings", "PolyhedralSurfaceZ"),
-        ("roofs", "PolygonZ"),
-        ("parts", "MultiPolygon"),
-    ):
-        table = names[key]
-        cursor.execute("select Find_SRID(current_schema()::text, %s, 'geom')", (table,))
-        if cursor.fetchone() != (srid,):
-            cursor.execute(f"alter table {table} alter column geom type geometry({kind}, {srid})")
+class Loading:
+    """One load, in the transaction of `cursor`."""
 
+    def __init__(self, cursor: Any, run: Load) -> None:
+        self.cursor, self.run = cursor, run
+        self.prefix = run.prefix.lower()  # as PostgreSQL reads names
 
-def insert(cursor: Any, rows: list[DatabaseRow], names: dict[str, str], srid: int) -> None:
-    """Insert buildings together with their roof surfaces."""
-    geometry = f"ST_GeomFromEWKT('SRID={srid};' || %s::text)"
-    cursor.executemany(
-        f"insert into {names['buildings']} (id, status, quality, roof_type, attributes, geom)"
-        f" values (%s, %s, %s, %s, %s, {geometry})",
-        [
-            (r.id, r.status, r.quality, r.roof_type, json.dumps(r.attributes), polyhedral_wkt(r))
-            for r in rows
-        ],
-    )
-    cursor.executemany(
-        f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, %s, {geometry})",
-        [roof for row in rows for roof in roof_rows(row)],
-    )
+    def name(self, ending: str) -> str:
+        return f"{self.prefix}_{ending}"
 
+    def load(
+        self,
+        stack: ExitStack,
+        buildings: Iterable[Described],
+        units: FileUnits,
+        damaged: Damaged,
+    ) -> int:
+        """Load the run; returns its number of buildings."""
+        self.cursor.execute("select pg_advisory_xact_lock(%s, hashtext(%s))", (LOCKS, self.prefix))
+        self.refuse_other_runs()
+        waiting = [
+            WaitingRows(table.layer, stack.enter_context(tempfile.TemporaryFile()))  # noqa: SIM115
+            for table in POSTGIS_TABLES
+        ]
+        count = collect_rows(waiting, buildings, units, damaged)
+        if self.run.replace:
+            self.drop_tables()
+        for table, rows in zip(POSTGIS_TABLES, waiting, strict=True):
+            self.fill_table(table, rows)
+        self.note_run()
+        return count
 
-def insert_parts(
-    cursor: Any, parts: Iterable[Sequence[tuple]], loaded: set[str], table: str, srid: int
-) -> None:
-    """Insert the rows of parts whose building is among those `loaded`."""
-    columns = [attribute.name for attribute in PARTS_LAYER]
-    values = ", ".join(["%s"] * len(columns))
-    sql = (
-        f"insert into {table} ({', '.join(columns)}, geom) values ({values}, "
-        f"ST_SetSRID(%s::geometry, {srid}))"
-    )
-    for part in parts:
-        cursor.executemany(
-            sql, [tuple(map(convert_value, row)) for row in part if row[0] in loaded]
+    def refuse_other_runs(self) -> None:
+        """Raise OutputError where the tables hold a run that would be lost, or one of this name
+        from another folder.
+        """
+        if self.run.replace or not self.table_exists("buildings"):
+            return
+        others = self.list_runs()
+        own = (self.run.name, self.run.folder)
+        clashing = [other for other in others if other[0] == own[0] and other != own]
+        lost = [] if self.run.append else [other for other in others if other != own]
+        if not (clashing or lost):
+            return
+        name, folder = (clashing or lost)[0]
+        tables = f"the tables {self.prefix}_*"
+        if self.run.append:
+            advice = "name this run with --run, or replace all runs with --replace"
+        else:
+            advice = "pass --replace to replace it, --append to keep both, or another --prefix"
+        raise OutputError(
+            f"expected {tables} to hold this run or none, got the run {name} of {folder}; {advice}"
         )
 
+    def list_runs(self) -> list[tuple[str, str]]:
+        """(name, folder) of every run in the tables; of those that no load noted, one without a
+        name.
+        """
+        if not self.table_exists("runs"):
+            return [("without a name", "another program")]
+        self.cursor.execute(f"select run, folder from {self.name('runs')} order by run")
+        return list(self.cursor.fetchall())
 
-def convert_value(value: Any) -> Any:
-    """A value of a table as the database takes it; NaN, which stands for what is not known, as
-    null."""
-    value = value.item() if isinstance(value, np.generic) else value
-    return None if isinstance(value, float) and math.isnan(value) else value
+    def table_exists(self, ending: str) -> bool:
+        self.cursor.execute("select to_regclass(%s) is not null", (self.name(ending),))
+        return bool(self.cursor.fetchone()[0])
+
+    def drop_tables(self) -> None:
+        names = ", ".join(self.name(t.ending) for t in reversed(POSTGIS_TABLES))
+        self.cursor.execute(f"drop table if exists {names}, {self.name('runs')}")
+
+    def fill_table(self, table: PostgisTable, rows: WaitingRows) -> None:
+        """Make the table or the columns that it lacks, and replace this run's rows in it."""
+        kinds = rows.kinds(PREFIX)
+        names = column_names([cut_name(name) for name in kinds], OWN_COLUMNS)
+        columns = dict(zip(names, kinds.values(), strict=True))
+        if self.table_exists(table.ending):
+            columns = self.widen_table(table, columns)
+        else:
+            self.refuse_too_many(table, len(columns) + len(OWN_COLUMNS))
+            self.make_table(table, columns)
+        self.copy_rows(table, rows, kinds, columns)
+
+    def make_table(self, table: PostgisTable, columns: dict[str, type]) -> None:
+        name, key = self.name(table.ending), ", ".join(table.key)
+        defined = "".join(f", {quote(c)} {POSTGRES_TYPES[kind]}" for c, kind in columns.items())
+        self.cursor.execute(
+            f"create table {name} (run text not null{defined}, "
+            f"geom geometry({table.geometry}, {self.run.srid}), primary key (run, {key}))"
+        )
+        self.cursor.execute(f"create index {name}_geom on {name} using gist (geom)")
+        if "type" in columns:
+            self.cursor.execute(f"create index {name}_type on {name} (type)")
+
+    def widen_table(self, table: PostgisTable, columns: dict[str, type]) -> dict[str, type]:
+        """Remove this run's rows, add the columns that a table lacks, and give one type to those of
+        two; returns the columns as the table has them.
+        """
+        name = self.name(table.ending)
+        self.cursor.execute(f"delete from {name} where run = %s", (self.run.name,))
+        self.settle_srid(table, name)
+        present, used = self.read_columns(name)
+        additions = {c: kind for c, kind in columns.items() if c not in present}
+        self.refuse_too_many(table, used + len(additions))
+        changes = [f"add column {quote(c)} {POSTGRES_TYPES[kind]}" for c, kind in additions.items()]
+        for c, kind in columns.items():
+            common = column_kind({kind, present.get(c, kind)}, "text")
+            if c in present and common is not present[c]:
+                sql_type = POSTGRES_TYPES[common]
+                changes.append(
+                    f"alter column {quote(c)} type {sql_type} using {quote(c)}::{sql_type}"
+                )
+            columns[c] = common
+        if changes:
+            self.cursor.execute(f"alter table {name} {', '.join(changes)}")
+        return columns
+
+    def read_columns(self, name: str) -> tuple[dict[str, type], int]:
+        """The columns of a table with their types, and how many it has ever had."""
+        self.cursor.execute(
+            "select attname, format_type(atttypid, null), attisdropped from pg_attribute "
+            "where attrelid = %s::regclass and attnum > 0",
+            (name,),
+        )
+        rows = self.cursor.fetchall()
+        return {c: KIND_OF_TYPE.get(t, str) for c, t, dropped in rows if not dropped}, len(rows)
+
+    def settle_srid(self, table: PostgisTable, name: str) -> None:
+        """Give the run's reference system to an empty table. Raises OutputError for one that holds
+        runs in another.
+        """
+        self.cursor.execute("select Find_SRID(current_schema()::text, %s, 'geom')", (name,))
+        (srid,) = self.cursor.fetchone()
+        if srid == self.run.srid:
+            return
+        self.cursor.execute(f"select exists (select from {name})")
+        if self.cursor.fetchone()[0]:
+            raise OutputError(
+                f"expected a run in EPSG:{srid} as those in {name}, got one in "
+                f"EPSG:{self.run.srid}; choose another --prefix"
+            )
+        kind = f"geometry({table.geometry}, {self.run.srid})"
+        self.cursor.execute(f"alter table {name} alter column geom type {kind}")
+
+    def refuse_too_many(self, table: PostgisTable, columns: int) -> None:
+        if columns > MOST_POSTGRES_COLUMNS:
+            raise OutputError(
+                f"expected at most {MOST_POSTGRES_COLUMNS} columns in {self.name(table.ending)}, "
+                f"which is PostgreSQL's limit, got {columns}; choose another --prefix, or give the "
+                "footprints fewer attributes"
+            )
+
+    def copy_rows(
+        self,
+        table: PostgisTable,
+        rows: WaitingRows,
+        kinds: dict[str, type],
+        columns: dict[str, type],
+    ) -> None:
+        """Send the rows; `kinds` are their values by name, `columns` those of the table in the same
+        order.
+        """
+        names = ", ".join(map(quote, ("run", *columns, "geom")))
+        with self.cursor.copy(f"copy {self.name(table.ending)} ({names}) from stdin") as copy:
+            for batch in rows.batches():
+                for wkb, values in batch:
+                    sent = [
+                        None if (value := values.get(name)) is None else kind(value)
+                        for name, kind in zip(kinds, columns.values(), strict=True)
+                    ]
+                    place = None if wkb is None else encode_place(wkb, self.run.srid)
+                    copy.write_row((self.run.name, *sent, place))
+
+    def note_run(self) -> None:
+        """Say in PREFIX_runs which run the tables hold now."""
+        name = self.name("runs")
+        self.cursor.execute(
+            f"create table if not exists {name} (run text primary key, folder text)"
+        )
+        self.cursor.execute(f"delete from {name} where run = %s", (self.run.name,))
+        self.cursor.execute(f"insert into {name} values (%s, %s)", (self.run.name, self.run.folder))
 
 
-def roof_rows(row: DatabaseRow) -> Iterator[tuple]:
-    """A row a roof surface: (building, number, part, type, slope, azimuth, area, WKT)."""
-    if row.solid is None:
-        return
-    for number, face in enumerate(row.solid.select_faces(ROOF)):
-        rings = [row.solid.vertices[list(ring)] for ring in face.rings]
-        wkt = f"POLYGON Z {rings_wkt([row.units.from_metres(ring) for ring in rings])}"
-        yield (row.id, number, face.part, row.part_types.get(face.part), *measure_plane(rings), wkt)
+def collect_rows(
+    waiting: list[WaitingRows],
+    buildings: Iterable[Described],
+    units: FileUnits,
+    damaged: Damaged,
+) -> int:
+    """Put the rows of all buildings where they wait; returns how many buildings."""
+    visited: set[str] = set()
+    for described in buildings:
+        id = plain_text(described.building.id)
+        if id in visited:
+            damaged(InputError(f"expected buildings of different ids, got {id!r:.80} again"))
+            continue
+        visited.add(id)
+        lines = split_lines(database_rows(described, units).to_text())
+        for rows in waiting:
+            rows.put(lines[rows.layer])
+    return len(visited)
 
 
-def measure_plane(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
-    """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat), true area
-    (m2) of rings in metres."""
-    normal = np.sum([ring_normal(ring) for ring in rings], axis=0)
-    area = float(np.linalg.norm(normal))
-    slope = float(np.degrees(np.arctan2(np.hypot(*normal[:2]), abs(normal[2]))))
-    azimuth = (
-        float(np.degrees(np.arctan2(normal[0], normal[1])) % 360)
-        if slope >= FLAT_SLOPE_DEG
-        else None
-    )
-    return slope, azimuth, area
+def database_rows(described: Described, units: FileUnits) -> Rows:
+    """The rows of a building as the GeoPackage has them, with its solid in place of its outline."""
+    building, figures, attributes = described
+    rows = table_rows(building, figures, attributes, units.table)
+    solid = None if building.built is None else polyhedral_wkb(building.solid, units.table)
+    return rows._replace(buildings=tuple((solid, values) for _, values in rows.buildings))
 
 
-def polyhedral_wkt(row: DatabaseRow) -> str | None:
-    """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None
-    without one."""
-    if row.solid is None:
-        return None
-    places = row.units.from_metres(row.solid.vertices)
-    triangles = [
-        places[t] for face in faces_triangles(row.solid.vertices, row.solid.faces) for t in face
+def polyhedral_wkb(solid: Solid, units: Units) -> bytes:
+    """The shell as triangles over the solid's own vertices, so that neighbours stay joined."""
+    places = np.round(units.from_metres(solid.vertices), 4)
+    triangles = np.concatenate(faces_triangles(solid.vertices, solid.faces))
+    rows = np.zeros(len(triangles), TRIANGLE_WKB)
+    rows["order"], rows["type"], rows["rings"], rows["points"] = 1, WKB_POLYGON_Z, 1, 4
+    rows["xyz"] = places[triangles[:, [0, 1, 2, 0]]]
+    return struct.pack("<BII", 1, WKB_POLYHEDRAL_Z, len(rows)) + rows.tobytes()
+
+
+TRIANGLE_WKB = np.dtype(
+    [
+        ("order", "u1"),
+        ("type", "<u4"),
+        ("rings", "<u4"),
+        ("points", "<u4"),
+        ("xyz", "<f8", (4, 3)),
     ]
-    return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt([t]) for t in triangles)})"
+)
 
 
-def rings_wkt(rings: list[np.ndarray]) -> str:
-    closed = (np.vstack([ring, ring[:1]]) for ring in rings)
-    return (
-        "("
-        + ", ".join(
-            "(" + ", ".join(f"{x:.4f} {y:.4f} {z:.4f}" for x, y, z in ring) + ")" for ring in closed
-        )
-        + ")"
-    )
+def encode_place(wkb: bytes, srid: int) -> str:
+    """Little-endian WKB as hexadecimal EWKB of a reference system, a polygon in plan as several."""
+    order, kind = struct.unpack_from("<BI", wkb)
+    if kind == WKB_POLYGON:
+        kind, wkb = WKB_MULTIPOLYGON, struct.pack("<BII", 1, WKB_MULTIPOLYGON, 1) + wkb
+    return (struct.pack("<BII", order, kind | WKB_HAS_SRID, srid) + wkb[5:]).hex()
+
+
+def quote(name: str) -> str:
+    """A column's name in SQL."""
+    return '"' + name.replace('"', '""') + '"'
+
+
+def cut_name(name: str) -> str:
+    """A column's name as long as PostgreSQL allows, with room for a number.
+
+    >>> len(cut_name("é" * 60).encode())
+    58
+    """
+    return name.encode()[: MOST_NAME_BYTES - 4].decode(errors="ignore") or "column"

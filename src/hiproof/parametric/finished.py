@@ -1,0 +1,222 @@
+"""Finished models, building by building: of a run's folder, of a parameters.jsonl, or of CityJSON
+and CityGML of any maker.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import HiproofError, InputError
+from ..evaluate.metrics import plan_outline
+from ..evaluate.models import BuildingModel, read_models, run_models
+from ..evaluate.run import run_crs, run_record
+from ..formats import FORMATS
+from ..frames import LocalFrame
+from ..geometry.rings import repair_polygons, ring_normal, ring_normals
+from ..model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Roof, Solid
+from ..read.cityjson import documents, reference_system
+from ..read.crs import find_units, parse_crs
+from ..read.damage import Damaged, refuse
+from ..read.solids import CITYGML_SUFFIXES, find_citygml_crs, read_solids
+from ..settings import ComposeSettings
+from ..status import Status
+from ..write.building_attributes import building_attributes, measure_figures
+from ..write.described import Described
+from ..write.head import FileHead
+from ..write.run_files import measure_or_drop_solid
+from ..write.values import plain, plain_text
+from .building import build
+from .file import DAMAGED, HEAD_KEY, opened_parameters
+
+# Share of a face's area that plan shows. A face that shows less is upright: rounded coordinates
+# tilt a wall by some 1e-4.
+PLAN_SHARE_UPRIGHT = 0.001
+
+
+@dataclass(frozen=True)
+class Run:
+    """Finished models, read one by one while you iterate: `for building in run`.
+
+    `path` is the file that they come from. `head` tells their CRS, units and settings. `record` is
+    the content of run.json, empty where there is none.
+    """
+
+    path: Path
+    head: FileHead
+    record: dict[str, Any]
+
+    @property
+    def crs(self) -> Any:
+        """The CRS (pyproj) of the models, None where it is unknown."""
+        return self.head.crs
+
+    def __iter__(self) -> Iterator[Building]:
+        return (described.building for described in self.describe())
+
+    def describe(self, damaged: Damaged = refuse) -> Iterator[Described]:
+        """Yield every building with what files tell of it; those that cannot be read or built are
+        told to `damaged`, which refuses the run by default, and left out.
+        """
+        if is_parameters(self.path):
+            return describe_parametric(self.path, self.head, damaged)
+        return describe_solids(self.path, self.head, damaged)
+
+
+def open_run(path: str | os.PathLike, crs: Any = None) -> Run:
+    """Open the models of a run's folder, or of a file: parameters.jsonl, CityJSON, CityJSONSeq or
+    CityGML.
+
+    `crs` (anything pyproj understands) replaces the CRS that they name. Buildings are read when you
+    iterate over the run, so that one is in memory at a time. Those of a parameters.jsonl, which
+    every run has, are composed again and have parts with parameters; others have a solid alone.
+    Raises InputError for what holds no models.
+    """
+    path = Path(path)
+    record = run_record(path) if path.is_dir() else {}
+    file = path / FORMATS["parameters"].file
+    if not path.is_dir():
+        file = path
+    elif not file.is_file():
+        file = run_models(path)
+    head = read_file_head(file, record)
+    return Run(file, head if crs is None else dataclasses.replace(head, crs=parse_crs(crs)), record)
+
+
+def read_file_head(file: Path, record: dict[str, Any]) -> FileHead:
+    """What a file tells of its models, the CRS by `record` where it names none."""
+    if is_parameters(file):
+        with opened_parameters(file) as (head, _):
+            return head
+    if file.suffix.lower() in CITYGML_SUFFIXES:
+        name = find_citygml_crs(file)
+    else:
+        name = reference_system(next(documents(file))[0])
+    return FileHead(parse_crs(name) if name else run_crs(record))
+
+
+def is_parameters(file: Path) -> bool:
+    """Whether a file begins as a parameters.jsonl does."""
+    try:
+        with file.open(encoding="utf-8-sig") as lines:
+            return HEAD_KEY in lines.readline(200)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def describe_parametric(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Described]:
+    """Yield the buildings of a parameters.jsonl, each composed."""
+    with opened_parameters(path, damaged) as (_, records):
+        for record in records:
+            if record is DAMAGED:
+                continue
+            try:
+                building, figures = measure_or_drop_solid(build(record, head.compose))
+            except HiproofError as error:
+                damaged(InputError(f"building {record['id']:.80} in {path}: {error}"))
+                continue
+            attributes = building_attributes(
+                building, figures, head.prefix, head.units.gml, head.write.osm_tags
+            )
+            yield Described(building, figures, attributes)
+
+
+def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Described]:
+    """Yield the buildings of a file of solids, with the attributes that stand there."""
+    for model in read_solid_models(path, head, damaged):
+        if model.is_damaged:
+            continue
+        try:
+            building = make_building(model)
+            figures = measure_figures(building)
+        except (ValueError, shapely.GEOSException) as error:
+            damaged(InputError(f"expected a solid of {model.id:.80} in {path}, got: {error}"))
+            continue
+        yield Described(building, figures, building.attributes)
+
+
+def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[BuildingModel]:
+    if path.suffix.lower() in CITYGML_SUFFIXES:
+        return (BuildingModel(id, {}, solid) for id, solid in read_solids(path, damaged))
+    units = find_units(head.crs) if head.crs is not None else head.units.cityjson
+    return read_models(path, units, damaged=damaged, must_be_valid=True)
+
+
+def make_building(model: BuildingModel) -> Building:
+    """The building of a model of unknown parameters: a part of its roof has a piece for each of its
+    faces.
+    """
+    attributes = {plain_text(name): plain(value) for name, value in model.attributes.items()}
+    code = model.status.upper()
+    status = Status[code] if code in Status.__members__ else Status.MODELLED
+    if model.solid is None:
+        return Building(model.id, status, attributes=attributes)
+    named = name_faces(model.solid)
+    types = [model.part_types.get(k, model.roof_type) for k in list_parts(named)]
+    solid = number_parts(named)
+    roof, z_ground = trace_roof(solid, types), float(solid.vertices[:, 2].min())
+    built = Model(roof, solid, ComposeSettings())
+    return Building(model.id, status, built=built, z_ground=z_ground, attributes=attributes)
+
+
+def name_faces(solid: Solid) -> Solid:
+    """The solid with faces that look up as its roof and faces that look down as its ground, where
+    the file names no roof.
+    """
+    if solid.select_faces(ROOF):
+        return solid
+    normals = ring_normals([solid.vertices[list(face.rings[0])] for face in solid.faces])
+    up = normals[:, 2] / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)
+    sloping = np.where(up > 0, ROOF, GROUND)
+    kinds = np.where(np.abs(up) > PLAN_SHARE_UPRIGHT, sloping, WALL).tolist()
+    faces = (
+        Face(face.rings, kind, 0 if kind == ROOF else -1)
+        for face, kind in zip(solid.faces, kinds, strict=True)
+    )
+    return dataclasses.replace(solid, faces=tuple(faces))
+
+
+def list_parts(solid: Solid) -> list[int]:
+    return sorted({face.part for face in solid.select_faces(ROOF)})
+
+
+def number_parts(solid: Solid) -> Solid:
+    """The solid with its roof's parts numbered from 0 on, without gaps."""
+    number = {part: k for k, part in enumerate(list_parts(solid))}
+    faces = (
+        dataclasses.replace(face, part=number[face.part] if face.kind == ROOF else -1)
+        for face in solid.faces
+    )
+    return dataclasses.replace(solid, faces=tuple(faces))
+
+
+def trace_roof(solid: Solid, types: list[str]) -> Roof:
+    """The roof of a solid, its parts of these `types`, from its faces."""
+    frame = LocalFrame(np.floor(solid.vertices.min(axis=0)))
+    local = solid.move(-frame.origin)
+    faces = local.select_faces(ROOF)
+    pieces = [[trace_piece(local, f) for f in faces if f.part == k] for k in range(len(types))]
+    parts = tuple(
+        Part(kind, tuple(piece for piece in of_part if piece is not None))
+        for kind, of_part in zip(types, pieces, strict=True)
+    )
+    return Roof(parts, plan_outline(local), frame)
+
+
+def trace_piece(solid: Solid, face: Face) -> Piece | None:
+    """The piece of a roof that a face is, None of an upright one."""
+    ring = solid.vertices[list(face.rings[0])]
+    normal = ring_normal(ring)
+    if abs(normal[2]) <= PLAN_SHARE_UPRIGHT * np.linalg.norm(normal):
+        return None
+    a, b = -normal[:2] / normal[2]
+    x, y, z = ring.mean(axis=0)
+    outline = repair_polygons(solid.project_face(face))
+    return Piece(outline, np.array([[a, b, z - a * x - b * y]]))

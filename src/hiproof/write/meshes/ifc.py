@@ -1,0 +1,261 @@
+"""IFC4X3: an IfcBuilding with a faceted body, a property set and the CRS of its site (needs
+ifcopenshell).
+
+Coordinates are metres about an origin that IfcMapConversion places in the CRS. Names of properties
+are those of all other formats.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...extras import import_extra
+from ...frames import Units
+from ...model import Face
+from ..colours import srgb
+from .viewed import Look, ViewedModel, merge_values
+
+IFC_SCHEMA = "IFC4X3"
+PROPERTY_SET = "hiproof"
+# of names made of ids, so that the same building has the same one in every file
+NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
+FIXED_TIME = "2000-01-01T00:00:00"  # in place of the clock's, for files that do not depend on it
+PRECISION_M = 1e-4  # of coordinates, as all formats have them
+
+IFC_VALUES = {str: "IfcText", float: "IfcReal", int: "IfcInteger", bool: "IfcBoolean"}
+
+
+def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None = None) -> int:
+    """Write `buildings` to `path`; returns how many.
+
+    The file is made in memory. Raises InputError where ifcopenshell is missing, OutputError when
+    the file cannot be written.
+    """
+    from ..files import atomic_file
+
+    model = IfcModel(import_extra("ifcopenshell", "ifc", "IFC"))
+    for building in buildings:
+        model.add(building)
+    model.finish(crs)
+    with atomic_file(path) as file:
+        file.write(model.file.to_string().encode())
+    return len(model.buildings)
+
+
+class IfcModel:
+    """The file as it grows: a project with a site, whose buildings are added one by one."""
+
+    def __init__(self, ifcopenshell: Any) -> None:
+        self.guid = ifcopenshell.guid
+        self.file = ifcopenshell.file(schema=IFC_SCHEMA)
+        self.file.header.file_name.time_stamp = FIXED_TIME
+        self.file.header.file_name.originating_system = "hiproof"
+        self.buildings: list[Any] = []
+        self.styles: dict[Look, Any] = {}
+        self.origin: np.ndarray | None = None
+        axes = self.make("IfcAxis2Placement3D", Location=self.point(np.zeros(3)))
+        self.context = self.make(
+            "IfcGeometricRepresentationContext",
+            ContextType="Model",
+            CoordinateSpaceDimension=3,
+            Precision=PRECISION_M,
+            WorldCoordinateSystem=axes,
+        )
+        self.body = self.make(
+            "IfcGeometricRepresentationSubContext",
+            ContextIdentifier="Body",
+            ContextType="Model",
+            ParentContext=self.context,
+            TargetView="MODEL_VIEW",
+        )
+        self.placement = self.make("IfcLocalPlacement", RelativePlacement=axes)
+
+    def make(self, kind: str, *ordered: Any, **values: Any) -> Any:
+        return self.file.create_entity(kind, *ordered, **values)
+
+    def make_rooted(self, kind: str, key: str, **values: Any) -> Any:
+        """An entity whose GlobalId follows from its kind and `key`."""
+        name = uuid.uuid5(NAMESPACE, f"{kind} {key}")
+        return self.make(kind, GlobalId=self.guid.compress(name.hex), **values)
+
+    def point(self, place: np.ndarray) -> Any:
+        return self.make("IfcCartesianPoint", Coordinates=np.round(place, 4).tolist())
+
+    def add(self, model: ViewedModel) -> None:
+        """Add a building with its body and its properties."""
+        if self.origin is None:
+            self.origin = np.floor(model.solid.vertices.min(axis=0))
+        key = f"{len(self.buildings)} {model.id}"
+        shape = self.make(
+            "IfcShapeRepresentation",
+            ContextOfItems=self.body,
+            RepresentationIdentifier="Body",
+            RepresentationType="Brep",
+            Items=[self.make_body(model)],
+        )
+        building = self.make_rooted(
+            "IfcBuilding",
+            key,
+            Name=model.id,
+            ObjectType=model.roof_type,
+            ObjectPlacement=self.make(
+                "IfcLocalPlacement",
+                PlacementRelTo=self.placement,
+                RelativePlacement=self.placement.RelativePlacement,
+            ),
+            Representation=self.make("IfcProductDefinitionShape", Representations=[shape]),
+            CompositionType="ELEMENT",
+        )
+        self.buildings.append(building)
+        self.add_properties(building, key, model)
+
+    def make_body(self, model: ViewedModel) -> Any:
+        """The closed shell of a solid, its faces coloured by kind and roof type."""
+        points = [self.point(place) for place in model.solid.vertices - self.origin]
+        faces = []
+        for look, members in model.faces_by_look().items():
+            for face in members:
+                faces.append(self.make_face(face, points))
+                self.make("IfcStyledItem", Item=faces[-1], Styles=[self.style(look)])
+        return self.make("IfcFacetedBrep", Outer=self.make("IfcClosedShell", CfsFaces=faces))
+
+    def make_face(self, face: Face, points: list[Any]) -> Any:
+        bounds = [
+            self.make(
+                "IfcFaceBound" if number else "IfcFaceOuterBound",
+                Bound=self.make("IfcPolyLoop", Polygon=[points[vertex] for vertex in ring]),
+                Orientation=True,
+            )
+            for number, ring in enumerate(face.rings)
+        ]
+        return self.make("IfcFace", Bounds=bounds)
+
+    def style(self, look: Look) -> Any:
+        """The surface style of a look, made once."""
+        if look not in self.styles:
+            red, green, blue = srgb(look.colour)
+            colour = self.make("IfcColourRgb", Red=red, Green=green, Blue=blue)
+            shading = self.make("IfcSurfaceStyleShading", SurfaceColour=colour)
+            self.styles[look] = self.make(
+                "IfcSurfaceStyle", Name=look.name, Side="BOTH", Styles=[shading]
+            )
+        return self.styles[look]
+
+    def add_properties(self, building: Any, key: str, model: ViewedModel) -> None:
+        """Add the attributes of a building, those that are known."""
+        members = {"id": model.id, "roof_type": model.roof_type}
+        values = merge_values(members, model.attributes)
+        properties = [
+            self.make("IfcPropertySingleValue", Name=name, NominalValue=self.make_value(value))
+            for name, value in values.items()
+            if value is not None
+        ]
+        related = self.make_rooted(
+            "IfcPropertySet", key, Name=PROPERTY_SET, HasProperties=properties
+        )
+        self.make_rooted(
+            "IfcRelDefinesByProperties",
+            key,
+            RelatedObjects=[building],
+            RelatingPropertyDefinition=related,
+        )
+
+    def make_value(self, value: Any) -> Any:
+        kind = IFC_VALUES.get(type(value), "IfcText")
+        return self.make(kind, value if type(value) in IFC_VALUES else json.dumps(value))
+
+    def finish(self, crs: str | None) -> None:
+        """Add what holds the buildings: project, site, units and the place of the origin."""
+        metre, square, cube, radian = (
+            self.make("IfcSIUnit", UnitType=kind, Name=name)
+            for kind, name in (
+                ("LENGTHUNIT", "METRE"),
+                ("AREAUNIT", "SQUARE_METRE"),
+                ("VOLUMEUNIT", "CUBIC_METRE"),
+                ("PLANEANGLEUNIT", "RADIAN"),
+            )
+        )
+        units = self.make("IfcUnitAssignment", Units=[metre, square, cube, radian])
+        project = self.make_rooted(
+            "IfcProject",
+            "",
+            Name="hiproof",
+            RepresentationContexts=[self.context],
+            UnitsInContext=units,
+        )
+        site = self.make_rooted("IfcSite", "", ObjectPlacement=self.placement)
+        self.add_parts(project, [site])
+        if self.buildings:
+            self.add_parts(site, self.buildings)
+        if crs is not None:
+            self.place_in_crs(crs, metre)
+
+    def add_parts(self, whole: Any, parts: list[Any]) -> None:
+        self.make_rooted(
+            "IfcRelAggregates", whole.is_a(), RelatingObject=whole, RelatedObjects=parts
+        )
+
+    def place_in_crs(self, crs: str, metre: Any) -> None:
+        """Say where the origin lies in the CRS, in its own units."""
+        from pyproj import CRS
+
+        from ...read.crs import find_units
+
+        units = find_units(CRS(crs))
+        origin = units.from_metres(np.zeros(3) if self.origin is None else self.origin)
+        projected = self.make(
+            "IfcProjectedCRS",
+            Name=crs_name(crs),
+            Description=CRS(crs).name,
+            MapUnit=metre if units.are_metres else self.make_unit(units, metre),
+        )
+        kind, scales = scale_axes(units)
+        self.make(
+            kind,
+            SourceCRS=self.context,
+            TargetCRS=projected,
+            Eastings=float(origin[0]),
+            Northings=float(origin[1]),
+            OrthogonalHeight=float(origin[2]),
+            **scales,
+        )
+
+    def make_unit(self, units: Units, metre: Any) -> Any:
+        """The unit of a plan that does not count in metres."""
+        length = self.make("IfcDimensionalExponents", 1, 0, 0, 0, 0, 0, 0)
+        factor = self.make(
+            "IfcMeasureWithUnit",
+            ValueComponent=self.make("IfcLengthMeasure", units.plan),
+            UnitComponent=metre,
+        )
+        return self.make(
+            "IfcConversionBasedUnit",
+            Dimensions=length,
+            UnitType="LENGTHUNIT",
+            Name=units.plan_name,
+            ConversionFactor=factor,
+        )
+
+
+def scale_axes(units: Units) -> tuple[str, dict[str, float]]:
+    """The entity that takes metres to a CRS of these units, and its scales."""
+    plan, height = 1 / units.plan, 1 / units.height
+    if plan == height:
+        return "IfcMapConversion", {"Scale": plan}
+    return "IfcMapConversionScaled", {"FactorX": plan, "FactorY": plan, "FactorZ": height}
+
+
+def crs_name(crs: str) -> str:
+    """The name by which IFC knows a CRS: "EPSG:28992" of the plan where it has a code."""
+    from pyproj import CRS
+
+    from ...read.crs import epsg_code, horizontal_crs
+
+    code = epsg_code(CRS(crs)) or epsg_code(horizontal_crs(CRS(crs)))
+    return CRS(crs).name if code is None else f"EPSG:{code}"

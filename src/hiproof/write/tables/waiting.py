@@ -1,0 +1,101 @@
+"""Rows of a table that wait until the last building has settled the type of every column."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from typing import Any, BinaryIO
+
+from ..attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, ROOFER, SURFACES_LAYER
+from .rows import Row
+
+DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
+ROWS_AT_ONCE = 1000  # rows handed on at once: the overhead is a call's, the memory a row's
+
+
+class WaitingRows:
+    """Rows of one table in a temporary file, as the text that their buildings brought, and the
+    types found in each column.
+    """
+
+    def __init__(self, layer: str, file: BinaryIO) -> None:
+        self.layer, self.file = layer, file
+        self.found: dict[str, set[type]] = {a.name: set() for a in DECLARED.get(layer, ())}
+
+    def put(self, line: bytes) -> None:
+        """A building's rows, as a line of `Rows.to_text`."""
+        for _, values in json.loads(line):
+            for name, value in values.items():
+                self.found.setdefault(name, set()).add(classify_value(value))
+        self.file.write(line + b"\n")
+
+    def kinds(self, prefix: str, limit: int | None = None) -> dict[str, type]:
+        """The one type of every column; of more than `limit`, the last of the input's own are left
+        out.
+        """
+        declared = {
+            start + a.name: a.kind
+            for start, table in ((prefix, ROOFER), (OWN, HIPROOF), ("", OSM))
+            for a in table
+        }
+        declared = (
+            {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
+        )
+        kinds = {
+            name: column_kind(result, declared.get(name, "text"))
+            for name, result in self.found.items()
+        }
+        excess = len(kinds) - (limit or len(kinds))
+        if excess > 0:
+            selected_kinds = [name for name in kinds if name not in declared and name != "id"]
+            left_out = set(selected_kinds[-excess:])
+            kinds = {name: kind for name, kind in kinds.items() if name not in left_out}
+        return kinds or {"id": str}
+
+    def batches(self) -> Iterator[list[Row]]:
+        """The rows, some thousands at a time; one empty batch if there are none."""
+        self.file.seek(0)
+        rows = (
+            (wkb and bytes.fromhex(wkb), values)
+            for line in self.file
+            for wkb, values in json.loads(line)
+        )
+        yield list(islice(rows, ROWS_AT_ONCE))
+        while batch := list(islice(rows, ROWS_AT_ONCE)):
+            yield batch
+
+
+def classify_value(value: Any) -> type:
+    """bool, int, float, str or NoneType; whole numbers beyond 64 bits count as text."""
+    return str if type(value) is int and abs(value) >= 2**63 else type(value)
+
+
+def column_kind(result: set[type], declared: str) -> type:
+    """The one type that holds all values found; a figure that is always unknown stays what it is
+    `declared`.
+    """
+    kinds = result - {type(None)}
+    if not kinds:
+        return {"text": str, "count": int}.get(declared, float)
+    if len(kinds) == 1:
+        return kinds.pop()
+    return str if str in kinds else float if float in kinds else int
+
+
+def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str]:
+    """Names that SQLite, which does not tell upper from lower case, can hold beside the `reserved`
+    ones.
+
+    >>> column_names(["id", "Year", "year", "fid"], ["fid"])
+    ['id', 'Year', 'year_2', 'fid_2']
+    """
+    accepted, unique = set(reserved), []
+    for name in names:
+        candidate, number = name, 1
+        while candidate.lower() in accepted:
+            number += 1
+            candidate = f"{name}_{number}"
+        accepted.add(candidate.lower())
+        unique.append(candidate)
+    return unique

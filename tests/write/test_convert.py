@@ -1,0 +1,249 @@
+"""`hiproof convert`: every format from a run and from files, opened by programs that we did not
+write.
+"""
+
+import importlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import pytest
+import typer
+from lxml import etree
+
+import hiproof
+from hiproof.cli.convert import convert
+from hiproof.errors import InputError
+from hiproof.formats import CONVERTED, FORMATS
+from hiproof.parametric.run import build_file
+from hiproof.read.solids import read_solids
+from sample_parameters import write_parameters_of_each_kind
+
+SCHEMAS = Path(__file__).parents[3] / "shared" / "schemas"
+PARSER = {"no_network": True, "huge_tree": True}
+MODELLED = ["gable", "hip and tower", "yard"]  # the run has one more without a model, "lost"
+
+
+def reader(name):
+    return pytest.importorskip(name, reason=f"no {name} here: pip install 'hiproof[test]'")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The folder of a run of four buildings."""
+    folder = tmp_path_factory.mktemp("convert")
+    write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
+    build_file(folder / "given" / "parameters.jsonl", folder / "run")
+    return folder / "run"
+
+
+@pytest.fixture(scope="module")
+def volumes(run):
+    """The volume of each modelled building, m3."""
+    return {b.id: b.volume for b in hiproof.open_run(run) if b.built}
+
+
+@pytest.fixture(scope="module")
+def outputs(run, tmp_path_factory):
+    """A function that converts the run to a format once, and gives the path."""
+    folder = tmp_path_factory.mktemp("outputs")
+
+    def write(name):
+        if name in ("parquet", "parquet_parts", "parquet_surfaces"):
+            reader("pyarrow")
+        if name == "ifc":
+            reader("ifcopenshell")
+        path = folder / FORMATS[name].file
+        if not path.exists():
+            given = {"geoid_height": 43.2} if name == "3dtiles" else {}
+            convert(run, path, find_format(name), **given)
+        return path
+
+    return write
+
+
+def find_format(name):
+    return importlib.import_module("hiproof.cli.convert").FormatName(name)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in CONVERTED if FORMATS[name].fragment and "parquet" not in name]
+)
+def test_what_a_run_has_written_is_written_again_to_the_byte(name, run, outputs):
+    original = run / FORMATS[name].file
+    if not original.exists():
+        build_file(
+            run / "parameters.jsonl", run.parent / "other", changes={"write": {"citygml": "both"}}
+        )
+        original = run.parent / "other" / FORMATS[name].file
+    assert outputs(name).read_bytes() == original.read_bytes()
+
+
+def test_the_suffix_chooses_the_format(run, tmp_path):
+    for name, head in (("a.glb", b"glTF"), ("b.gml", b"<?xml"), ("c.city.json", b'{"type"')):
+        convert(run, tmp_path / name)
+        assert (tmp_path / name).read_bytes().startswith(head)
+    with pytest.raises(InputError, match=r"one of \.gml, .*got .*a\.doc; or pass --format"):
+        convert(run, tmp_path / "a.doc")
+
+
+def test_a_file_of_the_run_is_not_replaced_without_a_name(run):
+    with pytest.raises(InputError, match=r"buildings\.gml is there already"):
+        convert(run, None, find_format("citygml2"))
+
+
+@pytest.mark.parametrize("name", ["cityjson", "cityjsonseq"])
+def test_cjio_opens_cityjson(outputs, name):
+    """In a process of its own, because it changes how all of a process writes numbers in JSON."""
+    reader("cjio")
+    source = "stdin" if name == "cityjsonseq" else str(outputs(name))
+    command = [sys.executable, "-c", "from cjio.cjio import cli; cli()", source, "info"]
+    with outputs(name).open() as file:
+        done = subprocess.run(command, stdin=file, capture_output=True, text=True, check=True)
+    told = "".join(done.stdout.split())
+    assert "CityJSONversion=2.0" in told and "EPSG=7415" in told and "Building(4)" in told
+
+
+@pytest.mark.parametrize(("name", "root"), [("citygml2", "citygml2"), ("citygml3", "citygml3")])
+def test_citygml_is_valid_by_its_schema(outputs, name, root):
+    path = SCHEMAS / root / "CityGML.xsd"
+    if not path.exists():
+        pytest.skip(f"needs the schema {path}")
+    schema = etree.XMLSchema(etree.parse(path, etree.XMLParser(**PARSER)))
+    schema.assertValid(etree.parse(outputs(name), etree.XMLParser(**PARSER)))
+
+
+@pytest.mark.parametrize("name", ["citygml2", "citygml3"])
+def test_gdal_opens_citygml(outputs, name):
+    layers = pyogrio.list_layers(outputs(name))[:, 0]
+    assert "Building" in layers
+    assert len(pyogrio.raw.read(outputs(name), layer="Building", read_geometry=False)[1] or []) in (
+        0,
+        4,
+    )
+
+
+@pytest.mark.parametrize(("name", "count"), [("gpkg", 4), ("parquet", 4), ("fgb", 3)])
+def test_geopandas_opens_the_outlines(outputs, name, count):
+    """FlatGeobuf has no rows without an outline."""
+    geopandas = reader("geopandas")
+    if name == "parquet":
+        frame = geopandas.read_parquet(outputs(name))
+    else:
+        frame = geopandas.read_file(outputs(name), layer="buildings")
+    frame = frame.set_index("id")
+    assert len(frame) == count and frame.crs.to_epsg() == 28992
+    assert frame.geometry["gable"].area == 96.0 and frame.geometry["yard"].area == 88.0
+    assert frame["hiproof_roof_type"]["gable"] == "gable" and frame["year"]["yard"] == 1905
+
+
+@pytest.mark.parametrize("name", ["glb", "stl"])
+def test_trimesh_opens_closed_meshes(outputs, volumes, name):
+    trimesh = reader("trimesh")
+    mesh = trimesh.load(outputs(name), force="mesh")
+    mesh.merge_vertices(merge_norm=True, merge_tex=True)
+    parts = mesh.split(only_watertight=True)
+    assert sorted(part.volume for part in parts) == pytest.approx(
+        sorted(volumes.values()), rel=1e-4
+    )
+
+
+def test_trimesh_opens_obj(outputs, volumes):
+    trimesh = reader("trimesh")
+    mesh = trimesh.load(outputs("obj"), force="mesh")
+    mesh.merge_vertices(merge_norm=True, merge_tex=True)
+    assert mesh.volume == pytest.approx(sum(volumes.values()), rel=1e-4)
+
+
+def test_tiles_are_valid_by_the_schema_and_trimesh_opens_them(outputs, volumes, monkeypatch):
+    trimesh = reader("trimesh")
+    folder = outputs("3dtiles")
+    (tile,) = folder.glob("tiles/*.glb")
+    mesh = trimesh.load(tile, force="mesh")
+    assert abs(mesh.volume) == pytest.approx(sum(volumes.values()), rel=2e-3)  # the map's scale
+    if not (SCHEMAS / "3dtiles" / "validate.py").exists():
+        pytest.skip(f"needs the schemas of 3D Tiles 1.1 in {SCHEMAS}")
+    monkeypatch.syspath_prepend(SCHEMAS / "3dtiles")
+    importlib.import_module("validate").check(folder / "tileset.json")
+
+
+def test_ifcopenshell_opens_valid_buildings(outputs, volumes):
+    ifcopenshell = reader("ifcopenshell")
+    for name in ("validate", "geom", "util.shape", "util.element"):
+        importlib.import_module(f"ifcopenshell.{name}")
+    model, log = ifcopenshell.open(outputs("ifc")), ifcopenshell.validate.json_logger()
+    ifcopenshell.validate.validate(model, log)
+    assert log.statements == [] and model.schema_identifier.startswith("IFC4X3")
+    buildings = {building.Name: building for building in model.by_type("IfcBuilding")}
+    assert list(buildings) == MODELLED
+    for name, building in buildings.items():
+        shape = ifcopenshell.geom.create_shape(ifcopenshell.geom.settings(), building)
+        found = ifcopenshell.util.shape.get_volume(shape.geometry)
+        assert found == pytest.approx(volumes[name], rel=1e-6)
+    properties = ifcopenshell.util.element.get_psets(buildings["yard"])["hiproof"]
+    assert properties["year"] == 1905 and properties["rf_volume_lod22"] == pytest.approx(440.0)
+    (conversion,), (crs,) = (
+        model.by_type(kind) for kind in ("IfcMapConversion", "IfcProjectedCRS")
+    )
+    assert (conversion.Eastings, conversion.Northings) == (84994.0, 445996.0)
+    assert crs.Name == "EPSG:7415" and conversion.Scale == 1.0
+
+
+def test_ifc_in_feet_names_its_unit(run, tmp_path):
+    reader("ifcopenshell")
+    convert(run, tmp_path / "a.ifc", crs="EPSG:2263+5703")
+    text = (tmp_path / "a.ifc").read_text()
+    assert "IFCMAPCONVERSIONSCALED" in text and "IFCCONVERSIONBASEDUNIT" in text
+
+
+def test_the_same_run_makes_the_same_ifc(run, outputs, tmp_path):
+    convert(run, tmp_path / "again.ifc") if outputs("ifc") else None
+    assert (tmp_path / "again.ifc").read_bytes() == outputs("ifc").read_bytes()
+
+
+@pytest.mark.parametrize("source", ["cityjson", "cityjsonseq", "citygml2"])
+@pytest.mark.parametrize("target", ["citygml3", "cityjson", "gpkg", "stl"])
+def test_files_are_converted_as_runs_are(source, target, outputs, volumes, tmp_path):
+    path = tmp_path / FORMATS[target].file
+    convert(outputs(source), path)
+    if target == "stl":
+        assert (
+            np.fromfile(path, "<u4", 1, offset=80) == (len(outputs("stl").read_bytes()) - 84) / 50
+        )
+    elif target == "gpkg":
+        tables = {
+            layer: pyogrio.read_info(path, layer=layer, force_feature_count=True)["features"]
+            for layer in ("buildings", "roof_surfaces")
+        }
+        # in CityGML, buildings without a solid are not read
+        assert tables == {"buildings": 3 if source == "citygml2" else 4, "roof_surfaces": 11}
+    else:
+        found = {id.removeprefix("bldg-"): s.volume for id, s in read_solids(path)}
+        assert sorted(found.values()) == pytest.approx(sorted(volumes.values()), rel=1e-4)
+
+
+def test_attributes_of_a_file_are_kept_as_they_stand(outputs, tmp_path):
+    convert(outputs("cityjson"), tmp_path / "again.city.json")
+    before, after = (
+        json.loads(path.read_text())["CityObjects"]
+        for path in (outputs("cityjson"), tmp_path / "again.city.json")
+    )
+    assert {id: o["attributes"] for id, o in after.items()} == {
+        id: o["attributes"] for id, o in before.items()
+    }
+
+
+def test_a_building_that_cannot_be_built_is_left_out(run, tmp_path, caplog):
+    text = (run / "parameters.jsonl").read_text()
+    (tmp_path / "parameters.jsonl").write_text(text.replace('"type":"hip"', '"type":"onion"'))
+    with pytest.raises(typer.Exit) as end:
+        convert(tmp_path / "parameters.jsonl", tmp_path / "a.city.json")
+    assert end.value.exit_code == 2 and "hip and tower" in caplog.text
+    assert set(json.loads((tmp_path / "a.city.json").read_text())["CityObjects"]) == {
+        "gable",
+        "yard",
+        "lost",
+    }
