@@ -197,5 +197,5 @@ def test_a_run_counts_what_its_details_leave_in_doubt(tmp_path, capsys):
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert summary.doubts[Doubt.TWO_SURFACES] == 1 and set(summary.doubts.values()) == {1}
-    print_summary(summary)
-    assert "1 building (two surfaces)" in capsys.readouterr().out
+    print_summary(summary, str(tmp_path / "out"))
+    assert "by remark in hiproof_detail: two surfaces 1" in capsys.readouterr().out

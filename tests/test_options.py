@@ -13,6 +13,7 @@ from hiproof.city.executors import Processes
 from hiproof.city.run import Summary
 from hiproof.cli import main
 from hiproof.errors import InputWarning
+from hiproof.evaluate.overview import Overview
 
 RUNS = None
 HUGE = "9" * 5000
@@ -133,7 +134,7 @@ def begun(monkeypatch):
     def check_only(request, progress):
         refuse_unusable(request)
         requests.append(request)
-        return Summary((), 0, {}, {}, None, None, (), (), {})
+        return Summary((), Overview(0, 0), {}, {}, (), (), {})
 
     monkeypatch.setattr("hiproof.city.run.reconstruct_area", check_only)
     return requests

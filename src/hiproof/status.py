@@ -68,3 +68,55 @@ class Doubt(Enum):
     @property
     def told(self) -> str:
         return self.name.lower().replace("_", " ")
+
+
+MOSTLY_OFF = 0.5
+"""Share of roof points within 0.2 m of the roof, below which a building does not count as modelled:
+most of its points contradict the model."""
+
+
+class Attention(Enum):
+    """Why a person should look at a building; `hiproof edit --only` takes these kinds."""
+
+    FAILED = "hiproof failed, or the input of the building is unusable"
+    DOUBTFUL = "the model contradicts its points, or stands on too few of them"
+    NO_POINTS = "no usable points inside the footprint"
+    CHANGED = "the building seems to have changed since its footprint was drawn"
+
+    @property
+    def code(self) -> str:
+        """Stable lower-case name for files and options."""
+        return self.name.lower()
+
+
+ATTENTION_OF_STATUS = {
+    Status.INTERNAL_ERROR: Attention.FAILED,
+    Status.BAD_FOOTPRINT: Attention.FAILED,
+    Status.NOT_BUILT: Attention.FAILED,
+    Status.SIMPLIFIED: Attention.DOUBTFUL,
+    Status.FLAT_FALLBACK: Attention.DOUBTFUL,
+    Status.NO_POINTS: Attention.NO_POINTS,
+    Status.NO_ROOF: Attention.NO_POINTS,
+    Status.NO_BUILDING: Attention.CHANGED,
+}
+SIGNS_OF_CHANGE = (Doubt.BARE_GROUND, Doubt.BARE_GROUND_INSIDE, Doubt.GROUND_UNDER_ROOF)
+
+
+def find_attention(
+    status: str, quality: str | None, detail: str, share: float | None
+) -> tuple[Attention, ...]:
+    """Return the kinds of attention that a building needs, from what a run writes of it: the codes
+    of its status and grade, its detail and its share of roof points within 0.2 m of the roof.
+
+    >>> find_attention("modelled", "good", "modelled", 0.97)
+    ()
+    >>> find_attention("modelled", "poor", "poor: 12 m2 of bare ground inside its footprint", 0.4)
+    (<Attention.DOUBTFUL: ...>, <Attention.CHANGED: ...>)
+    """
+    known = Status.__members__.get(status.upper())
+    kinds = {ATTENTION_OF_STATUS[known]} if known in ATTENTION_OF_STATUS else set()
+    if quality == Grade.POOR.code or (share is not None and share < MOSTLY_OFF):
+        kinds.add(Attention.DOUBTFUL)
+    if any(doubt.value in detail for doubt in SIGNS_OF_CHANGE):
+        kinds.add(Attention.CHANGED)
+    return tuple(kind for kind in Attention if kind in kinds)

@@ -406,3 +406,28 @@ def test_gaps_are_heights_of_the_points_drawn_over_the_roof(desk):
 
 def decode_bytes(text):
     return base64.b64decode(text)
+
+
+def change_outcomes(folder, **outcomes):
+    """Give buildings of a finished run other outcomes, and every other building a good model."""
+    path = folder / "parameters.jsonl"
+    head, *rows = map(json.loads, path.read_text().splitlines())
+    for row in rows:
+        row |= {"quality": "good", "detail": "modelled", "residuals": {"share_within_20cm": 0.99}}
+        row |= outcomes.get(row["id"].replace("-", "_"), {})
+    path.write_text("".join(json.dumps(row) + "\n" for row in [head, *rows]))
+
+
+def test_the_list_holds_only_the_kinds_and_ids_that_are_named(folder, caplog):
+    empty = {"status": "no_points", "quality": None, "parts": []}
+    change_outcomes(folder, house_1={"quality": "poor"}, house_2=empty)
+
+    def list_ids(*only):
+        return sorted(row["id"] for row in Desk(folder, "anna", only=only).buildings()["rows"])
+
+    assert list_ids("doubtful") == ["house-1"] and list_ids("no_points") == ["house-2"]
+    assert list_ids("doubtful", "house-0") == ["house-0", "house-1"]
+    assert len(list_ids()) == 4
+    assert list_ids("changed") == [] and "no building of the run" in caplog.text
+    with pytest.raises(InputError, match="doubtful, no_points, changed or ids"):
+        list_ids("house-99")

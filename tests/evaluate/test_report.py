@@ -210,7 +210,7 @@ def test_a_run_without_points_is_reported_too(tmp_path):
     app.command()(report)
     app([str(tmp_path)], standalone_mode=False)
     page = (tmp_path / "report.html").read_text()
-    assert "no residuals" in page and "no points given" in page
+    assert "no residuals" in page and "No points are given" in page
 
 
 def test_of_too_many_buildings_the_worst_are_shown_and_all_are_counted(run):

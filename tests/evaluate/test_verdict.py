@@ -16,7 +16,7 @@ from hiproof.city.ledger import Ledger
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.running import graded_words
-from hiproof.cli.status import describe
+from hiproof.cli.status import describe, read_state
 from hiproof.compose import compose
 from hiproof.evaluate.verdict import judge_model
 from hiproof.model import Model
@@ -164,7 +164,8 @@ def run_over_spire(folder, code, max_points=20_000):
 @pytest.mark.parametrize(("code", "max_points"), [(6, 20_000), (6, 1000), (18, 20_000)])
 def test_neither_thinning_nor_a_class_of_noise_hides_a_spire(tmp_path, code, max_points):
     row, summary = run_over_spire(tmp_path, code, max_points)
-    lines = describe(Ledger(tmp_path / "out" / ".hiproof" / "ledger.sqlite", read_only=True))
+    ledger = Ledger(tmp_path / "out" / ".hiproof" / "ledger.sqlite", read_only=True)
+    lines = describe(ledger, read_state(ledger), str(tmp_path / "out"))
     assert f"quality: {graded_words({row['quality']: 1})}" in lines
     assert row["quality"] != "good" and "m above the model" in row["detail"]
     assert summary.by_quality == {row["quality"]: 1}

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from ..evaluate.overview import BuildingOutcome, Overview
 from ..status import Doubt
 
 SCHEMA = """
@@ -24,8 +25,7 @@ create table if not exists task (
     losses integer default 0, message text default '', finished real);
 create table if not exists building (
     position integer primary key, id text, task text, status text, quality text, type text,
-    detail text, share real, psd real,
-    seconds real);
+    detail text, share real, seconds real);
 create table if not exists override (position integer primary key, digest text);
 create table if not exists output (name text primary key, bytes integer, digest text);
 """
@@ -55,7 +55,6 @@ class Outcome(NamedTuple):
     type: str | None
     detail: str
     share: float | None
-    psd: float | None
     seconds: float
 
 
@@ -248,7 +247,7 @@ class Ledger:
     def put_outcomes(self, task: str, outcomes: Iterable[Outcome]) -> None:
         rows = [(position, id, task, *remainder) for position, id, *remainder in outcomes]
         self.database.executemany(
-            "insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows
+            "insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows
         )
 
     def outcomes(self) -> dict[int, Outcome]:
@@ -275,11 +274,12 @@ class Ledger:
         }
         return {doubt: count for doubt, count in counts.items() if count}
 
-    def column(self, name: str) -> list:
-        return [
-            value
-            for (value,) in self.database.execute(f"select {name} from building order by position")
-        ]
+    def overview(self) -> Overview:
+        """How many of the buildings solved so far were modelled, how well, and what needs
+        attention.
+        """
+        rows = self.database.execute("select status, quality, detail, share from building")
+        return Overview.of(map(BuildingOutcome._make, rows))
 
     def failed_ids(self) -> list[str]:
         """Ids of all buildings that hit an internal error."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 import functools
 import json
 import logging
-import math
 import shutil
 import sqlite3
 import time
@@ -19,6 +18,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError, OutputError
+from ..evaluate.overview import Overview
 from ..formats import list_model_paths
 from ..frames import METRES, Units
 from ..log import LOGGER, count_things
@@ -48,16 +48,14 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Summary:
-    """What came of it: where the models are, buildings by status and type, figures, input that
-    could not be used, seconds by step.
+    """What came of it: where the models are, how many buildings were modelled and how well,
+    buildings by status and type, input that could not be used, seconds by step.
     """
 
     models: tuple[Path, ...]
-    buildings: int
+    overview: Overview
     by_status: dict[str, int]
     by_type: dict[str, int]
-    median_psd: float | None
-    mean_share: float | None
     broken_inputs: tuple[tuple[str, str], ...]
     failures: tuple[Failure, ...]
     seconds: dict[str, float]
@@ -65,6 +63,11 @@ class Summary:
     doubts: dict[Doubt, int] = field(default_factory=dict)
     bundles: Path | None = None  # where the input of failed buildings is kept
     by_quality: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def buildings(self) -> int:
+        """All buildings, modelled or not."""
+        return self.overview.buildings
 
     @property
     def exit_code(self) -> int:
@@ -311,11 +314,9 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
     broken = tuple((request_name(task.name, request), task.message) for task in failed)
     return Summary(
         models=tuple(list_model_paths(plan.settings, Path(request.out))),
-        buildings=sum(ledger.counts("status").values()),
+        overview=ledger.overview(),
         by_status=ledger.counts("status"),
         by_type=ledger.counts("type"),
-        median_psd=median(ledger.column("psd")),
-        mean_share=mean(ledger.column("share")),
         broken_inputs=broken,
         failures=tuple(ledger.failures()),
         seconds=clock.seconds,
@@ -329,16 +330,6 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
 def request_name(task: str, request: Request) -> str:
     kind, key = task.split(":", 1)
     return mask(request.clouds[int(key)]) if kind == "sort" else task
-
-
-def median(values: list) -> float | None:
-    selected_values = sorted(v for v in values if v is not None)
-    return selected_values[len(selected_values) // 2] if selected_values else None
-
-
-def mean(values: list) -> float | None:
-    selected_values = [v for v in values if v is not None]
-    return math.fsum(selected_values) / len(selected_values) if selected_values else None
 
 
 def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
@@ -366,12 +357,10 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "registration": plan.registration and plan.registration.to_dict(),
         "units": plan.head.units.describe(),
         "processes": request.processes,
-        "buildings": summary.buildings,
+        "summary": summary.overview.to_dict(),
         "by_status": summary.by_status,
         "by_quality": summary.by_quality,
         "by_type": summary.by_type,
-        "median_psd_m": summary.median_psd,
-        "mean_share_within_20cm": summary.mean_share,
         "broken_inputs": [list(pair) for pair in summary.broken_inputs],
         "seconds": summary.seconds,
     }

@@ -488,11 +488,9 @@ def record_failure(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fra
 
 
 def make_outcome(position: int, building: Building, seconds: float) -> Outcome:
-    quality = building.quality
-    share, psd = (
-        float(v) if np.isfinite(v) else None for v in (quality.share_within_20cm, quality.psd_mean)
-    )
+    value = building.quality.share_within_20cm
+    share = float(value) if np.isfinite(value) else None
     status, grade = building.status.code, None if building.grade is None else building.grade.code
     return Outcome(
-        position, building.id, status, grade, building.type, building.detail, share, psd, seconds
+        position, building.id, status, grade, building.type, building.detail, share, seconds
     )

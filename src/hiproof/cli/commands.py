@@ -80,7 +80,9 @@ COMMANDS = {
     "attributes": Entry(
         "Inspect", "explain every attribute and table", "hiproof attributes > attributes.md"
     ),
-    "edit": Entry("Edit", "correct buildings in your browser", "hiproof edit models"),
+    "edit": Entry(
+        "Edit", "correct buildings in your browser", "hiproof edit models --only doubtful"
+    ),
     "build": Entry(
         "Edit",
         "make all files again from edited parameters",

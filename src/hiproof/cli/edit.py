@@ -24,6 +24,12 @@ def edit(
             help="folder that now holds the inputs of the run, if they were moved",
         ),
     ] = None,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            help="buildings to list: doubtful, no_points, changed, failed, or ids, joined by commas"
+        ),
+    ] = None,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="port of the page (default: a free one)")
     ] = 0,
@@ -37,14 +43,12 @@ def edit(
     from ..edit.edits import EDITS_FILE
     from ..edit.server import Server, Service
 
-    service = Service(Desk(folder, who or user_name(), clouds))
+    names = [name.strip() for name in only.split(",")] if only else []
+    service = Service(Desk(folder, who or user_name(), clouds, names))
     with Server(service, port) as server:
         desk = service.desk
-        typer.echo(
-            f"{count_things(len(desk.run.rows), 'building')}, the most doubtful first; edits go "
-            "into "
-            f"{folder / EDITS_FILE}"
-        )
+        count = count_things(len(desk.select_rows()), "building")
+        typer.echo(f"{count}, the most doubtful first; edits go into {folder / EDITS_FILE}")
         if desk.points.missing:
             typer.echo(desk.points.missing, err=True)
         typer.echo(f"open {service.address}")

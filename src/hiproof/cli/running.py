@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from ..log import Level, console_level, count_things
-from ..status import Grade, Status
+import typer
+
+from ..evaluate.overview import Overview, show_command
+from ..log import Level, console_level
+from ..status import Grade
 from .progress import show_progress
 
 if TYPE_CHECKING:
@@ -22,9 +25,10 @@ def run_request(make_request: Callable[[], Request]) -> int:
     with show_progress("plan") as update:
         from ..city.run import reconstruct_area
 
-        summary = reconstruct_area(make_request(), update)
+        request = make_request()
+        summary = reconstruct_area(request, update)
     if console_level() is not Level.error:
-        print_summary(summary)
+        print_summary(summary, str(request.out))
     return summary.exit_code
 
 
@@ -37,50 +41,36 @@ def graded_words(by_quality: Mapping[str, int]) -> str:
     return ", ".join(f"{by_quality.get(grade.code, 0)} {grade.code}" for grade in Grade)
 
 
-def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> None:
-    """The table at the end: buildings by status and by type, figures, time, and every failure by
-    name.
-    """
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(soft_wrap=True, markup=False)  # names from outside may look like markup
-    show = show or console.print
-    table = Table("buildings", "outcome", title=count_things(summary.buildings, "building"))
-    for code, number in summary.by_status.items():
-        table.add_row(str(number), Status[code.upper()].value)
-    show(table)
-    if summary.by_quality:
-        show("quality: " + graded_words(summary.by_quality))
-    if summary.by_type:
-        show(
-            "roof types: "
-            + ", ".join(f"{number} {name}" for name, number in summary.by_type.items())
-        )
-    if summary.median_psd is not None:
-        show(
-            "median over buildings of the mean distance of all points, facades included: "
-            f"{summary.median_psd:.3f} m"
-        )
-    if summary.mean_share is not None:
-        share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
-        show(f"mean over buildings: {share} lie within 0.2 m of the roof")
+def print_summary(summary: Summary, out: str) -> None:
+    """Print what came of a run: models, how well they fit, what needs attention, the files."""
+    for line in describe_overview(summary.overview, summary.by_quality, out):
+        typer.echo(line)
     if summary.doubts:
-        doubtful = (
-            f"{count_things(count, 'building')} ({doubt.told})"
-            for doubt, count in summary.doubts.items()
-        )
-        show("read the detail of " + ", ".join(doubtful))
-    if not summary.units.are_metres:
-        show(f"coordinates are in {summary.units}; attributes and parameters in metres")
-    show(
-        "time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items())
-    )
+        remarks = ", ".join(f"{doubt.told} {count:,}" for doubt, count in summary.doubts.items())
+        typer.echo(f"buildings by remark in hiproof_detail: {remarks}")
     for name, reason in summary.broken_inputs:
-        show(Text.assemble(("could not be read:", "red"), f" {name}: {reason}"))
+        typer.echo(f"{typer.style('not read:', fg='red')} {name}: {reason}")
     for id, reason in summary.failures:
-        show(Text.assemble(("internal error:", "red"), f" building {id}: {reason}"))
+        typer.echo(f"{typer.style('internal error:', fg='red')} building {id}: {reason}")
     if summary.bundles:
-        show(Text(f"please report these, with the folders of the buildings in {summary.bundles}"))
-    show(Text("models: " + ", ".join(map(str, summary.models))))
+        typer.echo(f"please report these, with the folders of the buildings in {summary.bundles}")
+    if not summary.units.are_metres:
+        typer.echo(f"coordinates are in {summary.units}; attributes and parameters in metres")
+    typer.echo("files: " + ", ".join(map(str, summary.models)))
+    steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items())
+    typer.echo(f"time: {sum(summary.seconds.values()):.1f} s ({steps})")
+
+
+def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: str) -> list[str]:
+    """Describe the overview of the run in the folder `out` in lines: the result, how well the
+    models fit, and what needs attention with the command that shows it.
+    """
+    lines = [typer.style(overview.headline, bold=True), *filter(None, [overview.fit])]
+    if by_quality:
+        lines.append("quality: " + graded_words(by_quality))
+    if overview.attention:
+        lines.append("needs attention:")
+    for kind, count in overview.attention.items():
+        lines.append(f"  {count:,} {kind.code}: {kind.value}")
+        lines.append(f"    {show_command(out, kind)}")
+    return lines

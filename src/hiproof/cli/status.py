@@ -1,28 +1,30 @@
-"""`hiproof status`: how far a run is, read from its ledger while the run may still be
-writing it.
+"""`hiproof status`: how far a run is, and its summary, read from its ledger while the run may still
+be writing it.
 """
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError
-from .running import graded_words
+from .running import describe_overview
 
 if TYPE_CHECKING:
-    from ..city.ledger import Ledger
+    from ..city.ledger import Ledger, Task
 
 CLOSED = ("done", "failed")
 
 
-def status(folder: Annotated[Path, typer.Argument(help="output folder of a run")]) -> None:
-    """Show how far a run is: progress, failures by kind, throughput and time left, while it runs or
-    after.
-    """
+def status(
+    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of text")] = False,
+) -> None:
+    """Show how far a run is and what came of its buildings, while it runs or afterwards."""
     from ..city.ledger import Ledger
 
     path = folder / ".hiproof" / "ledger.sqlite"
@@ -32,44 +34,72 @@ def status(folder: Annotated[Path, typer.Argument(help="output folder of a run")
             "path"
         )
     try:
-        for line in describe(Ledger(path, read_only=True)):
-            typer.echo(line)
+        ledger = Ledger(path, read_only=True)
+        state = read_state(ledger)
+        lines = [json.dumps(state, indent=1)] if as_json else describe(ledger, state, str(folder))
     except sqlite3.DatabaseError as error:
         raise InputError(
             f"expected the ledger of a run at {path}, got: {error}; it may be damaged"
         ) from error
+    for line in lines:
+        typer.echo(line)
 
 
-def describe(ledger: Ledger) -> list[str]:
-    """Progress, failures by kind, throughput and time left, a line each."""
+def read_state(ledger: Ledger) -> dict[str, Any]:
+    """How far a run is, for `--json`: tasks and buildings done, rate, summary, failures."""
     tasks = ledger.tasks()
-    lines = []
-    for kind, subject in (("sort", "point files read"), ("solve", "work tiles solved")):
-        selected_tasks = [task for task in tasks if task.kind == kind]
-        lines.append(
-            f"{subject}: {sum(task.state in CLOSED for task in selected_tasks)} of "
-            f"{len(selected_tasks)}"
-        )
-    solve = [task for task in tasks if task.kind == "solve"]
-    total, done = (
-        sum(task.buildings for task in solve),
-        [task for task in solve if task.state in CLOSED],
-    )
-    finished = sum(task.buildings for task in done)
-    lines.append(f"buildings done: {finished} of {total}")
-    by_time = sorted((task.finished or 0.0, task.buildings) for task in done)
-    if len(done) > 1 and (seconds := by_time[-1][0] - by_time[0][0]) > 0:
-        rate = (finished - by_time[0][1]) / seconds
-        text = (
-            f", about {(total - finished) / rate:.0f} s left" if finished < total and rate else ""
-        )
+    sort, solve = ([task for task in tasks if task.kind == kind] for kind in ("sort", "solve"))
+    finished, total = count_buildings(solve), sum(task.buildings for task in solve)
+    rate = measure_rate(solve)
+    return {
+        "finished": ledger.get("merged") == "yes",
+        "point_files": {"read": count_closed(sort), "total": len(sort)},
+        "work_tiles": {"solved": count_closed(solve), "total": len(solve)},
+        "buildings": {"done": finished, "total": total},
+        "buildings_per_second": rate,
+        "seconds_left": (total - finished) / rate if rate and finished < total else None,
+        "summary": ledger.overview().to_dict(),
+        "by_status": ledger.counts("status"),
+        "by_quality": ledger.counts("quality"),
+        "failed_tasks": {task.name: task.message for task in tasks if task.state == "failed"},
+        "internal_errors": dict(ledger.failures()),
+    }
+
+
+def count_closed(tasks: list[Task]) -> int:
+    return sum(task.state in CLOSED for task in tasks)
+
+
+def count_buildings(tasks: list[Task]) -> int:
+    """Count the buildings of the tasks that are done."""
+    return sum(task.buildings for task in tasks if task.state in CLOSED)
+
+
+def measure_rate(tasks: list[Task]) -> float | None:
+    """Buildings a second between the first task that was done and the last, None before there are
+    two.
+    """
+    by_time = sorted((t.finished or 0.0, t.buildings) for t in tasks if t.state in CLOSED)
+    if len(by_time) < 2 or (seconds := by_time[-1][0] - by_time[0][0]) <= 0:
+        return None
+    return (count_buildings(tasks) - by_time[0][1]) / seconds
+
+
+def describe(ledger: Ledger, state: dict[str, Any], folder: str) -> list[str]:
+    """Progress, summary and failures, a line each."""
+    files, tiles, buildings = (state[name] for name in ("point_files", "work_tiles", "buildings"))
+    lines = [
+        f"point files read: {files['read']} of {files['total']}",
+        f"work tiles solved: {tiles['solved']} of {tiles['total']}",
+        f"buildings done: {buildings['done']} of {buildings['total']}",
+    ]
+    if rate := state["buildings_per_second"]:
+        left = state["seconds_left"]
+        text = "" if left is None else f", about {left:.0f} s left"
         lines.append(f"throughput: {rate:.1f} buildings a second{text}")
-    lines += [f"{number} {status}" for status, number in ledger.counts("status").items()]
-    if graded := ledger.counts("quality"):
-        lines.append(f"quality: {graded_words(graded)}")
-    lines += [f"failed: {task.name}: {task.message}" for task in tasks if task.state == "failed"]
-    lines += [f"internal error: building {id}: {detail}" for id, detail in ledger.failures()]
-    lines.append(
-        "finished" if ledger.get("merged") == "yes" else "not finished: the same command goes on"
-    )
-    return lines
+    lines += describe_overview(ledger.overview(), state["by_quality"], folder)
+    lines += [f"failed: {name}: {reason}" for name, reason in state["failed_tasks"].items()]
+    errors = state["internal_errors"].items()
+    lines += [f"internal error: building {id}: {reason}" for id, reason in errors]
+    end = "finished" if state["finished"] else "not finished: run the command again to resume"
+    return [*lines, end]

@@ -7,7 +7,7 @@ from __future__ import annotations
 import datetime
 import functools
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,12 @@ from ..draw.primitives import primitive_svg
 from ..errors import HiproofError, InputError, InputWarning
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
+from ..log import LOGGER
 from ..parametric.building import build
 from ..parametric.record import list_at, number, read_outline, text_at
 from ..primitives.catalogue import CATALOGUE
 from ..read.damage import finite
+from ..status import Attention
 from ..write.meshes.page_mesh import pack_values
 from ..write.parameters import building_record
 from ..write.values import plain_text
@@ -39,11 +41,20 @@ SAID = ("z_ground", "leave_out")  # of the building as a whole, by a person
 
 class Desk:
     """The buildings of the run in `folder`, and the edits that `who` accepts; the run's files may
-    have `moved_to` another folder.
+    have `moved_to` another folder. `only` names kinds of attention or ids of buildings, and limits
+    the list to these.
     """
 
-    def __init__(self, folder: Path, who: str, moved_to: Path | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        who: str,
+        moved_to: Path | None = None,
+        only: Sequence[str] = (),
+    ) -> None:
         self.run, self.who = RunFolder(folder), plain_text(who)[:MOST_NOTE]
+        self.only = frozenset(only)
+        self.refuse_unknown()
         self.edits, self.points = (
             Edits(folder, obeyed_by(folder, moved_to)),
             RunPoints(folder, moved_to),
@@ -53,10 +64,29 @@ class Desk:
         """The most doubtful buildings, of those whose id holds `find`."""
         self.run.refresh()
         self.edits.of("")
-        result = [row for row in self.run.rows if find in row.id]
+        wanted = self.select_rows()
+        result = [row for row in wanted if find in row.id]
         rows = [self.row(row) for row in result[:MOST_ROWS]]
-        accepted = sum(id in self.run.by_id for id in self.edits.records)
-        return {"rows": rows, "found": len(result), "all": len(self.run.rows), "accepted": accepted}
+        accepted = sum(row.id in self.edits.records for row in wanted)
+        return {"rows": rows, "found": len(result), "all": len(wanted), "accepted": accepted}
+
+    def select_rows(self) -> list[BuildingRow]:
+        """Return the buildings of the list, the most doubtful first."""
+        if not self.only:
+            return self.run.rows
+        return [row for row in self.run.rows if self.only & names_of(row)]
+
+    def refuse_unknown(self) -> None:
+        """Raise InputError where `only` names what no building of the run is or has."""
+        kinds = [kind.code for kind in Attention]
+        known = {name for row in self.run.rows for name in names_of(row)}
+        for name in sorted(self.only - known):
+            if name not in kinds:
+                raise InputError(
+                    f"expected --only to name {', '.join(kinds)} or ids of buildings in "
+                    f"{self.run.folder}, got {name!r:.80}; check the name"
+                )
+            LOGGER.warning("no building of the run in %s is %s", self.run.folder, name)
 
     def row(self, row: BuildingRow) -> dict[str, Any]:
         return {
@@ -211,6 +241,11 @@ def render_drawing(kind: str) -> str:
             f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r:.40}; choose one"
         )
     return primitive_svg(kind)
+
+
+def names_of(row: BuildingRow) -> set[str]:
+    """Return the names under which `--only` finds a building: its id and its kinds of attention."""
+    return {row.id, *(kind.code for kind in row.attention)}
 
 
 def number_or_none(value: float) -> float | None:

@@ -12,6 +12,7 @@ from ..parametric.file import DAMAGED, objects, parse_object, read_head
 from ..parametric.record import refuse_other_kinds
 from ..read.damage import SkippedBuildings, excerpt
 from ..settings import Settings
+from ..status import Attention, find_attention
 from ..write.parameters import FileHead
 from .doubt import BuildingDoubt, measure_doubt
 from .edits import read_stamp
@@ -31,6 +32,7 @@ class BuildingRow:
     status: str
     share: float | None
     doubt: BuildingDoubt
+    attention: tuple[Attention, ...] = ()
 
 
 class RunFolder:
@@ -128,13 +130,16 @@ def read_row(number: int, record: Any, start: int, path: Path) -> BuildingRow:
             "damaged",
             None,
             BuildingDoubt(MOST_DOUBT, (f"cannot be read: {error}",)),
+            (Attention.FAILED,),
         )
     share = (record.get("residuals") or {}).get("share_within_20cm")
+    status, detail = record.get("status", ""), record.get("detail") or ""
     return BuildingRow(
         record["id"],
         start,
         record.get("type"),
-        record.get("status", ""),
+        status,
         share,
         measure_doubt(record),
+        find_attention(status, record.get("quality"), detail, share),
     )

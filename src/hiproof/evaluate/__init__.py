@@ -7,6 +7,7 @@ layers             points that leave a roof to doubt: two surfaces, one over the
                    a part of it
 verdict            good, fair or poor: the grade of a model by its points, and what speaks against
                    it
+overview           how many buildings were modelled, how well, and which need attention
 evaluation         a row of figures a building, and summaries
 inputs             where the files that a run was made from lie now
 run                a finished run with its points: what the commands start from

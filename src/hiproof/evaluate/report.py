@@ -23,6 +23,7 @@ from ..masking import masked_values
 from ..status import Grade, Status
 from .evaluation import summarise
 from .metrics import psd
+from .overview import BuildingOutcome, Overview, show_command
 from .report_data import places_on_map, report_data
 from .report_pictures import building_pictures, histogram
 from .run import EvaluatedRun
@@ -67,6 +68,7 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
         "title": escape(title),
         "style": read_asset("page.css") + read_asset("report.css"),
         "lead": lead(run, len(buildings)),
+        "attention": attention_list(run),
         "statuses": status_table(run),
         "qualities": grade_table(run),
         "figures": figure_table(run),
@@ -94,19 +96,41 @@ def embed_json(data: Any) -> str:
 def lead(run: EvaluatedRun, visible: int) -> str:
     """Return the sentences at the top."""
     version = run.record.get("hiproof") or run.record.get("version") or __version__
-    modelled = sum(model.solid is not None for model in run.models)
+    overview = find_overview(run)
+    fit = f" {overview.fit.capitalize()}." if overview.fit else ""
     points = sum(map(len, run.points))
     measured = (
-        f"measured against {count_things(points, 'point')}"
+        f"Measured against {count_things(points, 'point')}"
         if points
-        else "no points given: residuals are those of the run"
+        else "No points are given, so residuals are those of the run"
     )
     part = f" Map and 3D view show {visible:,} of them." if visible < len(run.models) else ""
     text = f"Made by hiproof {escape(str(version))}."
-    return (
-        f"{count_things(len(run.models), 'building')}, {modelled:,} with a model, "
-        f"{measured}.{part} "
-        f"{text}"
+    return f"<strong>{overview.headline}.</strong>{fit} {measured}.{part} {text}"
+
+
+def attention_list(run: EvaluatedRun) -> str:
+    """The buildings that need attention, by kind, with the command that shows them."""
+    rows = "".join(
+        f"<li>{count:,} {kind.code}: {escape(kind.value)}. "
+        f"<code>{escape(show_command('RUN', kind))}</code></li>"
+        for kind, count in find_overview(run).attention.items()
+    )
+    return f"<p>Needs attention:</p><ul>{rows}</ul>" if rows else ""
+
+
+def find_overview(run: EvaluatedRun) -> Overview:
+    """The overview that the run wrote; made of its models where it wrote none."""
+    if record := run.record.get("summary"):
+        return Overview.from_dict(record)
+    return Overview.of(
+        BuildingOutcome(
+            model.status,
+            model.grade,
+            model.text("hiproof_detail"),
+            figures.quality.share_within_20cm if figures.quality.points else None,
+        )
+        for model, figures in zip(run.models, run.figures, strict=True)
     )
 
 

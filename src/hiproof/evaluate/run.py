@@ -18,6 +18,7 @@ from ..read.cityjson import parse_object, read_text
 from ..read.crs import find_units, parse_crs
 from ..read.damage import Damaged, excerpt, refuse
 from ..settings import Settings
+from ..status import Attention
 from ..write.naming import FileUnits
 from .evaluation import (
     BuildingFigures,
@@ -50,6 +51,13 @@ RECORD: dict[tuple[str, ...], Any] = {
     ("inputs", "overrides"): str,
     ("inputs", "started_in"): str,
     ("crs",): str,
+    ("summary",): dict,
+    ("summary", "buildings"): NUMBER,
+    ("summary", "modelled"): NUMBER,
+    ("summary", "share_within_20cm_median"): NUMBER,
+    ("summary", "share_within_20cm_worst_tenth"): NUMBER,
+    ("summary", "needs_attention"): dict,
+    **{("summary", "needs_attention", kind.code): NUMBER for kind in Attention},
 }
 """What of run.json is used, and what it must be where it is there."""
 
