@@ -1,5 +1,6 @@
-"""From a fitted roof to a valid solid: plan cells -> levels -> closed shell, and the check every
-solid passes.
+"""From a fitted roof to a valid solid.
+
+Plan cells become levels, levels a closed shell, and every solid is checked.
 
 settle            the roof made of exactly the numbers that are written of it
 simpler           parts given up one by one, where a roof cannot become a valid solid

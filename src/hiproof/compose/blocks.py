@@ -1,4 +1,4 @@
-"""Blocks: a building of LoD1, one prism over its outline or several of different heights."""
+"""Blocks of LoD1: one prism over a building's outline, or several."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from .solid import compose
 
 
 def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
-    """The prism over `outline` (m, any frame) between two heights; its walls are the outline's
-    edges.
+    """Return the prism over `outline` (m, any frame) between two heights.
+
+    Its walls are the outline's edges.
 
     >>> from hiproof.compose import check_solid
     >>> yard = shapely.box(0, 0, 10, 10).difference(shapely.box(3, 3, 7, 7))
@@ -42,7 +43,9 @@ def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
 def blocks(
     outlines: Sequence[shapely.Polygon], heights: Sequence[float], z_low: float
 ) -> Solid | None:
-    """One solid of blocks that stand side by side over `outlines`, each of its own height;
+    """Return one solid of blocks that stand side by side over `outlines`.
+
+    Each has its own height.
 
     None where they make no valid one.
     """

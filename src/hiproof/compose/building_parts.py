@@ -1,5 +1,6 @@
-"""Building parts: a solid cut along the walls at which its roofs meet, so that each part has a
-solid of its own.
+"""Building parts: a solid cut along the walls at which its roofs meet.
+
+Each part has a solid of its own.
 
 Roof faces that share an edge belong to one part: wings that run into each other, a dormer on its
 slope. Where roofs meet at a wall alone, or one stands out of another, parts end. They stand side by
@@ -28,7 +29,9 @@ most.
 
 @dataclass(frozen=True)
 class BuildingPart:
-    """A part's `solid`, in the frame of the whole, the plan polygon `outline` that it stands over,
+    """A part of a building.
+
+    It has its `solid`, in the frame of the whole, the plan polygon `outline` on which it stands,
     and its roof parts `members` (indices into `Roof.parts`), the largest first.
     """
 
@@ -38,8 +41,9 @@ class BuildingPart:
 
 
 class Border(NamedTuple):
-    """A plan edge of a roof face, which lies left of it: the `face` and its vertices at the edge's
-    ends.
+    """A plan edge of a roof face, which lies left of it.
+
+    It has the `face` and its vertices at the edge's ends.
     """
 
     face: int
@@ -55,8 +59,9 @@ Borders = dict[tuple[Place, Place], Border]
 
 
 def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPart, ...]:
-    """The parts of a valid `solid` whose roof faces name their roof parts, the lowest member first;
-    none where it is one alone.
+    """Return the parts of a valid `solid`, that of the lowest member first.
+
+    Its roof faces name their roof parts. A solid of one part has none.
 
     There are none either where a part would not be valid by itself, as where it touches itself at a
     corner.
@@ -85,7 +90,9 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
 
 
 def join_parts(parts: Solid) -> Solid:
-    """The one solid of which `parts`, the shells of building parts over common vertices, were cut.
+    """Join `parts`, building parts over common vertices, into one solid.
+
+    They are the shells into which it was cut.
 
     Its roof faces come first, in the order in which they stand in `parts`; its walls are not joined
     along straight stretches.
@@ -96,12 +103,15 @@ def join_parts(parts: Solid) -> Solid:
 
 
 def place_vertices(solid: Solid) -> list[Place]:
-    """The place of every vertex."""
+    """Return the place of every vertex."""
     return [(round(x / GRID_M), round(y / GRID_M)) for x, y in solid.vertices[:, :2].tolist()]
 
 
 def plan_borders(solid: Solid, roofs: list[int], place_of: list[Place]) -> Borders:
-    """The border over each directed plan edge; its neighbour lies over the edge turned round."""
+    """Return the border over each directed plan edge.
+
+    Its neighbour lies over the reversed edge.
+    """
     return {
         (place_of[start], place_of[end]): Border(index, start, end)
         for index in roofs
@@ -115,7 +125,7 @@ def list_edges(ring: tuple[int, ...]) -> Iterable[tuple[int, int]]:
 
 
 def joined_at_edges(roofs: list[int], borders: Borders) -> list[set[int]]:
-    """Roof faces in groups: those of one share edges in space, one after the other."""
+    """Group roof faces that share edges in space, directly or through others."""
     group_of = {index: {index} for index in roofs}
     for (a, b), current in borders.items():
         there = borders.get((b, a))
@@ -137,8 +147,9 @@ def distinct(group_of: dict[int, set[int]]) -> list[set[int]]:
 
 
 def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> list[set[int]]:
-    """The groups, each smaller than LEAST_PART_M2 taken in by the neighbour with which it shares
-    the longest border, smallest first.
+    """Merge groups smaller than LEAST_PART_M2 into neighbours, smallest first.
+
+    The neighbour is the one with the longest common border.
     """
     area = {
         index: solid.project_face(solid.faces[index]).area for group in groups for index in group
@@ -161,8 +172,9 @@ def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> lis
 def cut_part(
     solid: Solid, group: set[int], borders: Borders, place_of: list[Place]
 ) -> BuildingPart:
-    """The part under the roof faces `group`: these, the steps between them, walls down to the
-    ground around them, and the ground.
+    """Return the part under the roof faces `group`.
+
+    It has these, the steps between them, walls down to the ground around them, and the ground.
     """
     part_borders = {edge: border for edge, border in borders.items() if border.face in group}
     vertices, levels = with_base(
@@ -185,8 +197,9 @@ def cut_part(
 def with_base(
     solid: Solid, in_use: set[int], place_of: list[Place]
 ) -> tuple[np.ndarray, dict[Place, list[int]]]:
-    """The solid's vertices (n, 3) and new ones on the ground below those `in_use`, and all of them
-    over each place, from below.
+    """Add ground vertices below those `in_use`.
+
+    Returns the vertices (n, 3), and all of them over each place, from below.
     """
     z_base = min(
         solid.vertices[index, 2]
@@ -206,8 +219,9 @@ def with_base(
 def make_wall_ring(
     edge: tuple[Place, Place], part_borders: Borders, levels: dict[Place, list[int]]
 ) -> tuple[int, ...]:
-    """The wall below a border, down to its neighbour or to the ground, through every level on its
-    way; none where it lies lower.
+    """Return the wall below a border, down to its neighbour or to the ground.
+
+    It goes through every level on its way. There is none where it lies lower.
     """
     a, b = edge
     current, there = part_borders[edge], part_borders.get((b, a))
@@ -220,12 +234,12 @@ def make_wall_ring(
 
 
 def select_between(levels: list[int], lower: int, upper: int) -> list[int]:
-    """The vertices of a place from one to another that lies no lower."""
+    """Return the vertices of a place from one to another that lies no lower."""
     return levels[levels.index(lower) : levels.index(upper) + 1]
 
 
 def closed_rings(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
-    """Directed plan edges as closed rings, that around all others first."""
+    """Join directed plan edges to closed rings, the outermost first."""
     follow = dict(edges)
     rings = []
     while follow:
@@ -237,7 +251,7 @@ def closed_rings(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
 
 
 def list_members(solid: Solid, group: set[int]) -> tuple[int, ...]:
-    """Roof parts of the faces `group`, that of the largest area in plan first."""
+    """Return the roof parts of the faces `group`, the largest in plan first."""
     area: dict[int, float] = {}
     for index in sorted(group):
         face = solid.faces[index]

@@ -1,5 +1,6 @@
-"""From a roof to the cells of its plan: outline, pieces and the lines where the active plane
-changes, arranged.
+"""From a roof to the cells of its plan.
+
+Outline, pieces and the lines where the active plane changes are arranged.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ MAX_EXTENT_M = 50_000.0
 
 @dataclass(frozen=True)
 class PlanProblem:
-    """A roof in grid units: polygons as soups of edges, polygon 0 the outline and polygon k + 1
-    that of piece k.
+    """A roof in grid units.
+
+    Polygons are soups of edges: polygon 0 is the outline, polygon k + 1 that of piece k.
 
     `planes` (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within
     its roof part, `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that
@@ -47,8 +49,9 @@ class PlanProblem:
 
 @dataclass(frozen=True)
 class PlanCells:
-    """The plan as labelled edges: `xy` (n, 2) int64 grid units, `edges` (e, 2), `side` (e, 2)
-    labels left and right.
+    """The plan as labelled edges.
+
+    `xy` (n, 2) are int64 grid units, `edges` (e, 2), and `side` (e, 2) the labels left and right.
 
     A label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
     """
@@ -59,8 +62,9 @@ class PlanCells:
 
 
 def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
-    """Edges (m, 4) of all rings of each polygon (or of several in one), rounded to the grid,
-    without those of no length.
+    """Return the edges (m, 4) of all rings of each polygon, on the grid.
+
+    An item may be several polygons in one. Edges without length are left out.
     """
     parts, polygon_of_part = shapely.get_parts(np.array(polygons, object), return_index=True)
     rings, part_of_ring = shapely.get_rings(parts, return_index=True)
@@ -80,7 +84,7 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
 
 
 def plan_problem(roof: Roof) -> PlanProblem:
-    """The roof on the grid.
+    """Return the roof on the grid.
 
     Raises CompositionError when it has no outline, no pieces or planes that are not finite.
     """
@@ -115,7 +119,9 @@ def plan_problem(roof: Roof) -> PlanProblem:
 
 
 def equal_planes(planes: np.ndarray) -> np.ndarray:
-    """Index (p,) of the first plane that equals each within a micrometre and a millionth of slope.
+    """Return the index (p,) of the first plane that equals each.
+
+    Planes are equal within a micrometre and a millionth of slope.
 
     Parts that share a plane share its faces: where they touch, one face carries the first part's
     index.
@@ -124,7 +130,7 @@ def equal_planes(planes: np.ndarray) -> np.ndarray:
 
 
 def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """One array of edges and the start of each polygon in it."""
+    """Return one array of edges and the start of each polygon in it."""
     start = np.array([0, *itertools.accumulate(map(len, soups))])
     edges = np.concatenate(soups) if soups else np.zeros((0, 4))
     return np.ascontiguousarray(edges, float), start
@@ -133,8 +139,9 @@ def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 def arrange(
     problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_m: float
 ) -> PlanCells:
-    """Plan cells of a roof, well separated by `reach_m`; where no piece covers the outline, the
-    piece beside it is extended.
+    """Return the plan cells of a roof, well separated by `reach_m`.
+
+    Where no piece covers the outline, the piece beside it is extended.
     """
     for _ in range(4):
         soup, soup_start = stacked_soups(problem.soups)
@@ -167,8 +174,9 @@ def arrange(
 
 
 def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
-    """The problem with a further piece over each uncovered cell, its planes those of the piece it
-    borders most.
+    """Add a piece over each uncovered cell.
+
+    Its planes are those of the piece that the cell borders most.
     """
     follow = next_half_edges(cells.edges, *half_edge_order(cells.xy, cells.edges))
     face, _ = trace_faces(cells.xy, cells.edges, follow)
@@ -181,8 +189,9 @@ def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
 
 
 def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
-    """The problem with one more piece over the polygon `gap` (m, 4), whose edges border cells
-    labelled `neighbour` (m,).
+    """Add a piece over the polygon `gap` (m, 4).
+
+    Its edges border cells labelled `neighbour` (m,).
     """
     length = np.hypot(gap[:, 2] - gap[:, 0], gap[:, 3] - gap[:, 1])
     piece_of_plane = (
@@ -205,7 +214,10 @@ def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> P
 
 
 def nearest_piece(problem: PlanProblem, gap: np.ndarray) -> int:
-    """The piece whose border comes nearest to the first corner of the gap's edges (m, 4)."""
+    """Return the piece whose border comes nearest to a gap's first corner.
+
+    `gap` (m, 4) are edges.
+    """
     corner = shapely.Point(gap[0, :2])
     borders = [shapely.multilinestrings(list(soup.reshape(-1, 2, 2))) for soup in problem.soups[1:]]
     return int(np.argmin([corner.distance(border) for border in borders]))

@@ -1,4 +1,7 @@
-"""Is a solid valid by ISO 19107? Findings carry the codes of val3dity and a sentence each."""
+"""Validity of solids by ISO 19107, with val3dity's codes.
+
+Each finding has a code and a sentence.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +39,9 @@ EARTH_M = 1e9  # coordinates beyond it are of no system in use, and their produc
 
 @dataclass(frozen=True)
 class Finding:
-    """One defect: `code` as val3dity numbers it, index of the `face` (-1: the whole shell) and a
-    `message` sentence.
+    """One defect: val3dity's `code`, the `face`, and a `message`.
+
+    `face` is an index, -1 for the whole shell. The message is a sentence.
     """
 
     code: int
@@ -46,14 +50,14 @@ class Finding:
 
 
 def make_finding(code: int, face: int = -1, other: int = -1) -> Finding:
-    """The finding with its sentence."""
+    """Make the finding with its sentence."""
     text = CODES[code]
     subject = f"face {face} {text}" if face >= 0 else text
     return Finding(code, face, f"{code}: {subject}{f' (face {other})' if other >= 0 else ''}")
 
 
 def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]:
-    """Everything wrong with the shell of `solid`, nothing if it is valid.
+    """Return all defects of the shell of `solid`, none if it is valid.
 
     Rings count as closed; points closer than 1 mm are one; `planarity_m` is how far a vertex may
     lie from its face's plane (val3dity's default is 0.01). As in val3dity, the shell is looked at

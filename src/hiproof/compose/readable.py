@@ -1,4 +1,7 @@
-"""Whether a file of parameters can hold a roof: its reader and its writer share these checks."""
+"""Checks that a file of parameters can hold a roof.
+
+Its reader and its writer share them.
+"""
 
 from __future__ import annotations
 
@@ -52,8 +55,9 @@ def refuse_many(parts: Sequence) -> None:
 
 
 def refuse_wrong_part(part: Part, index: int, roof: Roof, visited: dict[tuple, int]) -> None:
-    """Raise InputError for a part without finite planes, off the outline, or equal to one `visited`
-    before.
+    """Raise InputError for a part that no file may hold.
+
+    It has no finite planes, lies off the outline, or equals one `visited` before.
 
     `visited` holds the numbers of earlier parts by their content; the part is added to it.
     """

@@ -1,5 +1,6 @@
-"""A fitted roof made of exactly the numbers that are written of it, so that its file builds the
-same bytes again.
+"""A fitted roof rounded to exactly the numbers that are written.
+
+So its file builds the same bytes again.
 
 Everything is rounded before the solid is composed: lengths and angles to a millionth of a metre or
 degree, plans and heights of the ground to the tenth of a millimetre on which solids are composed.
@@ -25,8 +26,9 @@ PLAN_DIGITS = 4  # of outlines and the terrain: tenths of a millimetre, as solid
 
 
 def settled_roof(roof: Roof) -> Roof:
-    """The roof with its outline and parts as written; its frame's origin is on whole millimetres
-    already.
+    """Round the roof's outline and parts as they are written.
+
+    Its frame's origin is on whole millimetres already.
     """
     return replace(
         roof, parts=tuple(map(settled_part, roof.parts)), outline=settled_outline(roof.outline)
@@ -34,8 +36,9 @@ def settled_roof(roof: Roof) -> Roof:
 
 
 def settled_part(part: Part) -> Part:
-    """The part with parameters, position, rotation and pieces as written, its planes made
-    of them.
+    """Round a part's parameters, position, rotation and pieces as written.
+
+    Its planes are made of them.
     """
     parameters = {name: round_number(value) for name, value in part.parameters.items()}
     kappa = math.radians(round_number(math.degrees(part.kappa)))
@@ -57,8 +60,9 @@ def make_pieces(
     translation: np.ndarray,
     outlines: list[shapely.Polygon],
 ) -> tuple[Piece, ...]:
-    """The pieces of a part over `outlines`: every plane of its shape, of a saw-tooth the one of the
-    tooth it lies in.
+    """Return the pieces of a part over `outlines`.
+
+    They have every plane of its shape, of a saw-tooth the one of the tooth in which they lie.
 
     Raises FitError for a type or parameters that make no shape.
     """
@@ -81,8 +85,9 @@ def make_pieces(
 
 
 def settled_sigma(sigma: Mapping[str, float]) -> dict[str, float]:
-    """Standard deviations as written; that of the rotation, `kappa` [rad], in whole millionths of a
-    degree.
+    """Round standard deviations as they are written.
+
+    That of the rotation, `kappa` [rad], is in whole millionths of a degree.
     """
     return {
         name: math.radians(round_number(math.degrees(value)))
@@ -93,7 +98,7 @@ def settled_sigma(sigma: Mapping[str, float]) -> dict[str, float]:
 
 
 def round_number(value: float, digits: int = DIGITS) -> float:
-    """A rounded number; minus zero is zero, NaN and infinities stay."""
+    """Round a number; minus zero becomes zero, NaN and infinities stay."""
     return round(float(value), digits) + 0.0
 
 
@@ -102,8 +107,9 @@ def rounded_outline(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
-    """The outline rounded; where that makes it cross itself, the largest valid polygon on the same
-    grid.
+    """Round the outline.
+
+    Where that makes it cross itself, it is the largest valid polygon on the same grid.
     """
     result = rounded_outline(outline)
     if result.is_valid:
@@ -113,7 +119,7 @@ def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
 
 
 def round_building(building: Building) -> Building:
-    """The building with its figures and probabilities as written."""
+    """Round a building's figures and probabilities as they are written."""
     values: dict[str, Any] = {f.name: getattr(building.quality, f.name) for f in fields(Quality)}
     values |= {name: round_number(value) for name, value in values.items() if name != "points"}
     return replace(

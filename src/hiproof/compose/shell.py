@@ -1,5 +1,6 @@
-"""From plan cells to a closed shell: roof faces over the cells, walls where levels part, one ground
-face below.
+"""From plan cells to a closed shell.
+
+It has roof faces over the cells, walls where levels part, and one ground face below.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ class Levels(NamedTuple):
 
 
 class Saddle(Exception):
-    """Around a plan vertex levels rise and fall twice, or a cell meets itself;
+    """A plan vertex around which the solid is no manifold.
+
+    Levels rise and fall twice around it, or a cell meets itself there.
 
     `patch` (soup, label) is the cure.
     """
@@ -52,7 +55,7 @@ def raise_shell(
     merge_walls: bool = True,
     turn_in: bool = False,
 ) -> Solid:
-    """Solid over the plan cells.
+    """Raise the solid over the plan cells.
 
     Raises Saddle where the problem needs a patch first, CompositionError when none helps.
 
@@ -95,7 +98,7 @@ def raise_shell(
 
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
-    """Lowest roof height at any vertex of any cell, in grid units."""
+    """Return the lowest roof height at any vertex of any cell, in grid units."""
     label = np.repeat(side.ravel(), 2)
     corners = xy[np.repeat(edges, 2, axis=0)].reshape(-1, 2)[label != OUTSIDE]
     a, b, c = planes[label[label != OUTSIDE]].T
@@ -103,7 +106,7 @@ def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.
 
 
 def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
-    """Closed walks of the chosen half-edges, each as a list of half-edges."""
+    """Return closed walks of the selected half-edges, as lists of half-edges."""
     visited = [False] * len(follow)
     result = []
     for first in range(len(follow)):
@@ -119,7 +122,7 @@ def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
 
 
 def simple_loops(ring: list[int]) -> list[list[int]]:
-    """A closed walk over vertices cut into loops that visit none of them twice."""
+    """Cut a closed walk into loops that visit no vertex twice."""
     loops: list[list[int]] = []
     path: list[int] = []
     position: dict[int, int] = {}
@@ -152,7 +155,10 @@ def roof_faces(
     xyz: list[list[float]],
     part: np.ndarray,
 ) -> list[Face]:
-    """A RoofSurface a cell: its outer walk counter-clockwise from above, then its holes."""
+    """Return one RoofSurface a cell.
+
+    It has its outer walk counter-clockwise from above, then its holes.
+    """
     rings_of: dict[int, list[list[int]]] = {}
     label_of = {}
     for walk in walks(follow, [current != OUTSIDE for current in label]):
@@ -169,7 +175,9 @@ def roof_faces(
 def ground_face(
     follow: list[int], level: list[int], label: list[int], skip: set[int], xyz: list[list[float]]
 ) -> Face:
-    """The GroundSurface: the walks around the outside, which run counter-clockwise seen from below.
+    """Return the GroundSurface.
+
+    It has the walks around the outside, which run counter-clockwise seen from below.
 
     `skip` are ground vertices in the middle of a straight wall, which nothing else needs.
     """
@@ -182,8 +190,9 @@ def ground_face(
 
 
 def wall_rises(follow: list[int], level: list[int]) -> dict[int, tuple[int, int, int, int]]:
-    """Half-edges whose left cell stands above the right one, with their levels (low, high at
-    origin, low, high at end).
+    """Return half-edges whose left cell stands above the right one.
+
+    With each come its levels: low, high at the origin, low, high at the end.
     """
     rises = {}
     for h in range(len(follow)):
@@ -204,8 +213,9 @@ def wall_runs(
     label: list[int],
     xyz: list[list[float]],
 ) -> list[list[int]]:
-    """Half-edges with walls, grouped: consecutive ones on a straight stretch of the outline make
-    one wall.
+    """Group half-edges with walls.
+
+    Consecutive ones on a straight stretch of the outline make one wall.
     """
     outer = {follow[h ^ 1] ^ 1: h for h in rises if label[h ^ 1] == OUTSIDE}
     next_edges = {
@@ -229,7 +239,10 @@ def wall_runs(
 def is_straight(
     run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz: list[list[float]]
 ) -> bool:
-    """Whether all ground vertices inside a run lie on the line between its ends."""
+    """Return whether all ground vertices inside a run lie on one line.
+
+    The line connects the run's ends.
+    """
     ax, ay, _ = xyz[rises[run[0]][0]]
     bx, by, _ = xyz[rises[run[-1]][2]]
     length = max(math.hypot(bx - ax, by - ay), 1.0)
@@ -243,8 +256,9 @@ def is_straight(
 
 
 def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> list[int]:
-    """Ring of the wall over a run of plan edges, counter-clockwise seen from its right, through
-    every level on the way.
+    """Return the ring of the wall over a run of plan edges.
+
+    It is counter-clockwise seen from its right, through every level on the way.
     """
     low_u, high_u, _, _ = rises[run[0]]
     _, _, low_v, high_v = rises[run[-1]]
@@ -259,7 +273,7 @@ def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) 
 
 
 def compact_solid(vertices: np.ndarray, faces: list[Face]) -> Solid:
-    """Solid with those of the `vertices` (n, 3) that faces use."""
+    """Return a solid of those `vertices` (n, 3) that faces use."""
     in_use = sorted({v for face in faces for ring in face.rings for v in ring})
     number = {vertex: index for index, vertex in enumerate(in_use)}
     faces = [
@@ -271,8 +285,9 @@ def compact_solid(vertices: np.ndarray, faces: list[Face]) -> Solid:
 
 @dataclass(frozen=True)
 class Sectors:
-    """The cells around a plan vertex, counter-clockwise: sector k lies between arm k and
-    the next.
+    """The cells around a plan vertex, counter-clockwise.
+
+    Sector k lies between arm k and the next.
     """
 
     corner: np.ndarray
@@ -283,7 +298,7 @@ class Sectors:
     label: list[int]
 
     def runs(self, same: list[int]) -> list[tuple[int, int]]:
-        """(first sector, number) of the runs of equal values around the vertex."""
+        """Return (first sector, number) of the runs of equal values."""
         size = len(same)
         first = [k for k in range(size) if same[k] != same[k - 1]]
         return [(k, (first[(i + 1) % len(first)] - k - 1) % size + 1) for i, k in enumerate(first)]
@@ -292,7 +307,10 @@ class Sectors:
         return sum(self.opening[(run[0] + j) % len(self.opening)] for j in range(run[1]))
 
     def tip(self, run: tuple[int, int], radius: float) -> np.ndarray:
-        """Edges (m, 4) of the wedge over a run of sectors, `radius` grid units long."""
+        """Return the edges (m, 4) of the wedge over a run of sectors.
+
+        It is `radius` grid units long.
+        """
         width = self.width(run)
         steps = (
             np.linspace(0, width, max(2, math.ceil(width / (np.pi / 3)) + 1)) + self.angle[run[0]]
@@ -305,7 +323,7 @@ class Sectors:
 def sectors_at(
     v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels
 ) -> Sectors:
-    """The sectors around plan vertex v."""
+    """Return the sectors around plan vertex v."""
     surroundings = levels.order[levels.start[v] : levels.start[v + 1]]
     arms = (xy[edges[surroundings >> 1, 1 - (surroundings & 1)]] - xy[v]).astype(float)
     angle = np.arctan2(arms[:, 1], arms[:, 0])
@@ -322,8 +340,9 @@ def sectors_at(
 
 
 def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
-    """Patch (soup, label) for a vertex that is no manifold: the tip of its narrowest peak goes to
-    the higher neighbour.
+    """Return a patch (soup, label) for a vertex that is no manifold.
+
+    It gives the tip of the narrowest peak to the higher neighbour.
 
     Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to
     that cell.
@@ -346,8 +365,9 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
 
 
 def pinches(sectors: Sectors) -> list[tuple[float, tuple[int, int], int]]:
-    """(width, run, label) of what a cell that meets itself encloses on either side, as far as it is
-    roofed.
+    """Return (width, run, label) of what a cell that meets itself encloses.
+
+    Either side counts, as far as it is roofed.
     """
     result = []
     for cell in {

@@ -49,8 +49,9 @@ def compose_simpler(
 def simpler_roofs(
     roof: Roof, failing: tuple[int, ...], points: np.ndarray
 ) -> Iterator[tuple[float, Roof, str]]:
-    """Yield (share of points on it, roof, what was given up) for each part that fails, or
-    for all.
+    """Yield simpler roofs, without each part that fails, then without all.
+
+    With a roof come the share of points on it and what was given up.
     """
     if len(roof.parts) < 2:
         return
@@ -64,7 +65,10 @@ def simpler_roofs(
 
 
 def level_part(part: Part, points: np.ndarray) -> Part:
-    """Return a flat part in the place of `part`, at the median height of its points or its own."""
+    """Return a flat part in the place of `part`.
+
+    It lies at the median height of its points, or at its own.
+    """
     z = part.height_at(points[:, :2])
     z = points[np.isfinite(z) & (np.abs(z - points[:, 2]) < NEAR_M), 2]
     height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)

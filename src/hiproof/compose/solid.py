@@ -36,8 +36,9 @@ MAX_PATCHES = 40  # crosswise corners mended in one building, so that it comes t
 
 
 def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None) -> Solid:
-    """The valid solid (ISO 19107) under `roof` and above `z_ground_local` [m], both in the roof's
-    local frame.
+    """Compose the valid solid (ISO 19107) under `roof`.
+
+    It stands on `z_ground_local` [m], in the roof's local frame.
 
     Over the roof's outline the top is max over covering pieces of min over their planes. Parts of
     the outline no piece covers are roofed by the piece they border most. Faces under the smallest
@@ -92,7 +93,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
 
 
 def parts_at_fault(solid: Solid, findings: tuple[Finding, ...]) -> tuple[int, ...]:
-    """The numbers of the roof parts whose faces have a finding, in ascending order."""
+    """Return ascending numbers of the roof parts whose faces have a finding."""
     parts = {solid.faces[finding.face].part for finding in findings if finding.face >= 0}
     return tuple(sorted(parts - {-1}))
 
@@ -105,8 +106,9 @@ def compose_at(
     merge_walls: bool,
     turn_in: bool = False,
 ) -> Solid:
-    """One attempt at the given snap distance; corners where levels meet crosswise are set back one
-    by one.
+    """Compose once, at the given snap distance.
+
+    Corners where levels meet crosswise are set back one by one.
     """
     reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
     for _ in range(MAX_PATCHES):
@@ -128,8 +130,9 @@ def terrain_intersection(
     z_floor: float = float("nan"),
     spacing_m: float = 1.0,
 ) -> tuple[np.ndarray, ...]:
-    """Closed lines (m, 3) where the outline's walls meet the terrain: one a ring, a vertex at least
-    every `spacing_m`.
+    """Return closed lines (m, 3) where the outline's walls meet the terrain.
+
+    There is one a ring, with a vertex at least every `spacing_m`.
 
     `terrain_height_at` takes (n, 2) and returns (n,) in the outline's frame; where it knows nothing
     (NaN) the height is that of the ring's other points on average, and `z_floor` if it knows

@@ -1,5 +1,6 @@
-"""Bare ground inside a footprint: a yard that is no hole, a wing pulled down, the roof of a garage
-below ground.
+"""Bare ground inside a footprint.
+
+It may be a yard that is no hole, a wing pulled down, or the roof of a garage below ground.
 
 Where ground points lie densely and roof points do not, nothing stands. What is cut out are
 right-angled pieces along the footprint's main direction: of all rectangles the one that holds most
@@ -79,8 +80,9 @@ is not its own.
 
 @dataclass(frozen=True)
 class BareGround:
-    """The `outline` without its bare ground, and the area (m2) that was cut off; the outline is
-    None where what is left is no one building.
+    """The `outline` without its bare ground, and the area (m2) cut off.
+
+    The outline is None where what is left is no single building.
     """
 
     outline: shapely.Polygon | None
@@ -90,7 +92,7 @@ class BareGround:
 def find_bare_ground(
     outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray
 ) -> BareGround | None:
-    """The bare ground inside `outline`, None where there is little.
+    """Return the bare ground inside `outline`, None where there is little.
 
     roof: (n, 2 or more) points of roofs, trees and whatever else stands high; ground: (m, 2 or
     more) points of the ground; all in one frame in metres.
@@ -126,7 +128,10 @@ def find_bare_ground(
 
 
 def subtract_pieces(outline: shapely.Polygon, pieces: list[shapely.Polygon]) -> shapely.Geometry:
-    """The outline less the pieces and less what would be left thinner than THIN_M beside them."""
+    """Return the outline less the pieces and less thin rests beside them.
+
+    Rests are thinner than THIN_M.
+    """
     remainder = shapely.difference(outline, shapely.union_all(pieces))
     thick = shapely.buffer(remainder, -THIN_M / 2, join_style="mitre")
     thick = shapely.buffer(thick, THIN_M / 2 + 1e-6, join_style="mitre", mitre_limit=3.0)
@@ -139,8 +144,10 @@ def subtract_pieces(outline: shapely.Polygon, pieces: list[shapely.Polygon]) -> 
 
 @dataclass
 class ClassifiedPoints:
-    """Places in the footprint's main directions, `node` (m) apart: `value` (rows, columns) 1 for
-    bare ground, negative for roof and unseen places, 0 outside; `x`, `y` their coordinates.
+    """Places in the footprint's main directions, `node` (m) apart.
+
+    `value` (rows, columns) is 1 for bare ground, negative for roof and unseen places, 0 outside.
+    `x` and `y` are their coordinates.
     """
 
     outline: shapely.Polygon
@@ -154,7 +161,7 @@ class ClassifiedPoints:
 
     @classmethod
     def of(cls, outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray) -> ClassifiedPoints:
-        """All places over the outline, classified."""
+        """Classify all places over the outline."""
         lower, upper = np.array(outline.bounds).reshape(2, 2)
         node = max(NODE_M, float((upper - lower).max()) / MOST_NODES)
         x, y = (np.arange(lower[k] + node / 2, upper[k], node) for k in (0, 1))
@@ -169,7 +176,7 @@ class ClassifiedPoints:
         return cls(outline, roof, ground, spacing, node, x, y, value.reshape(grid_x.shape))
 
     def pieces(self) -> Iterator[shapely.Polygon]:
-        """Rectangles of bare ground, the largest first."""
+        """Yield rectangles of bare ground, the largest first."""
         for _ in range(MOST_PIECES):
             top, bottom, left, right, total = largest_sum(self.value)
             block = self.value[top:bottom, left:right]
@@ -192,8 +199,10 @@ class ClassifiedPoints:
                 yield piece
 
     def side(self, box: np.ndarray, k: int) -> float:
-        """Where side `k` of `box` (xmin, ymin, xmax, ymax) belongs: before the roof that begins
-        beside it, out of the outline where none does up to its end, else where it is.
+        """Return the place to which side `k` of `box` belongs.
+
+        `box` is (xmin, ymin, xmax, ymax). The side goes before the roof that begins beside it, out
+        of the outline where none does up to its end, else it stays.
         """
         axis, sign = k % 2, -1.0 if k < 2 else 1.0
         lower, upper = box[1 - axis] + 0.25 * self.spacing, box[3 - axis] - 0.25 * self.spacing
@@ -211,7 +220,7 @@ class ClassifiedPoints:
 
 
 def first_dense(sorted_along: np.ndarray, spacing: float, largest: float) -> float | None:
-    """Where, from inside out, points begin to lie as densely as a roof's;
+    """Return the innermost place from which points lie as densely as a roof's.
 
     None where they do not.
     """
@@ -224,8 +233,9 @@ def first_dense(sorted_along: np.ndarray, spacing: float, largest: float) -> flo
 
 
 def mark_near(points: np.ndarray, distance_m: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Whether each place (rows, columns) of an even grid lies less than `distance_m` from any of
-    the `points` (n, 2).
+    """Return whether each place of a grid lies near any of `points` (n, 2).
+
+    Places are (rows, columns), and near is less than `distance_m`.
 
     `x` (columns,) and `y` (rows,) are the places' coordinates.
     """
@@ -241,9 +251,10 @@ def mark_near(points: np.ndarray, distance_m: float, x: np.ndarray, y: np.ndarra
 def list_near(
     values: np.ndarray, distance_m: float, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of the even `places` on an axis those that may lie within `distance_m` of each of the
-    `values` (n,), by their numbers (n, k), and the squares of their distances, infinite beyond an
-    end.
+    """Return the places on an axis that may lie near each of `values` (n,).
+
+    Near is within `distance_m` of the even `places`. Returns their numbers (n, k), and the squares
+    of their distances, infinite beyond an end.
     """
     step = places[1] - places[0] if len(places) > 1 else distance_m
     reach = math.ceil(distance_m / step)
@@ -255,14 +266,18 @@ def list_near(
 
 
 def estimate_spacing(roof: np.ndarray) -> float:
-    """Distance (m) between roof points, were they even: from the square metres that hold any."""
+    """Return the distance (m) between roof points, were they even.
+
+    It follows from the square metres that hold any.
+    """
     cells = count_cells(np.floor(roof))
     return math.sqrt(max(cells, 1) / len(roof))
 
 
 def largest_sum(value: np.ndarray) -> tuple[int, int, int, int, float]:
-    """Rows [top, bottom) and columns [left, right) of the rectangle with the largest sum,
-    and that.
+    """Return the rectangle with the largest sum, and that sum.
+
+    It is rows [top, bottom) and columns [left, right).
     """
     sums = np.vstack([np.zeros(value.shape[1]), np.cumsum(value, axis=0)])
     best = (0, 0, 0, 0, 0.0)

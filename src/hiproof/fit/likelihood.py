@@ -1,5 +1,6 @@
-"""The default objective: from points to the best roof of every type, the choice among them, and
-what is known of it.
+"""The default objective: from points to the best roof of every type.
+
+Then one of them is chosen, with its covariance.
 
     points -> starts by vote -> annealed fits -> derived types -> noise by EM -> choice by evidence
     -> sides -> covariance
@@ -54,8 +55,9 @@ PLAN_INDICES = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extent
 
 @dataclass(frozen=True)
 class Estimate:
-    """The chosen roof: `theta` (9,) of `primitive`, its `covariance` (9, 9), the `noise` learnt and
-    how each type fared.
+    """The chosen roof, and how each type fared.
+
+    It has `theta` (9,) of `primitive`, its `covariance` (9, 9), and the `noise` learnt.
 
     `value` is minus the log likelihood, `bics` by type (lower is better), both of the chosen type's
     optimum.
@@ -72,8 +74,9 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Roofs under test: row `kinds` (m,) of the tables, `thetas` (m, 9), minus log likelihoods
-    `values` (m,).
+    """Roofs under test.
+
+    Row `kinds` (m,) of the tables, `thetas` (m, 9), minus log likelihoods `values` (m,).
     """
 
     kinds: np.ndarray
@@ -85,7 +88,7 @@ class Candidates:
         return Candidates(self.kinds[rows], self.thetas[rows], self.values[rows], self.evaluations)
 
     def select_within(self, slack: float) -> Candidates:
-        """Those at most `slack` nats behind the best."""
+        """Select the candidates at most `slack` nats behind the best."""
         return self.select(self.values <= self.values.min() + slack)
 
     def joined(self, other: Candidates) -> Candidates:
@@ -99,7 +102,10 @@ class Candidates:
 
 @dataclass(frozen=True)
 class Search:
-    """One roof's problem, whole and thinned, with the shapes to try and the box of theta."""
+    """The problem of one roof, whole and thinned, with shapes and bounds.
+
+    The shapes are those to be tried.
+    """
 
     whole: Problem
     thinned: Problem
@@ -111,7 +117,10 @@ class Search:
     high: np.ndarray
 
     def box(self, candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds (m, 9) of each candidate; a given plan is a box without width."""
+        """Return bounds (m, 9) of each candidate.
+
+        A given plan is a box without width.
+        """
         lower, upper = self.low[candidates.kinds], self.high[candidates.kinds]
         if not self.whole.plan_is_free:
             lower[:, :Q0] = upper[:, :Q0] = candidates.thetas[:, :Q0]
@@ -125,7 +134,7 @@ class Search:
         iterations: int,
         tolerance: float,
     ) -> Candidates:
-        """Every candidate after some Levenberg-Marquardt steps on `problem`."""
+        """Return all candidates after some Levenberg-Marquardt steps."""
         thetas = candidates.thetas.copy()
         values, evaluations = kernel.minimise_each(
             problem,
@@ -140,27 +149,29 @@ class Search:
         return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations)
 
     def fit_coarsely(self, candidates: Candidates) -> Candidates:
-        """The best two of each type after coarse steps on the thinned points."""
+        """Return the best two of each type after coarse steps on thinned points."""
         return self.select_best(
             self.minimise(self.thinned, candidates, COARSE, 4, 0.5), 2, self.slack
         )
 
     def fit_roughly(self, candidates: Candidates) -> Candidates:
-        """The best two of each type after medium steps on the thinned points."""
+        """Return the best two of each type after medium steps on thinned points."""
         return self.select_best(
             self.minimise(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack
         )
 
     @property
     def slack(self) -> float:
-        """How far behind its type's best (nats, on the thinned points) a second candidate is still
-        worth its time.
+        """How far behind its type's best a second candidate is still tried.
+
+        It is in nats, on the thinned points.
         """
         return 3.0 + 0.05 * len(self.thinned.points)
 
     def select_best(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
-        """The `count` best of each type that are within `slack` nats of its best, types in the
-        tables' order.
+        """Select the `count` best of each type within `slack` nats of its best.
+
+        Types come in the tables' order.
         """
         families, values = self.family[candidates.kinds].tolist(), candidates.values.tolist()
         ranked = sorted(zip(families, values, range(len(values)), strict=True))
@@ -174,7 +185,7 @@ class Search:
         return candidates.select(np.array(selection, int))
 
     def select_gaining(self, candidates: Candidates) -> Candidates:
-        """Those but for types that explain no more than one that they derive from.
+        """Drop types that explain no more than one from which they derive.
 
         A gable is also a hip whose ends stand upright; learning the noise of every such type would
         take most of the time.
@@ -199,8 +210,9 @@ def fit_likelihood(
     side_taus: tuple[float, ...] = (),
     log_prior: dict[str, float] | None = None,
 ) -> Estimate:
-    """The most evident roof of `types` for `points` (n, 4): x, y, z about their centre, and the
-    probability of being roof.
+    """Fit the most evident roof of `types` to `points` (n, 4).
+
+    They are x, y, z about their centre, and the probability of being roof.
 
     With an `outline` the plan is its rectangle in the roof's direction and only heights are fitted.
     `side_taus` are the softnesses (m) tried at last on the sides; `log_prior` by type is added to
@@ -224,7 +236,10 @@ def search_types(
     side_taus: tuple[float, ...],
     log_prior: dict[str, float] | None,
 ) -> Estimate:
-    """The most evident roof of `types` from the starts that the thinned points vote for."""
+    """Return the most evident roof of `types`.
+
+    It starts where the thinned points vote.
+    """
     basic = search.fit_roughly(vote_starts(search, outline))
     candidates = basic.joined(
         search.fit_roughly(search.fit_coarsely(derived_starts(search, basic)))
@@ -248,8 +263,9 @@ def search_types(
 
 @cache
 def list_needed_types(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
-    """(`types` and those their starts derive from, the number of its type for each of their
-    variants).
+    """Return `types` with those from which their starts derive.
+
+    With them comes the number of its type for each of their variants.
     """
     mask = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
     names = tuple(name for name in CATALOGUE if name in mask)
@@ -260,7 +276,10 @@ def list_needed_types(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarr
 def new_search(
     points: np.ndarray, types: tuple[str, ...], plan_is_free: bool, coarse_points: int
 ) -> Search:
-    """The problem of `points` (n, 4), thinned to about `coarse_points`, and all shapes needed."""
+    """Set up the search for `points` (n, 4) and all shapes needed.
+
+    The points are also thinned to about `coarse_points`.
+    """
     names, family = list_needed_types(types)
     z_low, z_high = height_range(points[:, 2])
     plan_area = (plan_extents(points[:, :2]) + 2 * OUTLIER_REACH_M).prod() if plan_is_free else 1.0
@@ -274,14 +293,18 @@ def new_search(
 
 
 def height_range(z: np.ndarray) -> tuple[float, float]:
-    """Lowest and highest height but for one in a hundred and one in two hundred."""
+    """Return lowest and highest height without extremes.
+
+    One in a hundred and one in two hundred are left out.
+    """
     ordered = np.sort(z)
     return float(ordered[int(0.01 * len(z))]), float(ordered[len(z) - 1 - int(0.005 * len(z))])
 
 
 def plan_extents(xy: np.ndarray) -> np.ndarray:
-    """Sides (2,), shorter first, of the rectangle whose uniform points would scatter like `xy` (n,
-    2).
+    """Return the sides (2,) of the rectangle with the scatter of `xy` (n, 2).
+
+    Points lie evenly in it. The shorter side comes first.
     """
     x, y = xy[:, 0] - xy[:, 0].mean(), xy[:, 1] - xy[:, 1].mean()
     xx, yy, xy_ = x @ x / len(x), y @ y / len(x), x @ y / len(x)
@@ -290,8 +313,9 @@ def plan_extents(xy: np.ndarray) -> np.ndarray:
 
 
 def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
-    """Starts of the voting types in the likely directions, after a few coarse steps: the best two
-    of each type.
+    """Return the best two starts of each voting type.
+
+    They are taken in the likely directions, after a few coarse steps.
 
     Up to eight a type are stepped, for a saw-tooth has many counts and turns, but only those with
     nearly as many votes.
@@ -311,8 +335,9 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
 
 
 def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
-    """Likely directions (rad, modulo a quarter turn): of the slopes, and of the plan where that is
-    another one.
+    """Return likely directions (rad, modulo a quarter turn).
+
+    They are that of the slopes, and of the plan where that is another one.
 
     A given outline's own direction stands for both where they are close.
     """
@@ -330,7 +355,10 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
 
 
 def derived_starts(search: Search, basic: Candidates) -> Candidates:
-    """Starts of the types that derive from simpler ones, from the best `basic` fit of each."""
+    """Return starts of the types that derive from simpler ones.
+
+    They come from the best `basic` fit of each.
+    """
     basic = search.select_best(basic, 1)
     theta_of = {
         search.shapes[kind].name: theta
@@ -349,7 +377,7 @@ def derived_starts(search: Search, basic: Candidates) -> Candidates:
 
 
 def learn(search: Search, candidates: Candidates) -> tuple[Candidates, np.ndarray]:
-    """Candidates fitted together with their noise (m, 3) by EM."""
+    """Fit candidates together with their noise (m, 3) by EM."""
     noises = np.tile([0.1, SIDE_TAU_M, OUTLIERS_AT_FIRST], (len(candidates.kinds), 1))
     thetas = candidates.thetas.copy()
     values, evaluations = kernel.estimate_each(
@@ -370,7 +398,7 @@ def learn(search: Search, candidates: Candidates) -> tuple[Candidates, np.ndarra
 def choose(
     search: Search, candidates: Candidates, log_prior: dict[str, float]
 ) -> tuple[int, dict[str, float]]:
-    """(row of the most evident proper roof, BIC by type).
+    """Return the row of the most evident proper roof, and BIC by type.
 
     The penalty is twice the textbook's: it is safest there.
     """
@@ -395,8 +423,9 @@ def finish(
     bics: dict[str, float],
     side_taus: tuple[float, ...],
 ) -> Estimate:
-    """The winner with its sides sharpened and averaged, its heights fitted again, and its
-    covariance.
+    """Return the estimate of the winner.
+
+    Its sides are sharpened and averaged, its heights fitted again, and its covariance follows.
     """
     kind, theta, value = int(winner.kinds[0]), winner.thetas[0].copy(), float(winner.values[0])
     (lower,), (upper,) = search.box(winner)
@@ -428,7 +457,9 @@ def finish(
 
 
 def settle_sides(search, kind, theta, lower, upper, noise) -> tuple[np.ndarray, int]:
-    """Posterior means of the four sides, then heights, slopes and direction with them held;
+    """Set sides to posterior means, then fit the rest with these held.
+
+    The rest is heights, slopes and direction.
 
     `theta` in place.
 
@@ -456,8 +487,9 @@ def settle_sides(search, kind, theta, lower, upper, noise) -> tuple[np.ndarray, 
 def estimate_covariance(
     search: Search, kind: int, theta: np.ndarray, noise: Noise, variances: np.ndarray
 ) -> np.ndarray:
-    """Covariance (9, 9) of theta: the sides' own `variances` carried through the heights' inverse
-    Hessian.
+    """Return the covariance (9, 9) of theta.
+
+    The sides' own `variances` are carried through the heights' inverse Hessian.
     """
     hessian, _ = kernel.height_hessian(search.whole, search.tables, kind, theta, noise)
     c, s = np.cos(theta[KAPPA]), np.sin(theta[KAPPA])

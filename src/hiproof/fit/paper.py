@@ -1,5 +1,6 @@
-"""The objective of Li, Zhang and Shan (2020), as published: the reference that the likelihood is
-measured against.
+"""The objective of Li, Zhang and Shan (2020), as published.
+
+It is the reference for the likelihood.
 
 J = J1 + beta J2, with J1 the mean distance of the points to the nearest plane of the primitive, and
 J2 = 1 - IoU of its plan outline with the alpha shape of the points. The planes come from an SVD of
@@ -45,8 +46,9 @@ def fit_paper(
     outline: shapely.Polygon | None = None,
     settings: Settings | None = None,
 ) -> Fit:
-    """Fit one of `types` (default: those of the settings, else the paper's) to `points` (n, 3)
-    metres, any frame.
+    """Fit one of `types` to `points` (n, 3), in metres, in any frame.
+
+    The default is those of the settings, else the paper's.
 
     `outline` (same frame) takes the place of the alpha shape. In the outcome `value` is J; `bics`
     hold J by type, which plays BIC's role here, and there are no standard deviations. Raises
@@ -70,7 +72,7 @@ def fit_paper(
 
 
 def observed_outline(xy: np.ndarray) -> shapely.Polygon:
-    """The paper's B: the alpha shape of `xy` (n, 2).
+    """Return the paper's B, the alpha shape of `xy` (n, 2).
 
     Raises FitError for points that span no area.
     """
@@ -78,7 +80,10 @@ def observed_outline(xy: np.ndarray) -> shapely.Polygon:
 
 
 class PaperFit:
-    """One primitive (with its tooth count) while it is fitted; theta = (theta_p..., kappa, T_L)."""
+    """One primitive (with its tooth count) during its fit.
+
+    theta = (theta_p..., kappa, T_L).
+    """
 
     def __init__(self, shape: Primitive, xyz: np.ndarray, boundary: shapely.Polygon) -> None:
         self.shape, self.xyz, self.boundary = shape, xyz, boundary
@@ -89,8 +94,9 @@ class PaperFit:
         self.value = math.inf
 
     def box_starts(self) -> list[np.ndarray]:
-        """theta of the minimum bounding box with its sides in every role: two, or four where a half
-        turn matters.
+        """Return theta of the minimum bounding box with its sides in every role.
+
+        There are two, or four where a half turn matters.
         """
         corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(self.boundary))[:4]
         lower, upper = np.percentile(self.xyz[:, 2], (0, 100))
@@ -116,11 +122,11 @@ class PaperFit:
         return dict(zip(self.names, map(float, theta), strict=False)) | self.fixed
 
     def vertices(self, theta: np.ndarray) -> np.ndarray:
-        """Equation 9 without T_G: R_kappa S + T_L."""
+        """Return the vertices by equation 9 without T_G: R_kappa S + T_L."""
         return place_vertices(self.shape.vertices(self.theta_p(theta)), theta[-4], theta[-3:])
 
     def objective(self, theta: np.ndarray) -> float:
-        """J at `theta`."""
+        """Return J at `theta`."""
         self.evaluations += 1
         vertices = self.vertices(theta)
         j1 = np.abs(plane_distances(self.xyz, vertices, self.shape.faces)).min(axis=0).mean()
@@ -128,8 +134,9 @@ class PaperFit:
         return float(j1 + BETA * outline_misfit(vertices, self.boundary) + improper)
 
     def is_roof(self, theta: np.ndarray) -> bool:
-        """Whether the slopes and fractions that follow from theta_p lie within the primitive's
-        bounds.
+        """Return whether derived slopes and fractions lie within the bounds.
+
+        They follow from theta_p; bounds are the primitive's.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
             try:
@@ -141,7 +148,7 @@ class PaperFit:
         )
 
     def minimise(self) -> PaperFit:
-        """From the start to the nearest minimum."""
+        """Minimise from the start to the nearest minimum."""
         from scipy.optimize import minimize
 
         result = minimize(self.objective, self.theta, method="L-BFGS-B", bounds=self.bounds())
@@ -149,9 +156,7 @@ class PaperFit:
         return self
 
     def outcome(self, xyz: np.ndarray, frame: LocalFrame, values: dict[str, float]) -> Fit:
-        """The fit with its parameters in their one canonical form, in the frame of the points
-        given.
-        """
+        """Return the fit with canonical parameters, in the frame of the points."""
         if not self.is_roof(self.theta):
             raise FitError(
                 f"expected points of a {self.shape.name} roof, got no such roof from them; try "
@@ -185,7 +190,10 @@ class PaperFit:
 
 
 def best_variant(shape: Primitive, xyz: np.ndarray, boundary: shapely.Polygon) -> PaperFit:
-    """The fit of a primitive; of a saw-tooth, the tooth count with the smallest J."""
+    """Fit a primitive; of a saw-tooth, with the best tooth count.
+
+    The best has the smallest J.
+    """
     fits = [PaperFit(variant, xyz, boundary).minimise() for variant in shape.variants]
     return min(fits, key=lambda fitted: fitted.value)
 
@@ -193,8 +201,9 @@ def best_variant(shape: Primitive, xyz: np.ndarray, boundary: shapely.Polygon) -
 def plane_distances(
     xyz: np.ndarray, vertices: np.ndarray, faces: Sequence[Sequence[int]]
 ) -> np.ndarray:
-    """Signed distances (faces, n) of points to the plane of each face, by SVD of its centred
-    vertices.
+    """Return signed distances (faces, n) of points to each face's plane.
+
+    Planes come from an SVD of the face's centred vertices.
     """
     distances = np.empty((len(faces), len(xyz)))
     for row, face in zip(distances, faces, strict=True):
@@ -207,8 +216,9 @@ def plane_distances(
 
 
 def outline_misfit(vertices: np.ndarray, boundary: shapely.Polygon) -> float:
-    """J2 = 1 - IoU of `boundary` and the plan outline of the vertices (all primitives are convex in
-    plan).
+    """Return J2 = 1 - IoU of `boundary` and the vertices' plan outline.
+
+    All primitives are convex in plan.
     """
     outline = shapely.convex_hull(shapely.multipoints(vertices[:, :2]))
     common = shapely.intersection(outline, boundary).area

@@ -1,5 +1,6 @@
-"""The common shift between all footprints of a data set and the roofs in its clouds, with its
-uncertainty.
+"""The common shift between footprints and roofs of a data set.
+
+It comes with its uncertainty.
 
 A missing datum grid, or another epoch, moves all footprints alike. So all of them vote at once: for
 each shift the cost of the roof points is summed, where a point costs little inside the footprints
@@ -73,8 +74,9 @@ MOST_SAMPLE_POINTS = 30_000
 
 @dataclass(frozen=True)
 class Registration:
-    """The common shift `xy` (m, east and north) of the footprints onto the roofs, and its standard
-    deviations `sigma` (m).
+    """The common shift of the footprints onto the roofs.
+
+    `xy` is in m, east and north, with standard deviations `sigma` (m).
 
     `squares` had roof points; `agreement` is how much better the shift is than any other one that
     is far from it, in standard deviations of the sum over the squares.
@@ -108,13 +110,11 @@ class Registration:
 
     @property
     def shift(self) -> tuple[float, float]:
-        """What the footprints are moved by (m): the common shift where it is clear, else
-        nothing.
-        """
+        """The shift (m) of the footprints: the common one if it is clear, else none."""
         return self.xy if self.is_clear else (0.0, 0.0)
 
     def to_dict(self) -> dict[str, Any]:
-        """For run.json: what was found, and whether it was applied."""
+        """Return the result for run.json, and whether it was applied."""
         is_determined = self.squares > 0 and all(map(math.isfinite, self.sigma))
         return {
             "shift_m": list(self.xy),
@@ -139,8 +139,9 @@ class Registration:
 
 @dataclass(frozen=True)
 class Cell:
-    """Roof points of a part of the world on a raster, sorted: the `squares` (n,) and `nodes` (n,)
-    that they lie in.
+    """Roof points of a part of the world on a raster, sorted.
+
+    They lie in the `squares` (n,) and at the `nodes` (n,).
 
     `costs` (k,) are those of a point at each node, `row` the nodes of a row, and `low` the place of
     the first node.
@@ -153,8 +154,9 @@ class Cell:
     row: int
 
     def sums(self, shifts: np.ndarray, every: int = 1) -> np.ndarray:
-        """Costs (squares, m) of the points, one in `every`, summed by square, where footprints move
-        by `shifts` (m, 2) pitches.
+        """Return costs (squares, m) of one point in `every`, by square.
+
+        Footprints move by `shifts` (m, 2) pitches.
         """
         squares, nodes = self.squares[::every], self.nodes[::every]
         moves = (shifts @ [self.row, 1]).tolist()
@@ -164,8 +166,9 @@ class Cell:
 
 
 def register(cells: Iterable[tuple[np.ndarray, list[shapely.Polygon]]]) -> Registration:
-    """Estimate the common shift from the `cells` of a data set: roof points (n, 2) and the
-    footprints around them.
+    """Estimate the common shift from the `cells` of a data set.
+
+    A cell is roof points (n, 2) and the footprints around them.
 
     Coordinates are world metres. The cells must not overlap; their order does not matter, nor that
     of the points.
@@ -200,16 +203,18 @@ def register(cells: Iterable[tuple[np.ndarray, list[shapely.Polygon]]]) -> Regis
 
 
 def agreement(gains: np.ndarray) -> float:
-    """The smallest of the gains (squares, others) summed over squares, in standard deviations of
-    that sum.
+    """Return the smallest sum of gains (squares, others) over squares.
+
+    It is in standard deviations of that sum.
     """
     scatter = np.sqrt(((gains - gains.mean(axis=0)) ** 2).sum(axis=0))
     return round(float(np.min(gains.sum(axis=0) / np.maximum(scatter, 1e-9))), 3)
 
 
 def settle(cells: list[Cell], best: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The minimum (m) beside `best` by a parabola through its surroundings, with deviations by the
-    scatter between squares.
+    """Return the minimum (m) beside `best`, with deviations.
+
+    A parabola goes through its surroundings, and the scatter between squares gives the deviations.
     """
     surroundings = np.array(
         [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]]
@@ -231,18 +236,18 @@ def settle(cells: list[Cell], best: np.ndarray) -> tuple[tuple[float, float], tu
 
 
 def sum_costs(cells: list[Cell], shifts: np.ndarray, every: int = 1) -> np.ndarray:
-    """Costs (squares, m) of all cells, one after the other."""
+    """Return the costs (squares, m) of all cells, one after the other."""
     return np.concatenate([cell.sums(shifts, every) for cell in cells])
 
 
 def round_shift(pitches: np.ndarray) -> tuple[float, float]:
-    """Metres, to the millimetre, so that the run's files say exactly what was done."""
+    """Return metres, to the millimetre, as the run's files give them."""
     x, y = (round(float(value) * RASTER_PITCH_M, 3) for value in pitches)
     return x, y
 
 
 def make_shift_grid(step: int, reach_m: float) -> np.ndarray:
-    """Shifts (m, 2), `step` pitches apart, at most `reach_m` long."""
+    """Return shifts (m, 2), `step` pitches apart, at most `reach_m` long."""
     limit = round(reach_m / RASTER_PITCH_M / step)
     along = step * np.arange(-limit, limit + 1)
     shifts = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -250,7 +255,10 @@ def make_shift_grid(step: int, reach_m: float) -> np.ndarray:
 
 
 def make_cell(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
-    """The points in a fixed order, thinned, on the raster of what a point costs around them."""
+    """Return the points in a fixed order, thinned, on a raster of costs.
+
+    The raster holds what a point costs around them.
+    """
     places = np.unique(np.ascontiguousarray(np.asarray(xy, float)[:, :2]).view(complex))
     places = places[:: -(-len(places) // MOST_SAMPLE_POINTS)]
     xy = np.column_stack([places.real, places.imag])
@@ -285,8 +293,9 @@ def blur(raster: np.ndarray, sigma: float) -> np.ndarray:
 
 
 def blur_columns(raster: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Smooth each column of a raster by the symmetric `weights` (2 k + 1,), so many rows at once
-    that what they take stays small.
+    """Smooth each column of a raster by symmetric `weights` (2 k + 1,).
+
+    It takes so many rows at once that its memory stays small.
     """
     reach, smooth = len(weights) // 2, np.empty_like(raster)
     mirrored = np.pad(np.arange(len(raster)), reach, mode="symmetric")
@@ -303,7 +312,7 @@ def blur_columns(raster: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def rasterise(polygons: list[shapely.Polygon], lower: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """1 at the nodes (columns, rows) of a raster that any of the polygons holds, else 0;
+    """Return 1 at raster nodes (columns, rows) in any of the polygons, else 0.
 
     `lower` (2,) are the first node's pitches.
     """

@@ -29,7 +29,7 @@ def fit_roof(
     weights: np.ndarray | None = None,
     type_log_prior: dict[str, float] | None = None,
 ) -> Fit:
-    """The roof primitive that stands best for `points`.
+    """Fit the roof primitive that explains `points` best.
 
     points          (n, 3) metres in any frame; points that are not finite, or not on Earth, are
                     dropped, and their order does not matter
@@ -73,7 +73,10 @@ def fit_roof(
 
 
 def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
-    """`types` in the catalogue's order, each known; all of them for an empty tuple."""
+    """Return known `types` in the catalogue's order; all for an empty tuple.
+
+    Raises SettingsError for an unknown one.
+    """
     for name in types:
         get(name)
     return tuple(name for name in CATALOGUE if not types or name in types)
@@ -82,7 +85,9 @@ def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
 def usable_points(
     points: np.ndarray, weights: np.ndarray | None, outline: shapely.Polygon | None
 ) -> np.ndarray:
-    """Finite points inside the outline as (n, 4) x, y, z, weight, in lexicographic order.
+    """Return finite points inside the outline, in lexicographic order.
+
+    They are (n, 4): x, y, z, weight.
 
     Raises FitError for too few.
     """
@@ -128,8 +133,9 @@ def usable_points(
 
 
 def in_order(cloud: np.ndarray) -> np.ndarray:
-    """Rows (n, k) in lexicographic order; those of a building come so already, and looking is
-    cheaper than sorting.
+    """Sort rows (n, k) lexicographically, unless they are sorted already.
+
+    Those of a building come so, and looking is cheaper than sorting.
     """
     step = np.zeros(len(cloud) - 1)
     for column in cloud.T:
@@ -138,8 +144,9 @@ def in_order(cloud: np.ndarray) -> np.ndarray:
 
 
 def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
-    """The estimate in the words of the paper: theta_p, kappa, T_L, T_G, standard deviations,
-    vertices and faces.
+    """Return the estimate in the terms of the paper.
+
+    They are theta_p, kappa, T_L, T_G, standard deviations, vertices and faces.
     """
     shape = estimate.primitive
     theta_p, kappa, translation = shape.from_theta(estimate.theta)
@@ -167,8 +174,9 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
 
 
 def standard_deviations(estimate: Estimate) -> dict[str, float]:
-    """Standard deviation by name, by the delta method: gradients of the named formulas through
-    theta's covariance.
+    """Return standard deviations by name, by the delta method.
+
+    Gradients of the named formulas go through theta's covariance.
 
     What the points do not tell has none, as in a fit of several parts; what a given outline tells
     is exact, 0.

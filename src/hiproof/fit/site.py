@@ -1,5 +1,6 @@
-"""A building's footprint against the ground: what is bare is cut out, and where nothing stands that
-is said.
+"""A building's footprint against the ground.
+
+Bare ground is cut out. Where nothing stands, a remark says so.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ stands around a yard: cleared sites with heaps and trees on them reach 0.72
 
 @dataclass(frozen=True)
 class Site:
-    """What the ground says of a building before it is fitted: the points and the outline that
-    remain, whether nothing stands there, and a remark.
+    """The ground's evidence about a building before its fit.
+
+    It has the points and the outline that remain, whether nothing stands there, and a remark.
     """
 
     points: np.ndarray
@@ -48,8 +50,9 @@ def look_at_ground(
     terrain: Terrain | None,
     settings: Settings,
 ) -> Site:
-    """What remains of the building's points (n, 3) and outline by the points `ground` (m, 3), all
-    in the local `frame`, and by the terrain around.
+    """Return what remains of the building's points (n, 3) and outline.
+
+    The points `ground` (m, 3) and the terrain around decide, all in the local `frame`.
     """
     ground = ground.compress(shapely.intersects_xy(outline, ground[:, 0], ground[:, 1]), axis=0)
     plane = None if terrain is None else fit_plane_around(outline, frame, terrain)
@@ -78,8 +81,10 @@ def look_at_ground(
 
 
 def has_roofed_rest(all_points: np.ndarray, is_low: np.ndarray, outline: shapely.Polygon) -> bool:
-    """Whether what is left of the outline without its bare ground is all but covered by points
-    above the ground: a block around a wide yard, and no heaps and trees on a cleared site.
+    """Return whether points above the ground cover most of what is left.
+
+    That is the outline without its bare ground. It tells a block around a wide yard from heaps and
+    trees on a cleared site.
     """
     if is_low.all():
         return False
@@ -93,8 +98,9 @@ def has_roofed_rest(all_points: np.ndarray, is_low: np.ndarray, outline: shapely
 def fit_plane_around(
     outline: shapely.Polygon, frame: LocalFrame, terrain: Terrain
 ) -> np.ndarray | None:
-    """The plane of the ground around the outline in the local frame, by what the terrain knows,
-    guesses left out.
+    """Fit the plane of the ground around the outline, in the local frame.
+
+    The terrain's known heights count, without guesses.
     """
 
     def height_at(xy: np.ndarray) -> np.ndarray:
@@ -116,8 +122,10 @@ def cut_bare_ground(
     settings: Settings,
     upper: np.ndarray,
 ) -> Site:
-    """Points and outline without the bare ground among `ground` (m, 3), or with a remark where it
-    is roofed over; `upper` (k, 3) are the points that lie above it.
+    """Cut the bare ground among `ground` (m, 3) from points and outline.
+
+    Where it is roofed over it stays, with a remark. `upper` (k, 3) are the points that lie above
+    it.
     """
     bare_ground = find_bare_ground(outline, upper, ground) if len(ground) else None
     if bare_ground is None:

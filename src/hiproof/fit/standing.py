@@ -1,4 +1,6 @@
-"""Does anything stand on a footprint? Its roof points against the plane of the ground around it.
+"""The test of whether anything stands on a footprint.
+
+Its roof points are compared with the plane of the ground around it.
 
 Buildings that were pulled down leave ground, rubble and bushes where their footprint still is. Of
 the points on them a quarter or more lies on the ground, of those on standing buildings an eighth at
@@ -66,8 +68,10 @@ CELL_POINTS = 6.0
 
 @dataclass(frozen=True)
 class Standing:
-    """What the points of a footprint say: whether each (n,) lies on the ground, the share that
-    does, and whether they say that nothing stands there.
+    """The evidence of a footprint's points.
+
+    It says whether each (n,) lies on the ground, the share that does, and whether nothing stands
+    there.
     """
 
     is_low: np.ndarray
@@ -76,7 +80,10 @@ class Standing:
 
 
 def classify_standing(points: np.ndarray, plane: np.ndarray) -> Standing:
-    """What stands on the ground `plane` (3,), by the points (n, 3) inside a footprint."""
+    """Judge what stands on the ground `plane` (3,).
+
+    The points (n, 3) are those inside a footprint.
+    """
     height = points[:, 2] - points[:, :2] @ plane[:2] - plane[2]
     mask = (height < CLEAR_M) & (height > -DEEPEST_M)
     share = float(mask.mean()) if len(points) else 0.0
@@ -84,7 +91,10 @@ def classify_standing(points: np.ndarray, plane: np.ndarray) -> Standing:
 
 
 def cover(points: np.ndarray, is_high: np.ndarray) -> float:
-    """The share of the cells with points (n, 3) in which half of them or more are high."""
+    """Return the share of the cells in which half of the points are high.
+
+    Cells hold points (n, 3).
+    """
     extent = np.maximum(np.ptp(points[:, :2], axis=0), 0.1)
     side = float(np.sqrt(extent.prod() * CELL_POINTS / len(points)))
     cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / side)
@@ -95,8 +105,9 @@ def cover(points: np.ndarray, is_high: np.ndarray) -> float:
 def ground_plane(
     outline: shapely.Polygon, height_at: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray | None:
-    """The plane (3,) a, b, c of z = a x + b y + c through the ground around `outline`, None where
-    it is not known or no plane.
+    """Fit a plane through the ground around `outline`.
+
+    It is (3,) a, b, c of z = a x + b y + c, None where it is not known or no plane.
 
     `height_at` gives the ground's height (n,) at places (n, 2) in the outline's frame, NaN where it
     is unknown.
@@ -120,7 +131,7 @@ def ground_plane(
 
 
 def places_along(area: shapely.Geometry) -> np.ndarray:
-    """Places (n, 2) along the outer ring of `area`."""
+    """Return places (n, 2) along the outer ring of `area`."""
     rings = [part.exterior for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
     return np.concatenate(
         [shapely.get_coordinates(shapely.segmentize(ring, PLACE_M))[:-1] for ring in rings]

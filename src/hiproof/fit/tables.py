@@ -1,5 +1,6 @@
-"""The catalogue as arrays for the compiled core: one row a variant, the planes' formulas as a list
-of terms.
+"""The catalogue as arrays for the compiled core.
+
+There is one row a variant, and the planes' formulas are a list of terms.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ PLAN_LOW, PLAN_HIGH = (-np.inf, -np.inf, -np.inf, 0.6, 0.6), (np.inf, np.inf, np
 
 @cache
 def variants(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[Primitive, ...]:
-    """All variants of the primitives called `names`, in the order of the tables' rows."""
+    """Return all variants of the primitives `names`, in the tables' order."""
     return tuple(variant for name in names for variant in CATALOGUE[name].variants)
 
 
 @cache
 def tables(names: tuple[str, ...] = tuple(CATALOGUE)) -> Tables:
-    """The term table of the variants of `names`.
+    """Return the term table of the variants of `names`.
 
     Raises ValueError for a shape with more planes than the core holds.
     """
@@ -32,7 +33,7 @@ def tables(names: tuple[str, ...] = tuple(CATALOGUE)) -> Tables:
 
 
 def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
-    """The term table of `shapes`, one row each."""
+    """Return the term table of `shapes`, one row each."""
     if any(len(shape.planes) > MAX_PLANES for shape in shapes):
         raise ValueError(
             f"expected at most {MAX_PLANES} planes a primitive; raise kernel.MAX_PLANES for more"
@@ -62,7 +63,7 @@ def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
 
 
 def pad_rows(rows: list[tuple[float, ...]]) -> np.ndarray:
-    """`rows` as one array, NaN where a row is shorter than the longest."""
+    """Return `rows` as one array, NaN where a row is shorter than the longest."""
     result = np.full((len(rows), max(len(row) for row in rows)), np.nan)
     for k, row in enumerate(rows):
         result[k, : len(row)] = row
@@ -71,7 +72,10 @@ def pad_rows(rows: list[tuple[float, ...]]) -> np.ndarray:
 
 @cache
 def bounds(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[np.ndarray, np.ndarray]:
-    """(low, high), each (T, 9): the box of theta for every variant; q0 is left to the data."""
+    """Return the box of theta for every variant: (low, high), each (T, 9).
+
+    q0 is left to the data.
+    """
     shapes = variants(names)
     lower, upper = np.full((len(shapes), SIZE), -np.inf), np.full((len(shapes), SIZE), np.inf)
     lower[:, : len(PLAN_LOW)], upper[:, : len(PLAN_HIGH)] = PLAN_LOW, PLAN_HIGH

@@ -169,7 +169,10 @@ def read_file(
     where: str | None,
     make_box: Callable[[Any], Box | None],
 ) -> Features:
-    """The features of a file, by its kind; `make_box` gives the box to read in the file's CRS."""
+    """Read the features of a file, by its kind.
+
+    `make_box` gives the box to read in the file's CRS.
+    """
     if is_parquet(path):
         from .parquet_table import read_parquet
 

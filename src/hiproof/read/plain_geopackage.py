@@ -43,7 +43,10 @@ class Unusual(Exception):
 
 
 class Layer(NamedTuple):
-    """A table of features, its column of geometries with their kind, and the name of its CRS."""
+    """A table of features.
+
+    It has the column of geometries with their kind, and the name of its CRS.
+    """
 
     table: str
     geometry: str
@@ -57,7 +60,7 @@ class Layer(NamedTuple):
 
 
 def is_geopackage(path: str | Path) -> bool:
-    """Whether a local file is a GeoPackage of version 1.2 or later."""
+    """Return whether a local file is a GeoPackage of version 1.2 or later."""
     try:
         with open(path, "rb") as file:
             start = file.read(ID_POSITION + len(APPLICATION_ID))
@@ -67,8 +70,9 @@ def is_geopackage(path: str | Path) -> bool:
 
 
 def read_plain_geopackage(path: str | Path, layer: str | int | None) -> Features | None:
-    """Metadata (fields, crs), numbers, geometries and attribute columns of a layer, or None of a
-    file that GDAL has to read.
+    """Read metadata, numbers, geometries and attribute columns of a layer.
+
+    Returns None for a file that GDAL has to read.
     """
     try:
         with closing(open_database(path)) as database:
@@ -88,7 +92,7 @@ def read_plain_geopackage(path: str | Path, layer: str | int | None) -> Features
 
 
 def read_plain_crs(path: str | Path, layer: str | int | None) -> str | None:
-    """The code of a layer's CRS, or None of a file that GDAL has to read."""
+    """Return the code of a layer's CRS, None for a file that GDAL has to read."""
     try:
         with closing(open_database(path)) as database:
             return choose_layer(database, layer).crs
@@ -101,7 +105,7 @@ def open_database(path: str | Path) -> sqlite3.Connection:
 
 
 def choose_layer(database: sqlite3.Connection, layer: str | int | None) -> Layer:
-    """The layer of that name, or the only one."""
+    """Return the layer of that name, or the only one."""
     layers = [Layer(*row) for row in database.execute(LAYERS)]
     chosen = [one for one in layers if layer is None or one.table == layer]
     if (
@@ -114,7 +118,7 @@ def choose_layer(database: sqlite3.Connection, layer: str | int | None) -> Layer
 
 
 def list_columns(database: sqlite3.Connection, layer: Layer) -> tuple[str, dict[str, type]]:
-    """The column of the features' numbers, and the attributes by name with their types."""
+    """Return the column of feature numbers, and the types of the attributes."""
     keys, columns = [], {}
     for _, name, declared, _, _, is_key in database.execute(
         f"pragma table_info({quote(layer.table)})"
@@ -132,7 +136,7 @@ def list_columns(database: sqlite3.Connection, layer: Layer) -> tuple[str, dict[
 
 
 def strip_header(blob: Any) -> bytes | None:
-    """The WKB of a geometry as GeoPackage keeps it."""
+    """Return the WKB of a geometry in GeoPackage's own form."""
     if blob is None:
         return None
     if not isinstance(blob, bytes) or blob[:2] != b"GP" or blob[3] & EXTENDED_FLAG:
@@ -144,7 +148,7 @@ def strip_header(blob: Any) -> bytes | None:
 
 
 def convert(values: tuple, kind: type) -> np.ndarray:
-    """The values (n,) of a column, None where a feature has none."""
+    """Convert the values (n,) of a column, None where a feature has none."""
     stored_kind = int if kind is bool else kind
     if any(value is not None and type(value) is not stored_kind for value in values):
         raise Unusual
@@ -156,5 +160,5 @@ def convert(values: tuple, kind: type) -> np.ndarray:
 
 
 def quote(name: str) -> str:
-    """A name of a table or a column in SQL."""
+    """Quote the name of a table or a column for SQL."""
     return '"' + name.replace('"', '""') + '"'

@@ -1,4 +1,7 @@
-"""Features of a vector file through GDAL (pyogrio): GeoPackage, GeoJSON, Shapefile, ..."""
+"""Features of a vector file through GDAL (pyogrio).
+
+GDAL reads GeoPackage, GeoJSON, Shapefile and others.
+"""
 
 from __future__ import annotations
 
@@ -25,8 +28,9 @@ def read_vector_file(
     where: str | None,
     make_box: Callable[[Any], tuple[float, float, float, float] | None],
 ) -> Features:
-    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and
-    attribute columns.
+    """Read pyogrio's metadata, feature numbers, geometries and columns.
+
+    Geometries are shapely's, None where a feature has none.
 
     `make_box` gives the box to read in the layer's CRS.
     """
@@ -70,7 +74,7 @@ def read_vector_file(
 
 
 def vector_file_crs(path: str | Path, layer: str | int | None) -> str | None:
-    """The CRS that a layer names, as GDAL gives it."""
+    """Return the CRS that a layer names, in GDAL's form."""
     source, layer = translate_read_errors(
         lambda: find_source(str(path), choose_layer(path, layer)), path
     )
@@ -78,7 +82,7 @@ def vector_file_crs(path: str | Path, layer: str | int | None) -> str | None:
 
 
 def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
-    """`layer`, or the only layer of a file that holds geometries.
+    """Return `layer`, or the only layer of a file that holds geometries.
 
     Raises InputError, listing them, where several do.
     """
@@ -98,8 +102,10 @@ def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
 def translate_read_errors(
     read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None
 ) -> Any:
-    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that
-    helps; with the `info` of a layer, its attributes for a condition that does not go with them.
+    """Call `read()` and turn pyogrio's errors into InputErrors.
+
+    The error lists the layers where that helps. With the `info` of a layer it lists the attributes
+    for a condition that does not fit them.
     """
     try:
         with warnings.catch_warnings():

@@ -1,4 +1,6 @@
-"""The outline of a building without a footprint, from its points, as a draughtsman would draw it.
+"""The outline of a building without a footprint, from its points.
+
+It is drawn as a draughtsman would draw it.
 
 rough   the points' alpha shape, pushed out, with few corners, with more and with many
 spread  how evenly points are spread, by which prices go
@@ -55,8 +57,9 @@ STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
 
 def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
-    """Outline, with courts, of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and
-    across.
+    """Estimate the outline of `points`, courts included.
+
+    Points are (n, 3) or (n, 2) in metres. Sides run mostly along `kappa` (rad) and across.
 
     With heights, points of walls are known, and the outline runs through them. Each ring is the
     cheapest of three drawings, from few corners on, from more and from many, these along another
@@ -81,9 +84,11 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
 
 
 class Cloud(NamedTuple):
-    """What all rings are drawn by: points `xy` (n, 2), which of them are a `wall`'s, which are
-    `telling`: not those of inner walls; `density` (points of the roof a square metre), `spacing`
-    (m), `dearness` of structure.
+    """The points by which all rings are drawn.
+
+    `xy` (n, 2) are points; `wall` and `telling` say which are a wall's, and which are not those of
+    inner walls. `density` is in points of the roof a square metre, `spacing` in m, and `dearness`
+    is that of structure.
     """
 
     xy: np.ndarray
@@ -95,7 +100,7 @@ class Cloud(NamedTuple):
 
 
 def make_cloud(points: np.ndarray, rough: Rough) -> Cloud:
-    """What `points` (n, 2 or 3) say of the rings to be drawn."""
+    """Prepare `points` (n, 2 or 3) for the drawing of rings."""
     xy = points[:, :2]
     wall = (
         on_walls(points, points, rough.spacing)
@@ -116,8 +121,9 @@ def make_cloud(points: np.ndarray, rough: Rough) -> Cloud:
 
 
 def draw_ring(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> shapely.Polygon:
-    """One ring: the cheapest of the drawings from its `starts` on, each along one of the `ways`
-    (rad).
+    """Draw one ring, the cheapest of several drawings.
+
+    They begin with `starts`, each along one of the `ways` (rad).
     """
     drawings = []
     for corners, way in zip(starts, ways, strict=True):
@@ -136,16 +142,18 @@ def draw_ring(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -
 
 
 def along_y(corners: np.ndarray, way: float) -> float:
-    """The `way` (rad), or that across it, such that `corners` (n, 2) turned by it reach further in
-    y: fewer sides are as high as a point.
+    """Return `way` (rad), or that across it, for which the corners reach far in y.
+
+    `corners` (n, 2) are turned by it. Then fewer sides are as high as a point.
     """
     x, y = np.ptp(turned_back(corners, way), axis=0)
     return way if y >= x else way + 0.5 * math.pi
 
 
 def make_border(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
-    """What bears on a ring that begins with `corners` (n, 2), in axes turned by `angle` (rad): some
-    of the points, and the prices.
+    """Prepare what bears on a ring that begins with `corners` (n, 2).
+
+    It is some of the points, and the prices, in axes turned by `angle` (rad).
     """
     xy, wall = turned_back(cloud.xy[cloud.telling], angle), cloud.wall[cloud.telling]
     start, court = turned_back(corners, angle), compute_area(corners) < 0.0
@@ -168,7 +176,7 @@ def make_border(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
 
 
 def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shapely.Polygon:
-    """The outline less its courts.
+    """Return the outline less its courts.
 
     One that is drawn as a bay already, or would cut a roof in two, is left out.
     """
@@ -181,16 +189,18 @@ def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shap
 
 
 def turned_back(xy: np.ndarray, angle: float) -> np.ndarray:
-    """Places (n, 2) in axes turned by `angle` (rad): along these a side is near few points only,
-    and what it costs soon known.
+    """Return places (n, 2) in axes turned by `angle` (rad).
+
+    Along these a side is near few points only, and its cost is soon known.
     """
     c, s = math.cos(angle), math.sin(angle)
     return xy @ np.array([[c, -s], [s, c]])
 
 
 def draw_outline(lines: np.ndarray, border: Border, step_m: float) -> Drawing:
-    """The cheapest drawing found from `lines` (n, 2) on, mostly along the axes: few of them at
-    first, then with what breaks them.
+    """Return the cheapest drawing found from `lines` (n, 2) on.
+
+    It runs mostly along the axes. It has few lines at first, then those that break them.
     """
     drawing = redraw(make_drawing(lines, 0.0, border), border, step_m)
     for longest in (1, RUN):  # bays of single sides come first: fewer runs go wrong

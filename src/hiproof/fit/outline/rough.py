@@ -1,5 +1,6 @@
-"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few
-corners, with more and with many.
+"""First outlines: the points' alpha shape, pushed out by half their spacing.
+
+There is one with few corners, one with more and one with many.
 
 Places in it without points, 4 m2 or more, are courts.
 """
@@ -34,9 +35,11 @@ MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 
 class Rough(NamedTuple):
-    """`rings`: of the outline, then of each court in it, corners (n, 2) to begin with, few, more
-    and many, no two neighbouring sides parallel; the outline's run counter-clockwise, courts'
-    clockwise. `spacing` (m) of the points, `shape`: their alpha shape.
+    """The rings from which an outline is drawn.
+
+    `rings` are that of the outline, then of each court in it: corners (n, 2) to begin with, few,
+    more and many, no two neighbouring sides parallel. The outline's run counter-clockwise, courts'
+    clockwise. `spacing` (m) is that of the points, `shape` their alpha shape.
     """
 
     rings: list[list[np.ndarray]]
@@ -45,7 +48,10 @@ class Rough(NamedTuple):
 
 
 def rough_outline(points: np.ndarray) -> Rough:
-    """What `points` (m, 2 or 3) are drawn from. Raises FitError for points that span no area."""
+    """Return the rings from which `points` (m, 2 or 3) are drawn.
+
+    Raises FitError for points that span no area.
+    """
     xy = points[:, :2]
     radius = default_radius(xy)
     thinner = math.sqrt(len(xy) / telling_count(points, radius / SPACINGS))
@@ -72,8 +78,10 @@ def rough_outline(points: np.ndarray) -> Rough:
 
 
 def telling_count(points: np.ndarray, spacing: float) -> int:
-    """How many of `points` (m, 2 or 3), about `spacing` (m) apart, tell how far that is: all, or
-    where many stand one over another on walls the roof's.
+    """Return how many of `points` show their `spacing` (m).
+
+    They are (m, 2 or 3). It is all or, where many stand one over another on walls, those of the
+    roof.
     """
     if points.shape[1] < 3 or len(points) < 3:
         return max(len(points), 1)
@@ -87,8 +95,9 @@ def with_large_holes(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def simplify_corners(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray:
-    """Its corners less those within so much of a straight line, or within more where they are too
-    many.
+    """Return the corners less those near a straight line.
+
+    Near is within `tolerance_m`, and more where they are too many.
     """
     for k in range(RADII_TRIED):
         simple = largest(shapely.simplify(polygon, tolerance_m * COARSER**k))
@@ -101,8 +110,10 @@ def simplify_corners(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray
 
 
 def from_farthest_corner(polygon: shapely.Polygon) -> shapely.Polygon:
-    """The polygon without holes, its ring beginning at the corner farthest from its middle, which
-    is one however it is turned: what is simplified keeps its first corner.
+    """Return the polygon without holes, its farthest corner first.
+
+    That corner is farthest from its middle, however the polygon is turned: what is simplified keeps
+    its first corner.
     """
     ring = counter_clockwise(polygon)
     first = int(np.argmax(np.hypot(*(ring - shapely.get_coordinates(polygon.centroid)).T)))
@@ -118,8 +129,9 @@ def counter_clockwise(polygon: shapely.Polygon) -> np.ndarray:
 
 
 def without_straight_corners(corners: np.ndarray) -> np.ndarray:
-    """The corners less those at which the outline all but goes straight on, or back, the
-    straightest first.
+    """Drop corners at which the outline goes straight on, or back.
+
+    The straightest go first.
     """
     while len(corners) > 4:
         azimuth = make_lines(corners)[:, 0]

@@ -1,5 +1,7 @@
-"""How evenly points are spread: a scanner's rows leave no gaps as wide as chance would, so an empty
-place of theirs says more.
+"""The evenness of points.
+
+A scanner's rows leave no gaps as wide as chance would, so an empty place of theirs is stronger
+evidence.
 """
 
 from __future__ import annotations
@@ -14,8 +16,10 @@ LEAST, MOST_SPREAD = 0.4, 1.2
 
 
 def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
-    """Standard deviation of the number of points `xy` (n, 2) in cells well inside their `shape`,
-    over what chance gives.
+    """Return the scatter of point counts in cells, relative to chance.
+
+    It is the standard deviation of the number of points `xy` (n, 2) in cells well inside their
+    `shape`.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.0, 12, 0.5), np.arange(0.0, 12,
     ...     0.5)))
