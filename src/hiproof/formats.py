@@ -1,5 +1,6 @@
-"""Every kind of output file once: its name, what stands in it, and the module of `write` that makes
-it.
+"""Every kind of output file, declared once.
+
+A declaration has its name, its content, and the module of `write` that makes it.
 
 A run, its merge, `hiproof build`, `hiproof convert`, help and documents derive from FORMATS: a new
 format is a module and a line here. A module has either
@@ -45,8 +46,10 @@ def parquet(write: WriteSettings) -> bool:
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of output file: its `file` name, `what` it holds, and the `module` of `write` that
-    makes it, with `given`.
+    """A kind of output file.
+
+    It has its `file` name, `what` it holds, and the `module` of `write` that makes it, with
+    `given`.
 
     `fragment` is the module that makes a building's part of it, empty for a format of `hiproof
     convert` alone; `asked` whether a run of these settings writes it; `tile_ending` that of the
@@ -151,8 +154,9 @@ TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a r
 
 
 def requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
-    """Paths in `folder` of the files that a run of these settings writes for the whole area, by
-    format.
+    """Return the paths of a run's files for the whole area, by format.
+
+    They lie in `folder`, and are those that these settings write.
 
     >>> [path.name for path in requested_files(Settings(), Path("models")).values()]
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
@@ -167,8 +171,9 @@ def requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
 
 
 def requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
-    """Paths in `folder` of the files of a work tile's own, by format; none where such a run writes
-    none.
+    """Return the paths of a work tile's own files, by format.
+
+    They lie in `folder`; there are none where such a run writes none.
     """
     by_tile = settings.city.models != "merged"
     requested = {
@@ -180,8 +185,9 @@ def requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[st
 
 
 def list_model_paths(settings: Settings, folder: Path) -> list[Path]:
-    """Where the models of such a run stand in `folder`: files of the whole area, the folder of
-    those of work tiles.
+    """Return the places of a run's models in `folder`.
+
+    They are files of the whole area, and the folder of those of work tiles.
 
     >>> [path.name for path in list_model_paths(Settings.from_dict({"write": {"citygml": "3.0"}}),
     ...     Path("out"))]
@@ -192,21 +198,22 @@ def list_model_paths(settings: Settings, folder: Path) -> list[Path]:
 
 
 def requested_fragments(write: WriteSettings) -> list[str]:
-    """The modules that make a building's parts of all files of such a run, those of its work tiles
-    included.
+    """Return the modules that make a building's parts of all files.
+
+    Files are those of such a run, those of its work tiles included.
     """
     return list(dict.fromkeys(format.fragment for format in requested_formats(write).values()))
 
 
 def requested_formats(write: WriteSettings) -> dict[str, Format]:
-    """What a run of these settings writes, as whole files or by work tile."""
+    """Return the formats of a run, as whole files or by work tile."""
     return {
         name: format for name, format in FORMATS.items() if format.fragment and format.asked(write)
     }
 
 
 def import_format(name: str) -> ModuleType:
-    """The module of `write` of that name."""
+    """Import the module of `write` of that name."""
     return import_module(f".write.{name}", __package__)
 
 

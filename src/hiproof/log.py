@@ -1,5 +1,6 @@
-"""What the program says while it works: standard logging under the name `hiproof`, warnings among
-it, secrets masked.
+"""The program's messages: standard logging under the name `hiproof`.
+
+Warnings are among them, and secrets are masked.
 
 The library logs and leaves it to its user what becomes of that; the command line shows warnings and
 errors on standard error, and with `--log-file` keeps everything from progress on, with time and
@@ -38,7 +39,9 @@ class Level(StrEnum):
 
 
 def count_things(number: int, item: str, many: str = "") -> str:
-    """So many things in words; `many` is their plural where that is not `item` with an s.
+    """Return a number of things in words.
+
+    `many` is their plural where that is not `item` with an s.
 
     >>> count_things(1, "building"), count_things(2000, "vertex", "vertices")
     ('1 building', '2,000 vertices')
@@ -54,15 +57,20 @@ class Masking(logging.Formatter):
 
 
 class Console(logging.Handler):
-    """Standard error as it is when a record comes: a progress bar may have taken it over since."""
+    """Standard error at the time of each record.
+
+    A progress bar may have taken it over since.
+    """
 
     def emit(self, record: logging.LogRecord) -> None:
         print(self.format(record), file=sys.stderr, flush=True)
 
 
 class Elsewhere(logging.Handler):
-    """What other packages log, in their own words: for `debug` alone, and not straight to standard
-    error."""
+    """Messages of other packages: shown for `debug` alone.
+
+    They do not go straight to standard error.
+    """
 
     def emit(self, record: logging.LogRecord) -> None:
         if not record.name.startswith(LOGGER.name):
@@ -70,7 +78,10 @@ class Elsewhere(logging.Handler):
 
 
 class KeptFile(logging.FileHandler):
-    """A log file that may fill its disk: the work goes on without it, which is said once."""
+    """A log file that may fill its disk: the work then goes on without it.
+
+    That is logged once.
+    """
 
     def handleError(self, record: logging.LogRecord) -> None:
         error = sys.exc_info()[1]
@@ -85,9 +96,12 @@ class KeptFile(logging.FileHandler):
 
 
 def start(level: Level = Level.warning, file: Path | None = None) -> None:
-    """Show the log of `level` and above on standard error, and keep that of `info` and above
-    (`debug`, if that is the level) at the end of `file`. What was started before ends. Raises
-    OutputError where the file cannot be written."""
+    """Start the log, on standard error and in a file.
+
+    `level` and above go to standard error, `info` and above (`debug`, if that is the level) to the
+    end of `file`. What was started before ends. Raises OutputError where the file cannot be
+    written.
+    """
     handlers: list[logging.Handler] = [
         make_handler(Console(), "hiproof: %(message)s", level.number)
     ]
@@ -119,7 +133,10 @@ def make_handler(handler: logging.Handler, form: str, level: int) -> logging.Han
 
 
 def console_level() -> Level:
-    """The level from which the log is shown; warning where nothing was started."""
+    """Return the level from which the log is shown.
+
+    It is warning where nothing was started.
+    """
     console = find_console()
     return Level.warning if console is None else Level(logging.getLevelName(console.level).lower())
 
@@ -129,8 +146,10 @@ def find_console() -> Console | None:
 
 
 def worker_arguments() -> tuple:
-    """The arguments of `start` that a worker process needs to log as this one does; none where
-    nothing was started."""
+    """Return the arguments of `start` for a worker process.
+
+    With them it logs as this process does; there are none where nothing was started.
+    """
     if find_console() is None:
         return ()
     file = next(
@@ -152,7 +171,9 @@ def log_warning(
     file: object = None,
     line: str | None = None,
 ) -> None:
-    """A warning as users read it: the sentence alone, without the place in the source. Other
-    packages' are for `debug`."""
+    """Log a warning as users read it, without its place in the source.
+
+    Other packages' warnings are for `debug`.
+    """
     level = logging.WARNING if issubclass(category, HiproofWarning) else logging.DEBUG
     LOGGER.log(level, " ".join(str(message).split()))

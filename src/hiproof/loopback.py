@@ -1,5 +1,7 @@
-"""Pages for one person at this machine: a server at the loopback address, who may ask it, and what
-goes with every answer."""
+"""Pages for one person at this machine: a server at the loopback address.
+
+It decides who may ask, and what goes with every answer.
+"""
 
 from __future__ import annotations
 
@@ -41,8 +43,10 @@ Headers = Mapping[str, str] | Message
 
 
 class Answer(NamedTuple):
-    """An HTTP answer: its code, its bytes, what kind of text they are, and headers in place of
-    those of SAFE."""
+    """An HTTP answer: its code, its bytes, their type, and headers.
+
+    Headers replace those of SAFE.
+    """
 
     code: int
     body: bytes
@@ -51,8 +55,9 @@ class Answer(NamedTuple):
 
 
 class LoopbackServer(ThreadingHTTPServer):
-    """Listens at the loopback address alone; `port` 0 is any that is free. Raises InputError where
-    the port is taken.
+    """A server at the loopback address alone.
+
+    `port` 0 is any that is free. Raises InputError where the port is taken.
 
     Closing it waits for answers on their way, so that what they write is whole.
     """
@@ -123,8 +128,10 @@ def stop(*_: Any) -> None:
 
 
 class TimedReader(io.RawIOBase):
-    """What comes from a socket until `until` (by time.monotonic), which whoever sends byte by byte
-    cannot put off."""
+    """A reader of a socket with a deadline.
+
+    It reads until `until` (by time.monotonic), which whoever sends byte by byte cannot put off.
+    """
 
     def __init__(self, connection: socket.socket) -> None:
         self.connection, self.until = connection, 0.0
@@ -141,8 +148,10 @@ class TimedReader(io.RawIOBase):
 
 
 class LoopbackHandler(BaseHTTPRequestHandler):
-    """Reads requests of this machine's own pages and sends what `answer` says to them; others are
-    refused before."""
+    """A handler of requests by this machine's own pages.
+
+    It sends what `answer` returns to them, and refuses others before.
+    """
 
     protocol_version = "HTTP/1.1"
     # Without this the body waits until the browser has confirmed the head.
@@ -150,11 +159,11 @@ class LoopbackHandler(BaseHTTPRequestHandler):
     server: LoopbackServer
 
     def answer(self, method: str, body: bytes) -> Answer:
-        """The answer to a request, GET or POST."""
+        """Return the answer to a request, GET or POST."""
         raise NotImplementedError
 
     def refuse(self, code: int, sentence: str) -> Answer:
-        """The answer that says why a request is refused."""
+        """Return the answer that says why a request is refused."""
         return Answer(code, sentence.encode())
 
     def setup(self) -> None:
@@ -205,8 +214,10 @@ class LoopbackHandler(BaseHTTPRequestHandler):
             self.wfile.write(answer.body)
 
     def end_headers(self) -> None:
-        """End the head of every answer, of errors too, with the headers that keep a page to
-        itself."""
+        """End the head of every answer with headers that keep a page to itself.
+
+        Errors have them too.
+        """
         if self.request_version != "HTTP/0.9":
             for name, value in {**SAFE, **getattr(self, "own", {})}.items():
                 self.send_header(name, value)
@@ -216,12 +227,13 @@ class LoopbackHandler(BaseHTTPRequestHandler):
         return "hiproof"
 
     def log_message(self, format: str, *arguments: Any) -> None:
-        """Say nothing: a terminal full of requests helps nobody, and addresses may hold a token."""
+        """Log nothing: requests would fill a terminal, and addresses hold tokens."""
 
 
 def refusal(headers: Headers, port: int) -> str:
-    """Say why those who ask with these headers may not: they must call this machine by its own
-    name, as a page of its own.
+    """Return why a request with these headers is refused, or an empty text.
+
+    A caller must call this machine by its own name, as a page of its own.
 
     >>> refusal({"Host": "localhost:8000"}, 8000), refusal({"Host": "localhost:8000",
     ...     "Origin": "null"}, 8000)
@@ -242,8 +254,9 @@ def refusal(headers: Headers, port: int) -> str:
 
 
 def list_own_hosts(port: int) -> set[Any]:
-    """What a request's Host may be: a site elsewhere that gives its own name this machine's address
-    has another.
+    """Return the values that a request's Host may have.
+
+    A site elsewhere that gives its own name this machine's address has another.
 
     >>> sorted(list_own_hosts(8000))
     ['127.0.0.1:8000', 'localhost:8000']

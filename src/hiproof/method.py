@@ -27,8 +27,9 @@ def reconstruct(
     ground: np.ndarray | None = None,
     unused: np.ndarray | None = None,
 ) -> Building:
-    """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3,
-    with our fits).
+    """Reconstruct one building from its roof points.
+
+    The method is that of Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits.
 
     points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed;
     repeated ones and those that are nowhere on Earth (not finite, 3.4e38) are dropped. footprint:

@@ -1,5 +1,6 @@
-"""What each line of `reconstruct` does: every step takes values and returns values, and a failure
-becomes a status.
+"""The steps of `reconstruct`.
+
+Every step takes values and returns values, and a failure becomes a status.
 """
 
 from __future__ import annotations
@@ -60,8 +61,10 @@ less far down.
 
 @dataclass(frozen=True)
 class Recognised:
-    """What the network says: probabilities by roof type, empty without it, and a weight (n,) a
-    point (1 roof, 0 not) for a fit of one primitive; a fit of several weighs all points alike.
+    """The network's opinion.
+
+    It has probabilities by roof type, empty without it, and a weight (n,) a point (1 roof, 0 not)
+    for a fit of one primitive; a fit of several weighs all points alike.
     """
 
     weights: np.ndarray | None = None
@@ -70,8 +73,9 @@ class Recognised:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Parts over an outline in the local frame, how they were chosen, and what became of
-    the fit.
+    """Parts over an outline in the local frame, and the outcome of the fit.
+
+    It says how they were chosen.
     """
 
     parts: tuple[Part, ...]
@@ -84,8 +88,9 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Ground:
-    """Where the walls end: height in the world, the source of it, and the terrain's line along the
-    outline.
+    """The lower end of walls: its height, source and terrain line.
+
+    The height is in the world, and the line runs along the outline.
     """
 
     z: float
@@ -94,8 +99,9 @@ class Ground:
 
 
 def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> None:
-    """Raise InputError for arguments of another kind, by their own names: what they hold may be
-    anything.
+    """Raise InputError for arguments of another kind, by their own names.
+
+    What they hold may be anything.
     """
     if footprint is not None and not isinstance(footprint, (shapely.Geometry, Footprint)):
         raise InputError(
@@ -115,12 +121,15 @@ def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> 
 
 
 def fits_one(settings: Settings) -> bool:
-    """Whether one primitive is fitted to a building, as the paper has it, and not several."""
+    """Return whether one primitive is fitted to a building, as in the paper."""
     return settings.fit.parts == "one" or settings.fit.objective == "paper"
 
 
 def asks_network(settings: Settings) -> bool:
-    """Whether the network is used: with `auto` only where one primitive is fitted to a building."""
+    """Return whether the network is used.
+
+    With `auto` it is only where one primitive is fitted to a building.
+    """
     network = settings.segment.network
     return network == "always" or (network == "auto" and fits_one(settings))
 
@@ -138,8 +147,9 @@ def refuse_without_network(settings: Settings) -> None:
 
 
 def start_building(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
-    """The outcome to start from: the building's name, its footprint and the attributes it came
-    with.
+    """Return the outcome to start from.
+
+    It has the building's name, its footprint and its attributes.
     """
     if isinstance(footprint, Footprint):
         input_values = {
@@ -156,8 +166,9 @@ def start_building(footprint: shapely.Polygon | Footprint | None, id: str) -> Bu
 def align_footprint(
     building: Building, points: np.ndarray, settings: Settings
 ) -> tuple[Building, shapely.Polygon | None, str]:
-    """The building with its footprint's shift onto its points, the footprint there, and a remark:
-    on points in and around it.
+    """Shift the footprint onto its points, with a remark.
+
+    Points are those in and around it. Returns the building with the shift, and the footprint there.
 
     It stays where it is unless the evidence is clear, or its shift is known. Of thousands of
     vertices it keeps those that matter.
@@ -184,8 +195,9 @@ def align_footprint(
 
 
 def shift_remark(result: Shift, of_row: int = 1) -> str:
-    """What is said of a footprint that was moved, alone or with a row of so many, and of a roof of
-    another size; empty where there is neither.
+    """Return a remark on a moved footprint or a roof of another size.
+
+    It moved alone or with a row of so many. The remark is empty where there is neither.
     """
     remarks = []
     if result.is_clear:
@@ -208,7 +220,10 @@ def shift_remark(result: Shift, of_row: int = 1) -> str:
 def usable(
     points: np.ndarray, footprint: shapely.Polygon | None
 ) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
-    """Finite, distinct points inside the footprint, in one order whatever order they came in."""
+    """Return finite, distinct points inside the footprint, in one order.
+
+    The order in which they came does not matter.
+    """
     if footprint is not None:
         footprint = largest_polygon(footprint)
         if footprint.is_empty or not footprint.area >= 0.1:
@@ -227,7 +242,10 @@ def usable(
 
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
-    """The largest polygon of a geometry, made valid; an empty polygon where there is none."""
+    """Return the largest polygon of a geometry, made valid.
+
+    It is empty where there is none.
+    """
     geometry = geometry if geometry.is_valid else repair_polygons(geometry)
     if geometry.geom_type == "Polygon":
         return geometry
@@ -236,15 +254,19 @@ def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
 
 
 def finite(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 2 or 3) whose coordinates are numbers, and of this Earth: what stands
-    for no value may be 3.4e38.
+    """Return the points (n, 2 or 3) with coordinates of this Earth.
+
+    They are numbers; what stands for no value may be 3.4e38.
     """
     is_usable = is_plausible(points)
     return points if is_usable.all() else points[is_usable]
 
 
 def distinct(points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) sorted by x, y, z without repeats: the same set gives the same array."""
+    """Sort points (n, 3) by x, y, z, without repeats.
+
+    The same set gives the same array.
+    """
     # complex numbers are in order by x, then by y
     plan = np.ascontiguousarray(points[:, :2]).view(complex)[:, 0]
     order = np.argsort(plan)
@@ -260,7 +282,7 @@ def distinct(points: np.ndarray) -> np.ndarray:
 
 
 def on_a_line(xy: np.ndarray, width_m: float = 0.05) -> bool:
-    """Whether plan points (n, 2) lie within a strip too narrow to be a roof."""
+    """Return whether plan points (n, 2) lie in a strip too narrow for a roof."""
     across = np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2][-1]
     return bool(np.ptp((xy - xy.mean(axis=0)) @ across) < width_m)
 
@@ -272,9 +294,11 @@ def to_local(outline: shapely.Polygon | None, frame: LocalFrame) -> shapely.Poly
 def without_needless_vertices(
     outline: shapely.Polygon | None,
 ) -> tuple[shapely.Polygon | None, str]:
-    """The outline to fit over, and what was left out: of more than MOST_OUTLINE_VERTICES those
-    within 1 cm of the line between their neighbours (Douglas and Peucker), or within 2, 4, 8 cm,
-    ... until no more are left, and with them courtyards narrower than that.
+    """Return the outline to fit over, and what was left out.
+
+    Of more than MOST_OUTLINE_VERTICES those within 1 cm of the line between their neighbours
+    (Douglas and Peucker) go, or within 2, 4, 8 cm, ... until no more are left, and with them
+    courtyards narrower than that.
     """
     if outline is None or (count := shapely.get_num_coordinates(outline)) <= MOST_OUTLINE_VERTICES:
         return outline, ""
@@ -301,7 +325,7 @@ def without_needless_vertices(
 
 
 def simplify_outline(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
-    """The polygon by Douglas and Peucker.
+    """Simplify a polygon by Douglas and Peucker.
 
     Their time grows with the square of the vertices, so thousands go piece by piece.
     """
@@ -321,9 +345,7 @@ def simplify_outline(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Po
 
 
 def simplified_in_pieces(xy: np.ndarray, tolerance_m: float) -> np.ndarray:
-    """A ring's coordinates (n, 2) whose pieces of PIECE_VERTICES edges are simplified each by
-    itself.
-    """
+    """Simplify a ring's coordinates (n, 2) in pieces of PIECE_VERTICES edges."""
     ends = np.append(np.arange(0, len(xy) - 2, PIECE_VERTICES), len(xy) - 1)
     vertices = np.concatenate(
         [np.arange(first, last + 1) for first, last in itertools.pairwise(ends)]
@@ -346,8 +368,9 @@ def look_at_ground(
     terrain: Terrain | None,
     settings: Settings,
 ) -> Site:
-    """Points and outline, both in the local frame, without bare ground inside the outline; or that
-    nothing stands there.
+    """Remove bare ground from points and outline, both in the local frame.
+
+    The result may be that nothing stands there.
     """
     from .fit.site import Site, look_at_ground
 
@@ -358,7 +381,7 @@ def look_at_ground(
 
 
 def add_remark(building: Building, remark: str) -> Building:
-    """The building with a remark added to what is said of it."""
+    """Add a remark to a building's detail."""
     return (
         dataclasses.replace(
             building, detail=f"{building.detail or building.status.value}; {remark}"
@@ -369,13 +392,14 @@ def add_remark(building: Building, remark: str) -> Building:
 
 
 def without_doubt(detail: str, doubt: Doubt) -> str:
-    """A building's detail without the remark that tells of a doubt which no longer holds."""
+    """Remove the remark of a doubt that no longer holds from a detail."""
     return "; ".join(remark for remark in detail.split("; ") if doubt.value not in remark)
 
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
-    """The network's opinion of the points (paper section 3.1), none where nobody heeds or asks for
-    it, or it cannot tell.
+    """Ask the network for its opinion of the points (paper section 3.1).
+
+    There is none where nobody heeds or asks for it, or it cannot tell.
     """
     if not asks_network(settings):
         return Recognised()
@@ -391,8 +415,9 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
 def fit(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """Roof parts that explain the points: one primitive (the paper's case) or as many as the
-    evidence pays for.
+    """Fit roof parts to the points.
+
+    It is one primitive (the paper's case) or as many as the evidence pays for.
     """
     if len(points) < FEWEST_POINTS:
         return flat(points, outline, Status.FLAT_FALLBACK)
@@ -408,8 +433,9 @@ def fit(
 def fit_several(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """As many volumes as the evidence pays for; what the network says of the whole building does
-    not bear on them.
+    """Fit as many volumes as the evidence pays for.
+
+    The network's opinion of the whole building does not matter to them.
     """
     from .fit.union import fit_building
 
@@ -423,8 +449,9 @@ def fit_several(
 
 
 def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
-    """A sentence where parts became flat although only other types were asked for; empty
-    otherwise.
+    """Return a sentence where parts became flat against the settings.
+
+    Only other types were requested. It is empty otherwise.
     """
     types = settings.fit.types
     flat = sum(part.type == "flat" for part in parts)
@@ -439,7 +466,7 @@ def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
 def fit_one(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """One primitive for the whole building (paper section 3.2)."""
+    """Fit one primitive to the whole building (paper section 3.2)."""
     from .fit import fit_roof
     from .segment import choose_most_probable
 
@@ -463,8 +490,9 @@ def fit_one(
 
 
 def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, ...]:
-    """Types to fit by one primitive, empty for all: those asked for, by the paper's objective only
-    what the network sees.
+    """Return the types to fit by one primitive, empty for all.
+
+    They are those requested, and by the paper's objective only what the network sees.
 
     So the paper has it (section 3.1), and a fit by its objective takes half a second a type.
 
@@ -484,9 +512,7 @@ def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, .
 
 
 def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:
-    """A flat roof at the median height: what a building becomes when nothing better can be told or
-    built.
-    """
+    """Return a flat roof at the median height, the last fallback."""
     # the upper median: what strays lies below a roof
     height = float(np.sort(points[:, 2])[len(points) // 2])
     part = Part(
@@ -506,8 +532,9 @@ def find_ground(
     terrain: Terrain | None,
     roof: Roof | None = None,
 ) -> Ground:
-    """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the
-    terrain's line around them.
+    """Find z_min, and the terrain's line around the outline.
+
+    It is the lowest terrain under the roof's eave vertices (paper section 3.3).
 
     Where no terrain is known it is assumed as low as a low wall's foot, or as the lowest points of
     the walls that are seen below `roof`.
@@ -535,8 +562,9 @@ def find_ground(
 
 
 def assume_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
-    """Height in the frame of the points (n, 3) where nothing tells it but them, and what it goes
-    by.
+    """Return an assumed ground height, and the reason for it.
+
+    It is in the frame of the points (n, 3), where nothing else gives it.
     """
     lowest, usual = float(points[:, 2].min()), f"assumed {ASSUMED_WALL_M:g} m below"
     eave = math.inf if roof is None else find_lowest_over(points, roof)
@@ -551,17 +579,26 @@ def assume_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
 
 
 def find_lowest_over(points: np.ndarray, roof: Roof) -> float:
-    """The lowest height of the roof over the points (n, 3), in its frame."""
+    """Return the lowest height of the roof over the points (n, 3).
+
+    It is in the roof's frame.
+    """
     return float(np.nanmin(roof.height_at(points[:, :2]), initial=math.inf))
 
 
 def find_second_lowest(points: np.ndarray) -> float:
-    """Height of the lowest of the points (n, 3) but one: a single one may be noise."""
+    """Return the second lowest height of the points (n, 3).
+
+    A single lowest one may be noise.
+    """
     return float(np.partition(points[:, 2], 1)[1]) if len(points) > 1 else float(points[0, 2])
 
 
 def query_terrain(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
-    """Terrain heights (n,) at `xy_world` (n, 2), and the source that answered first."""
+    """Return terrain heights (n,) at `xy_world` (n, 2), and their source.
+
+    It is the source that answered first.
+    """
     if hasattr(terrain, "heights_and_sources"):
         heights, sources = terrain.heights_and_sources(xy_world)
         return heights, sources[0] if sources else terrain.source
@@ -571,7 +608,7 @@ def query_terrain(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, s
 def solid_or_simpler(
     roof: Roof, points: np.ndarray, ground: Ground, fitted: Fitted, settings: Settings
 ) -> tuple[Roof, Solid | None, Fitted]:
-    """The roof as it is written and its checked solid, in the local frame.
+    """Return the rounded roof and its checked solid, in the local frame.
 
     Where it cannot become a valid one that can be read again, parts that fail are given up, and in
     the end all are, for a flat block.
@@ -619,8 +656,9 @@ def judge(
     settings: Settings,
     unused: np.ndarray | None = None,
 ) -> Building:
-    """The finished building: quality measured on its solid, an honest status, the verdict and what
-    is in doubt, everything back in the world's frame.
+    """Return the finished building, in the world's frame.
+
+    It has quality measured on its solid, an honest status, the verdict and doubts.
     """
     from .compose.settle import round_building
     from .evaluate.metrics import quality, well_inside
@@ -646,8 +684,9 @@ def judge(
 
 
 def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
-    """Those of the `unused` world points (m, 3) that are finite and inside a roof's outline, in the
-    roof's frame.
+    """Return the `unused` points inside a roof's outline, in its frame.
+
+    They are world points (m, 3), and have to be finite.
     """
     if unused is None:
         return np.zeros((0, 3))
@@ -658,8 +697,10 @@ def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
 def grade_building(
     building: Building, points: np.ndarray, unused: np.ndarray | None = None
 ) -> Building:
-    """The building with the verdict on its model by its `points` (n, 3), in the roof's frame, and
-    by those that its fit left `unused` (m, 3).
+    """Add the verdict on a building's model.
+
+    It is by its `points` (n, 3), in the roof's frame, and by those that its fit left `unused` (m,
+    3).
     """
     from .evaluate.verdict import judge_model
 
@@ -668,8 +709,10 @@ def grade_building(
 
 
 def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Building:
-    """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in
-    the roof's frame and those well `inner`, two surfaces one over the other.
+    """Add doubts about a building to its detail.
+
+    They are ground above its eaves and, by its points (n, 3), in the roof's frame, and those well
+    `inner`, two surfaces one over the other.
     """
     from .evaluate.layers import find_second_surface
 

@@ -1,5 +1,6 @@
-"""Where compiled code is kept: a file for each function, stamp of its sources, argument types and
-processor.
+"""The files of compiled code.
+
+There is one for each function, stamp of its sources, argument types and processor.
 
 Code for the kind of processors that wheels carry (kinds.py) is read where there is none for this
 machine's own.
@@ -36,8 +37,9 @@ WRAPPER = "-python"  # marks the file of a function's wrapper for calls from Pyt
 
 
 class Kept:
-    """One function's code on disk, a file for each tuple of argument types; numba asks it as it
-    asks its own cache.
+    """One function's code on disk, a file for each tuple of argument types.
+
+    numba uses it like its own cache.
     """
 
     def __init__(self, function: Callable, file: Path):
@@ -51,7 +53,7 @@ class Kept:
         return str(self.folders[0])
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """The code for these argument types, or None where it has to be compiled.
+        """Return the code for these argument types, or None to have it compiled.
 
         What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs
         its memory alone.
@@ -78,7 +80,10 @@ class Kept:
             self.write("", signature, context, code, *linking.links(result))
 
     def load_wrapper(self, signature: Any, context: Any) -> tuple[list, bytes] | None:
-        """Return constants and machine code of the wrapper for Python, None where none is kept."""
+        """Return constants and machine code of the wrapper for Python, or None.
+
+        It is None where none is kept.
+        """
         return next(self.read(WRAPPER, signature, context), None)
 
     def save_wrapper(self, signature: Any, context: Any, library: Any, constants: list) -> None:
@@ -87,7 +92,10 @@ class Kept:
             self.write(WRAPPER, signature, context, constants, library._get_compiled_object())
 
     def read(self, part: str, signature: Any, context: Any) -> Iterator[Any]:
-        """What is kept of a `part` of the code, that for this machine's own processor first."""
+        """Yield the stored content of a `part` of the code.
+
+        That for this machine's own processor comes first.
+        """
         for file in self.places(part, signature, context.codegen().magic_tuple()):
             try:
                 selection, *content = pickle.loads(file.read_bytes())
@@ -114,20 +122,27 @@ class Kept:
         remove_outdated(folder, self.module, self.stamp)
 
     def places(self, part: str, signature: Any, processor: tuple[str, str, str]) -> Iterator[Path]:
-        """Where a part of the code may lie, that for this machine's own processor first."""
+        """Yield the paths at which a part of the code may lie.
+
+        That for this machine's own processor comes first.
+        """
         system, _, _ = processor
         for kind in (processor, (system, KIND, ""))[: 1 + runs_kind()]:
             name = self.file_name(part, signature, kind)
             yield from (folder / name for folder in self.folders)
 
     def file_name(self, part: str, signature: Any, processor: tuple[str, str, str]) -> str:
-        """`processor` is numba's name of the system, of the processor and of its features."""
+        """Return the name of the file of a part of the code.
+
+        `processor` is numba's name of the system, of the processor and of its features.
+        """
         key = hashlib.sha256(repr((signature, processor)).encode()).hexdigest()[:16]
         return f"{self.start}-{key}{part}.{PYTHON}.nbc"
 
     def flush(self) -> None:
-        """Forget the code that is kept; numba asks for it when a function is to be compiled
-        again.
+        """Forget the stored code.
+
+        numba asks for this when a function is to be compiled again.
         """
         for folder in self.folders:
             for file in folder.glob(f"{self.start}-*.{PYTHON}.nbc"):
@@ -157,7 +172,10 @@ def reduce_result(result: Any) -> tuple:
 
 
 def folders(function: Callable, file: str) -> tuple[Path, ...]:
-    """Where numba would keep functions of `file`, the first choice first."""
+    """Return the folders in which numba would keep functions of `file`.
+
+    The first choice comes first.
+    """
     kinds = [caching.InTreeCacheLocator, caching.UserWideCacheLocator]
     if numba.config.CACHE_DIR:
         kinds.insert(0, caching.UserProvidedCacheLocator)
@@ -168,7 +186,7 @@ def folders(function: Callable, file: str) -> tuple[Path, ...]:
 
 @functools.cache
 def place_to_write(places: tuple[Path, ...]) -> Path | None:
-    """The first folder that can be written, or None, with a warning."""
+    """Return the first folder that can be written, or None, with a warning."""
     for place in places:
         try:
             place.mkdir(parents=True, exist_ok=True)
@@ -195,8 +213,9 @@ def warn_not_kept() -> None:
 
 @functools.cache
 def remove_outdated(folder: Path, module: str, stamp: str) -> None:
-    """Remove what this Python compiled from another state of the module's sources; other Pythons
-    still use theirs.
+    """Remove this Python's code of another state of the module's sources.
+
+    Other Pythons still use theirs.
     """
     for file in folder.glob(f"{module}.*.{PYTHON}.*"):
         if f"-{stamp}-" not in file.name:

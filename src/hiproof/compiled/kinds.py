@@ -1,5 +1,6 @@
-"""The kind of processors that code in wheels and images is for: it was made on another machine than
-it runs on.
+"""The kind of processors for which wheels and images carry code.
+
+That code was made on another machine than it runs on.
 
 Code of one's own processor comes first (`hiproof warm` compiles it); it is 1.05 to 1.1 times as
 fast.
@@ -19,16 +20,18 @@ CPU_FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
 
 def read_processor() -> str:
-    """What is compiled for: this machine's processor, or the kind that numba's own variable
-    names.
+    """Return the processor for which code is compiled.
+
+    It is this machine's, or the kind that numba's own variable names.
     """
     return numba.config.CPU_NAME or get_host_cpu_name()
 
 
 @functools.cache
 def runs_kind() -> bool:
-    """Whether this machine's processor is of that KIND; not where numba's own variables say what to
-    compile for.
+    """Return whether this machine's processor is of that KIND.
+
+    It is not where numba's own variables set the processor.
     """
     if numba.config.CPU_NAME or numba.config.CPU_FEATURES or not numba.config.ENABLE_AVX:
         return False

@@ -1,4 +1,4 @@
-"""News of compiling: how many functions are ready, and who shows it while the user waits.
+"""Progress of compiling, for whoever shows it to the user.
 
 `listener` is called before and after a function is compiled, with the numbers of ready and of all
 functions. Compiling takes a minute or so, once for each version, and silence would look like a
@@ -23,7 +23,7 @@ processes = 1  # that compile at the moment
 
 
 def headline(finished: int, total: int) -> str:
-    """What is going on and how long it takes at most.
+    """Return a line on what is going on and how long it takes at most.
 
     >>> headline(20, 220)
     'compiling for this machine, once for each version: up to 200 functions, about 70 s'
@@ -37,8 +37,9 @@ def headline(finished: int, total: int) -> str:
 
 
 class Lines:
-    """The news as a few lines: the headline before anything is compiled, then one at every further
-    tenth.
+    """Progress as a few lines of the log.
+
+    The headline comes before anything is compiled, then a line at every further tenth.
     """
 
     def __init__(self, say: Callable[[str], None]):

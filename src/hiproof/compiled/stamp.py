@@ -1,4 +1,4 @@
-"""The stamp of a source file: one digest of all that decides what its functions compile to.
+"""The stamp of a source file: a digest of all that its code depends on.
 
 Compiling puts functions and constants of other files into a function, so the stamp is made of the
 file's text and of the texts of all files of its package that imports lead to from there, with the
@@ -30,18 +30,21 @@ DECIDING = ("__init__.py", "dispatcher.py", "linking.py")
 
 @functools.cache
 def compute_stamp(file: Path) -> str:
-    """Sixteen hexadecimal digits. Files that cannot be read raise OSError."""
+    """Return the stamp of a file, sixteen hexadecimal digits.
+
+    Files that cannot be read raise OSError.
+    """
     return digest(closure(file))
 
 
 def compute_common_stamp() -> str:
-    """One stamp of everything that hiproof's compiled functions stand on."""
+    """Return one stamp of all sources of hiproof's compiled functions."""
     return digest(set().union(*map(closure, compiled_files())))
 
 
 @functools.cache
 def count_compiled() -> int:
-    """How many functions hiproof compiles."""
+    """Count the functions that hiproof compiles."""
     return sum(read_text(file).count(b"\n@compiled") for file in compiled_files())
 
 
@@ -50,7 +53,10 @@ def compiled_files() -> list[Path]:
 
 
 def digest(files: Iterable[Path]) -> str:
-    """One stamp of several files, whatever their order and wherever their package lies."""
+    """Return one stamp of several files.
+
+    It depends neither on their order nor on where their package lies.
+    """
     hasher = hashlib.sha256(" ".join([PYTHON, *map(read_version, VERSIONS)]).encode())
     for file in sorted(files, key=place_in_package):
         hasher.update(digest_file(file))
@@ -59,7 +65,7 @@ def digest(files: Iterable[Path]) -> str:
 
 @functools.cache
 def digest_file(file: Path) -> bytes:
-    """Digests of a file's place and of its text, one after the other."""
+    """Return the digests of a file's place and of its text, one after the other."""
     return b"".join(
         hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), read_text(file))
     )
@@ -79,7 +85,9 @@ def read_text(file: Path) -> bytes:
 
 
 def closure(file: Path) -> set[Path]:
-    """The file and all files that its imports lead to, within its own package and hiproof.
+    """Return the file and all files to which its imports lead.
+
+    These are files within its own package and hiproof.
 
     How code is kept changes nothing of it, so of this folder only the decorator and the linking
     count, which no import names.
@@ -96,7 +104,10 @@ def closure(file: Path) -> set[Path]:
 
 @functools.cache
 def list_imports(file: Path) -> frozenset[Path]:
-    """The files of the two packages that import statements at the top of `file` name."""
+    """Return the files that import statements at the top of `file` name.
+
+    These are files of the two packages.
+    """
     result: set[Path] = set()
     for statement in IMPORT.finditer(read_text(file).decode()):
         for path in resolve_import(file, statement):
@@ -109,7 +120,10 @@ def list_imports(file: Path) -> frozenset[Path]:
 
 
 def resolve_import(file: Path, statement: re.Match) -> Iterator[Path]:
-    """The modules and packages, as paths without ending, that one import statement may mean."""
+    """Yield the modules and packages that one import statement may mean.
+
+    They are paths without ending.
+    """
     if statement["modules"]:
         for name in re.findall(r"[\w.]+", statement["modules"]):
             parts = name.split(".")
@@ -128,8 +142,9 @@ def resolve_import(file: Path, statement: re.Match) -> Iterator[Path]:
 
 
 def starts(file: Path, package: str) -> Iterator[Path]:
-    """Where absolute imports of `package` are looked up: beside the file's own package and beside
-    hiproof.
+    """Yield the folders in which absolute imports of `package` are looked up.
+
+    They are beside the file's own package and beside hiproof.
     """
     for top in {find_top_folder(file), PACKAGE}:
         if top.name == package:
@@ -138,8 +153,9 @@ def starts(file: Path, package: str) -> Iterator[Path]:
 
 @functools.cache
 def find_top_folder(file: Path) -> Path:
-    """The outermost folder of the package that `file` belongs to; for a file outside packages,
-    itself without ending.
+    """Return the outermost folder of the package to which `file` belongs.
+
+    For a file outside packages it is the file itself without ending.
     """
     top = file.with_suffix("")
     while (top.parent / "__init__.py").exists():
@@ -149,5 +165,5 @@ def find_top_folder(file: Path) -> Path:
 
 @functools.cache
 def place_in_package(file: Path) -> str:
-    """The file's path from where its package lies, with forward slashes."""
+    """Return the file's path from its package's folder, with forward slashes."""
     return file.relative_to(find_top_folder(file).parent).as_posix()

@@ -1,5 +1,4 @@
-"""Pictures of models: a view for notebooks without network, a plot over points, every primitive
-with its parameters' names.
+"""Pictures of models: in notebooks, in plots, and of every roof type.
 
 view          how a solid is seen: faces turned, projected, ordered from far to near
 html          a notebook's view, which turns

@@ -1,5 +1,6 @@
-"""A building in a notebook: a small view that turns when dragged, its parts in a table; no request
-leaves the page.
+"""A building in a notebook: a small view that turns, and a table of parts.
+
+No request leaves the page.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ MM = 3  # digits of coordinates sent to the page: millimetres
 
 
 def render_building(building: Building) -> str:
-    """The building as HTML: its view where it has a solid, status, and the parameters of
-    its parts.
+    """Return a building as HTML.
+
+    It has its view where it has a solid, its status, and the parameters of its parts.
     """
     head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
     view = render_view(building) if building.built is not None else ""
@@ -40,7 +42,7 @@ def render_building(building: Building) -> str:
 
 
 def render_view(building: Building) -> str:
-    """The solid as SVG, and the script that turns it."""
+    """Return the solid as SVG, with the script that turns it."""
     solid, colours, turn = building.solid, list_colours(building), choose_turn(building)
     middle, radius = bound_sphere(solid)
     corners = np.round(solid.vertices - middle, MM)
@@ -75,7 +77,7 @@ def render_view(building: Building) -> str:
 
 
 def render_path(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
-    """A face as an SVG path."""
+    """Return a face as an SVG path."""
     d = "".join(
         "M" + "L".join(f"{x * scale:.1f} {y * scale:.1f}" for x, y in ring) + "Z" for ring in rings
     )
@@ -83,7 +85,7 @@ def render_path(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str
 
 
 def parts_table(building: Building) -> str:
-    """A row a part: number, type, parameters with their standard deviations."""
+    """Return a table of parts: number, type, parameters and their deviations."""
     rows = "".join(
         table_row(str(number), escape(part.type), parameters_text(part))
         for number, part in enumerate(building.parts[:SHOWN_PARTS])
@@ -94,12 +96,15 @@ def parts_table(building: Building) -> str:
 
 
 def table_row(*cells: str) -> str:
-    """A row of HTML; notebooks set cells of tables to the right, which is for numbers."""
+    """Return a row of HTML, aligned to the left.
+
+    Notebooks set cells of tables to the right, which is for numbers.
+    """
     return "<tr>" + "".join(f'<td style="text-align:left">{cell}</td>' for cell in cells) + "</tr>"
 
 
 def parameters_text(part) -> str:
-    """Parameters as a person reads them: degrees for angles, else metres."""
+    """Format parameters for people: degrees for angles, else metres."""
     entries = []
     for name, value in part.parameters.items():
         unit = "°" if name.startswith(ANGLES) else "" if name == "teeth" else " m"

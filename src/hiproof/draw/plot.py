@@ -18,8 +18,9 @@ MOST_PLOT_POINTS = 5000  # points drawn; more make a black patch
 
 
 def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -> Any:
-    """Draw the building's solid, and `points` (n, 3) world metres coloured by their height over its
-    roof, into matplotlib axes.
+    """Draw the building's solid, and `points`, into matplotlib axes.
+
+    `points` (n, 3) are world metres, and coloured by their height over its roof.
 
     ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the
     roof are blue, others red. Raises NoModelError for a building without a model, InputError for
@@ -74,7 +75,7 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
 
 
 def new_axes(turn_deg: float) -> Any:
-    """Three-dimensional axes in a figure of their own, seen as the view of a notebook is."""
+    """Make three-dimensional axes with the view of a notebook."""
     plt = import_extra("matplotlib.pyplot", "report", "plots")
     ax = plt.figure(figsize=(7, 6)).add_subplot(projection="3d")
     # seen from the south where nothing is turned

@@ -1,5 +1,6 @@
-"""One figure a roof type: an ordinary roof of it with every parameter drawn where it is measured
-and called by its name.
+"""One figure a roof type, with its parameters.
+
+Every parameter of an ordinary roof is drawn where it is measured.
 
 Roofs come from the catalogue and the family, and a line's ends from the parameters, so a figure
 cannot say what the code does not.
@@ -37,8 +38,9 @@ LINE_COLOUR, TEXT_COLOUR = "#8c1c13", "#1a1a1a"
 
 @dataclass(frozen=True)
 class Measure:
-    """A parameter in the figure: from `start` to `end` (3,), in the part's frame above the lowest
-    eave; a mark without `end`.
+    """A parameter in the figure, from `start` to `end` (3,).
+
+    It is in the part's frame above the lowest eave. Without `end` it is a mark.
     """
 
     name: str
@@ -51,12 +53,12 @@ class Measure:
 
 
 def typical_parameters(kind: str) -> dict[str, float]:
-    """Parameters of an ordinary roof of a type."""
+    """Return the parameters of an ordinary roof of a type."""
     return CATALOGUE[kind].typical(DRAWN_WIDTH, DRAWN_LENGTH, DRAWN_RISE)
 
 
 def make_typical_building(kind: str) -> Building:
-    """An ordinary roof of a type on low walls."""
+    """Make an ordinary roof of a type on low walls."""
     u, v = DRAWN_LENGTH / 2, DRAWN_WIDTH / 2
     part = {"type": kind, "parameters": typical_parameters(kind), "position": [0.0, 0.0, 0.0]}
     ring = [[-u, -v], [u, -v], [u, v], [-u, v], [-u, -v]]
@@ -72,7 +74,7 @@ def make_typical_building(kind: str) -> Building:
 
 
 def measures(kind: str) -> list[Measure]:
-    """Where every parameter of a type is measured on its ordinary roof.
+    """Return where every parameter of a type is measured on its roof.
 
     >>> [(m.name, m.length) for m in measures("gable")]
     [('width', 8.0), ('length', 12.0), ('height', 3.6)]
@@ -84,7 +86,7 @@ def measures(kind: str) -> list[Measure]:
 
 
 def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
-    """One parameter `name` among all, `p`;
+    """Return the place of one parameter `name` among all, `p`.
 
     `highest` (k, 3) are the corners of the roof's ridge or top.
 
@@ -114,7 +116,7 @@ def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measur
 
 
 def primitive_svg(kind: str) -> str:
-    """The figure of a roof type."""
+    """Return the figure of a roof type."""
     building = make_typical_building(kind)
     colours = list_colours(building)
     centre, _ = bound_sphere(building.solid)
@@ -162,7 +164,10 @@ def face_path(face: SeenFace) -> str:
 
 
 def draw_measure(measure: Measure, page: list[np.ndarray]) -> str:
-    """A line with its name beside it; the name alone of what has no length in the figure."""
+    """Draw a line with its name beside it.
+
+    What has no length in the figure has a name alone.
+    """
     if len(page) < 2 or measure.length < 1e-9:
         x, y = page[0]
         text = f"{measure.name} = 0" if measure.end is not None else measure.name

@@ -1,5 +1,6 @@
-"""How a solid is seen: faces turned, projected and ordered from far to near (painter's
-algorithm).
+"""The view of a solid: faces turned, projected and ordered.
+
+They are ordered from far to near (painter's algorithm).
 """
 
 from __future__ import annotations
@@ -19,7 +20,10 @@ TURN_DEG, TILT_DEG = -35.0, 35.0
 
 @dataclass(frozen=True)
 class SeenFace:
-    """A face on the page: its rings (m, 2), y downwards, its colour, how light it is (0 to 1)."""
+    """A face on the page: its rings (m, 2), colour and lightness.
+
+    y runs downwards. Lightness is 0 to 1.
+    """
 
     rings: tuple[np.ndarray, ...]
     colour: str
@@ -28,8 +32,9 @@ class SeenFace:
 
 
 def project_points(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
-    """Page coordinates and nearness (n, 3) of points seen from a `tilt_deg` above the horizon,
-    turned by `turn_deg`.
+    """Return page coordinates and nearness (n, 3) of points.
+
+    They are seen from `tilt_deg` above the horizon, turned by `turn_deg`.
     """
     a, t = math.radians(turn_deg), math.radians(tilt_deg)
     x = xyz[:, 0] * math.cos(a) - xyz[:, 1] * math.sin(a)
@@ -40,21 +45,25 @@ def project_points(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndar
 
 
 def bound_sphere(solid: Solid) -> tuple[np.ndarray, float]:
-    """Return the middle (3,) of a solid and the largest distance (m) of a corner from it."""
+    """Return the middle (3,) of a solid and the largest distance (m) from it.
+
+    The distance is that of a corner.
+    """
     smallest, largest = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     middle = (smallest + largest) / 2
     return middle, float(np.linalg.norm(solid.vertices - middle, axis=1).max())
 
 
 def choose_turn(building: Building) -> float:
-    """Degrees to turn a building by, so that it is seen from a corner whichever way its main part
-    stands.
+    """Return the degrees that turn a building to be seen from a corner.
+
+    Its main part may stand any way.
     """
     return TURN_DEG - math.degrees(building.parts[building.model.main].kappa)
 
 
 def list_colours(building: Building) -> list[str]:
-    """A colour a face: that of its part's type for roofs."""
+    """Return one colour a face: that of its part's type for roofs."""
     types = {number: part.type for number, part in enumerate(building.parts)}
     return [choose_look(face, types).colour for face in building.solid.faces]
 
@@ -62,7 +71,7 @@ def list_colours(building: Building) -> list[str]:
 def select_seen_faces(
     solid: Solid, colours: list[str], turn_deg: float = TURN_DEG, tilt_deg: float = TILT_DEG
 ) -> list[SeenFace]:
-    """The faces that look towards the eye, the farthest first."""
+    """Return the faces that look towards the eye, the farthest first."""
     page = project_points(solid.vertices - bound_sphere(solid)[0], turn_deg, tilt_deg)
     visited = []
     for face, colour in zip(solid.faces, colours, strict=True):
@@ -81,14 +90,14 @@ def select_seen_faces(
 
 
 def lightness(solid: Solid, face) -> float:
-    """How light a face is under a lamp high in the south-west."""
+    """Return how light a face is under a lamp high in the south-west."""
     normal = ring_normal(solid.vertices[list(face.rings[0])])
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
     return float(0.72 + 0.28 * normal @ np.array([-0.4, -0.5, 0.77]))
 
 
 def shade_colour(colour: str, light: float) -> str:
-    """A colour (#rrggbb) made darker.
+    """Darken a colour (#rrggbb).
 
     >>> shade_colour("#ff8000", 0.5)
     '#804000'

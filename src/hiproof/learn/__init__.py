@@ -1,5 +1,6 @@
-"""Training of the network that recognises roofs (extra `train`): network, data sets, training,
-export.
+"""Training of the network that recognises roofs (extra `train`).
+
+The package has the network, data sets, training and export.
 
     sample     a labelled cloud, and what a source of them is
     houses     houses made up for training, with annexes
@@ -24,7 +25,7 @@ __all__ = ["TrainSettings", "train"]
 
 
 def __getattr__(name: str):
-    """`train` and `TrainSettings`, imported when used.
+    """Import `train` and `TrainSettings` when they are used.
 
     Raises InputError where what training takes is missing.
     """

@@ -1,5 +1,6 @@
-"""PointNeXt's recipe on the data's side: random scaling, dropping and jittering, and the free
-symmetries of a roof.
+"""Random changes of training clouds, after PointNeXt's recipe.
+
+Clouds are scaled, thinned and jittered, and mirrored by the symmetries of a roof.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ first axis.
 
 @dataclass(frozen=True)
 class AugmentSettings:
-    """Bounds of the random changes: `scale` relative, `jitter_m` the largest standard deviation,
-    `drop` a share.
+    """Bounds of the random changes.
+
+    `scale` is relative, `jitter_m` the largest standard deviation, `drop` a share.
     """
 
     scale: float = 0.12
@@ -30,9 +32,7 @@ class AugmentSettings:
 def vary_cloud(
     xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settings: AugmentSettings
 ):
-    """A cloud (n, 3) and its labels (n,), scaled, stretched in height, thinned and jittered at
-    random.
-    """
+    """Scale, stretch, thin and jitter a cloud (n, 3) with labels (n,)."""
     mask = rng.random(len(xyz)) >= settings.drop * rng.random() ** 2
     if mask.sum() >= FEWEST_KEPT:
         xyz, labels = xyz[mask], labels[mask]
@@ -42,7 +42,10 @@ def vary_cloud(
 
 
 def symmetric(features: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Arranged features (N, 11) mirrored along and across the building, each every second time."""
+    """Mirror arranged features (N, 11) along and across the building.
+
+    Each happens every second time.
+    """
     features = features.copy()
     for columns in (ALONG_AXES, ACROSS_AXES):
         if rng.random() < 0.5:

@@ -10,8 +10,9 @@ from ..segment.inference import stack_arrangements
 
 
 def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[torch.Tensor, ...]:
-    """The network's nine inputs for a batch of buildings, in the order of
-    `segment.inference.INPUT_NAMES`.
+    """Return the network's nine inputs for a batch of buildings.
+
+    They are in the order of `segment.inference.INPUT_NAMES`.
     """
     return tuple(
         torch.from_numpy(array) for array in stack_arrangements(arrangements, layout).values()
@@ -19,6 +20,6 @@ def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[tor
 
 
 def example_batch(layout: Layout) -> tuple[torch.Tensor, ...]:
-    """Inputs of one generic cloud, to trace the network with."""
+    """Return inputs of one generic cloud, to trace the network with."""
     xyz = np.random.default_rng(0).uniform(0.0, 10.0, (2 * layout.points, 3))
     return network_inputs([arrange(xyz, layout)], layout)

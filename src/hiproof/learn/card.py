@@ -1,5 +1,6 @@
-"""What a training run leaves beside its weights: the curve as a picture and the model card as JSON
-and Markdown.
+"""The record of a training run: its curve and its model card.
+
+The curve is a picture, and the card is JSON and Markdown.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from .. import __version__
 
 
 def write_curve(history: list[dict], path: Path) -> None:
-    """Loss and validation figures by epoch as a PNG."""
+    """Plot loss and validation figures by epoch as a PNG."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -41,8 +42,9 @@ def write_card(
     best_epoch: int,
     made_by: dict,
 ) -> None:
-    """`model_card.json` and `model_card.md`: data, settings, figures of the best epoch, and what
-    trained it.
+    """Write `model_card.json` and `model_card.md`.
+
+    They have data, settings, figures of the best epoch, and what trained it.
     """
     best = next(record for record in history if record["epoch"] == best_epoch)
     card = {
@@ -59,7 +61,7 @@ def write_card(
 
 
 def card_text(card: dict) -> str:
-    """The model card as Markdown."""
+    """Return the model card as Markdown."""
     validation = card["validation"]
     recalls = "\n".join(
         f"| {name} | {value:.3f} |" for name, value in validation["recalls"].items()

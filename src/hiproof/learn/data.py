@@ -1,5 +1,6 @@
-"""Where training clouds come from: the simulator, The Hague's real shapes scanned by it, or
-RoofN3D's real clouds.
+"""Sources of training clouds.
+
+They are the simulator, The Hague's real shapes under its scanner, and RoofN3D's real clouds.
 """
 
 from __future__ import annotations
@@ -29,7 +30,10 @@ FIRST_SOURCE_SHARE = 0.7
 
 @dataclass(frozen=True)
 class Simulated:
-    """Buildings made up without end, some with annexes, under a scanner with all its defects."""
+    """Buildings simulated without end, some with annexes.
+
+    The scanner has all its defects.
+    """
 
     types: tuple[str, ...]
     seed: int
@@ -56,8 +60,9 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Scanned:
-    """Solids of a CityJSON file with a roofType under the same scanner; types are drawn evenly,
-    then their shapes.
+    """Solids of a CityJSON file with a roofType, under the same scanner.
+
+    Types are drawn evenly, then their shapes.
 
     Training never sees the buildings held out for validation and test (a share by the hash of the
     building's id).
@@ -93,7 +98,7 @@ class Scanned:
 
 @dataclass(frozen=True)
 class Mixture:
-    """Several sources, the first the main one; validation and test are the first's alone."""
+    """Several sources; validation and test come from the first, the main one."""
 
     sources: tuple[Source, ...]
     seed: int
@@ -117,13 +122,14 @@ class Mixture:
 
 
 def usable(cloud: Scan) -> bool:
-    """Whether enough of the roof was seen to call it by its name."""
+    """Return whether enough of the roof was seen to name its type."""
     return len(cloud) >= POINTS[0] and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * POINTS[0]
 
 
 def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Generator) -> Sample:
-    """A scan with its labels counted in `types`, thinned to the most points a training cloud may
-    have.
+    """Return a scan with labels in `types`, thinned.
+
+    It keeps the most points that a training cloud may have.
     """
     if len(cloud) > POINTS[1]:
         cloud = cloud.select(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
@@ -134,7 +140,9 @@ def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Gen
 
 
 def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 1) -> Source:
-    """The source(s) that `data` names: "simulated", "denhaag:FILE" or "roofn3d:DIR";
+    """Open the source or sources that `data` names.
+
+    Names are "simulated", "denhaag:FILE" or "roofn3d:DIR".
 
     `types` empty means all of them.
 

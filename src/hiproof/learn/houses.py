@@ -1,5 +1,6 @@
-"""Houses for training, closer to real ones than the tests' clean types: annexes, rows, sheds, cut
-corners, one-sided hips.
+"""Houses for training, closer to real ones than the tests' clean types.
+
+They have annexes, rows, sheds, cut corners and one-sided hips.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ OVERLAP_M = 0.05  # m that an annex reaches into the house, so that no gap opens
 
 
 def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:
-    """A building of roof `type`: small, long, low and cut by a party wall as real ones are;
+    """Draw a building of roof `type`: small, long, low or cut as real ones are.
+
+    A party wall may cut it.
 
     `annex_share` of them have one or two smaller parts (porch, extension, cross wing) at their
     sides. The type stays the main roof's.
@@ -49,7 +52,7 @@ def training_house(rng: np.random.Generator, type: str, annex_share: float) -> S
 
 
 def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
-    """A hip whose ridge is a sixteenth to a quarter of its width."""
+    """Return a hip whose ridge is a sixteenth to a quarter of its width."""
     ridge = hip.parameters["width"] * rng.uniform(0.06, 0.25)
     length = hip.parameters["length"] - hip.parameters["ridge_length"] + ridge
     parameters = hip.parameters | {"length": length, "ridge_length": ridge}
@@ -57,7 +60,10 @@ def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
 
 
 def lengthen(rng: np.random.Generator, part: Part) -> Part:
-    """A part as long as a row or a barn: half a width to three widths longer."""
+    """Make a part as long as a row or a barn.
+
+    It becomes half a width to three widths longer.
+    """
     additions = part.parameters["width"] * rng.uniform(0.5, 3.0)
     parameters = {
         name: value + additions * (name in LENGTHS) for name, value in part.parameters.items()
@@ -66,8 +72,9 @@ def lengthen(rng: np.random.Generator, part: Part) -> Part:
 
 
 def resize(rng: np.random.Generator, part: Part) -> Part:
-    """A part down to two fifths of its size (a shed, a garage), and lower than that yet by up to a
-    half.
+    """Shrink a part down to two fifths of its size, and lower it.
+
+    It is a shed or a garage then, and lower than that by up to a half.
     """
     size = rng.uniform(0.4, 1.0)
     lower = size * rng.uniform(0.5, 1.0)
@@ -77,7 +84,7 @@ def resize(rng: np.random.Generator, part: Part) -> Part:
 
 
 def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
-    """A part of one piece on a plot whose border, oblique to the roof, cuts off a corner."""
+    """Cut a corner off a part of one piece, by an oblique plot border."""
     angle = part.kappa + rng.integers(4) * math.pi / 2 + math.radians(rng.uniform(25.0, 65.0))
     normal, along = (
         np.array([math.cos(angle), math.sin(angle)]),
@@ -100,7 +107,7 @@ def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
 
 
 def hip_one_end(rng: np.random.Generator, gable: Part) -> Part:
-    """A roof with a hip at one end and a gable wall at the other.
+    """Return a roof with a hip at one end and a gable wall at the other.
 
     It is called a gable: RoofN3D's hips are "two-sided", and the catalogue has nothing nearer.
     """
@@ -112,8 +119,9 @@ def hip_one_end(rng: np.random.Generator, gable: Part) -> Part:
 
 
 def annex(rng: np.random.Generator, main: Part) -> Part:
-    """One part against a random side of `main`: under its eave, or level with it and reaching under
-    its roof.
+    """Place one part against a random side of `main`.
+
+    It lies under its eave, or level with it and reaching under its roof.
     """
     length, width = main.parameters["length"], main.parameters["width"]
     quarters = int(rng.integers(4))
@@ -143,8 +151,9 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
 def annex_parameters(
     rng: np.random.Generator, type: str, length: float, width: float, limit: float
 ) -> dict[str, float]:
-    """theta_p of an annex `length` (outwards) by `width`, a gable or hip no higher than `limit`
-    unless that is low.
+    """Return theta_p of an annex `length` (outwards) by `width`.
+
+    A gable or hip is no higher than `limit` unless that is low.
     """
     slope = math.tan(math.radians(rng.uniform(15.0, 45.0)))
     parameters = {"length": length, "width": width}

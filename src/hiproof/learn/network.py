@@ -1,5 +1,6 @@
-"""PointNet++ for roofs: four set abstractions, two feature propagations, a head for points and one
-for the building.
+"""PointNet++ for roofs.
+
+It has four set abstractions, two feature propagations, a head for points and one for the building.
 
 After Qi et al., "PointNet++" (2017), single-scale grouping, with the relative positions divided by
 the ball's radius as in Qian et al., "PointNeXt" (2022). Sampling and grouping happen outside
@@ -23,8 +24,10 @@ from ..segment.sampling import POINT_FEATURES, POSITION_SCALE
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """Widths of the network: `widths` of the four set abstractions as (first layer, output) pairs,
-    and of the heads.
+    """Widths of the network.
+
+    `widths` are those of the four set abstractions as (first layer, output) pairs, and those of the
+    heads.
     """
 
     types: tuple[str, ...] = ()
@@ -47,8 +50,9 @@ class Dense(nn.Module):
 
 
 class SetAbstraction(nn.Module):
-    """PointNet over each group: two layers on (features, relative position / radius), then the
-    maximum.
+    """PointNet over each group: two layers, then the maximum.
+
+    The layers take features and relative position / radius.
 
     The first layer is linear in the neighbour's features and in the difference of positions, so it
     is evaluated once a source and once a centre and subtracted after grouping: the same numbers for
@@ -64,8 +68,9 @@ class SetAbstraction(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x, position, centres, group):
-        """Features (rows, C) and positions over the radius (rows, 3) to the centres' features (S,
-        outputs).
+        """Return the centres' features (S, outputs).
+
+        Inputs are features (rows, C) and positions over the radius (rows, 3).
         """
         source = self.features(x) + self.position(position)
         grouped = torch.relu(gather_rows(source, group) - self.position(centres).unsqueeze(1))
@@ -73,7 +78,9 @@ class SetAbstraction(nn.Module):
 
 
 class FeaturePropagation(nn.Module):
-    """Coarse features interpolated at finer points, joined with the fine ones, through a layer.
+    """Coarse features interpolated at finer points, through a layer.
+
+    They are joined with the fine ones.
 
     The layer's coarse half is applied before interpolation, with which it commutes and where the
     rows are few.
@@ -88,8 +95,10 @@ class FeaturePropagation(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, coarse, fine, index, weight):
-        """Coarse (rows, C) and fine features (S, D), interpolation `index`, `weight` (S, 3): (S,
-        outputs).
+        """Return features (S, outputs) at the finer points.
+
+        Inputs are coarse (rows, C) and fine features (S, D), interpolation `index` and `weight` (S,
+        3).
         """
         joined = (gather_rows(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(
             dim=1
@@ -111,8 +120,9 @@ class GlobalAbstraction(nn.Module):
 
 
 class RoofNetwork(nn.Module):
-    """Logits of every point (types, then not-roof last) and of the building's type from arranged
-    clouds.
+    """Logits of every point and of the building's type, from arranged clouds.
+
+    A point's logits are those of the types, then of not-roof.
     """
 
     def __init__(self, settings: NetworkSettings):
@@ -138,7 +148,7 @@ class RoofNetwork(nn.Module):
     def forward(
         self, features, group1, group2, group3, radii, up_index1, up_index2, up_weight1, up_weight2
     ):
-        """See `segment.arrange.Arrangement`;
+        """Compute the logits; see `segment.arrange.Arrangement`.
 
         `features` (B N, 11), indices into flat rows, `radii` (B, 3).
 
@@ -163,5 +173,5 @@ class RoofNetwork(nn.Module):
 
 
 def gather_rows(x, index):
-    """Rows of `x` (rows, C) by `index` (S, K): (S, K, C)."""
+    """Return rows of `x` (rows, C) by `index` (S, K): (S, K, C)."""
     return x[index]

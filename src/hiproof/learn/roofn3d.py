@@ -1,4 +1,4 @@
-"""RoofN3D as training data: real clouds of gables, hips and pyramids, split 80/20 by id."""
+"""RoofN3D as training data: gables, hips and pyramids, split 80/20 by id."""
 
 from __future__ import annotations
 
@@ -22,9 +22,11 @@ FEWEST_CLOUD_POINTS = 10  # points; the least the network takes
 
 @dataclass(frozen=True)
 class RoofN3D:
-    """All usable buildings: `xyz` (n, 3) float32 and `on_surface` (n,) end to end, cut at `starts`
-    (b + 1), each with its `type_of` (b,) and `held_out` (b,). Training draws types evenly; held-out
-    buildings come in the file's order.
+    """All usable buildings.
+
+    `xyz` (n, 3) float32 and `on_surface` (n,) lie end to end, cut at `starts` (b + 1), each with
+    its `type_of` (b,) and `held_out` (b,). Training draws types evenly; held-out buildings come in
+    the file's order.
     """
 
     types: tuple[str, ...]
@@ -82,7 +84,7 @@ class RoofN3D:
         )
 
     def sample(self, role: int, index: int) -> Sample:
-        """Training cloud drawn by number, or held-out cloud number `index`."""
+        """Return a training cloud by number, or held-out cloud number `index`."""
         if role == TRAINING:
             rng = np.random.default_rng([self.seed, 17, index])
             present = np.unique(self.type_of[~self.held_out])
@@ -103,7 +105,9 @@ class RoofN3D:
 
 
 def is_held_out(id: str) -> bool:
-    """Whether the building `id` is among the 20 % training never sees, whatever the file's order.
+    """Return whether `id` is among the 20 % that training never sees.
+
+    The file's order does not matter.
 
     >>> round(sum(is_held_out(str(i)) for i in range(10_000)) / 10_000, 1)
     0.2

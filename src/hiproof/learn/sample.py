@@ -1,4 +1,4 @@
-"""What training is fed: one labelled cloud, and the roles in which a source is asked for them."""
+"""The training data: one labelled cloud, and the roles of a source."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ TRAINING, VALIDATION, TEST = 1, 2, 3  # roles; their numbers seed what is drawn 
 
 @dataclass(frozen=True)
 class Sample:
-    """One labelled cloud: `xyz` (n, 3) metres, `labels` (n,) index of the roof type or -1 for
-    not-roof, `type` index.
+    """One labelled cloud.
+
+    `xyz` (n, 3) are metres, `labels` (n,) the index of the roof type or -1 for not-roof, and `type`
+    an index.
     """
 
     xyz: np.ndarray
@@ -22,8 +24,9 @@ class Sample:
 
 
 class Source(Protocol):
-    """A supply of labelled clouds by role (TRAINING, VALIDATION, TEST) and number: the same
-    whenever asked for.
+    """A supply of labelled clouds, the same whenever asked for.
+
+    A cloud has a role (TRAINING, VALIDATION, TEST) and a number.
     """
 
     @property

@@ -1,5 +1,6 @@
-"""Real building shapes to scan: the solids of a CityJSON file that carry a CityGML
-roofType code.
+"""Real building shapes to scan.
+
+They are solids of a CityJSON file with a CityGML roofType code.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ SMALLEST_AREA_M2 = 12.0  # m2 of ground; smaller are sheds, whose type is often 
 
 @dataclass(frozen=True)
 class Shape:
-    """One solid in world coordinates with its roof type, plan `outline`, and whether training may
-    not see it.
+    """One solid in world coordinates with its roof type.
+
+    It has a plan `outline`, and tells whether training may see it.
     """
 
     id: str
@@ -41,7 +43,9 @@ class Shape:
 
 
 def read_shapes(path: Path) -> list[Shape]:
-    """The solids of a CityJSON file with a known roofType and 12 m2 or more of ground.
+    """Read the solids of a CityJSON file with a known roofType.
+
+    They have 12 m2 or more of ground.
 
     All parts of a building are held out together. Raises InputError for a file that is no CityJSON.
     """

@@ -1,5 +1,6 @@
-"""Training: PointNeXt's recipe (AdamW, cosine schedule, label smoothing), checkpoints, and the best
-by validation.
+"""Training by PointNeXt's recipe, with checkpoints.
+
+It uses AdamW, a cosine schedule and label smoothing, and keeps the best by validation.
 
 Every random draw is named by the seed and a sample's or an epoch's number, so that a run that was
 killed and resumed gives the weights of one that was not.
@@ -32,8 +33,9 @@ from .sample import TRAINING, VALIDATION, Sample, Source
 
 @dataclass(frozen=True)
 class TrainSettings:
-    """How to train: `samples` clouds are shown in all, each made one `views` times, `epoch` between
-    validations.
+    """The settings of training.
+
+    `samples` clouds are shown in all, each made one `views` times, `epoch` between validations.
 
     A validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the
     share `warm_up` and falls as a cosine; `average` is the running average's memory a step. `start`
@@ -63,8 +65,9 @@ class TrainSettings:
 def train(
     data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print
 ) -> Path:
-    """Train the network on `data` and write weights, curve, model card and checkpoints to the
-    folder `out`.
+    """Train the network on `data`, and write the results to the folder `out`.
+
+    They are weights, curve, model card and checkpoints.
 
     `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 70
     %). A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX
@@ -93,8 +96,9 @@ def train(
 
 
 class Trainer:
-    """One training run: the network, its running average, optimiser, history, and where they are
-    kept.
+    """One training run.
+
+    It has the network, its running average, optimiser, history, and the place of its files.
     """
 
     def __init__(self, source: Source, settings: TrainSettings, folder: Path):
@@ -135,8 +139,9 @@ class Trainer:
         self.history.append({"epoch": self.epoch, "loss": float(np.mean(losses))})
 
     def batches(self):
-        """Yield the epoch's batches: fresh clouds first, then the same again in another order and
-        other symmetries.
+        """Yield the epoch's batches.
+
+        Fresh clouds come first, then the same again in another order and other symmetries.
 
         A last batch of a single cloud is left out: it has no statistics to normalise by.
         """
@@ -157,8 +162,9 @@ class Trainer:
                 yield [turn_cloud(clouds[i], rng) for i in order[index : index + settings.batch]]
 
     def training_cloud(self, index: int):
-        """The arranged cloud number `index`, varied at random by that number, with its points'
-        labels and its type.
+        """Return the arranged cloud number `index`, with labels and type.
+
+        It is varied at random by that number.
         """
         rng = np.random.default_rng([self.settings.seed, 7, index])
         sample = self.source.sample(TRAINING, index)
@@ -167,7 +173,7 @@ class Trainer:
         return turn_cloud((arrangement, labels[arrangement.select], sample.type), rng)
 
     def step(self, clouds) -> float:
-        """One step of the optimiser on a batch of (arrangement, labels, type)."""
+        """Take one step of the optimiser on a batch of (arrangement, labels, type)."""
         inputs, labels, types = self.tensors(clouds)
         point_logits, type_logits = self.network(*inputs)
         smoothing = self.settings.smoothing
@@ -180,7 +186,10 @@ class Trainer:
         return float(loss.detach())
 
     def tensors(self, clouds):
-        """Network inputs, point labels (not-roof last) and types of a batch, on the device."""
+        """Return network inputs, point labels and types of a batch, on the device.
+
+        Not-roof is the last label.
+        """
         inputs = network_inputs([cloud[0] for cloud in clouds], self.settings.layout)
         all_labels = np.concatenate([cloud[1] for cloud in clouds])
         labels = torch.from_numpy(
@@ -194,7 +203,7 @@ class Trainer:
         )
 
     def set_rate(self, progress: float):
-        """Linear warm-up, then a cosine to zero."""
+        """Set the rate: linear warm-up, then a cosine to zero."""
         warm = self.settings.warm_up
         share = (
             progress / warm
@@ -206,8 +215,9 @@ class Trainer:
 
     @torch.no_grad()
     def update_average(self, steps: int):
-        """Exponential running average of weights and statistics, its memory short in the first of
-        all `steps`.
+        """Update the exponential running average of weights and statistics.
+
+        Its memory is short in the first of all `steps`.
         """
         keep = min(self.settings.average, (1 + steps) / (10 + steps))
         state = self.network.state_dict()
@@ -258,7 +268,7 @@ class Trainer:
         os.replace(partial, self.folder / "checkpoint.pt")
 
     def resume(self):
-        """Go on from the folder's checkpoint if there is one.
+        """Resume from the folder's checkpoint if there is one.
 
         Raises InputError if it is of another network.
         """
@@ -297,7 +307,7 @@ class Trainer:
         return path
 
     def line(self) -> str:
-        """Progress in one line."""
+        """Return progress in one line."""
         last, settings = self.history[-1], self.settings
         return (
             f"epoch {self.epoch}/{math.ceil(settings.samples / settings.epoch)}  loss "
@@ -309,19 +319,22 @@ class Trainer:
 
 
 def turn_cloud(cloud, rng: np.random.Generator):
-    """An arranged, labelled cloud in another of the roof's symmetries."""
+    """Return an arranged, labelled cloud in another of the roof's symmetries."""
     arrangement, labels, type = cloud
     return replace(arrangement, features=symmetric(arrangement.features, rng)), labels, type
 
 
 def arrange_sample(sample: Sample, layout: Layout):
-    """A validation cloud as it is: (arrangement, labels of its chosen points, type)."""
+    """Arrange a validation cloud, unchanged.
+
+    Returns (arrangement, labels of its chosen points, type).
+    """
     arrangement = arrange(sample.xyz, layout)
     return arrangement, sample.labels[arrangement.select], sample.type
 
 
 def chosen_device(name: str) -> torch.device:
-    """The device asked for;
+    """Return the requested device.
 
     "auto" takes a GPU where there is one. Raises SettingsError when it is absent.
     """

@@ -1,5 +1,6 @@
-"""Recognising a roof before fitting it: the shipped PointNet++ in ONNX Runtime, and its part in the
-choice of type.
+"""Recognising a roof before its fit.
+
+The shipped PointNet++ runs in ONNX Runtime, and takes part in the choice of type.
 
 sampling    farthest points and ball neighbours, compiled
 arrange     a cloud in its canonical frame, as the network takes it (shared with training)

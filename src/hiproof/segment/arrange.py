@@ -1,5 +1,6 @@
-"""A building's cloud arranged for the network: canonical frame, local features, farthest-point
-levels, neighbourhoods.
+"""A building's cloud arranged for the network.
+
+It has a canonical frame, local features, farthest-point levels and neighbourhoods.
 
 All of it is free of weights, shared by training and inference, and follows the points under
 rotation about Z.
@@ -16,8 +17,9 @@ from .sampling import arrange_cloud, thin_to_grid
 
 @dataclass(frozen=True)
 class Layout:
-    """Sizes of the network's input: `points` kept of a cloud, points of each `levels`, `neighbours`
-    in a group.
+    """Sizes of the network's input.
+
+    They are the `points` kept of a cloud, points of each `levels`, and `neighbours` in a group.
     """
 
     points: int = 256
@@ -28,7 +30,9 @@ class Layout:
 
 @dataclass(frozen=True)
 class Arrangement:
-    """One cloud as the network takes it; N points, level sizes S1, S2, S3, K neighbours.
+    """One cloud in the network's form.
+
+    There are N points, level sizes S1, S2, S3, and K neighbours.
 
     `chosen` (N,) indices into the cloud, repeated where it has fewer than N points; `features` (N,
     11) float32; `groups` per level (S, K) indices into the level above; `radii` (3,) metres;
@@ -46,8 +50,9 @@ class Arrangement:
 
 
 def arrange(xyz: np.ndarray, layout: Layout) -> Arrangement:
-    """Arrange a building's cloud `xyz` (n, 3), metres in any frame, n >= 1 finite points, for the
-    network.
+    """Arrange a building's cloud `xyz` (n, 3) for the network.
+
+    It is in metres in any frame, of n >= 1 finite points.
     """
     thinned = thin_to_grid(xyz, layout.thinned)
     local = np.ascontiguousarray(xyz[thinned] - xyz[thinned].mean(axis=0), dtype=float)

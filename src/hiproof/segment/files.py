@@ -1,4 +1,4 @@
-"""Files of `hiproof segment`: clouds in, one LAZ with labels and a table of types out."""
+"""Files of `hiproof segment`: labelled points, and a table of types."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ EXTRA_DIMENSIONS = (("roof_type", "uint8"), ("not_roof", "float32"), ("building"
 
 
 def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Path, str]:
-    """Label each cloud of `clouds` as one building; write the points to `out` (LAZ or LAS) and the
-    types to a CSV of the same name. Returns why, by file, where a building could not be labelled.
+    """Label each cloud of `clouds` as one building.
+
+    Points go to `out` (LAZ or LAS) and types to a CSV of the same name. Returns why, by file, where
+    a building could not be labelled.
 
     Raises InputError if none could, and for weights that cannot be used; OutputError if `out`
     cannot be written.
@@ -49,7 +51,10 @@ def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Pat
 def write_points(
     out: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types, crs, units: Units
 ) -> None:
-    """All points in `units` with their extra dimensions, heights and positions to a thousandth."""
+    """Write all points in `units` with their extra dimensions.
+
+    Heights and positions are to a thousandth.
+    """
     xyz = units.from_metres(np.concatenate([points for _, _, points, _ in labelled]))
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, 0.001), np.floor(xyz.min(axis=0))
@@ -74,8 +79,9 @@ def write_points(
 def write_table(
     path: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types
 ) -> None:
-    """One row a building: number, file, points, share of roof points, type, and the probability of
-    every type.
+    """Write one row a building.
+
+    A row has number, file, points, share of roof points, type, and the probability of every type.
     """
     try:
         with open(path, "w", newline="", encoding="utf-8") as file:

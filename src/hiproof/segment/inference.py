@@ -1,5 +1,6 @@
-"""The shipped network in ONNX Runtime: `segment` labels a building's points and names its roof
-type.
+"""The shipped network in ONNX Runtime.
+
+`segment` labels a building's points and names its roof type.
 
 The first step of Li, Zhang and Shan (2020): only roof points go on to the fit, with the network's
 probabilities as the prior of its choice of type.
@@ -86,8 +87,9 @@ class Segmentation:
 
     @property
     def weights(self) -> np.ndarray:
-        """(n,) weight of each point in a fit: 0 where it is surely no roof, else 1; all 1 where
-        hardly any is left.
+        """Weight (n,) of each point in a fit.
+
+        It is 0 where the point is surely no roof, else 1; all are 1 where hardly any is left.
         """
         mask = self.not_roof < SURELY_NOT_ROOF
         return mask.astype(float) if mask.sum() >= FEWEST_CLOUD_POINTS else np.ones(len(mask))
@@ -103,8 +105,9 @@ class LoadedNetwork:
 
 
 def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentation:
-    """Roof type, and roof or not, of every point of one building, and the probabilities of the
-    building's type.
+    """Label the points of one building, and give its type's probabilities.
+
+    A label is a roof type, or not roof.
 
     `points` (n, 3) metres, any frame and order, n >= 10; but for rounding, the answer does not
     change when they turn about Z. A cloud beyond the network's size is thinned to farthest points
@@ -133,8 +136,9 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
 
 
 def barred_types(model: LoadedNetwork, allowed: tuple[str, ...]) -> np.ndarray:
-    """Log prior (types,) of a choice among `allowed` types, or those nearest to them, only: 0 or
-    minus infinity; empty allows all.
+    """Return the log prior (types,) of a choice among `allowed` types.
+
+    Types nearest to them count as well. It is 0 or minus infinity; empty allows all.
     """
     classes = {find_nearest_type(name, model.types) for name in allowed}
     if allowed and not classes & set(model.types):
@@ -154,8 +158,9 @@ def run(model: LoadedNetwork, arrangements: list[Arrangement]) -> tuple[np.ndarr
 
 
 def stack_arrangements(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
-    """The graph's inputs by name for B buildings: flat over buildings, indices counting rows of the
-    level above.
+    """Return the graph's inputs by name for B buildings.
+
+    They are flat over buildings, and indices count rows of the level above.
     """
     sizes = (layout.points, *layout.levels)
 
@@ -175,8 +180,9 @@ def stack_arrangements(arrangements: list[Arrangement], layout: Layout) -> dict[
 def carried_back(
     probability: np.ndarray, sampled: np.ndarray, xyz: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Labels (n,) and not-roof probability (n,) of all `xyz` from the nearest of the `sampled`
-    points.
+    """Carry labels (n,) and probabilities (n,) back to all points `xyz`.
+
+    They come from the nearest of the `sampled` points. The probability is that of not-roof.
 
     `probability` (m, types + 1), not-roof last; the mean of the three nearest weighted by inverse
     distance, in pieces, so that memory beyond the result is bounded.
@@ -198,7 +204,10 @@ def carried_back(
 
 
 def checked_points(points: np.ndarray) -> np.ndarray:
-    """`points` as float64 (n, 3) in a frame of their own. Raises as `segment` does."""
+    """Return `points` as float64 (n, 3) in a frame of their own.
+
+    Raises as `segment` does.
+    """
     xyz = np.asarray(points)
     if xyz.ndim != 2 or xyz.shape[1] < 3 or not np.issubdtype(xyz.dtype, np.number):
         raise InputError(
@@ -226,7 +235,7 @@ def checked_points(points: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def load(weights: str, device: str = "cpu") -> LoadedNetwork:
-    """The network in the ONNX file `weights`, loaded once a process, on one thread.
+    """Load the network in the ONNX file `weights`, once a process, on one thread.
 
     Raises as `segment` does.
     """
@@ -274,7 +283,7 @@ def load(weights: str, device: str = "cpu") -> LoadedNetwork:
 
 
 def import_onnxruntime(alternative: str = "") -> Any:
-    """What runs the network.
+    """Import onnxruntime.
 
     Raises InputError where it is missing, with how to do without it, if that can be.
     """
@@ -286,6 +295,6 @@ def first_line(error: Exception) -> str:
 
 
 def softmax(logits: np.ndarray) -> np.ndarray:
-    """Probabilities along the last axis, in float64."""
+    """Return probabilities along the last axis, in float64."""
     shifted = np.exp(np.asarray(logits, float) - logits.max(axis=-1, keepdims=True))
     return shifted / shifted.sum(axis=-1, keepdims=True)

@@ -1,5 +1,6 @@
-"""What a roof type is to a network that knows fewer: the first type that it knows of the same
-CityGML code.
+"""The stand-in for a roof type that a network does not know.
+
+It is the first type that it knows of the same CityGML code.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from ..primitives import CATALOGUE
 
 
 def find_nearest_type(name: str, known_types: Iterable[str]) -> str:
-    """`name`, or the first of the `known_types` types with its code;
+    """Return `name`, or the first of the `known_types` with its code.
 
     `name` also where there is none.
 

@@ -1,5 +1,6 @@
-"""Prior times evidence: the network's probabilities and the fits' BIC into the posterior of the
-roof type.
+"""Prior times evidence: the posterior of the roof type.
+
+The prior is the network's probabilities, the evidence the fits' BIC.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def combine(
     points: int = 0,
     evidence_exponent: float = EVIDENCE_EXPONENT,
 ) -> dict[str, float]:
-    """Posterior probability of every roof type, best first.
+    """Return the posterior probability of every roof type, best first.
 
     `types` the network's probability by type, `bics` by type from `Fit.bics` (lower is better, on
     the scale of twice a negative log-likelihood, without a prior in them) of a fit to `points`
@@ -70,8 +71,9 @@ def combine(
 
 
 def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str, float]:
-    """Natural logarithm of the network's probability of each of `names` (all of `types` by
-    default), bounded below.
+    """Return the natural logarithm of the network's probabilities.
+
+    They are those of `names` (all of `types` by default), bounded below.
 
     A network may be wrong with confidence; no evidence could undo a prior of zero.
     """
@@ -82,8 +84,9 @@ def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str,
 
 
 def find_prior(name: str, types: dict[str, float]) -> float:
-    """The probability of a type; of one that the network does not know that of the nearest, else
-    the mean.
+    """Return the probability of a type.
+
+    Of one that the network does not know it is that of the nearest, else the mean.
     """
     return types.get(find_nearest_type(name, types), 1.0 / max(len(types), 1))
 
@@ -91,7 +94,7 @@ def find_prior(name: str, types: dict[str, float]) -> float:
 def choose_most_probable(
     fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]
 ) -> tuple[Fit, dict[str, float]]:
-    """The fit to build, and the posterior by type, best first.
+    """Return the fit to build, and the posterior by type, best first.
 
     It is the fit of the type with the highest posterior, unless its roof lies clearly farther from
     the points than the most evident one: then that. (By the paper's objective, which knows no
@@ -111,8 +114,9 @@ def choose_most_probable(
 
 
 def expected_distance(fit: Fit) -> float:
-    """Mean distance (m) of a fit's points from its roof by its own account of noise and
-    outliers.
+    """Return the mean distance (m) of a fit's points that the fit expects.
+
+    It follows from its noise and outliers.
     """
     on_roof = np.sqrt(2 / np.pi) * fit.noise_m  # mean of the absolute value of a normal
     return (1 - fit.outlier_share) * on_roof + fit.outlier_share * OUTLIER_DISTANCE_M

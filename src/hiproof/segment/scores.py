@@ -1,5 +1,6 @@
-"""Figures of a classification: confusion matrix, accuracy, balanced accuracy, recalls, mean
-intersection over union.
+"""Figures of a classification.
+
+They are confusion matrix, accuracy, balanced accuracy, recalls, and mean intersection over union.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Scores:
-    """What a confusion matrix (true, told) of classes `names` says; classes that never occur count
-    nowhere.
+    """Figures of a confusion matrix (true, predicted) of classes `names`.
+
+    Classes that never occur count nowhere.
 
     >>> scores = Scores.of(np.array([0, 0, 1, 1]), np.array([0, 0, 1, 0]), ("flat", "gable"))
     >>> scores.accuracy, scores.balanced_accuracy, scores.lowest_recall
@@ -24,7 +26,10 @@ class Scores:
 
     @classmethod
     def of(cls, true: np.ndarray, predicted: np.ndarray, names: tuple[str, ...]) -> Scores:
-        """Scores of class indices `true` (n,) and `predicted` (n,), both in 0 .. len(names) - 1."""
+        """Score class indices `true` (n,) against `predicted` (n,).
+
+        Both are in 0 .. len(names) - 1.
+        """
         size = len(names)
         counts = np.bincount(np.asarray(true) * size + np.asarray(predicted), minlength=size * size)
         return cls(tuple(names), counts.reshape(size, size))

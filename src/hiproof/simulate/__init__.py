@@ -1,5 +1,6 @@
-"""Roofs whose truth is known and an airborne scanner over them: for training, experiments, tests
-and the demo.
+"""Roofs with known truth, and an airborne scanner over them.
+
+Training, experiments, tests and the demo use them.
 
 building = random_building(rng, "hip")          one primitive (roofs, shapes) ...
 building = random_compound(rng, "L")            ... or several (compounds)

@@ -1,4 +1,4 @@
-"""`python -m hiproof.simulate`: make the bundled neighbourhood, or a city of any size."""
+"""`python -m hiproof.simulate`: the bundled neighbourhood, or a city."""
 
 from pathlib import Path
 from typing import Annotated
@@ -21,7 +21,7 @@ def neighbourhood(
     ],
     seed: Annotated[int, typer.Option(help="the same seed gives the same neighbourhood")] = 5,
 ) -> None:
-    """The demo's neighbourhood: every roof type and several compounds."""
+    """Make the demo's neighbourhood: every roof type and several compounds."""
     from .neighbourhood import write_neighbourhood
 
     try:
@@ -45,7 +45,7 @@ def city(
     tile: Annotated[float, typer.Option(help="side of a tile in metres")] = 500.0,
     seed: Annotated[int, typer.Option(help="the same seed gives the same city")] = 0,
 ) -> None:
-    """A city of any size, tile by tile."""
+    """Make a city of any size, tile by tile."""
     from .city import City, write_city
 
     total = 0

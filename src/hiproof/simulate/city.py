@@ -1,5 +1,6 @@
-"""A simulated city of any size, made tile by tile: street blocks of houses and works on hills,
-surveyed from the air.
+"""A simulated city of any size, made tile by tile.
+
+Street blocks of houses and works stand on hills, and are surveyed from the air.
 
 Every block is drawn from a seed of its own, so a tile needs only the blocks that reach into it:
 memory stays that of one tile, and a tile is the same whatever else is made.
@@ -68,8 +69,9 @@ WORKS = {
 
 @dataclass(frozen=True)
 class City:
-    """The first `buildings` buildings of the endless city of `seed`, surveyed at `density`
-    (points/m2).
+    """The first `buildings` buildings of the endless city of `seed`.
+
+    They are surveyed at `density` (points/m2).
 
     Blocks lie in rows of `blocks_a_row`; block (i, j) is the same in every city of that seed,
     whatever its size.
@@ -108,7 +110,10 @@ class City:
 
 
 def block_buildings(seed: int, i: int, j: int, terrain: Relief) -> list[SimBuilding]:
-    """The buildings of block (i, j): two rows of houses back to back, or one of works."""
+    """Return the buildings of block (i, j).
+
+    They are two rows of houses back to back, or one of works.
+    """
     rng = np.random.default_rng([seed, 11, i, j])
     corner = CITY_ORIGIN_XY + turn_points(CITY_BLOCK_M * [[i, j]], HEADING)[0]
     length, depth = CITY_BLOCK_M - STREET_M
@@ -124,15 +129,16 @@ def block_buildings(seed: int, i: int, j: int, terrain: Relief) -> list[SimBuild
 
 
 def drawn_names(rng: np.random.Generator, weights: dict[str, float]) -> Iterator[str]:
-    """Names without end, as often as their weights say."""
+    """Yield names without end, as often as their weights say."""
     names, p = list(weights), np.array(list(weights.values()))
     while True:
         yield names[rng.choice(len(names), p=p / p.sum())]
 
 
 class Stock:
-    """Which buildings stand in which block, known by number alone; the buildings are drawn again
-    when asked for.
+    """The buildings of each block, known by number alone.
+
+    They are drawn again when asked for.
     """
 
     def __init__(self, city: City):
@@ -148,7 +154,10 @@ class Stock:
         self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.draw_lots)
 
     def count_blocks(self) -> tuple[list[tuple[int, int]], list[int]]:
-        """Blocks, and the number of buildings before each; the last block may be cut short."""
+        """Return blocks, and the number of buildings before each.
+
+        The last block may be cut short.
+        """
         blocks, first, total, k = [], [], 0, 0
         while total < self.city.buildings:
             j, i = divmod(k, self.city.blocks_a_row)
@@ -159,7 +168,7 @@ class Stock:
         return blocks, first
 
     def draw_lots(self, block: int) -> tuple[Lot, ...]:
-        """The lots of a block, drawn by its number alone;
+        """Draw the lots of a block by its number alone.
 
         `lots` keeps those of the blocks asked for last.
         """
@@ -171,23 +180,33 @@ class Stock:
         )
 
     def find_blocks(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Numbers of the blocks that reach within SURROUNDINGS_M of the rectangle from `lower` to
-        `upper` (2,).
+        """Return the numbers of the blocks near a rectangle.
+
+        Near is within SURROUNDINGS_M of the rectangle from `lower` to `upper` (2,).
         """
         is_near = (self.low < upper + SURROUNDINGS_M) & (self.high > lower - SURROUNDINGS_M)
         return np.flatnonzero(is_near.all(axis=1))
 
     def near(self, bounds: Bounds) -> list[Lot]:
-        """All lots of the blocks that reach into `bounds`, their trees and shadows included."""
+        """Return all lots of the blocks that reach into `bounds`.
+
+        Their trees and shadows count.
+        """
         blocks = self.find_blocks(np.array(bounds[:2]), np.array(bounds[2:]))
         return [lot for block in blocks for lot in self.lots(int(block))]
 
     def patches(self, bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The patches of `bounds` in or beside the city; the country around it is not surveyed."""
+        """Return the patches of `bounds` in or beside the city.
+
+        The country around it is not surveyed.
+        """
         return [patch for patch in divide_into_patches(bounds) if len(self.find_blocks(*patch))]
 
     def tiles(self) -> Iterator[Bounds]:
-        """Squares of the city's tile size, on round coordinates, that touch a block."""
+        """Yield the squares of the city's tile size that touch a block.
+
+        They lie on round coordinates.
+        """
         size = self.city.tile_m
         first, last = np.floor(self.low.min(axis=0) / size), np.ceil(self.high.max(axis=0) / size)
         for y in np.arange(first[1], last[1]) * size:
@@ -205,7 +224,9 @@ class Written(NamedTuple):
 
 
 def write_city(folder: Path, city: City) -> Iterator[Written]:
-    """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`; yields what each tile holds.
+    """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`.
+
+    Yields what each tile holds.
 
     Each building is in footprints and truth once, with the tile its frame's origin lies in. Raises
     OutputError where the folder cannot be written or already holds a city.
@@ -242,6 +263,9 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
 
 
 def holds(bounds: Bounds, lot: Lot) -> bool:
-    """Whether a lot's building stands in a tile; one on the border stands in one tile alone."""
+    """Return whether a lot's building stands in a tile.
+
+    One on the border stands in one tile alone.
+    """
     x, y, _ = lot.building.roof.frame.origin
     return bounds[0] <= x < bounds[2] and bounds[1] <= y < bounds[3]

@@ -1,5 +1,6 @@
-"""Compound buildings: wings, annexes, steps, rows and dormers, as the maximum of their parts'
-roofs.
+"""Compound buildings: wings, annexes, steps, rows and dormers.
+
+A roof is the maximum of its parts' roofs.
 
 Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under
 the main roof as far as its ridge, so that the maximum of both makes the valley, and a dormer until
@@ -35,8 +36,9 @@ DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 
 class CompoundLayout:
-    """The building's axes: parts are placed by their centre (u, v) and a number of quarter
-    turns.
+    """The building's axes.
+
+    Parts are placed by their centre (u, v) and a number of quarter turns.
     """
 
     def __init__(self, kappa: float):
@@ -62,8 +64,9 @@ def random_compound(
     origin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
     kappa: float | None = None,
 ) -> SimBuilding:
-    """A compound of `kind` (one of COMPOUND_KINDS; drawn when None) on the ground at `origin`
-    (world).
+    """Draw a compound of `kind` on the ground at `origin` (world).
+
+    `kind` is one of COMPOUND_KINDS; it is drawn when None.
 
     L, L_of_hips, T, cross, extension, two_level and saw_tooth_hall have two parts, U and winged_hip
     three, a dormered house two to five, a row three to six. Raises InputError for an unknown kind.
@@ -83,7 +86,10 @@ def random_compound(
 
 
 def make_winged(rng: np.random.Generator, layout: CompoundLayout, kind: str) -> list[Part]:
-    """A main body with one or two wings at right angles, all gables, all hips or all flat."""
+    """Make a main body with one or two wings at right angles.
+
+    All are gables, all hips or all flat.
+    """
     type = str(rng.choice(("gable", "hip", "flat"), p=(0.6, 0.2, 0.2)))
     width, eave = rng.uniform(6.5, 11.0), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(20, 50)))
@@ -115,8 +121,9 @@ def make_winged(rng: np.random.Generator, layout: CompoundLayout, kind: str) -> 
 
 
 def regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
-    """A gable, hip (all four slopes equal, longer than wide) or flat roof of given plan and
-    slope.
+    """Return a gable, hip or flat roof of given plan and slope.
+
+    A hip has four equal slopes and is longer than wide.
     """
     parameters = {"length": float(length), "width": float(width)}
     if type != "flat":
@@ -127,8 +134,9 @@ def regular(type: str, length: float, width: float, slope: float) -> dict[str, f
 
 
 def make_extended(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """A house with a lower annex along its eave: a flat roof, or a lean-to that rises towards the
-    house.
+    """Make a house with a lower annex along its eave.
+
+    It is a flat roof, or a lean-to that rises towards the house.
     """
     type = str(rng.choice(("gable", "hip", "half_hip", "mansard", "asymmetric_gable", "gambrel")))
     house, eave = random_parameters(rng, type), random_eave(rng) + 2.0
@@ -148,7 +156,7 @@ def make_extended(rng: np.random.Generator, layout: CompoundLayout) -> list[Part
 
 
 def make_level_blocks(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Two flat blocks side by side, a storey or more apart."""
+    """Make two flat blocks side by side, a storey or more apart."""
     parameters, upper = random_parameters(rng, "flat"), random_parameters(rng, "flat")
     upper = upper | {"width": parameters["width"] * float(rng.uniform(0.6, 1.0))}
     eave = random_eave(rng)
@@ -166,7 +174,7 @@ def make_level_blocks(rng: np.random.Generator, layout: CompoundLayout) -> list[
 
 
 def saw_tooth_hall_and_office(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """A saw-tooth hall with a flat-roofed office along the foot of its first tooth."""
+    """Make a saw-tooth hall with a flat office along its first tooth's foot."""
     hall, eave = random_parameters(rng, "shed"), rng.uniform(4.5, 7.0)
     office = {"length": hall["length"], "width": float(rng.uniform(5.0, 9.0))}
     v = -(hall["width"] + office["width"]) / 2
@@ -177,8 +185,9 @@ def saw_tooth_hall_and_office(rng: np.random.Generator, layout: CompoundLayout) 
 
 
 def houses_in_a_row(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Terraced houses: slices of one depth whose ridges run along the row, some stepped, now and
-    then a flat one.
+    """Make terraced houses of one depth, with ridges along the row.
+
+    Some are stepped, and now and then one is flat.
     """
     count, depth = int(rng.integers(3, 7)), rng.uniform(7.5, 11.0)
     slope, eave, u = math.tan(math.radians(rng.uniform(28, 50))), random_eave(rng) + 1.0, 0.0
@@ -193,7 +202,7 @@ def houses_in_a_row(rng: np.random.Generator, layout: CompoundLayout) -> list[Pa
 
 
 def make_dormered(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """A house with one to four dormers of one shape, on one slope or on both."""
+    """Make a house with one to four equal dormers, on one slope or on both."""
     type = "gable" if rng.random() < 0.75 else "hip"
     width, slope = rng.uniform(8.0, 11.0), math.tan(math.radians(rng.uniform(38, 52)))
     ridge = width * rng.uniform(0.9, 1.4)
@@ -220,8 +229,10 @@ def make_dormered(rng: np.random.Generator, layout: CompoundLayout) -> list[Part
 def dormer(
     rng: np.random.Generator, span: float, slope: float, width: float
 ) -> tuple[str, float, float, tuple[float, float]]:
-    """Type, depth, distance of its front from the eave, and (eave over the house's eave, rise) of a
-    dormer of `span` on a roof of `width` and `slope`; its back ends under the slope.
+    """Draw the type, depth, place and heights of a dormer of `span`.
+
+    Heights are (eave over the house's eave, rise), the place is the distance of its front from the
+    eave. It stands on a roof of `width` and `slope`; its back ends under the slope.
     """
     type = str(rng.choice(("gable", "flat", "monopitch"), p=(0.5, 0.25, 0.25)))
     front, own_slope = rng.uniform(0.6, 1.1), math.tan(math.radians(rng.uniform(6, 14)))
@@ -236,7 +247,10 @@ def dormer(
 
 
 def winged_hip_roof(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """A hip with two lower wings alike, gables or hips, on one side of it or on both."""
+    """Make a hip with two equal lower wings on one side or on both.
+
+    Wings are gables or hips.
+    """
     type = str(rng.choice(("gable", "hip")))
     width, eave = rng.uniform(8.0, 12.0), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(22, 45)))
@@ -255,8 +269,9 @@ def winged_hip_roof(rng: np.random.Generator, layout: CompoundLayout) -> list[Pa
 
 
 def make_corner_hips(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Two hips of one width, slope and eave that share a corner: their ridges meet there at one
-    height.
+    """Make two hips of one width, slope and eave that share a corner.
+
+    Their ridges meet there at one height.
     """
     width, eave = rng.uniform(6.5, 10.5), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(20, 48)))

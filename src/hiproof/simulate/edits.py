@@ -1,5 +1,6 @@
-"""Random changes of a building's parts: what a person, a program or a slip of the hand may do to
-parameters.
+"""Random changes of a building's parts.
+
+They are what a person, a program or a slip of the hand may do to parameters.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ EDIT_KINDS = ("parameter", "type", "ridge", "eave", "turn", "move", "size", "add
 
 
 def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int, dict[str, Any]]:
-    """(kind, part, change) for `Building.with_part`, or `without_part` where the kind is "remove".
+    """Draw (kind, part, change) for `Building.with_part`.
+
+    It is for `without_part` where the kind is "remove".
 
     Parameters become anything from a hundredth to four times what they were, now and then below
     zero or none at all; types any other; parts go up to 5 m aside, and turn anywhere.
@@ -52,7 +55,7 @@ def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int,
 
 
 def random_value(rng: np.random.Generator, value: float) -> float:
-    """A value near, far from, or opposite to `value`."""
+    """Draw a value near, far from, or opposite to `value`."""
     slip = rng.random()
     if slip < 0.05:
         return 0.0
@@ -62,7 +65,7 @@ def random_value(rng: np.random.Generator, value: float) -> float:
 
 
 def edit_at_random(rng: np.random.Generator, building: Building) -> Building:
-    """The building after a random edit.
+    """Return the building after a random edit.
 
     Raises the HiproofError of an edit that makes no building.
     """

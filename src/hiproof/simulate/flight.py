@@ -1,5 +1,6 @@
-"""Where an airborne scanner's beams go: swaths of scan lines over a disc, with heading, scan angle
-and spacing.
+"""The beams of an airborne scanner: swaths of scan lines over a disc.
+
+Swaths have heading, scan angle and spacing.
 
 Within a swath, points lie at regular steps along each scan line and lines at regular steps along
 the flight; an oscillating mirror pushes lines together in pairs, away from the middle of its swath.
@@ -16,7 +17,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams by height, p(z) = xy0 + slope z: `xy0`, `slope` (n, 2);
+    """Beams by height, p(z) = xy0 + slope z, with `xy0` and `slope` (n, 2).
 
     `shift` (n, 3) is the swath's registration error.
     """
@@ -63,8 +64,9 @@ def random_swaths(
     edge_probability: float,
     reach: float,
 ) -> list[Swath]:
-    """One to three swaths that share `density` (points/m2); the second and third may end within
-    `reach` (m).
+    """Draw one to three swaths that share `density` (points/m2).
+
+    The second and third may end within `reach` (m).
     """
     count = 1 + int(rng.random() < 0.5) + int(rng.random() < 0.15)
     share = rng.uniform(0.6, 1.4, count)
@@ -97,7 +99,10 @@ def random_swaths(
 def make_beams(
     rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius: float, z_ref: float
 ) -> Beams:
-    """Beams of `swath` that cross the disc of `radius` about `centre` (2,) at height `z_ref`."""
+    """Return beams of `swath` that cross a disc at height `z_ref`.
+
+    It has `radius` about `centre` (2,).
+    """
     cosine, sine = math.cos(swath.heading), math.sin(swath.heading)
     along_lines, phase, across_steps = lattice(rng, swath, radius)
     jitter = rng.normal(0.0, 0.07, (2, len(along_lines), len(across_steps)))
@@ -118,8 +123,9 @@ def make_beams(
 def lattice(
     rng: np.random.Generator, swath: Swath, radius: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Scan lines along track (m from the centre), each line's phase (0-1), and steps across track
-    (m from the centre).
+    """Draw scan lines, each line's phase (0-1), and steps across track.
+
+    Lines and steps are in m from the centre, along and across track.
     """
     lines = np.arange(int(2 * radius / swath.line_spacing) + 2)
     steps = np.arange(int(2 * radius / swath.point_spacing) + 2)

@@ -1,5 +1,6 @@
-"""The demo: a small neighbourhood with every roof type and several compounds, on a slope, with
-trees.
+"""The demo: a small neighbourhood on a slope, with trees.
+
+It has every roof type and several compounds.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ SCAN = ScanSettings(density=8.0, range_noise_m=0.02, horizontal_noise_m=0.04, be
 
 
 def demo_files() -> dict[str, Path]:
-    """Paths of the bundled neighbourhood: "cloud", "footprints", "terrain", "truth".
+    """Return the paths of the bundled neighbourhood.
+
+    They are "cloud", "footprints", "terrain" and "truth".
 
     >>> sorted(demo_files())
     ['cloud', 'footprints', 'terrain', 'truth']
@@ -52,7 +55,10 @@ def demo_files() -> dict[str, Path]:
 
 
 def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
-    """Lots and terrain of the neighbourhood; each name of STREETS stands once."""
+    """Return lots and terrain of the neighbourhood.
+
+    Each name of STREETS stands once.
+    """
     rng = np.random.default_rng([seed, 1])
     terrain = Relief.random(rng, GROUND_M, ORIGIN_XY)
     heading, start = math.radians(14.0), ORIGIN_XY.copy()
@@ -68,7 +74,10 @@ def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
 
 
 def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
-    """How far a building reaches from a street that begins at `start` (2,), m."""
+    """Return how far (m) a building reaches from a street.
+
+    The street begins at `start` (2,).
+    """
     corners = np.array(building.footprint.exterior.coords) - start
     return float(turn_points(corners, -heading)[:, 1].max())
 

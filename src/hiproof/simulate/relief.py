@@ -1,4 +1,4 @@
-"""The terrain under a simulated scene: a sloping plane, or gentle hills without end."""
+"""The terrain under a simulated scene: a sloping plane, or endless hills."""
 
 from __future__ import annotations
 
@@ -21,14 +21,19 @@ class Plane:
         return xy @ (self.a, self.b) + self.c
 
     def hit(self, xy0: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Height (n,) where the beams p(z) = xy0 + slope z meet the terrain."""
+        """Return the height (n,) where the beams meet the terrain.
+
+        Beams are p(z) = xy0 + slope z.
+        """
         return self.height_at(xy0) / (1.0 - slope @ (self.a, self.b))
 
 
 @dataclass(frozen=True)
 class Relief:
-    """Hills as a sum of plane waves: `waves` (w, 4) = (kx, ky, phase, amplitude in metres) about
-    `base` (m); positions are taken relative to `origin` (2,).
+    """Hills as a sum of plane waves.
+
+    `waves` (w, 4) = (kx, ky, phase, amplitude in metres) about `base` (m); positions are taken
+    relative to `origin` (2,).
     """
 
     waves: np.ndarray
@@ -37,7 +42,10 @@ class Relief:
 
     @classmethod
     def random(cls, rng: np.random.Generator, base: float, origin: np.ndarray) -> Relief:
-        """Waves of 140 to 1500 m whose slopes together stay under about eight percent."""
+        """Draw waves of 140 to 1500 m with gentle slopes.
+
+        Their slopes together stay under about eight percent.
+        """
         length = np.array([1500.0, 800.0, 420.0, 230.0, 140.0])
         direction, phase = rng.uniform(0.0, 2 * np.pi, (2, len(length)))
         k = 2 * np.pi / length
@@ -46,16 +54,22 @@ class Relief:
         return cls(waves, base, np.asarray(origin, float))
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Terrain height (n,) at `xy` (n, 2)."""
+        """Return the terrain height (n,) at `xy` (n, 2)."""
         x, y = (np.asarray(xy, float) - self.origin).T
         return self.base + sum(
             amplitude * np.sin(kx * x + ky * y + phase) for kx, ky, phase, amplitude in self.waves
         )
 
     def move(self, shift: np.ndarray) -> Relief:
-        """The same terrain in a frame whose points are those of this one plus `shift` (3,)."""
+        """Return the same terrain in a frame moved by `shift` (3,).
+
+        The frame's points are those of this one plus `shift`.
+        """
         return Relief(self.waves, self.base + float(shift[2]), self.origin + shift[:2])
 
     def hit(self, xy0: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Height (n,) where the beams p(z) = xy0 + slope z meet the terrain."""
+        """Return the height (n,) where the beams meet the terrain.
+
+        Beams are p(z) = xy0 + slope z.
+        """
         return cast_waves(xy0 - self.origin, slope, self.waves, self.base)

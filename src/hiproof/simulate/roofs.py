@@ -1,6 +1,4 @@
-"""Buildings whose truth is known: one primitive with dimensions and slopes as real
-roofs have them.
-"""
+"""Buildings with known truth: one primitive with realistic dimensions."""
 
 from __future__ import annotations
 
@@ -56,9 +54,7 @@ class SimBuilding:
         return shapely.transform(self.outline, self.roof.frame.to_world)
 
     def truth(self) -> dict:
-        """Plain values for JSON: type, kind, ground height, frame origin and every part's
-        parameters.
-        """
+        """Return type, kind, ground height, origin and parameters, for JSON."""
         return {
             "type": self.type,
             "kind": self.kind,
@@ -82,8 +78,9 @@ def random_building(
     origin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
     kappa: float | None = None,
 ) -> SimBuilding:
-    """A building of one primitive, its ground at `origin` (world), turned by `kappa` (rad; drawn
-    when None).
+    """Draw a building of one primitive.
+
+    Its ground is at `origin` (world), and it is turned by `kappa` (rad; drawn when None).
 
     Raises InputError for a type that is not in the catalogue.
 
@@ -104,18 +101,24 @@ def random_building(
 def assemble(
     parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[float, float, float]
 ) -> SimBuilding:
-    """`parts` as a building on the ground at `origin`; the outline is the union of their pieces."""
+    """Return `parts` as a building on the ground at `origin`.
+
+    The outline is the union of their pieces.
+    """
     roof = Roof(parts, united_outline(parts), LocalFrame(np.asarray(origin, float)))
     return SimBuilding(find_largest_part(roof).type, kind, roof, float(origin[2]))
 
 
 def find_largest_part(roof: Roof) -> Part:
-    """The part of the largest outline, what others hide of it included."""
+    """Return the part of the largest outline.
+
+    What others hide of it counts.
+    """
     return max(roof.parts, key=lambda part: part.area)
 
 
 def read_truth(truth: dict) -> SimBuilding:
-    """The building whose `SimBuilding.truth` was written to a file.
+    """Read the building whose `SimBuilding.truth` was written to a file.
 
     Raises InputError for anything else.
 
@@ -142,7 +145,7 @@ def read_truth(truth: dict) -> SimBuilding:
 
 
 def turn_building(building: SimBuilding, angle: float) -> SimBuilding:
-    """The building turned by `angle` (rad) about its frame's origin."""
+    """Turn a building by `angle` (rad) about its frame's origin."""
     parts = []
     for part in building.roof.parts:
         translation = np.append(
@@ -153,8 +156,9 @@ def turn_building(building: SimBuilding, angle: float) -> SimBuilding:
 
 
 def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
-    """Union of all pieces, joined in the axes of the first part, where common edges are exactly on
-    one line.
+    """Return the union of all pieces.
+
+    They are joined in the axes of the first part, where common edges are exactly on one line.
     """
     outlines = [piece.outline for part in parts for piece in part.pieces]
     if len(outlines) == 1:
@@ -174,14 +178,19 @@ def turn_points(xy: np.ndarray, angle: float) -> np.ndarray:
 
 
 def random_eave(rng: np.random.Generator) -> float:
-    """Height of the lowest eave over the ground: one to four storeys, sheds included."""
+    """Draw the height of the lowest eave over the ground.
+
+    It is that of one to four storeys, sheds included.
+    """
     return float(rng.choice((2.4, 3.0, 5.5, 5.8, 8.5, 11.5)) + rng.uniform(-0.3, 0.5))
 
 
 def random_parameters(
     rng: np.random.Generator, type: str, width: float | None = None
 ) -> dict[str, float]:
-    """theta_p of one roof of `type`; `width` (m) may be given, for parts that must fit together.
+    """Draw theta_p of one roof of `type`.
+
+    `width` (m) may be given, for parts that must fit together.
 
     The shapes' own draws keep each type apart from its neighbours in the catalogue: a hip has a
     ridge, a half-hip a gable wall worth the name, an asymmetric gable a visible difference of

@@ -1,5 +1,6 @@
-"""An airborne laser scanner over made-up buildings and over solids: labelled points with the faults
-of real clouds.
+"""An airborne laser scanner over simulated buildings and over solids.
+
+Points are labelled, and have the faults of real clouds.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class Scan:
-    """`points` (n, 3) world metres;
+    """Scanned `points` (n, 3), world metres, with labels and sources.
 
     `label` (n,) index into the catalogue, NOT_ROOF for all else; `source` (n,) index into SOURCES
     (roof, wall, ground, tree, clutter).
@@ -77,7 +78,7 @@ class Scan:
 def scan(
     building: SimBuilding, rng: np.random.Generator, settings: ScanSettings | None = None
 ) -> Scan:
-    """One building as a scanner sees it, with what stands around it.
+    """Scan one building with what stands around it.
 
     >>> from hiproof.simulate import random_building, scan
     >>> rng = np.random.default_rng(0)
@@ -102,7 +103,7 @@ def scan_solids(
     settings: ScanSettings | None = None,
     types: list[str | None] | None = None,
 ) -> Scan:
-    """Solids of any origin (all in one frame) as a scanner sees them together.
+    """Scan solids of any origin, all in one frame.
 
     Their RoofSurfaces are labelled with `types` (names of the catalogue; None or an unknown name
     gives NOT_ROOF but still the source "roof"). The terrain is level at the solids' lowest height.
@@ -134,8 +135,9 @@ def scan_scene(
     rng: np.random.Generator,
     settings: ScanSettings,
 ) -> Scan:
-    """Beams over `area` (plan, the scene's frame), their returns with noise, and the cloud's
-    defects.
+    """Scan `area` with noise and the cloud's defects.
+
+    `area` is in plan, in the scene's frame.
     """
     x_low, y_low, x_high, y_high = area.bounds
     centre = np.array([(x_low + x_high) / 2, (y_low + y_high) / 2])
@@ -159,8 +161,10 @@ def scan_scene(
 
 
 def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: ScanSettings) -> Scan:
-    """Points of all beams: a wide beam mixes the heights of two near surfaces and splits over two
-    far ones; leaves catch some of the light and let the rest through.
+    """Return the points of all beams.
+
+    A wide beam mixes the heights of two near surfaces and splits over two far ones; leaves catch
+    some of the light and let the rest through.
     """
     z_hit, source, label = first_hits(scene, beams.xy0, beams.slope)
     n = len(z_hit)
@@ -194,8 +198,9 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
 def first_hits(
     scene: Scene, xy0: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Height (n,), source and label (n,) of the first surface each beam meets; terrain where there
-    is nothing else.
+    """Return height (n,), source and label (n,) of each beam's first surface.
+
+    It is the terrain where there is nothing else.
     """
     z_hit = scene.terrain.hit(xy0, slope)
     source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
@@ -220,8 +225,9 @@ def caught_by_leaves(
     label: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The returns with those of leaves, and the beam index of each: a third of the beams caught
-    return from below too.
+    """Add the returns of leaves, and return the beam index of each.
+
+    A third of the beams caught return from below too.
     """
     z_crown = np.full(len(xy0), -np.inf)
     cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
@@ -237,15 +243,16 @@ def caught_by_leaves(
 def without_strip(
     rng: np.random.Generator, beams: Beams, heading: float, centre: np.ndarray, reach: float
 ) -> Beams:
-    """Some scan lines lost: a band of 0.8 to 3 m across the flight."""
+    """Drop some scan lines: a band of 0.8 to 3 m across the flight."""
     along = (beams.xy0 - centre) @ (math.cos(heading), math.sin(heading))
     start, width = rng.uniform(-0.7, 0.7) * reach, rng.uniform(0.8, 3.0)
     return beams.select((along < start) | (along > start + width))
 
 
 def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, reach: float) -> Scan:
-    """A part of the roof that gave no return (wet, dark, or hidden): all points of a disc about
-    some place near the edge.
+    """Drop all points of a disc about some place near the roof's edge.
+
+    That part of the roof gave no return (wet, dark, or hidden).
     """
     angle, radius = rng.uniform(-math.pi, math.pi), reach * rng.uniform(0.25, 0.6)
     middle = centre + 0.8 * reach * np.array([math.cos(angle), math.sin(angle)])
@@ -254,7 +261,7 @@ def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, re
 
 
 def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
-    """A few returns from nothing: birds above, multiple reflections below."""
+    """Add a few returns from birds above and multiple reflections below."""
     count = rng.poisson(share * len(cloud))
     position = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(
         0.0, 1.0, (count, 3)
@@ -273,9 +280,10 @@ def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
 def uniform_points(
     building: SimBuilding, rng: np.random.Generator, density: float = 4.72, noise: float = 0.12
 ):
-    """Points (n, 3) world metres drawn as in the paper's Table 3: uniform over the outline, on the
-    roof, with vertical errors whose size is uniform within 1 `noise` for 90 %, within 1-2 for 9 %
-    and within 2-3 for 1 % of the points.
+    """Draw points (n, 3), world metres, as in the paper's Table 3.
+
+    They lie evenly over the outline, on the roof, with vertical errors whose size is uniform within
+    1 `noise` for 90 %, within 1-2 for 9 % and within 2-3 for 1 % of the points.
     """
     outline = building.outline
     x_low, y_low, x_high, y_high = outline.bounds
@@ -288,12 +296,12 @@ def uniform_points(
 
 
 def bare_scene(building: SimBuilding) -> Scene:
-    """The building alone on level ground."""
+    """Return a scene of the building alone on level ground."""
     return make_scene(building_bodies(building))
 
 
 def check_settings(settings: ScanSettings) -> ScanSettings:
-    """`settings`, or InputError where a scanner could not have them."""
+    """Return `settings`, or raise InputError where no scanner can have them."""
     if not 0.05 <= settings.density <= 1000:
         raise InputError(
             f"expected a density of 0.05 to 1000 points/m2, got {settings.density}; 1 to 20 is "

@@ -1,5 +1,6 @@
-"""What the beams can hit: buildings, solids, trees and clutter as half-spaces, triangles and
-crowns.
+"""The targets of beams: buildings, solids, trees and clutter.
+
+They are half-spaces, triangles and crowns.
 """
 
 from __future__ import annotations
@@ -26,8 +27,9 @@ DISC_SLACK_M = 3.0  # a building's walls may go this far down below its own grou
 
 @dataclass(frozen=True)
 class Defects:
-    """How often a building's surroundings and cloud have each defect (probabilities), and the share
-    of outliers.
+    """Probabilities of a building's and a cloud's defects.
+
+    Outliers have a share.
     """
 
     tree: float = 0.35
@@ -42,7 +44,7 @@ class Defects:
 
     @classmethod
     def none(cls) -> Defects:
-        """A bare building under a faultless scanner."""
+        """Return a bare building under a faultless scanner."""
         return cls(*(0.0,) * 9)
 
 
@@ -69,8 +71,9 @@ class Scene:
 
 @dataclass(frozen=True)
 class Body:
-    """A convex body: the prism of a piece's outline under its planes, with what a hit on its top
-    is; the piece's frame is that of the scene less `shift` (3,).
+    """A convex body: the prism of a piece's outline under its planes.
+
+    It has what a hit on its top is; the piece's frame is that of the scene less `shift` (3,).
     """
 
     piece: Piece
@@ -81,7 +84,9 @@ class Body:
 
 
 def list_halfspaces(piece: Piece) -> np.ndarray:
-    """Outline edges, then planes, as rows (nx, ny, nz, d) with n . p <= d inside.
+    """Return outline edges, then planes, as rows (nx, ny, nz, d).
+
+    n . p <= d inside.
 
     Raises InputError when not convex.
     """
@@ -108,8 +113,9 @@ def list_halfspaces(piece: Piece) -> np.ndarray:
 
 
 def bound_body(body: Body) -> tuple[float, float, float, float]:
-    """(x, y, z, radius): beams up to 45 degrees off the vertical that hit the body above ground
-    pass this disc at z.
+    """Return (x, y, z, radius) of a disc at z that bounds the body's beams.
+
+    Beams up to 45 degrees off the vertical that hit the body above ground pass it.
     """
     corners = shapely.get_coordinates(body.piece.outline)
     smallest, largest = corners.min(axis=0), corners.max(axis=0)
@@ -124,7 +130,10 @@ def bound_body(body: Body) -> tuple[float, float, float, float]:
 def make_scene(
     bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: Plane | Relief | None = None
 ) -> Scene:
-    """Bodies packed for the beams; `crowns` and `terrain` are in the scene's frame."""
+    """Pack bodies for the beams.
+
+    `crowns` and `terrain` are in the scene's frame.
+    """
     sides, discs, source, label = [np.empty((0, 4))], [], [], []
     for body in bodies:
         rows = list_halfspaces(body.piece)
@@ -146,7 +155,7 @@ def make_scene(
 
 
 def building_bodies(building: SimBuilding) -> list[Body]:
-    """The building's pieces, each roof labelled with its part's type."""
+    """Return the building's pieces, each roof labelled with its part's type."""
     return [
         Body(piece, label=find_label(part.type))
         for part in building.roof.parts
@@ -155,8 +164,9 @@ def building_bodies(building: SimBuilding) -> list[Body]:
 
 
 def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> Scene:
-    """`building` with the clutter, neighbours, trees and sloping ground that `defects` allows, in
-    its local frame.
+    """Draw the surroundings of `building`, in its local frame.
+
+    They are clutter, neighbours, trees and sloping ground as `defects` allows.
     """
     bodies = building_bodies(building) + superstructures(rng, building, defects)
     has_neighbour, has_tree = rng.random(2) < (defects.neighbour, defects.tree)
@@ -170,7 +180,7 @@ def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defec
 def superstructures(
     rng: np.random.Generator, building: SimBuilding, defects: Defects
 ) -> list[Body]:
-    """Chimneys, dormers and antennas that stand on the building's roof."""
+    """Draw chimneys, dormers and antennas on the building's roof."""
     bodies = []
     has_chimney, has_dormer, has_antenna = rng.random(3) < (
         defects.chimney,
@@ -187,7 +197,10 @@ def superstructures(
 
 
 def place_on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarray, Piece]:
-    """A point of the plan at least 15 % away from a random piece's border, and that piece."""
+    """Draw a place on the roof, and the piece there.
+
+    It is at least 15 % away from a random piece's border.
+    """
     pieces = building.roof.pieces
     piece = pieces[rng.integers(len(pieces))]
     corners = shapely.get_coordinates(piece.outline)[:-1]
@@ -211,8 +224,9 @@ def antenna(rng: np.random.Generator, building: SimBuilding) -> Body:
 
 
 def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
-    """One to three boxes that come out of a slope and meet it at their back; none on a flat
-    roof.
+    """Draw one to three boxes that come out of a slope.
+
+    They meet it at their back; there are none on a flat roof.
     """
     bodies = []
     for _ in range(1 + int(2.5 * rng.random() ** 2)):
@@ -235,7 +249,10 @@ def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
 
 
 def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
-    """A building beside this one, wall to wall or some metres off; its points are clutter here."""
+    """Draw a building beside this one, wall to wall or some metres off.
+
+    Its points are clutter here.
+    """
     part = building.largest
     type = ROOF_TYPES[rng.choice((0, 1, 2, 3))]
     parameters = random_parameters(rng, type)
@@ -256,8 +273,9 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
 
 
 def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
-    """One to three crowns (t, 5) whose trunks stand outside, mostly near a corner, and lean over
-    the roof.
+    """Draw one to three crowns (t, 5) that lean over the roof.
+
+    Trunks stand outside, mostly near a corner.
     """
     corners = shapely.get_coordinates(building.outline.exterior)[:-1]
     centre = corners.mean(axis=0)
@@ -274,7 +292,10 @@ def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
 
 
 def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
-    """Any closed solids as triangles; their RoofSurfaces carry `labels` (of `find_label`)."""
+    """Return closed solids as triangles.
+
+    Their RoofSurfaces carry `labels` (of `find_label`).
+    """
     triangles, source, label = [np.empty((0, 3, 3))], [], []
     for solid, roof_label in zip(solids, labels, strict=True):
         for face in solid.faces:
@@ -292,8 +313,9 @@ def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
 
 
 def triangulate(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Triangles (m, 3, 3) of one planar polygon with holes, cut in the coordinate plane it faces
-    most.
+    """Return triangles (m, 3, 3) of one planar polygon with holes.
+
+    It is cut in the coordinate plane that it faces most.
     """
     outer = vertices[list(rings[0])]
     if len(rings) == 1 and len(outer) == 3:

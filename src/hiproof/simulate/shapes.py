@@ -1,5 +1,6 @@
-"""Roof parts of the catalogue placed in plan, and the small flat or gabled boxes that stand on
-roofs.
+"""Roof parts placed in plan, and the small boxes that stand on roofs.
+
+Boxes are flat or gabled.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ network tells apart.
 
 
 def find_label(type: str | None) -> int:
-    """The label of a roof's points: the place of its type in the catalogue, NOT_ROOF for what is
-    none.
+    """Return the label of a roof type's points.
+
+    It is its place in the catalogue, NOT_ROOF for what is none.
     """
     return list(CATALOGUE).index(type) if type in CATALOGUE else NOT_ROOF
 
@@ -32,9 +34,10 @@ def find_label(type: str | None) -> int:
 def make_part(
     type: str, parameters: dict[str, float], kappa: float, translation: np.ndarray
 ) -> Part:
-    """One primitive with theta_p `parameters`, turned by `kappa` about Z and moved by `translation`
-    (3,), its eave at translation's height; the parameters it carries are the canonical ones of its
-    surface.
+    """Return one primitive, turned by `kappa` about Z and moved.
+
+    It has theta_p `parameters`, its eave at the height of `translation` (3,); the parameters it
+    carries are the canonical ones of its surface.
     """
     primitive = CATALOGUE[type].variant(parameters)
     return primitive.part(
@@ -45,8 +48,9 @@ def make_part(
 def box(
     xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float, rise: float = 0.0
 ) -> Piece:
-    """A block of `size` (along, across) about `xy`, turned by `kappa`: flat at `z_top`, or with
-    `rise` a gable whose ridge is at `z_top`.
+    """Return a block of `size` (along, across) about `xy`, turned by `kappa`.
+
+    It is flat at `z_top`, or with `rise` a gable whose ridge is at `z_top`.
     """
     cosine, sine = math.cos(kappa), math.sin(kappa)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (size[0] / 2, size[1] / 2)

@@ -1,4 +1,7 @@
-"""A survey flight over a town, and its files: a classified LAZ, a terrain model, footprints."""
+"""A survey flight over a town, and its files.
+
+They are a classified LAZ, a terrain model and footprints.
+"""
 
 from __future__ import annotations
 
@@ -30,9 +33,10 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Flight:
-    """Parallel flight lines over a town: `heading` (rad) through `origin` (2,), flying height, half
-    the field of view (deg), the distance between lines, and `registration` (m), one sigma of a
-    line's offset.
+    """Parallel flight lines over a town.
+
+    `heading` (rad) goes through `origin` (2,); there are flying height, half the field of view
+    (deg), the distance between lines, and `registration` (m), one sigma of a line's offset.
     """
 
     heading: float
@@ -45,8 +49,9 @@ class Flight:
     def plan_swaths(
         self, seed: int, centre: np.ndarray, radius: float, density: float
     ) -> list[Swath]:
-        """Swaths of all flight lines that see the disc of `radius` about `centre`; together they
-        have `density` in the mean.
+        """Return swaths of all flight lines that see a disc.
+
+        It has `radius` about `centre`; together they have `density` in the mean.
         """
         half_width = self.altitude_m * math.tan(math.radians(self.half_view_deg))
         spacing = math.sqrt(2 * half_width / self.line_distance_m / density)
@@ -74,7 +79,10 @@ class Flight:
 
 
 def divide_into_patches(bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Lowest and highest corners (2,) of the patches of at most PATCH_M that tile `bounds`."""
+    """Return the corners (2,) of the patches that tile `bounds`.
+
+    They are lowest and highest, of patches of at most PATCH_M.
+    """
     lower, upper = np.array(bounds[:2]), np.array(bounds[2:])
     columns, rows = np.ceil((upper - lower) / PATCH_M).astype(int)
     corners = [lower + PATCH_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
@@ -89,7 +97,9 @@ def survey(
     seed: int,
     settings: ScanSettings,
 ) -> Iterator[Scan]:
-    """Points (world) of each of `patches`; the same whatever else of the town is surveyed.
+    """Yield the points (world) of each of `patches`.
+
+    They are the same whatever else of the town is surveyed.
 
     `lots` must hold every lot that reaches into the patches.
     """
@@ -112,8 +122,9 @@ def surveyed_patch(
     seed: int,
     settings: ScanSettings,
 ) -> Scan:
-    """Points of one patch between its corners `lower` and `upper` (2,), drawn from a seed of its
-    place.
+    """Return the points of one patch, drawn from a seed of its place.
+
+    Its corners are `lower` and `upper` (2,).
     """
     xy_centre = (lower + upper) / 2
     centre = np.array([*xy_centre, float(terrain.height_at(xy_centre[None])[0])])
@@ -133,12 +144,18 @@ def surveyed_patch(
 
 
 def select_beams(beams: Beams, half_size: np.ndarray) -> Beams:
-    """Beams that meet the ground within the rectangle of `half_size` (2,) about the origin."""
+    """Select beams that meet the ground within a rectangle about the origin.
+
+    It has `half_size` (2,).
+    """
     return beams.select((np.abs(beams.xy0) < half_size).all(axis=1))
 
 
 def assign_classes(cloud: Scan) -> np.ndarray:
-    """ASPRS classes: ground 2, trees 5, all that is built 6, as producers deliver them."""
+    """Return ASPRS classes as producers deliver them.
+
+    They are ground 2, trees 5, and all that is built 6.
+    """
     classes = np.full(len(cloud), CLASS_BUILDING, np.uint8)
     classes[cloud.source == SOURCE_GROUND] = CLASS_GROUND
     classes[cloud.source == SOURCE_TREE] = CLASS_TREE
@@ -146,7 +163,7 @@ def assign_classes(cloud: Scan) -> np.ndarray:
 
 
 def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: float = 0.01) -> int:
-    """Clouds in one LAZ 1.4 file, streamed; the number of points.
+    """Write clouds to one LAZ 1.4 file, streamed; return the number of points.
 
     Raises OutputError where it cannot be written.
     """
@@ -177,7 +194,7 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
 
 
 def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 1.0) -> None:
-    """Terrain heights at the pixel centres as a GeoTIFF."""
+    """Write terrain heights at the pixel centres as a GeoTIFF."""
     from ..read.raster import import_rasterio
 
     rasterio = import_rasterio()
@@ -208,7 +225,7 @@ def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 
 
 
 def write_footprints(path: Path, lots: list[Lot], append: bool = False) -> None:
-    """Outlines of `lots` as the layer "footprints" of a GeoPackage, with their `id`."""
+    """Write outlines of `lots`, with `id`, as a GeoPackage's "footprints"."""
     import pyogrio
     import shapely
 

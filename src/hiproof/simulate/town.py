@@ -1,4 +1,4 @@
-"""Buildings along streets on hilly ground: the stock of which neighbourhoods and cities are made.
+"""Buildings along streets on hilly ground, for neighbourhoods and cities.
 
 A lot is a building where it stands, with its chimneys, dormers and trees; a street side is a line
 of lots. Everything is drawn from the generator given, so that one seed a block makes any part of a
@@ -26,8 +26,10 @@ TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, ante
 
 @dataclass(frozen=True)
 class Lot:
-    """One building where it stands, `id` its name, `bodies` all that is built in the building's
-    frame and `crowns` (t, 5) the trees around it in world coordinates.
+    """One building where it stands.
+
+    `id` is its name, `bodies` all that is built in the building's frame and `crowns` (t, 5) the
+    trees around it in world coordinates.
     """
 
     id: str
@@ -46,15 +48,16 @@ class Lot:
 
 
 def make(rng: np.random.Generator, name: str, kappa: float) -> SimBuilding:
-    """A building whose `name` is a roof type or a kind of compound, its frame at the origin."""
+    """Make a building of a roof type or a compound kind, its frame at the origin."""
     if name in COMPOUND_KINDS:
         return random_compound(rng, name, kappa=kappa)
     return random_building(rng, name, kappa=kappa)
 
 
 def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBuilding:
-    """The building moved so that its frame's origin is at `xy` (world), on the lowest ground under
-    its outline.
+    """Move a building so that it stands at `xy` (world).
+
+    Its frame's origin lies there, on the lowest ground under its outline.
     """
     corners = shapely.get_coordinates(building.outline) + xy
     z_ground = round(float(terrain.height_at(corners).min()), 3)
@@ -63,7 +66,10 @@ def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBu
 
 
 def build_row(row: SimBuilding) -> list[SimBuilding]:
-    """A row of houses as single buildings with common walls, all in the row's frame."""
+    """Return a row of houses as single buildings, all in the row's frame.
+
+    They have common walls.
+    """
     roofs = [Roof((part,), part.pieces[0].outline, row.roof.frame) for part in row.roof.parts]
     return [
         SimBuilding(find_largest_part(roof).type, "terraced", roof, row.z_ground) for roof in roofs
@@ -71,7 +77,7 @@ def build_row(row: SimBuilding) -> list[SimBuilding]:
 
 
 def furnish_lot(rng: np.random.Generator, id: str, building: SimBuilding) -> Lot:
-    """The lot of `building` with what stands on it and beside it."""
+    """Return the lot of `building` with what stands on it and beside it."""
     bodies = building_bodies(building) + superstructures(rng, building, TOWN_DEFECTS)
     crowns = np.empty((0, 5))
     if rng.random() < TOWN_DEFECTS.tree:
@@ -89,8 +95,9 @@ def street_side(
     depth: float,
     terrain: Relief,
 ) -> list[SimBuilding]:
-    """Buildings side by side along `heading` (rad) from `start` (2,), to its left, within `length`
-    by `depth` metres.
+    """Return buildings side by side along `heading` (rad) from `start` (2,).
+
+    They stand to its left, within `length` by `depth` metres.
 
     `names` are taken one after the other until the side is full; a building deeper than the plot is
     turned, and left out where that does not help. Terraced rows come back as their houses half of
@@ -117,13 +124,16 @@ def street_side(
 
 
 def extent(building: SimBuilding, heading: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner (2,) of the outline in axes turned by `heading`."""
+    """Return the lowest and highest corner (2,) of the outline.
+
+    Axes are turned by `heading`.
+    """
     corners = turn_points(shapely.get_coordinates(building.outline), -heading)
     return corners.min(axis=0), corners.max(axis=0)
 
 
 def town_scene(lots: list[Lot], terrain: Relief, centre: np.ndarray) -> Scene:
-    """All `lots` in the frame whose origin is `centre` (3,) (world)."""
+    """Return all `lots` in the frame whose origin is `centre` (3,) (world)."""
     bodies = [
         replace(body, shift=lot.building.roof.frame.origin - centre)
         for lot in lots

@@ -25,7 +25,9 @@ def training_sample(
     density: tuple[float, float] = (1.0, 20.0),
     defects: Defects | None = None,
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """One scanned building: points (n, 3) about their mean, labels (n,) and the building's type.
+    """Scan one building for training.
+
+    Returns points (n, 3) about their mean, labels (n,) and the building's type.
 
     Labels and type index `types`; a point that is not roof has the label len(types). The density is
     drawn on a logarithmic scale within `density` and the scanner's noise, beam and margin at
@@ -62,8 +64,9 @@ def random_settings(
     n_points: tuple[int, int],
     defects: Defects | None,
 ) -> ScanSettings:
-    """A scanner at random whose density, within `density`, gives a building of `area_m2` about
-    `n_points`.
+    """Draw scanner settings that give a building about `n_points`.
+
+    Its area is `area_m2`, and the density lies within `density`.
     """
     smallest = min(max(density[0], n_points[0] / area_m2), density[1])
     largest = max(min(density[1], 1.2 * n_points[1] / area_m2), smallest)

@@ -21,8 +21,9 @@ def load_postgis(
     name: str | None = None,
     **how: bool,
 ) -> int:
-    """Load the models of `folder` into the tables of a `prefix` in the database at `dsn`; returns
-    the number of buildings.
+    """Replace a prefix's tables in a database by the models of `folder`.
+
+    They are PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`.
 
     `name` is that of the run in the tables, its folder's by default; `how` is `replace` or
     `append` (see Load). A damaged building is told to `damaged`, which refuses the run by
@@ -36,6 +37,9 @@ def load_postgis(
 
 
 def find_srid(crs: Any) -> int:
-    """Return the EPSG code of a CRS; 0 (unknown to PostGIS) without one."""
+    """Return the EPSG code of the metadata's reference system.
+
+    It is 0 (unknown to PostGIS) without one.
+    """
     code = (reference_system(crs) or "").rpartition("/")[2]
     return int(code) if code.isdigit() and int(code) <= MOST_SRID else 0

@@ -1,5 +1,7 @@
-"""A page that shows 3D Tiles, served to this machine's browser alone; it asks nothing of the
-network."""
+"""A page that shows 3D Tiles, served to this machine's browser alone.
+
+It needs no network.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +34,9 @@ VIEW_ASSETS = {
 
 
 def make_server(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
-    """A server of the page at `/` and of the files of the folder `tileset`; 0 is any free `port`.
+    """Make a server of the page at `/` and of the folder `tileset`.
+
+    0 is any free `port`.
 
     Raises InputError where the port is taken.
     """
@@ -42,7 +46,7 @@ def make_server(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
 
 
 def render_page(title: str) -> str:
-    """The page as text, scripts and styles in it."""
+    """Return the page as text, with its scripts and styles."""
     texts = {
         name: (files(package) / "assets" / file).read_text("utf-8")
         for name, (package, file) in VIEW_ASSETS.items()
@@ -60,8 +64,9 @@ def render_page(title: str) -> str:
 
 
 def make_policy(page: str) -> str:
-    """Return the Content-Security-Policy that lets this page run the scripts and styles that stand
-    in it, and no other.
+    """Return the Content-Security-Policy of a page.
+
+    It lets the page run the scripts and styles that stand in it, and no other.
 
     >>> make_policy("<style>a</style>")[:91]
     "default-src 'none'; script-src 'none'; style-src 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuY"
@@ -83,7 +88,10 @@ def hash_text(text: str) -> str:
 
 
 class ViewHandler(LoopbackHandler):
-    """Serves the page and the files of a folder; it lists none and follows no way out of it."""
+    """Serves the page and the files of a folder, and nothing outside it.
+
+    It lists no folder.
+    """
 
     def __init__(self, *args, directory: str, page: str, **named) -> None:
         self.folder, self.page, self.policy = (
