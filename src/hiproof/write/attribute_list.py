@@ -1,5 +1,6 @@
-"""Every attribute and table that hiproof writes, with unit and meaning: what the formats name and
-the documents list.
+"""Every attribute and table that hiproof writes, with unit and meaning.
+
+The formats name them, and the documents list them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,10 @@ OWN = "hiproof_"
 
 
 class Attribute(NamedTuple):
-    """A named value: `kind` is text, number or count; `unit` is empty where there is none."""
+    """A named value of the `kind` text, number or count.
+
+    `unit` is empty where there is none.
+    """
 
     name: str
     kind: str
@@ -491,12 +495,15 @@ their own names. Lengths are metres also where coordinates are not. Made by `hip
 
 
 def attributes_text() -> str:
-    """All tables as Markdown: what `hiproof attributes` prints and docs/attributes.md holds."""
+    """Return all tables as Markdown.
+
+    `hiproof attributes` prints them, and docs/attributes.md holds them.
+    """
     return "\n".join([PREFACE, files_text(), *map(table_text, TABLES)])
 
 
 def files_text() -> str:
-    """Every kind of file as Markdown."""
+    """Return every kind of file as Markdown."""
     rows = [
         f"| `{format.file}` | {format.what} | `hiproof "
         f"{'reconstruct' if format.fragment else f'convert --format {name}'}` |"

@@ -1,5 +1,6 @@
-"""What a building's record says in every format: roofer's attribute names, our own, and the
-input's.
+"""The attributes of a building in every format.
+
+They have roofer's names, our own, and those of the input.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
 
 
 def measure_figures(building: Building) -> RoofFigures | None:
-    """Figures of the building's solid, None without one."""
+    """Return the figures of the building's solid, None without one."""
     return None if building.built is None else roof_figures(building.solid)
 
 
@@ -33,8 +34,10 @@ def building_attributes(
     units: Units = METRES,
     osm: bool = False,
 ) -> dict[str, Any]:
-    """Attributes by name, in a fixed order: the input's own, roofer's (`prefix`), ours
-    (`hiproof_`), with `osm` the tags of OpenStreetMap.
+    """Return a building's attributes by name, in a fixed order.
+
+    They are the input's own, roofer's (`prefix`), ours (`hiproof_`), and with `osm` the tags of
+    OpenStreetMap.
 
     Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what
     we computed wins. Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose
@@ -60,7 +63,7 @@ def building_attributes(
 
 
 def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
-    """The attributes that users of roofer and 3DBAG look for, without prefix."""
+    """Return the attributes that users of roofer and 3DBAG expect, unprefixed."""
     quality = building.quality
     if figures is None:
         shape = dict.fromkeys(
@@ -87,7 +90,7 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
 
 
 def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
-    """Heights and volume, without prefix."""
+    """Return heights and volume, without prefix."""
     return {
         "h_roof_min": metres(figures.h_min),
         "h_roof_50p": metres(figures.h_50p),
@@ -101,7 +104,7 @@ def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
 def hiproof_attributes(
     building: Building, figures: RoofFigures | None = None, units: Units = METRES
 ) -> dict[str, Any]:
-    """Our own attributes, without prefix."""
+    """Return our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
     recognised = max(building.recognised, key=building.recognised.__getitem__, default=None)
@@ -134,7 +137,7 @@ def hiproof_attributes(
 
 
 def check_as_written(solid: Solid, units: Units) -> str:
-    """Codes of ISO 19107 that hold against the solid where it is written, as JSON.
+    """Return ISO 19107's codes against the solid as it is written, as JSON.
 
     Only solids that pass the check get here; in another CRS they are checked again.
     """

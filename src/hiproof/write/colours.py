@@ -1,4 +1,6 @@
-"""Colours of roofs, models and distances, the same in pictures, pages, styles and converted models.
+"""Colours of roofs, models and distances.
+
+They are the same in pictures, pages, styles and converted models.
 
 A legend has at most eight colours. People with any colour vision deficiency can distinguish them:
 two of a legend differ by at least 25 (residuals: 20) in CIELAB, as everyone sees them.
@@ -82,7 +84,9 @@ def page_colours() -> dict[str, Any]:
 
 
 def linear_rgb(colour: str) -> tuple[float, float, float]:
-    """Return linear red, green, blue in 0..1 of a `#rrggbb` sRGB colour, as glTF wants them.
+    """Return linear red, green, blue in 0..1 of a `#rrggbb` sRGB colour.
+
+    glTF wants them so.
 
     >>> linear_rgb("#ff0000")
     (1.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""A building with what every format tells of it, and its way into a file of any format."""
+"""A building with its figures and attributes, for files of any format."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from .roof_figures import RoofFigures
 
 
 class Described(NamedTuple):
-    """A building, the `figures` of its solid (None without one) and its `attributes` as files hold
-    them.
+    """A building with `figures` and `attributes`.
+
+    `figures` are those of its solid (None without one), `attributes` as files hold them.
     """
 
     building: Building

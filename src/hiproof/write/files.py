@@ -1,5 +1,6 @@
-"""Files that appear whole or not at all: written beside their place under a hidden name, synced,
-then renamed.
+"""Files that appear whole or not at all.
+
+They are written beside their place under a hidden name, synced, then renamed.
 
 Whatever goes wrong on the way (an exception, Ctrl-C, a full disk), the half-written file is removed
 and a file that stood there before keeps its content. What the file system refuses becomes an
@@ -42,7 +43,7 @@ ONLY_WRITING = (errno.ENOSPC, getattr(errno, "EDQUOT", -1), errno.EFBIG, errno.E
 
 
 def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
-    """The sentence for `error`, met while writing `path`.
+    """Return the error for `error`, met while writing `path`.
 
     >>> str(output_error("out/a.gml", OSError(errno.ENOSPC, "No space left on device")))[:50]
     'expected to write out/a.gml, but the disk is full;'
@@ -54,13 +55,17 @@ def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
 
 
 def elsewhere(error: OutputError, command: str) -> OutputError:
-    """Name the `command` that writes elsewhere, where the place was not of the user's choice."""
+    """Add the `command` that writes elsewhere to an error.
+
+    The user did not choose the place.
+    """
     return OutputError(f"{error}. Write elsewhere with `{command}`")
 
 
 class OutputFile(io.FileIO):
-    """A raw file opened for exclusive writing (and reading back) whose failing writes raise
-    OutputError.
+    """A raw file whose failing writes raise OutputError.
+
+    It is opened for exclusive writing (and reading back).
     """
 
     def __init__(self, hidden: Path, path: Path):
@@ -76,8 +81,9 @@ class OutputFile(io.FileIO):
 
 @contextmanager
 def atomic(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a free hidden path beside `path`, which becomes `path` when the block ends well and is
-    removed when not.
+    """Yield a free hidden path beside `path`, which becomes `path`.
+
+    It becomes so when the block ends well, and is removed when not.
 
     The parent folder is made if missing. Raises OutputError where the place cannot be written,
     before the block is entered if that can be known, and for the block's own errors when they come
@@ -125,8 +131,9 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextmanager
 def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends
-    well; see `atomic`.
+    """Yield a binary file that becomes `path` when the block ends well.
+
+    It is buffered, seekable and readable; see `atomic`.
     """
     with atomic(path) as hidden, open_hidden(hidden, Path(path)) as file:
         yield file
@@ -134,8 +141,9 @@ def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
 
 @contextmanager
 def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a temporary binary file beside `path`, gone when the block ends; a full disk raises
-    OutputError.
+    """Yield a temporary binary file beside `path`, gone when the block ends.
+
+    A full disk raises OutputError.
     """
     hidden = hidden_name(Path(os.path.realpath(path)))
     try:
@@ -163,21 +171,26 @@ def open_hidden(hidden: Path, path: Path) -> Iterator[BinaryIO]:
 
 
 def remove(path: Path) -> None:
-    """Remove a file if it can be: where a file system is read-only, there is none, and the error
-    before it is the one to tell.
+    """Remove a file if it can be.
+
+    Where a file system is read-only there is none, and the error before it is the one to report.
     """
     with suppress(OSError):
         path.unlink(missing_ok=True)
 
 
 def hidden_name(path: Path) -> Path:
-    """A free name beside `path` that listings do not show, with its suffix."""
+    """Return a free name beside `path` that listings do not show.
+
+    It has the same suffix.
+    """
     return path.with_name(f".{path.name[:40]}-{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
 
 
 def sync(path: Path) -> None:
-    """Ask the operating system to put the file or folder at `path` on disk; folders cannot be
-    opened everywhere, and Windows does so only for files opened for writing.
+    """Ask the operating system to put a file or folder on disk.
+
+    Folders cannot be opened everywhere, and Windows does so only for files opened for writing.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)

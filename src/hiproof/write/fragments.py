@@ -1,4 +1,6 @@
-"""A building's texts, ready to be joined into the files of a run, and how they are kept until then.
+"""A building's texts, ready to be joined into the files of a run.
+
+This module also stores them until then.
 
 A work tile's buildings are one file of plain arrays: bytes one after the other with the ends of
 each, and numbers. A file that somebody else could have written is only ever read as data.
@@ -28,9 +30,10 @@ EXTENT, ENDS = ".extent", ".ends"
 
 @dataclass(frozen=True)
 class Sheet:
-    """A building with all that its texts are made of: the `figures` of its solid (None without
-    one), its `attributes`, its names in CityJSON and in GML, and what the files of its run have in
-    common.
+    """A building with all from which its texts are made.
+
+    It has the `figures` of its solid (None without one), its `attributes`, its names in CityJSON
+    and in GML, and what the files of its run have in common.
     """
 
     building: Building
@@ -48,8 +51,9 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Fragment:
-    """A building as a file of a run holds it: its bytes and its extent there (low x y z, high x y
-    z), None where it has none.
+    """A building's part of a run's file: its bytes, and its extent there.
+
+    The extent is low x y z, high x y z, None where it has none.
     """
 
     text: bytes
@@ -72,7 +76,7 @@ def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
 
 
 def load_fragments(path: Path) -> Iterator[Fragments]:
-    """The buildings that `save_fragments` wrote to `path`.
+    """Load the buildings that `save_fragments` wrote to `path`.
 
     Raises OutputError for a file that is not whole.
     """
@@ -91,8 +95,9 @@ def load_fragments(path: Path) -> Iterator[Fragments]:
 
 
 def column(joined: np.ndarray, ends: np.ndarray, extents: np.ndarray) -> list[Fragment]:
-    """The texts whose bytes stand one after the other in `joined` (n,), each up to its end, with
-    their extents (b, 6).
+    """Split joined texts with their extents.
+
+    The bytes stand one after the other in `joined` (n,), each up to its end, with extents (b, 6).
     """
     content, starts = joined.tobytes(), [0, *ends.tolist()]
     texts = [content[start:end] for start, end in itertools.pairwise(starts)]

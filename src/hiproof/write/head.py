@@ -16,11 +16,12 @@ from .naming import FileUnits
 
 @dataclass(frozen=True)
 class FileHead:
-    """What the files of a run have in common: the CRS (anything pyproj understands, or None), the
-    unit of coordinates without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON
-    file, None where its first building settles it, how solids are composed, what is written of
-    buildings, what goes before roofer's attribute names, and the date that CityGML gives its
-    buildings, if any.
+    """What the files of a run have in common.
+
+    It is the CRS (anything pyproj understands, or None), the unit of coordinates without one (a key
+    of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
+    sets it, how solids are composed, what is written of buildings, what goes before roofer's
+    attribute names, and the date that CityGML gives its buildings, if any.
     """
 
     crs: Any = None

@@ -12,7 +12,9 @@ COMPACT = json.JSONEncoder(
 
 
 def dump(value: Any) -> bytes:
-    """Compact JSON in UTF-8; NaN, which JSON does not know, is refused with a ValueError.
+    """Return compact JSON in UTF-8.
+
+    NaN, which JSON does not know, is refused with a ValueError.
 
     >>> dump({"id": "a", "kappa": 0.5})
     b'{"id":"a","kappa":0.5}'

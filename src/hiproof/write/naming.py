@@ -1,5 +1,6 @@
-"""Names in files: gml:ids that are valid, unique and the same in every run, how a CRS is named, and
-its units.
+"""Names in files: gml:ids, CRSs and units.
+
+Ids are valid, unique and the same in every run.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
 
 
 def gml_name(building_id: str) -> str:
-    """`building_id` with every character that an XML name forbids replaced by its code between
-    underscores.
+    """Return `building_id` as a valid XML name.
+
+    A character that such a name forbids is replaced by its code between underscores.
 
     >>> gml_name("NL.IMBAG.Pand.05031/a b")
     'NL.IMBAG.Pand.05031_2f_a_20_b'
@@ -44,7 +46,9 @@ class UniqueNames:
 
 
 def srs_name(crs: Any) -> str | None:
-    """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN;
+    """Return GML's `srsName` of a CRS.
+
+    It is a URN with one EPSG code, or OGC's compound URN.
 
     None when `crs` is unknown or has no code.
 
@@ -73,8 +77,9 @@ def srs_name(crs: Any) -> str | None:
 
 
 def reference_system(crs: Any) -> str | None:
-    """The `referenceSystem` of CityJSON, which holds one code: the compound's own where it has one,
-    else the plan's.
+    """Return CityJSON's `referenceSystem`, which holds one code.
+
+    It is the compound's own where it has one, else the plan's.
 
     >>> reference_system("EPSG:28992+5709"), reference_system(None)
     ('https://www.opengis.net/def/crs/EPSG/0/7415', None)
@@ -87,7 +92,10 @@ def reference_system(crs: Any) -> str | None:
 
 
 def plan_wkt(crs: Any) -> str | None:
-    """WKT of the plan component of `crs`, for layers without heights; None when `crs` is."""
+    """Return WKT of the plan component of `crs`, for layers without heights.
+
+    It is None when `crs` is.
+    """
     from ..read.crs import horizontal_crs, parse_crs
 
     crs = parse_crs(crs)
@@ -96,8 +104,9 @@ def plan_wkt(crs: Any) -> str | None:
 
 @dataclass(frozen=True)
 class FileUnits:
-    """Units in which the files of a run hold coordinates; attributes and parameters are in metres
-    in all of them.
+    """Units of coordinates in the files of a run.
+
+    Attributes and parameters are in metres in all of them.
 
     They are those of the CRS that a file names, so that a reader who knows only the file is right:
     where CityJSON can name the plan's CRS alone, and in tables, which always do, heights are in the
@@ -110,7 +119,9 @@ class FileUnits:
 
     @classmethod
     def of(cls, crs: Any, world_units: Units | None = None, out_crs: str = "") -> FileUnits:
-        """Units of files of a run in `crs`, written in `out_crs` where that is one;
+        """Return the units of files of a run in `crs`.
+
+        They are written in `out_crs` where that is one.
 
         `world_units` are those of coordinates without a CRS, or without a name for it.
 
@@ -136,6 +147,6 @@ class FileUnits:
         )
 
     def describe(self) -> dict[str, Any]:
-        """What the record of a run says of units."""
+        """Return the units for the record of a run."""
         metres = {"metres_in_plan_unit": self.gml.plan, "metres_in_height_unit": self.gml.height}
         return {"coordinates": str(self.gml), "attributes": "metre", **metres}

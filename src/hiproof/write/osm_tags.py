@@ -1,4 +1,7 @@
-"""A building's roof as OpenStreetMap's Simple 3D Buildings tags it, by its main part."""
+"""A building's roof in OpenStreetMap's Simple 3D Buildings tags.
+
+Its main part counts.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ ONE_ENDED = ("side_hip", "side_half_hip")
 
 
 def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
-    """The tags by name, in the order of OSM;
+    """Return the tags by name, in the order of OSM.
 
     None what cannot be told or, of a flat roof, has no meaning.
 
@@ -53,12 +56,15 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
 
 
 def osm_shape(name: str) -> str | None:
-    """The value of roof:shape of a roof type; None of what is none."""
+    """Return the value of roof:shape of a roof type, None if it has none."""
     return CATALOGUE[name].osm_shape if name in CATALOGUE else None
 
 
 def find_direction(building: Building, main: int, azimuth_deg: float) -> float:
-    """The direction that the hipped end of part `main` looks in, else that of its largest face."""
+    """Return the direction of part `main`.
+
+    It is that of its hipped end, else that of its largest face.
+    """
     part = building.parts[main]
     return (
         math.degrees(0.5 * math.pi - part.kappa) % 360.0 if part.type in ONE_ENDED else azimuth_deg
@@ -66,7 +72,7 @@ def find_direction(building: Building, main: int, azimuth_deg: float) -> float:
 
 
 def format_number(value: Any) -> Any:
-    """A number to the centimetre or hundredth of a degree, None where it is none."""
+    """Round a number to the centimetre or hundredth of a degree; NaN is None."""
     if isinstance(value, (float, np.floating)):
         return round_value(float(value), 2) if math.isfinite(value) else None
     return value

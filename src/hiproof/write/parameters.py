@@ -36,8 +36,9 @@ def write_parameters(
     crs: Any = None,
     head: FileHead | None = None,
 ) -> None:
-    """Write a head and one JSON object a building to `path`; raises OutputError when it cannot be
-    written.
+    """Write a head and one JSON object a building to `path`.
+
+    Raises OutputError when it cannot be written.
 
     What stands in them is listed in docs/attributes.md. All lengths are metres, `origin` too, also
     where the files' CRS counts in feet; angles are degrees. What cannot be told is null.
@@ -73,12 +74,12 @@ writer = ParametersWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """A building's line in a run's file."""
+    """Return a building's line in a run's file."""
     return Fragment(parameters_line(sheet.building))
 
 
 def head_record(head: FileHead) -> dict[str, Any]:
-    """The JSON object of the first line."""
+    """Return the JSON object of the first line."""
     return {
         "hiproof_parameters": VERSION,
         "crs": crs_text(head.crs),
@@ -90,7 +91,7 @@ def head_record(head: FileHead) -> dict[str, Any]:
 
 
 def crs_text(crs: Any) -> str | None:
-    """The shortest text that is the same CRS to the letter: "EPSG:7415" or WKT.
+    """Return the shortest exact text of a CRS: "EPSG:7415" or WKT.
 
     >>> crs_text(7415)
     'EPSG:7415'
@@ -112,7 +113,7 @@ def parameters_line(building: Building) -> bytes:
 
 
 def building_record(building: Building) -> dict[str, Any]:
-    """The JSON object of one building; see `write_parameters`."""
+    """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
     return {
         "id": plain_text(building.id),
@@ -145,7 +146,7 @@ def building_record(building: Building) -> dict[str, Any]:
 
 
 def part_record(part: Part) -> dict[str, Any]:
-    """A part of a building's object: what `hiproof build` makes it of."""
+    """Return a part of a building's object, as `hiproof build` reads it."""
     sigma = {
         ("rotation" if n == "kappa" else n): (math.degrees(s) if n == "kappa" else s)
         for n, s in part.sigma.items()
@@ -161,7 +162,7 @@ def part_record(part: Part) -> dict[str, Any]:
 
 
 def outline_record(outline: shapely.Polygon | None) -> list[list[list[float]]] | None:
-    """The rings of a polygon, the outer first; None where there is none."""
+    """Return the rings of a polygon, the outer first; None where it is None."""
     if outline is None or outline.is_empty:
         return None
     return [
@@ -170,18 +171,21 @@ def outline_record(outline: shapely.Polygon | None) -> list[list[list[float]]] |
 
 
 def by_name(values: dict[str, float]) -> dict[str, float | None]:
-    """Numbers by name, in the order the primitive declares them."""
+    """Return numbers by name, in the order that the primitive declares."""
     return {str(name): number(value) for name, value in values.items()}
 
 
 def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
-    """A rounded number; None for NaN and infinities, which JSON does not know."""
+    """Round a number; None for NaN and infinities, which JSON does not know."""
     # + 0.0: minus zero is zero
     return round(float(value), digits) + 0.0 if math.isfinite(value) else None
 
 
 def places(xyz: np.ndarray) -> list[list[float | None]]:
-    """A line (m, 3) as `numbers` has each of its vertices: at once where all are known."""
+    """Return a line (m, 3) with each vertex as from `numbers`.
+
+    All go at once where all are known.
+    """
     if not np.isfinite(xyz).all():
         return [numbers(place) for place in xyz.tolist()]
     return (np.round(xyz, LENGTH_DIGITS) + 0.0).tolist()

@@ -1,4 +1,4 @@
-"""Coordinates of files in another CRS than the run's own: what `--out-crs` asks for.
+"""Coordinates of files in another CRS than the run's own (`--out-crs`).
 
 Every vertex goes by itself, so that corners which meet still meet, whatever building or file they
 are in. A plan goes as a plan and a height as a height: what stands upright in one CRS does so in
@@ -29,8 +29,9 @@ from ..read.crs import (
 
 @dataclass(frozen=True)
 class Reprojected(Units):
-    """Units of a file, and the way to its CRS from world metres, which are coordinates of another
-    CRS times their units, `own`.
+    """Units of a file, and the way to its CRS from world metres.
+
+    World metres are coordinates of another CRS times their units, `own`.
 
     `plan_way` takes plans, `height_way` places with their heights, in a unit of `height_m` metres;
     None where heights stay.
@@ -42,7 +43,7 @@ class Reprojected(Units):
     height_m: float = 1.0
 
     def from_metres(self, world: np.ndarray) -> np.ndarray:
-        """The file's coordinates of world metres (..., 2) or (..., 3).
+        """Return the file's coordinates of world metres (..., 2) or (..., 3).
 
         Raises InputError for places that have none there.
         """
@@ -63,7 +64,7 @@ class Reprojected(Units):
         return result
 
     def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
-        """World metres of the file's coordinates (..., 2) or (..., 3)."""
+        """Return world metres of the file's coordinates (..., 2) or (..., 3)."""
         coordinates = np.asarray(coordinates, float)
         x, y = coordinates[..., 0], coordinates[..., 1]
         result = self.own.to_metres(
@@ -80,8 +81,9 @@ class Reprojected(Units):
         return np.concatenate([result, z[..., None]], axis=-1)
 
     def convert_heights(self, coordinates: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Heights (...) in the file's unit of heights `z` (...) in metres, at coordinates
-        `coordinates` (..., 3) of the first CRS.
+        """Convert heights `z` (...) in metres to the file's unit and level.
+
+        They are at `coordinates` (..., 3) of the first CRS.
         """
         if self.height_way is not None:
             z = self.height_m * np.asarray(
@@ -93,8 +95,9 @@ class Reprojected(Units):
 
 
 def choose_file_crs(crs: Any, requested: str) -> Any:
-    """The CRS in which files of a run in `crs` are written: the one `requested` for, with the run's
-    heights where it names none.
+    """Return the CRS in which files of a run in `crs` are written.
+
+    It is the one `requested`, with the run's heights where it names none.
 
     Raises InputError for one that is no projection, or where the run's is not known.
 
@@ -121,8 +124,9 @@ def choose_file_crs(crs: Any, requested: str) -> Any:
 
 
 def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> Units:
-    """The way from world metres of `crs` (units `source_units`) to the coordinates of `out` in a
-    file that counts in `units`.
+    """Return the way from world metres of `crs` to a file in `out`.
+
+    World metres have `source_units`; the file is in `units`.
 
     Raises InputError where pyproj knows none, of heights without a grid that is at hand.
     """
@@ -148,7 +152,7 @@ def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> 
 
 
 def height_way(crs: Any, out: Any) -> Any:
-    """pyproj's way from one CRS with heights to another.
+    """Return pyproj's transformer from one CRS with heights to another.
 
     Raises InputError where heights or a grid are missing.
     """
@@ -173,6 +177,6 @@ def has_heights(crs: Any) -> bool:
 
 
 def same_height_system(crs: Any, out: Any) -> bool:
-    """Whether both count heights from the same level in the same unit."""
+    """Return whether both have the same level and unit of heights."""
     own_names, theirs = vertical_crs(crs), vertical_crs(out)
     return own_names is not None and theirs is not None and own_names.equals(theirs)

@@ -24,8 +24,9 @@ STEEP = np.tan(np.radians(FLAT_SLOPE_DEG))
 
 @dataclass(frozen=True)
 class RoofFigures:
-    """Figures of one solid; heights in world metres, angles in degrees, NaN where there is nothing
-    to measure.
+    """Figures of one solid: heights in world metres, angles in degrees.
+
+    A figure is NaN where there is nothing to measure.
 
     `h_50p` and `h_70p` are the levels that 50 and 70 % of the roof's plan area lie below; `h_ridge`
     the height of the longest level edge from which two faces fall away, `h_eave` that which half of
@@ -61,8 +62,9 @@ class RoofFigures:
 
 
 def find_ground_height(building: Building, figures: RoofFigures | None) -> float:
-    """Height of the building's ground: what reconstruction found, else the base of its solid, else
-    NaN.
+    """Return the height of the building's ground.
+
+    It is that of reconstruction, else the base of its solid, else NaN.
     """
     if math.isfinite(building.z_ground) or figures is None:
         return building.z_ground
@@ -70,7 +72,9 @@ def find_ground_height(building: Building, figures: RoofFigures | None) -> float
 
 
 def roof_figures(solid: Solid) -> RoofFigures:
-    """Figures of `solid` (vertices in world metres, faces oriented outwards).
+    """Return the figures of `solid`.
+
+    Its vertices are in world metres, its faces oriented outwards.
 
     Raises ValueError when no face is a RoofSurface.
 
@@ -122,9 +126,10 @@ def roof_figures(solid: Solid) -> RoofFigures:
 
 
 def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, float]:
-    """Lowest, highest and two heights between them below which a share of the roof's area lies; of
-    triangles by their corners' heights `z` (t, 3) over `z_origin`, in order, and their areas in
-    plan (t,).
+    """Return the lowest and highest height, and two between them.
+
+    A share of the roof's area lies below these two. Triangles are given by their corners' heights
+    `z` (t, 3) over `z_origin`, in order, and their areas in plan (t,).
     """
     from .roof_levels import find_level  # compiled, as above
 
@@ -136,8 +141,9 @@ def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, 
 
 
 def face_fans(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
-    """Vertex indices (t, 3) of the fan triangles of all faces, (origin, edge start, edge end), and
-    their face (t,).
+    """Return vertex indices (t, 3) of the fan triangles, and faces (t,).
+
+    A triangle is (origin, edge start, edge end), of all faces.
     """
     origins: list[int] = []
     starts: list[int] = []
@@ -154,7 +160,10 @@ def face_fans(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Row-wise cross product (n, 3); numpy's own costs more than all the rest here."""
+    """Return the row-wise cross product (n, 3), faster than numpy's.
+
+    numpy's own costs more than all the rest here.
+    """
     product = np.empty_like(a)
     product[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
     product[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
@@ -163,7 +172,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def slopes_and_azimuths(area: np.ndarray, is_roof: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slope and azimuth in degrees (faces,) of vector areas (faces, 3);
+    """Return slope and azimuth in degrees (faces,) of vector areas (faces, 3).
 
     NaN where no roof or, for azimuths, level.
     """
@@ -174,15 +183,19 @@ def slopes_and_azimuths(area: np.ndarray, is_roof: np.ndarray) -> tuple[np.ndarr
 
 
 def find_base_height(solid: Solid) -> float:
-    """Lowest height of the ground surface, or of the whole solid where none is marked."""
+    """Return the lowest height of the ground surface.
+
+    It is that of the whole solid where none is marked.
+    """
     ground = [index for face in solid.select_faces(GROUND) for ring in face.rings for index in ring]
     return float(solid.vertices[ground or slice(None), 2].min())
 
 
 class RoofEdges(NamedTuple):
-    """The roof's directed edges: height of their middle (m,), length in plan, a number that is the
-    same for both directions, whether they are level, and whether the face left of them falls away
-    from them.
+    """The roof's directed edges.
+
+    Each has the height of its middle (m,), its length in plan, a number that is the same for both
+    directions, whether it is level, and whether the face left of it falls away from it.
     """
 
     height: np.ndarray
@@ -193,9 +206,11 @@ class RoofEdges(NamedTuple):
 
 
 def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdges:
-    """Of `edges` (m, 2, 3), start and end, with `ends` (m, 2), their vertex indices, and `area` (m,
-    3), the vector area of each edge's face. A face lies left of its edges and falls along its
-    vector area's plan direction, so it falls away from an edge when that direction points left.
+    """Return the roof's edges from `edges` (m, 2, 3), start and end.
+
+    `ends` (m, 2) are their vertex indices, and `area` (m, 3) the vector area of each edge's face. A
+    face lies left of its edges and falls along its vector area's plan direction, so it falls away
+    from an edge when that direction points left.
     """
     start, end = edges[:, 0], edges[:, 1]
     x, y, rise = (end - start).T
@@ -213,7 +228,7 @@ def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdg
 
 
 def find_ridge_height(edges: RoofEdges) -> float:
-    """Height of the longest level ridge among the roof's edges, NaN if it has none."""
+    """Return the height of the longest level ridge, NaN if there is none."""
     usable = np.flatnonzero(edges.falls_away & edges.is_level)
     key = edges.number[usable]
     order = np.argsort(key, kind="stable")
@@ -226,7 +241,7 @@ def find_ridge_height(edges: RoofEdges) -> float:
 
 
 def find_eave_height(edges: RoofEdges) -> float:
-    """Height that half of the length of the eaves lies below.
+    """Return the height below which half of the length of the eaves lies.
 
     Eaves are level edges of one roof face alone that does not fall away from them; of a roof
     without one, all its outer edges.

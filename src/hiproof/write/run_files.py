@@ -29,7 +29,9 @@ from .writer import BuildingWriter
 def write_all(
     folder: str | os.PathLike, buildings: Iterable[Building], crs: Any = None
 ) -> list[str]:
-    """Write buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg to `folder`.
+    """Write the four default files of a run to `folder`.
+
+    They are buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg.
 
     `buildings` may be a generator; `crs` is anything pyproj understands or None. Returns the ids of
     buildings whose solid turned out to be broken: they are written without it, as internal errors,
@@ -55,15 +57,16 @@ def write_all(
 
 
 def make_writer(format: Format, path: Path, head: FileHead) -> BuildingWriter:
-    """The incremental writer of a file of a run."""
+    """Return the incremental writer of a file of a run."""
     return import_format(format.module).writer(path, head, **format.given)
 
 
 def fragments(
     requested: Building, names: tuple[str, str], head: FileHead
 ) -> tuple[Building, Fragments]:
-    """The texts of one building, `names` being its CityJSON id and its gml:id, and the building
-    they tell of.
+    """Return one building, and its texts.
+
+    `names` are its CityJSON id and its gml:id.
 
     They are those of the files that a run writes, `head` what these have in common, the offset of
     the CityJSON file included. A solid that cannot be measured is left out, as in `write_all`.
@@ -78,8 +81,9 @@ def fragments(
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
-    """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without
-    making any text.
+    """Write `files` of a run from `parts`, each whole or not at all.
+
+    They are as `write_all` would write them, without making any text.
 
     `files` are paths by format, a key of FORMATS. Raises OutputError when one cannot be written.
     """
@@ -94,7 +98,10 @@ def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: Fil
 
 
 def measure_or_drop_solid(building: Building) -> tuple[Building, RoofFigures | None]:
-    """`building` and the figures of its solid; without the solid if that cannot be measured."""
+    """Return `building` and its solid's figures.
+
+    A solid that cannot be measured is dropped.
+    """
     try:
         if building.built is not None and not np.isfinite(building.solid.vertices).all():
             raise ValueError("its solid has coordinates that are not numbers")

@@ -1,5 +1,6 @@
-"""What is drawn of a building beside its own solid: footprint and roof edge, blocks, building
-parts, as far as asked for.
+"""The geometry of a building beside its own solid.
+
+It is footprint and roof edge, blocks, and building parts, as far as requested.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PartShape:
-    """A building part: its `solid` with `figures`, its LoD1.3 `block` if asked for, the roof types
-    of its roof parts, the largest first, and its attributes.
+    """A building part with what is drawn of it.
+
+    It has its `solid` with `figures`, its LoD1.3 `block` if requested, the roof types of its roof
+    parts, the largest first, and its attributes.
     """
 
     solid: Solid
@@ -36,7 +39,9 @@ class PartShape:
 
 @dataclass(frozen=True)
 class Shapes:
-    """A building's further geometry, None or empty where it is not asked for or there is none.
+    """A building's further geometry, None or empty where there is none.
+
+    There is none where it is not requested.
 
     `outline` is the solid's ground, which at the height of the eaves, `z_edge`, is the roof's edge
     of LoD0; `lod12` and `lod13` are blocks; `parts` are two or more, and have blocks of their own
@@ -50,7 +55,7 @@ class Shapes:
     parts: tuple[PartShape, ...] = ()
 
     def edge_vertices(self, solid: Solid) -> np.ndarray:
-        """The vertices (n, 3) of `solid` at the height of the roof's edge."""
+        """Return the vertices (n, 3) of `solid` at the height of the roof's edge."""
         return np.column_stack([solid.vertices[:, :2], np.full(len(solid.vertices), self.z_edge)])
 
 
@@ -60,7 +65,7 @@ NO_SHAPES = Shapes()
 def make_shapes(
     building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX
 ) -> Shapes:
-    """The shapes of `building` that `write` asks for;
+    """Return the shapes of `building` that `write` asks for.
 
     `figures` are those of its solid, None without one.
     """
@@ -88,8 +93,9 @@ def cut_into_parts(solid: Solid) -> tuple[BuildingPart, ...]:
 
 
 def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
-    """LoD1.2: one block over the outline, as high as seven tenths of the roof lie below (as 3DBAG
-    has it).
+    """Return LoD1.2: one block over the outline.
+
+    It is as high as seven tenths of the roof lie below (as 3DBAG has it).
     """
     from ..compose.blocks import block
 
@@ -97,8 +103,9 @@ def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
 
 
 def make_stepped_block(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
-    """LoD1.3 as one solid: a block for each building part, as high as seven tenths of its own roof
-    lie below.
+    """Return LoD1.3 as one solid: a block for each building part.
+
+    Each is as high as seven tenths of its own roof lie below.
     """
     from ..compose.blocks import blocks
 
@@ -109,7 +116,7 @@ def make_stepped_block(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> S
 def part_shapes(
     building: Building, cut: tuple[BuildingPart, ...], requested: set[str], prefix: str
 ) -> tuple[PartShape, ...]:
-    """The building parts with what their roof parts are."""
+    """Return the building parts with what their roof parts are."""
     primitives = [
         part_values(building, number, visible)
         for number, visible in enumerate(building.compute_visible_areas())
@@ -128,7 +135,10 @@ def part_shapes(
 def part_shape(
     part: BuildingPart, primitives: list[dict[str, Any]], requested: set[str], prefix: str
 ) -> PartShape:
-    """A building part of these roof parts with its figures, block and attributes."""
+    """Return a building part with its figures, block and attributes.
+
+    It is made of these roof parts.
+    """
     from ..compose.blocks import block
 
     figures = roof_figures(part.solid)
@@ -144,7 +154,7 @@ def part_shape(
 def part_attributes(
     primitives: list[dict[str, Any]], figures: RoofFigures, prefix: str
 ) -> dict[str, Any]:
-    """Attributes of a building part by name."""
+    """Return the attributes of a building part by name."""
     result = {
         **shape_attributes(figures),
         "roof_type": figures.roofer_type,

@@ -1,4 +1,4 @@
-"""Single values as every format can hold them: rounded numbers, plain types, clean text."""
+"""Single values for every format: rounded numbers, plain types, clean text."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ WIDEST = -123456789.1234
 
 
 def round_value(value: float, digits: int = 6) -> float:
-    """`value` rounded, minus zero being zero; NaN and infinities stay."""
+    """Round `value`; minus zero becomes zero, NaN and infinities stay."""
     return round(float(value), digits) + 0.0
 
 
 def metres(value: float) -> float:
-    """Rounded to a tenth of a millimetre, as coordinates are written."""
+    """Round to a tenth of a millimetre, as coordinates are written."""
     return round_value(value, 4)
 
 
 def plain(value: Any) -> Any:
-    """`value` as str, int, float, bool or None, which every format can hold.
+    """Return `value` as str, int, float, bool or None.
+
+    Every format can hold these.
 
     >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2),
     ...     b"x", [1, "a"])]
@@ -50,7 +52,7 @@ def plain(value: Any) -> Any:
 
 
 def plain_text(value: Any) -> str:
-    """`value` as text that every format can hold.
+    """Return `value` as text that every format can hold.
 
     Halves of surrogate pairs, from files read in a wrong encoding, fit none, and a NUL ends a
     database's text.

@@ -1,5 +1,6 @@
-"""The life of an output file: opened, given one building after another, finished, and only then
-seen.
+"""The life of an output file.
+
+It is opened, given one building after another, finished, and only then seen.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from .roof_figures import RoofFigures
 
 
 class BuildingWriter(AbstractContextManager):
-    """Base of the incremental writers: `with Writer(path, ...) as writer: writer.add(building)`.
+    """Base of the incremental writers.
+
+    Use it as `with Writer(path, ...) as writer: writer.add(building)`.
 
     The file appears when the block ends well; after an exception nothing is left and an older file
     stays. A format fills in `begin`, `add`, `put` and `finish`.
@@ -28,7 +31,7 @@ class BuildingWriter(AbstractContextManager):
         self.path = path
 
     def begin(self, stack: ExitStack) -> None:
-        """Write what comes before the first building;
+        """Write what comes before the first building.
 
         `stack` closes what the format opens beside the file.
         """
@@ -40,13 +43,17 @@ class BuildingWriter(AbstractContextManager):
         figures: RoofFigures | None = None,
         attributes: dict[str, Any] | None = None,
     ) -> None:
-        """Write one building; `figures` of its solid and its `attributes` if the caller has them
-        already.
+        """Write one building.
+
+        `figures` are those of its solid, and `attributes` its own, if the caller has them already.
         """
 
     @abstractmethod
     def put(self, fragment: Fragment) -> None:
-        """Write a building whose text the format's `fragment` made, here or in another process."""
+        """Write a building whose text the format's `fragment` made.
+
+        It was made here or in another process.
+        """
 
     def finish(self) -> None:
         """Write what comes after the last building."""

@@ -17,8 +17,9 @@ QUOTED = ESCAPES | str.maketrans({'"': "&quot;", "\n": "&#10;", "\t": "&#9;"})
 
 
 def xml_text(value: Any) -> str:
-    """`value` as the text of an element; control characters that XML cannot hold become replacement
-    characters.
+    """Return `value` as the text of an element.
+
+    Control characters that XML cannot hold become replacement characters.
 
     >>> xml_text("a < b"), xml_text(2.5)
     ('a &lt; b', '2.5')
@@ -28,13 +29,13 @@ def xml_text(value: Any) -> str:
 
 
 def xml_attribute(value: Any) -> str:
-    """`value` as an attribute's value, to stand between double quotes."""
+    """Return `value` as an attribute's value, between double quotes."""
     text = str(value)
     return text if PLAIN.fullmatch(text) else NOT_IN_XML.sub("\ufffd", text).translate(QUOTED)
 
 
 def generic_attribute(name: str, value: Any) -> str:
-    """A gen:*Attribute of the value's kind; None is left out."""
+    """Return a gen:*Attribute of the value's kind; None is left out."""
     if value is None:
         return ""
     tag = GENERIC_ATTRIBUTES.get(type(value), GENERIC_ATTRIBUTES[str])
@@ -43,7 +44,7 @@ def generic_attribute(name: str, value: Any) -> str:
 
 
 def format_attribute_set(name: str, values: dict[str, Any]) -> str:
-    """A gen:genericAttributeSet of `values` by name."""
+    """Return a gen:genericAttributeSet of `values` by name."""
     inside = "".join(generic_attribute(key, value) for key, value in values.items())
     return (
         f'<gen:genericAttributeSet name="{xml_attribute(name)}">{inside}</gen:genericAttributeSet>'

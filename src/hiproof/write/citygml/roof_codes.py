@@ -1,5 +1,6 @@
-"""The roof type of a building or a part as code lists of CityGML name it: SIG3D's, or that of the
-German surveys (AdV).
+"""Roof types in CityGML's code lists.
+
+Lists are SIG3D's and that of the German surveys (AdV).
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ MIXED = {"sig3d": "1130", "adv": "5000"}
 
 
 def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
-    """The code of roof parts of `types`: their own where all have the same, else that of a mixed
-    roof.
+    """Return the code of roof parts of `types`.
+
+    It is their own where all have the same, else that of a mixed roof.
 
     >>> roof_type_code(["gable", "asymmetric_gable"]), roof_type_code(["gable",
     ...     "hip"]), roof_type_code(["hip"], "adv")
@@ -29,7 +31,7 @@ def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
 
 
 def find_code(name: str, code_list: str) -> str:
-    """The code of one roof type."""
+    """Return the code of one roof type."""
     if name not in CATALOGUE:
         return MIXED[code_list]
     shape = CATALOGUE[name]

@@ -21,8 +21,10 @@ ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 
 
 def surface_ids(faces: tuple[Face, ...], name: str, part: str = "") -> list[str]:
-    """Each face's polygon named by kind and number, that of a building part before it; the
-    building's name comes last, so that no two names meet.
+    """Return an id for each face's polygon, by kind and number.
+
+    That of a building part comes before it; the building's name comes last, so that no two names
+    meet.
     """
     counts = dict.fromkeys(ROLES, 0)
     ids = []
@@ -33,7 +35,7 @@ def surface_ids(faces: tuple[Face, ...], name: str, part: str = "") -> list[str]
 
 
 def lod1_solid(solid: Solid | None, units: Units) -> str:
-    """A block; nothing for None."""
+    """Return the GML of a block; nothing for None."""
     if solid is None:
         return ""
     members = surface_members(list_face_rings(solid.faces, units.from_metres(solid.vertices)))
@@ -44,7 +46,10 @@ def lod1_solid(solid: Solid | None, units: Units) -> str:
 
 
 def lod2_solid(polygon_ids: list[str], id: str) -> str:
-    """The closed shell under its gml:id, made of the boundary surfaces' own polygons."""
+    """Return the closed shell under its gml:id.
+
+    It is made of the boundary surfaces' own polygons.
+    """
     members = "".join(
         f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids
     )
@@ -55,7 +60,7 @@ def lod2_solid(polygon_ids: list[str], id: str) -> str:
 
 
 def lod2_surfaces(rings: list[str]) -> str:
-    """The solid's surfaces by value, for readers that follow no links."""
+    """Return the solid's surfaces by value, for readers that follow no links."""
     return f"<bldg:lod2MultiSurface>{multi_surface(rings)}</bldg:lod2MultiSurface>"
 
 
@@ -73,7 +78,10 @@ def surface_members(rings: list[str]) -> str:
 
 
 def terrain_element(lines: list[np.ndarray], level: int) -> str:
-    """The lines (m, 3) along which the building meets the terrain, at that level of detail."""
+    """Return the lines (m, 3) where the building meets the terrain, as GML.
+
+    They are of that level of detail.
+    """
     members = "".join(
         f"<gml:curveMember><gml:LineString>{position_list(positions(line))}</gml:LineString></gml:curveMember>"
         for line in lines
@@ -85,8 +93,9 @@ def terrain_element(lines: list[np.ndarray], level: int) -> str:
 def boundary_surfaces(
     solid: Solid, figures: RoofFigures, polygon_ids: list[str], rings: list[str]
 ) -> list[str]:
-    """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth
-    in degrees.
+    """Return a RoofSurface, WallSurface or GroundSurface for every face.
+
+    Roofs have their slope and azimuth in degrees.
     """
     surfaces = []
     for index, (face, polygon_id, of_face) in enumerate(
@@ -104,7 +113,7 @@ def boundary_surfaces(
 
 
 def angle_attributes(figures: RoofFigures, index: int) -> str:
-    """Slope and azimuth of roof face `index`, as far as they are known."""
+    """Return slope and azimuth of roof face `index`, as far as they are known."""
     angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
     return "".join(
         generic_attribute(key, round_value(angle, 3))
@@ -114,13 +123,13 @@ def angle_attributes(figures: RoofFigures, index: int) -> str:
 
 
 def list_face_rings(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:
-    """The rings of each of the faces over the vertices `xyz` (n, 3)."""
+    """Return the rings of each of the faces over the vertices `xyz` (n, 3)."""
     place = positions(xyz)
     return [polygon_rings(face, place) for face in faces]
 
 
 def polygon_rings(face: Face, place: list[str]) -> str:
-    """The rings of a face, `place` being the vertices' coordinates as text."""
+    """Return the rings of a face; `place` has the vertices as text."""
     text = ""
     for number, ring in enumerate(face.rings):
         bound = "gml:interior" if number else "gml:exterior"
@@ -134,5 +143,8 @@ def position_list(place: list[str]) -> str:
 
 
 def positions(xyz: np.ndarray) -> list[str]:
-    """Each of the coordinates (n, 3) as text, to a ten-thousandth of their unit."""
+    """Return each of the coordinates (n, 3) as text.
+
+    It goes to a ten-thousandth of their unit.
+    """
     return ["%.4f %.4f %.4f" % (x, y, z) for x, y, z in (np.round(xyz, 4) + 0.0).tolist()]  # noqa: UP031

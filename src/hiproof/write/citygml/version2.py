@@ -142,8 +142,9 @@ writer = CityGMLWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """The cityObjectMember of a building, whose gml:ids end in its name; the root's namespaces are
-    taken as declared.
+    """Return the cityObjectMember of a building.
+
+    Its gml:ids end in its name; the root's namespaces are taken as declared.
     """
     text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
     lines = terrain_lines(sheet)
@@ -157,7 +158,10 @@ def fragment(sheet: Sheet) -> Fragment:
 
 
 def building_element(sheet: Sheet) -> str:
-    """One bldg:Building, its children in the schema's order; all its gml:ids end in its name."""
+    """Return one bldg:Building, its children in the schema's order.
+
+    All its gml:ids end in its name.
+    """
     building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
     if sheet.head.creation_date is not None:
@@ -186,8 +190,9 @@ def building_element(sheet: Sheet) -> str:
 
 
 def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
-    """One bldg:BuildingPart with its solid; its gml:ids have the part's number before the
-    building's name.
+    """Return one bldg:BuildingPart with its solid.
+
+    Its gml:ids have the part's number before the building's name.
     """
     name, ground = f"{number}-{sheet.gml_name}", find_ground_height(sheet.building, sheet.figures)
     sets = part.attributes.get(f"{OWN}primitives", [])
@@ -210,7 +215,7 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
 
 
 def list_visible_types(building: Building) -> list[str]:
-    """Roof types of the parts that are seen from above."""
+    """Return the roof types of the parts that are seen from above."""
     return [
         part.type
         for part, area in zip(building.parts, building.model.visible_m2, strict=True)
@@ -221,8 +226,9 @@ def list_visible_types(building: Building) -> list[str]:
 def format_roof_and_height(
     types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings
 ) -> str:
-    """roofType of roof parts of `types`, where there are any, and measuredHeight, over the
-    ground.
+    """Return roofType of roof parts of `types`, and measuredHeight.
+
+    Height is over the ground; roofType is left out without types.
     """
     code = roof_type_code(types, write.roof_codes) if types else None
     roof = (
@@ -235,7 +241,7 @@ def format_roof_and_height(
 
 
 def level_surfaces(sheet: Sheet) -> str:
-    """LoD0, where asked for: footprint and roof edge."""
+    """Return footprint and roof edge (LoD0), where requested."""
     shapes, solid = sheet.shapes, sheet.building.solid
     if shapes.outline is None:
         return ""
@@ -251,8 +257,9 @@ def level_surfaces(sheet: Sheet) -> str:
 
 
 def undo_shift(sheet: Sheet) -> np.ndarray:
-    """The vertices (n, 3) of the solid in the file's unit as they would be where the footprint lay
-    before it was moved.
+    """Return the solid's vertices (n, 3) as if its footprint had not moved.
+
+    They are in the file's unit.
     """
     return sheet.head.units.gml.from_metres(
         sheet.building.solid.vertices - np.array([*sheet.building.shift, 0.0])
@@ -260,8 +267,9 @@ def undo_shift(sheet: Sheet) -> np.ndarray:
 
 
 def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
-    """The building's own solid of LoD2, `shell`, its surfaces, of these `rings`, and the line along
-    which it meets the terrain, as far as asked for.
+    """Return the building's own LoD2 solid, surfaces and terrain line.
+
+    The solid is `shell`, the surfaces are of these `rings`, all as far as requested.
 
     GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line,
     which is the same at all levels, stands before them as LoD1's; without LoD2 it would be the
@@ -276,8 +284,9 @@ def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
 
 
 def terrain_lines(sheet: Sheet) -> list[np.ndarray]:
-    """The terrain intersection's lines (m, 3) in the file's unit that are lines: two points at
-    least, all known.
+    """Return the usable lines (m, 3) of the terrain intersection.
+
+    They are in the file's unit, with two points at least, all known.
     """
     if not sheet.head.write.terrain_intersection:
         return []
@@ -290,13 +299,14 @@ def terrain_lines(sheet: Sheet) -> list[np.ndarray]:
 
 
 def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
-    """The vertices (n, 3) of a solid in the file's unit."""
+    """Return the vertices (n, 3) of a solid in the file's unit."""
     return sheet.head.units.gml.from_metres(solid.vertices)
 
 
 def choose_solid(sheet: Sheet) -> Solid | None:
-    """The solid that is the building's own: none where its parts have solids, or where none is
-    asked for.
+    """Return the solid that is the building's own, or None.
+
+    There is none where its parts have solids, or where none is requested.
     """
     is_own = "2.2" in sheet.head.write.lods and sheet.figures is not None and not sheet.shapes.parts
     return sheet.building.solid if is_own else None

@@ -1,5 +1,6 @@
-"""CityGML 3.0, made of what stands in CityGML 2.0: other names, another order, an id for every
-geometry.
+"""CityGML 3.0, translated from CityGML 2.0.
+
+It has other names, another order, and an id for every geometry.
 
 What 3.0 tells otherwise: surfaces are boundaries of a space and belong to constructions, heights
 say from where to where they were measured, generic attributes are elements of their own, footprint
@@ -92,13 +93,14 @@ writer = CityGML3Writer
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """A building's part of a run's file."""
+    """Return a building's part of a run's file."""
     return upgrade_member(version2.fragment(sheet))
 
 
 def upgrade_member(member: Fragment) -> Fragment:
-    """The cityObjectMember of CityGML 2.0 as one of 3.0; the root's namespaces are taken as
-    declared in both.
+    """Translate a cityObjectMember of CityGML 2.0 to 3.0.
+
+    The root's namespaces are taken as declared in both.
     """
     declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in version2.NAMESPACES.items())
     (old,) = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
@@ -112,7 +114,10 @@ HUGE = etree.XMLParser(huge_tree=True, resolve_entities=False)
 
 
 def upgrade_building(old: Any) -> Any:
-    """A Building or BuildingPart with all that is in it, in the order of the schemas."""
+    """Translate a Building or BuildingPart with all that is in it.
+
+    The result is in the order of the schemas.
+    """
     new = make_element(f"bldg:{local(old)}", **{ID: old.get(OLD_ID)})
     owner = new.get(ID)
     new.extend(
@@ -130,7 +135,7 @@ def upgrade_building(old: Any) -> Any:
 
 
 def upgrade_property(old: Any, owner: str) -> Any:
-    """What 3.0 makes of a property of a building or surface in 2.0;
+    """Translate a property of a building or surface.
 
     `owner` ends the ids that are new.
     """
@@ -160,7 +165,7 @@ def upgrade_property(old: Any, owner: str) -> Any:
 
 
 def upgrade_generic(old: Any) -> Any:
-    """A generic attribute, or a named set of them."""
+    """Translate a generic attribute, or a named set of them."""
     name = make_element("gen:name", text=old.get("name"))
     if local(old) == SET:
         return make_element(
@@ -174,7 +179,7 @@ def upgrade_generic(old: Any) -> Any:
 
 
 def upgrade_surface(old: Any, owner: str) -> Any:
-    """A RoofSurface, WallSurface or GroundSurface."""
+    """Translate a RoofSurface, WallSurface or GroundSurface."""
     properties = sorted(
         (upgrade_property(child, owner) for child in old),
         key=lambda child: ORDER.index(local(child)),
@@ -183,7 +188,7 @@ def upgrade_surface(old: Any, owner: str) -> Any:
 
 
 def upgrade_height(old: Any) -> Any:
-    """A measuredHeight, which says from where to where it was measured."""
+    """Translate a measuredHeight, adding from where to where it was measured."""
     properties = {
         "highReference": "highestRoofEdge",
         "lowReference": "lowestGroundPoint",
@@ -196,7 +201,10 @@ def upgrade_height(old: Any) -> Any:
 
 
 def upgrade_geometry(old: Any) -> Any:
-    """A geometry of GML 3.1 as one of 3.2, where a solid's boundary is a shell."""
+    """Translate a geometry of GML 3.1 to 3.2.
+
+    A solid's boundary is a shell there.
+    """
     is_shell = local(old) == "CompositeSurface" and local(old.getparent().getparent()) == "Solid"
     new = make_element(
         f"gml:{'Shell' if is_shell else local(old)}", *map(upgrade_geometry, old), text=old.text
@@ -207,7 +215,7 @@ def upgrade_geometry(old: Any) -> Any:
 
 
 def make_element(tag: str, *children: Any, text: str | None = None, **attributes: str) -> Any:
-    """An element `prefix:name`."""
+    """Make an element `prefix:name`."""
     element = etree.Element(qualify_name(tag), attributes, nsmap=NAMESPACES_3)
     element.text = text
     element.extend(children)
@@ -215,7 +223,7 @@ def make_element(tag: str, *children: Any, text: str | None = None, **attributes
 
 
 def qualify_name(tag: str) -> str:
-    """The name in lxml's form of `prefix:name`."""
+    """Return `prefix:name` in lxml's form."""
     prefix, _, name = tag.partition(":")
     return f"{{{NAMESPACES_3[prefix]}}}{name}"
 

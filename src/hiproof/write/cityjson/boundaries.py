@@ -1,5 +1,6 @@
-"""The geometry of one building in CityJSON: footprint and roof edge, blocks, Solids
-with semantics.
+"""The geometry of one building in CityJSON.
+
+It is footprint and roof edge, blocks, and Solids with semantics.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 
 
 class Vertices:
-    """The vertices of one feature as integers: integer * scale + origin, in `units`; equal ones are
-    one.
+    """The vertices of one feature as integers; equal ones are one.
+
+    A coordinate is integer * scale + origin, in `units`.
     """
 
     def __init__(self, origin: np.ndarray, scale: float, units: Units = METRES) -> None:
@@ -31,7 +33,7 @@ class Vertices:
         self.index_of: dict[tuple[int, int, int], int] = {}
 
     def add(self, xyz: np.ndarray) -> list[int]:
-        """Indices of the world coordinates `xyz` (n, 3), metres."""
+        """Add world coordinates `xyz` (n, 3), metres, and return their indices."""
         integers = (
             np.rint((self.units.from_metres(xyz) - self.origin) / self.scale)
             .astype(np.int64)
@@ -54,8 +56,9 @@ def building_geometry(
     prefix: str,
     lods: tuple[str, ...],
 ) -> list[dict[str, Any]]:
-    """What is drawn of the building itself, as far as it has it and `lods` ask: the footprint
-    always, roof edge, blocks, solid.
+    """Return the geometry of the building itself, as far as `lods` ask.
+
+    The footprint comes always, then roof edge, blocks, and solid.
 
     Vertices go to `vertices`. A building in parts has no solid of its own.
     """
@@ -87,7 +90,7 @@ def building_geometry(
 def part_geometry(
     building: Building, part: PartShape, vertices: Vertices, prefix: str, lods: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    """The block and the solid of a building part, as far as `lods` ask for them."""
+    """Return block and solid of a building part, as far as `lods` ask."""
     block = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
     if "2.2" not in lods:
         return block
@@ -96,8 +99,9 @@ def part_geometry(
 
 
 def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
-    """LoD0: the footprint where it lay before it was moved, and the roof's edge, with semantics to
-    tell them apart by.
+    """Return LoD0: the unmoved footprint, and the roof's edge.
+
+    Semantics tell them apart.
     """
     corners, grounds = building.solid.vertices, building.solid.select_faces(GROUND)
     unmoved = corners - np.array([*building.shift, 0.0]) if any(building.shift) else corners
@@ -113,7 +117,7 @@ def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> li
 def ground_boundaries(
     grounds: tuple[Face, ...], corners: np.ndarray, vertices: Vertices
 ) -> list[list[list[int]]]:
-    """Ground faces with their vertices at `corners` (n, 3), turned to look up."""
+    """Return ground faces at `corners` (n, 3), turned to look up."""
     return [[vertices.add(corners[list(ring)])[::-1] for ring in face.rings] for face in grounds]
 
 
@@ -131,8 +135,9 @@ def named_surfaces(surface: dict[str, Any], kind: str) -> dict[str, Any]:
 def solid_geometry(
     solid: Solid, vertices: Vertices, lod: str, roofs: dict[int, dict[str, Any]] | None = None
 ) -> dict[str, Any]:
-    """The Solid: a roof face in `roofs` is a semantic surface of its own, all others of a kind
-    share one.
+    """Return the Solid with its semantics.
+
+    A roof face in `roofs` is a semantic surface of its own; all others of a kind share one.
     """
     number = vertices.add(solid.vertices)
     surfaces: list[dict[str, Any]] = []
@@ -157,8 +162,10 @@ def solid_geometry(
 def roof_surfaces(
     building: Building, solid: Solid, figures: RoofFigures, prefix: str
 ) -> dict[int, dict[str, Any]]:
-    """Semantics of the roof faces of its `solid`, or a part's, by index: slope, azimuth (degrees),
-    the roof part they belong to.
+    """Return the semantics of a solid's roof faces by index.
+
+    `solid` is the building's or a part's. They are slope, azimuth (degrees), and the roof part to
+    which a face belongs.
     """
     result = {}
     for index, face in enumerate(solid.faces):
@@ -178,8 +185,9 @@ def roof_surfaces(
 
 
 def level_footprint(building: Building) -> shapely.Polygon | None:
-    """The footprint of a building without a solid, None without one or without a height to draw it
-    at.
+    """Return the footprint of a building without a solid, or None.
+
+    It is None without one or without a height at which to draw it.
     """
     footprint = building.footprint
     if footprint is None or footprint.is_empty or not math.isfinite(building.z_ground):
@@ -190,8 +198,9 @@ def level_footprint(building: Building) -> shapely.Polygon | None:
 def outline_boundaries(
     outline: shapely.Geometry, z: float, vertices: Vertices
 ) -> list[list[list[int]]]:
-    """Surfaces of the polygons of `outline` at height `z`, outer rings counter-clockwise seen from
-    above.
+    """Return surfaces of the polygons of `outline` at height `z`.
+
+    Outer rings are counter-clockwise seen from above.
     """
     surfaces = []
     for polygon in shapely.get_parts(shapely.normalize(outline)):
@@ -205,7 +214,7 @@ def outline_boundaries(
 
 
 def first_corner(building: Building) -> np.ndarray | None:
-    """A corner (3,) of what `building_geometry` would draw, None if that is nothing."""
+    """Return a corner (3,) of what `building_geometry` would draw, or None."""
     if building.built is not None:
         return building.solid.vertices.min(axis=0)
     footprint = level_footprint(building)

@@ -1,4 +1,4 @@
-"""CityJSON 2.0: a sequence of features, one building a line (CityJSONSeq), or one document.
+"""CityJSON 2.0: one building a line (CityJSONSeq), or one document.
 
 A building is written as soon as it is added and forgotten, so a city needs no more memory than a
 street. The first line must name the offset of all coordinates and their extent, which only the last
@@ -44,8 +44,9 @@ def write_cityjson(
     scale: float = SCALE,
     write: WriteSettings | None = None,
 ) -> None:
-    """Write `buildings` (solids in world metres) to `path`: CityJSONSeq 2.0, or one document if it
-    ends in `.json`.
+    """Write `buildings` (solids in world metres) to `path`.
+
+    It is CityJSONSeq 2.0, or one document if the name ends in `.json`.
 
     `crs` is anything pyproj understands or None; coordinates are written in its unit. `prefix` goes
     before roofer's attribute names; `scale` is the grid that coordinates are rounded to, in the
@@ -115,7 +116,10 @@ class CityJSONWriter(BuildingWriter):
             )
 
     def choose_origin(self, building: Building) -> np.ndarray:
-        """The file's offset (3,), settled by the first building that has coordinates."""
+        """Return the file's offset (3,), set by the first building.
+
+        That is the first that has coordinates.
+        """
         if self.translate is None:
             corner = first_corner(building)
             if corner is None:
@@ -154,7 +158,7 @@ class CityJSONWriter(BuildingWriter):
         self.file.write(b"]}\n")
 
     def header(self, translate: np.ndarray, extent: list[float] | None) -> bytes:
-        """The first line; of a document, everything before the first object."""
+        """Return the first line; of a document, all before the first object."""
         metadata: dict[str, Any] = {}
         if extent is not None:
             metadata["geographicalExtent"] = extent
@@ -171,21 +175,25 @@ writer = CityJSONWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """A building's line in a run's file."""
+    """Return a building's line in a run's file."""
     offset = np.zeros(3) if sheet.head.offset is None else sheet.head.offset
     vertices = Vertices(offset, SCALE, sheet.head.units.cityjson)
     return feature_line(sheet, vertices)
 
 
 def choose_offset(corner_xy: np.ndarray) -> np.ndarray:
-    """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole thousands, so
-    that it seldom moves.
+    """Return the offset (3,) of a file that starts at `corner_xy` (2,).
+
+    It is in whole thousands, so that it seldom moves.
     """
     return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
 def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
-    """CityObjects by id: the building and its parts; their vertices go to `vertices`."""
+    """Return CityObjects by id: the building and its parts.
+
+    Their vertices go to `vertices`.
+    """
     name, prefix, lods = sheet.name, sheet.head.prefix, sheet.head.write.lods
     geometry = building_geometry(
         sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods
@@ -208,7 +216,7 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
 
 
 def part_object(sheet: Sheet, part: PartShape, vertices: Vertices) -> dict[str, Any]:
-    """The CityObject of a part of the building."""
+    """Return the CityObject of a part of the building."""
     geometry = part_geometry(
         sheet.building, part, vertices, sheet.head.prefix, sheet.head.write.lods
     )
@@ -221,7 +229,7 @@ def part_object(sheet: Sheet, part: PartShape, vertices: Vertices) -> dict[str, 
 
 
 def compute_extent(vertices: Vertices) -> tuple[float, ...]:
-    """Low x y z and high x y z of all vertices."""
+    """Return low x y z and high x y z of all vertices."""
     grid = np.array(vertices.grid)
     lower, upper = (
         edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0))
@@ -230,7 +238,10 @@ def compute_extent(vertices: Vertices) -> tuple[float, ...]:
 
 
 def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
-    """The CityJSONFeature of a building; `vertices` are empty, about the file's offset."""
+    """Return the CityJSONFeature of a building.
+
+    `vertices` are empty, about the file's offset.
+    """
     objects = city_objects(sheet, vertices)
     feature = {
         "type": "CityJSONFeature",
@@ -242,7 +253,7 @@ def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
 
 
 def shift_indices(boundaries: Any, count: int) -> Any:
-    """Nested lists of vertex indices, each index raised by `count`."""
+    """Raise each index in nested lists of vertex indices by `count`."""
     return (
         boundaries + count
         if isinstance(boundaries, int)

@@ -1,4 +1,4 @@
-"""The container of binary glTF 2.0: JSON tables, and one binary buffer that they point into."""
+"""The container of binary glTF 2.0: JSON tables, and one binary buffer."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ ALIGNED = 8  # bytes: what tables of properties ask for, and more than arrays of
 
 
 class GlbDocument:
-    """A document as it grows: `tables` are its JSON, views and accessors are added by the methods
-    that fill the buffer.
+    """A glTF document that grows.
+
+    `tables` are its JSON; views and accessors are added by the methods that fill the buffer.
     """
 
     def __init__(self) -> None:
@@ -34,8 +35,9 @@ class GlbDocument:
         return len(views) - 1
 
     def accessor(self, values: np.ndarray, target: int = VERTICES, **table: Any) -> int:
-        """Append `values`, (n,) or (n, k) of float32 or unsigned integers, little-endian; the index
-        of their accessor.
+        """Append `values`, and return the index of their accessor.
+
+        They are (n,) or (n, k) of float32 or unsigned integers, little-endian.
         """
         accessors = self.tables.setdefault("accessors", [])
         view = self.view(np.ascontiguousarray(values).tobytes(), target=target)
@@ -47,14 +49,17 @@ class GlbDocument:
         return len(accessors) - 1
 
     def positions(self, places: np.ndarray) -> int:
-        """Append `places` (n, 3) as float32 with their bounds; the index of their accessor."""
+        """Append `places` (n, 3) as float32 with bounds; return their accessor."""
         places = places.astype("<f4")
         return self.accessor(
             places, min=places.min(axis=0).tolist(), max=places.max(axis=0).tolist()
         )
 
     def to_bytes(self) -> bytes:
-        """The whole file: header, JSON chunk, binary chunk, each padded to four bytes."""
+        """Return the whole file: header, JSON chunk, binary chunk.
+
+        Each is padded to four bytes.
+        """
         buffers = {"buffers": [{"byteLength": self.size}]} if self.size else {}
         text = json.dumps(self.tables | buffers, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
@@ -65,5 +70,5 @@ class GlbDocument:
 
 
 def turn_y_up(vectors: np.ndarray) -> np.ndarray:
-    """East, north, up to glTF's x, y, z: east is x, north is -z."""
+    """Turn east, north, up to glTF's x, y, z: east is x, north is -z."""
     return np.column_stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]])

@@ -1,5 +1,6 @@
-"""Binary glTF 2.0 (`.glb`): one node a building, its id the node's name, its attributes the node's
-`extras`.
+"""Binary glTF 2.0 (`.glb`): one node a building.
+
+Its id is the node's name, and its attributes are the node's `extras`.
 
 Viewers compute in float32, so coordinates are given about an origin that `asset.extras` names.
 glTF's y axis points up: east is x, north is -z.
@@ -47,7 +48,10 @@ class GlbContent:
         self.origin: np.ndarray | None = None
 
     def add(self, model: ViewedModel) -> None:
-        """One building: a primitive for the roofs of each type, its walls and its ground each."""
+        """Add one building.
+
+        It has a primitive for the roofs of each type, its walls and its ground.
+        """
         vertices = model.solid.vertices
         if self.origin is None:
             self.origin = np.floor(vertices.min(axis=0))
@@ -63,7 +67,7 @@ class GlbContent:
         self.meshes.append({"name": model.id, "primitives": primitives})
 
     def to_bytes(self, crs: str | None) -> bytes:
-        """The whole file."""
+        """Return the whole file."""
         origin = (np.zeros(3) if self.origin is None else self.origin).tolist()
         tables = self.document.tables
         tables["asset"]["extras"] = {
@@ -89,8 +93,9 @@ def material_table(look: Look) -> dict[str, Any]:
 
 
 def flat_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (3 t, 3) and face normals (3 t, 3) of the triangles of `faces` over `vertices` (n,
-    3), turned y up.
+    """Return corners and face normals (3 t, 3) of the faces' triangles.
+
+    `vertices` are (n, 3); the result is turned y up.
     """
     corners, normals = [np.empty((0, 3))], [np.empty((0, 3))]
     directions = face_normals(vertices, faces)

@@ -1,5 +1,6 @@
-"""IFC4X3: an IfcBuilding with a faceted body, a property set and the CRS of its site (needs
-ifcopenshell).
+"""IFC4X3: one IfcBuilding a model (needs ifcopenshell).
+
+It has a faceted body, a property set and the CRS of its site.
 
 Coordinates are metres about an origin that IfcMapConversion places in the CRS. Names of properties
 are those of all other formats.
@@ -49,7 +50,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 
 
 class IfcModel:
-    """The file as it grows: a project with a site, whose buildings are added one by one."""
+    """A growing IFC file: a project with a site, and its buildings."""
 
     def __init__(self, ifcopenshell: Any) -> None:
         self.guid = ifcopenshell.guid
@@ -80,7 +81,7 @@ class IfcModel:
         return self.file.create_entity(kind, *ordered, **values)
 
     def make_rooted(self, kind: str, key: str, **values: Any) -> Any:
-        """An entity whose GlobalId follows from its kind and `key`."""
+        """Make an entity whose GlobalId follows from its kind and `key`."""
         name = uuid.uuid5(NAMESPACE, f"{kind} {key}")
         return self.make(kind, GlobalId=self.guid.compress(name.hex), **values)
 
@@ -116,7 +117,7 @@ class IfcModel:
         self.add_properties(building, key, model)
 
     def make_body(self, model: ViewedModel) -> Any:
-        """The closed shell of a solid, its faces coloured by kind and roof type."""
+        """Make the closed shell of a solid, coloured by kind and roof type."""
         points = [self.point(place) for place in model.solid.vertices - self.origin]
         faces = []
         for look, members in model.faces_by_look().items():
@@ -137,7 +138,7 @@ class IfcModel:
         return self.make("IfcFace", Bounds=bounds)
 
     def style(self, look: Look) -> Any:
-        """The surface style of a look, made once."""
+        """Return the surface style of a look, made once."""
         if look not in self.styles:
             red, green, blue = srgb(look.colour)
             colour = self.make("IfcColourRgb", Red=red, Green=green, Blue=blue)
@@ -227,7 +228,7 @@ class IfcModel:
         )
 
     def make_unit(self, units: Units, metre: Any) -> Any:
-        """The unit of a plan that does not count in metres."""
+        """Make the unit of a plan that is not in metres."""
         length = self.make("IfcDimensionalExponents", 1, 0, 0, 0, 0, 0, 0)
         factor = self.make(
             "IfcMeasureWithUnit",
@@ -244,7 +245,10 @@ class IfcModel:
 
 
 def scale_axes(units: Units) -> tuple[str, dict[str, float]]:
-    """The entity that takes metres to a CRS of these units, and its scales."""
+    """Return the entity that leads from metres to a CRS, and its scales.
+
+    The CRS is in these units.
+    """
     plan, height = 1 / units.plan, 1 / units.height
     if plan == height:
         return "IfcMapConversion", {"Scale": plan}
@@ -252,7 +256,10 @@ def scale_axes(units: Units) -> tuple[str, dict[str, float]]:
 
 
 def crs_name(crs: str) -> str:
-    """The name by which IFC knows a CRS: "EPSG:28992" of the plan where it has a code."""
+    """Return IFC's name of a CRS.
+
+    It is "EPSG:28992" of the plan where it has a code.
+    """
     from pyproj import CRS
 
     from ...read.crs import epsg_code, horizontal_crs

@@ -1,5 +1,6 @@
-"""Wavefront OBJ with its material library: one object a building, groups that name the roof type
-and kind of surface.
+"""Wavefront OBJ with its material library: one object a building.
+
+Groups name the roof type and kind of surface.
 
 OBJ has no attributes: the building's id is the object's name, the roof types of its parts are those
 of groups and materials. Coordinates are about an origin that the first lines name, because viewers
@@ -52,7 +53,10 @@ def header(library: str, origin: np.ndarray, crs: str | None) -> str:
 
 
 def building_text(model: ViewedModel, origin: np.ndarray, first: int) -> str:
-    """One building's lines; `first` is the number of its first vertex in the file."""
+    """Return one building's lines.
+
+    `first` is the number of its first vertex in the file.
+    """
     name, solid = "_".join(model.id.split()) or "_", model.solid
     lines = [f"o {name}"]
     lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in solid.vertices - origin]
@@ -67,12 +71,15 @@ def building_text(model: ViewedModel, origin: np.ndarray, first: int) -> str:
 
 
 def polygons(solid: Solid, face: Face) -> Iterable[Iterable[int]]:
-    """The face itself, or its triangles where it has holes, which OBJ has no way to write."""
+    """Return the face itself, or its triangles where it has holes.
+
+    OBJ has no way to write holes.
+    """
     return face.rings if len(face.rings) == 1 else face_triangles(solid.vertices, face)
 
 
 def material_library() -> str:
-    """Every material a model may name."""
+    """Return every material that a model may name."""
     colours = {f"roof_{name}": colour for name, colour in type_colours().items()}
     colours |= {"WallSurface": WALL_COLOUR, "GroundSurface": GROUND_COLOUR}
     entries = [

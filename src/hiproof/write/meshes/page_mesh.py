@@ -1,5 +1,6 @@
-"""A solid as a page draws it: triangles of roofs and walls, the roof's edges, packed for
-JavaScript.
+"""A solid as a page draws it.
+
+It has triangles of roofs and walls, and the roof's edges, packed for JavaScript.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from .triangles import faces_triangles
 
 @dataclass(frozen=True)
 class PageMesh:
-    """Corners (t, 3, 3) of triangles, the part (t,) that each roofs (-1: a wall), ends (e, 2, 3) of
-    the roof's edges.
+    """Triangles of a solid, their parts, and the roof's edges.
+
+    Corners are (t, 3, 3), the part (t,) is the one that each roofs (-1: a wall), and ends of edges
+    are (e, 2, 3).
     """
 
     corners: np.ndarray
@@ -25,7 +28,10 @@ class PageMesh:
 
 
 def solid_mesh(solid: Solid) -> PageMesh:
-    """The mesh of a solid, in its own frame; faces on the ground are left out."""
+    """Return the mesh of a solid, in its own frame.
+
+    Faces on the ground are left out.
+    """
     corners, part, edges = [np.empty((0, 3, 3))], [], [np.empty((0, 2, 3))]
     faces = [face for face in solid.faces if face.kind in (ROOF, WALL)]
     for face, triangles in zip(faces, faces_triangles(solid.vertices, faces), strict=True):
@@ -38,5 +44,5 @@ def solid_mesh(solid: Solid) -> PageMesh:
 
 
 def pack_values(values: np.ndarray, kind: str) -> str:
-    """Base64 of the array's little-endian bytes."""
+    """Return the array's little-endian bytes as Base64."""
     return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")

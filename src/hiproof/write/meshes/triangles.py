@@ -12,8 +12,9 @@ from ...model import Face
 
 
 def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
-    """Vertex indices (t, 3) of triangles that tile `face` (holes left out), oriented like its outer
-    ring.
+    """Return vertex indices (t, 3) of triangles that tile `face`.
+
+    Holes are left out. Triangles are oriented like the outer ring.
 
     `vertices` (n, 3) in any frame. No vertices are added, so that neighbouring faces stay joined.
 
@@ -25,7 +26,7 @@ def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
 
 
 def face_normals(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
-    """Vector areas (n, 3) of the outer rings of n faces."""
+    """Return the vector areas (n, 3) of the outer rings of n faces."""
     return (
         ring_normals([vertices[list(face.rings[0])] for face in faces])
         if faces
@@ -36,7 +37,9 @@ def face_normals(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
 def faces_triangles(
     vertices: np.ndarray, faces: Sequence[Face], normals: np.ndarray | None = None
 ) -> list[np.ndarray]:
-    """The triangles of every face, as `face_triangles` has them, all cut by one call;
+    """Return the triangles of every face, all cut by one call.
+
+    They are as from `face_triangles`.
 
     `normals` are those of `face_normals`, where a caller has them.
     """
@@ -57,8 +60,9 @@ def is_triangle(face: Face) -> bool:
 def cut_faces(
     vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray
 ) -> list[np.ndarray]:
-    """Triangles (t, 3) of faces given by their rings of vertex indices and their normals (n, 3), by
-    constrained Delaunay.
+    """Return triangles (t, 3) of faces, by constrained Delaunay.
+
+    Faces are given by their rings of vertex indices and their normals (n, 3).
     """
     # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they
     # name their vertex.
@@ -86,8 +90,9 @@ def cut_faces(
 
 
 def number_corners(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
-    """Vertex indices (t, 3) of triangles' corners (t, 3, 2), which are among the vertices `plan`
-    (m, 2) with these `indices`.
+    """Return vertex indices (t, 3) of triangles' corners (t, 3, 2).
+
+    Corners are among the vertices `plan` (m, 2) with these `indices`.
     """
     index_at = dict(zip(map(tuple, plan.tolist()), indices, strict=True))
     return np.array([index_at[tuple(xy)] for xy in corners.reshape(-1, 2).tolist()], int).reshape(

@@ -22,7 +22,7 @@ class Look(NamedTuple):
 
 
 class ViewedModel(NamedTuple):
-    """A building with its solid in world metres;
+    """A building with its solid in world metres.
 
     `part_types` are the roof types of its parts by number (`Face.part`), `roof_type` is that of the
     largest.
@@ -35,7 +35,7 @@ class ViewedModel(NamedTuple):
     part_types: Mapping[int, str]
 
     def faces_by_look(self) -> dict[Look, list[Face]]:
-        """Roofs, walls and grounds, those of one look together."""
+        """Group roofs, walls and grounds by their look."""
         result: dict[Look, list[Face]] = {}
         for kind in (ROOF, WALL, GROUND):
             for face in self.solid.select_faces(kind):
@@ -44,8 +44,10 @@ class ViewedModel(NamedTuple):
 
 
 def view_building(building: Building, attributes: dict[str, Any], units: Units) -> ViewedModel:
-    """The model of a building with its `attributes`, and its parameters as JSON among them where
-    its parts have any; the solid in metres of the CRS of files, which count in `units`.
+    """Return the model of a building with its `attributes`.
+
+    Its parameters are among them as JSON where its parts have any. The solid is in metres of the
+    CRS of files, which are in `units`.
     """
     solid, text = building.solid, parameters_text(building)
     there = Units(units.plan, units.height).to_metres(units.from_metres(solid.vertices))
@@ -59,7 +61,10 @@ def view_building(building: Building, attributes: dict[str, Any], units: Units) 
 
 
 def parameters_text(building: Building) -> str:
-    """The parts of a roof as JSON, without outlines; empty where none has parameters."""
+    """Return the parts of a roof as JSON, without outlines.
+
+    It is empty where none has parameters.
+    """
     records = [part_record(part) for part in building.parts]
     if not any(record["parameters"] or record["type"] == "free" for record in records):
         return ""
@@ -69,8 +74,9 @@ def parameters_text(building: Building) -> str:
 
 
 def merge_values(members: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
-    """`members` values by name, then the `attributes`, of which one that has such a name and says
-    something else is called NAME_input.
+    """Return `members` values by name, then the `attributes`.
+
+    An attribute that has such a name and another value is called NAME_input.
 
     >>> merge_values({"id": "a", "type": "gable"}, {"id": "a", "type": "church", "year": 1905})
     {'id': 'a', 'type': 'gable', 'type_input': 'church', 'year': 1905}
@@ -86,7 +92,7 @@ def merge_values(members: dict[str, Any], attributes: dict[str, Any]) -> dict[st
 
 
 def choose_look(face: Face, part_types: Mapping[int, str]) -> Look:
-    """The look of a face: a roof's is that of its part's type.
+    """Return the look of a face: a roof's is that of its part's type.
 
     >>> choose_look(Face(((0, 1, 2),), ROOF, part=1), {0: "gable", 1: "hip"})
     Look(name='roof hip', colour='#05429b')

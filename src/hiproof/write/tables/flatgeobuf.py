@@ -1,4 +1,7 @@
-"""buildings.fgb: the outlines with all attributes as FlatGeobuf, which web maps read by parts."""
+"""buildings.fgb: the outlines with all attributes as FlatGeobuf.
+
+Web maps read it by parts.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,10 @@ from .waiting import column_names
 
 
 class FlatGeobufWriter(AttributesWriter):
-    """Incremental writer of the same rows as the GeoPackage's buildings, but those without an
-    outline, which a spatial index cannot hold. All rows are in memory at the end.
+    """Incremental writer of the rows of the GeoPackage's buildings.
+
+    Those without an outline are left out, since a spatial index cannot hold them. All rows are in
+    memory at the end.
     """
 
     layers = (BUILDINGS,)
@@ -53,7 +58,7 @@ writer = FlatGeobufWriter
 
 
 def column(values: list[Any], kind: type) -> tuple[np.ndarray, np.ndarray]:
-    """Values (n,) of one type, and where they are unknown (n,)."""
+    """Return values (n,) of one type, and where they are unknown (n,)."""
     mask = np.array([value is None for value in values], dtype=bool)
     if kind is str:
         return objects([None if v is None else str(v) for v in values]), mask
@@ -62,7 +67,7 @@ def column(values: list[Any], kind: type) -> tuple[np.ndarray, np.ndarray]:
 
 
 def objects(values: list[Any]) -> np.ndarray:
-    """An array (n,) of the values themselves, whatever their types and lengths."""
+    """Return an array (n,) of the values themselves, whatever their types."""
     array = np.empty(len(values), dtype=object)
     array[:] = values
     return array

@@ -1,5 +1,6 @@
-"""buildings.gpkg: outlines with every attribute, parts and roof surfaces as tables, for QGIS and
-its like.
+"""buildings.gpkg: outlines with attributes, parts and roof surfaces.
+
+They are tables for QGIS and its like.
 
 A table's columns need one type each, known before the first row, while the input's attributes may
 differ from building to building: rows wait in a temporary file until the last building has settled
@@ -41,8 +42,9 @@ MOST_COLUMNS = 1998
 def write_attributes(
     path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, prefix: str = PREFIX
 ) -> None:
-    """Write the GeoPackage `path`: layers of the outlines of `buildings` (world coordinates), their
-    parts and roof surfaces.
+    """Write the GeoPackage `path`.
+
+    It has layers of the outlines of `buildings` (world coordinates), their parts and roof surfaces.
 
     A building whose outline is unknown gets a row without geometry. Values of one column are
     brought to one type: whole numbers and decimals to decimals, anything beside text to text.
@@ -55,7 +57,10 @@ def write_attributes(
 
 
 def attributes_with_a_column() -> int:
-    """How many attributes of the input a table of buildings has room for beside hiproof's own."""
+    """Return how many input attributes a table of buildings has room for.
+
+    They stand beside hiproof's own.
+    """
     return MOST_COLUMNS - len(ROOFER) - len(HIPROOF) - len(OSM) - 1
 
 
@@ -134,7 +139,7 @@ writer = AttributesWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """A building's rows in the tables of a run, as text."""
+    """Return a building's rows in the tables of a run, as text."""
     return Fragment(
         table_rows(
             sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table

@@ -89,14 +89,17 @@ DELETE_BOX = 'DELETE FROM "rtree_{table}_geom" WHERE id = OLD.fid'
 
 
 class GeometryType(NamedTuple):
-    """The geometry of a table's features: `MULTIPOLYGON` or `POLYGON`, with heights or without."""
+    """The geometry of a table's features, with heights or without.
+
+    It is `MULTIPOLYGON` or `POLYGON`.
+    """
 
     name: str
     has_z: bool = False
 
 
 class GeoPackage:
-    """A new GeoPackage at `path`, whose features are in the plan CRS `wkt` (None: unknown).
+    """A new GeoPackage at `path`, in the plan CRS `wkt` (None: unknown).
 
     Call `close` at the end. Methods raise sqlite3.Error where the file cannot be written.
     """
@@ -109,7 +112,10 @@ class GeoPackage:
         self.srs_id = self.add_reference_systems(wkt)
 
     def add_reference_systems(self, wkt: str | None) -> int:
-        """Add the three CRSs that every file has, and that of the features; its id is returned."""
+        """Add the CRSs that every file has, and that of the features.
+
+        Returns the id of the latter.
+        """
         undefined = "undefined {} coordinate reference system"
         rows = [
             ("Undefined Cartesian SRS", -1, "NONE", -1, "undefined", undefined.format("Cartesian")),
@@ -155,7 +161,7 @@ class GeoPackage:
     def insert_features(
         self, table: str, first: int, wkb: Sequence[bytes | None], rows: Iterable[tuple]
     ) -> None:
-        """Insert features with the numbers `first`, `first` + 1, ..., their geometries as WKB."""
+        """Insert features with numbers from `first` on, geometries as WKB."""
         geometries = shapely.from_wkb(np.array(wkb, dtype=object))
         if self.types[table] == "MULTIPOLYGON":
             geometries = promote_to_multi(geometries)
@@ -199,13 +205,16 @@ class GeoPackage:
 
 
 def format_triggers(table: str) -> str:
-    """The triggers of a table's index."""
+    """Return the triggers of a table's index."""
     insert, delete = (text.format(table=table) for text in (INSERT_BOX, DELETE_BOX))
     return INDEX_TRIGGERS.format(table=table, insert=insert, delete=delete)
 
 
 def describe_reference_system(crs: Any) -> tuple[str, int, str, int, str, str]:
-    """The row of a plan CRS in `gpkg_spatial_ref_sys`, whose second value is its id."""
+    """Return the row of a plan CRS in `gpkg_spatial_ref_sys`.
+
+    Its second value is its id.
+    """
     crs = parse_crs(crs)
     code = epsg_code(crs)
     organization, number = ("NONE", CUSTOM_SRS) if code is None else ("EPSG", code)
@@ -213,8 +222,9 @@ def describe_reference_system(crs: Any) -> tuple[str, int, str, int, str, str]:
 
 
 def format_wkt(crs: CRS) -> str:
-    """The definition in the first version of WKT, which the standard asks for; in the second where
-    the first cannot say it.
+    """Return the definition in the first version of WKT, as the standard asks.
+
+    It is in the second where the first cannot express it.
     """
     try:
         return crs.to_wkt("WKT1_GDAL")
@@ -234,7 +244,10 @@ def promote_to_multi(geometries: np.ndarray) -> np.ndarray:
 
 
 def encode_blobs(geometries: np.ndarray, bounds: np.ndarray, srs_id: int) -> list[bytes | None]:
-    """Geometries (n,) with their bounds (n, 4) as GeoPackage keeps them: a header, then ISO WKB."""
+    """Encode geometries (n,) with their bounds (n, 4) for a GeoPackage.
+
+    They become a header, then ISO WKB.
+    """
     envelopes = bounds[:, [0, 2, 1, 3]].tolist()
     return [
         wkb and BLOB_HEADER.pack(b"GP", 0, BLOB_FLAGS, srs_id, *envelope) + wkb
@@ -245,7 +258,7 @@ def encode_blobs(geometries: np.ndarray, bounds: np.ndarray, srs_id: int) -> lis
 
 
 def quote(name: str) -> str:
-    """A name of a table or a column in SQL.
+    """Quote the name of a table or a column for SQL.
 
     >>> quote('so "called"')
     '"so ""called\"""'

@@ -1,5 +1,6 @@
-"""buildings.parquet, parts.parquet, roof_surfaces.parquet: the tables as GeoParquet 1.0, for data
-frames and columnar databases (needs pyarrow).
+"""buildings, parts and roof_surfaces as GeoParquet 1.0 (needs pyarrow).
+
+They are for data frames and columnar databases.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ GEOMETRY_TYPES = {BUILDINGS: PLAN_TYPES, "parts": PLAN_TYPES, "roof_surfaces": [
 
 
 class GeoParquetWriter(AttributesWriter):
-    """Incremental writer of the same rows as the GeoPackage's `layer`; raises InputError where
-    pyarrow is missing.
+    """Incremental writer of the rows of the GeoPackage's `layer`.
+
+    Raises InputError where pyarrow is missing.
     """
 
     reserved = (*AttributesWriter.reserved, GEOMETRY)
@@ -44,8 +46,9 @@ class GeoParquetWriter(AttributesWriter):
                 )
 
     def schema(self, kinds: dict[str, type]) -> Any:
-        """Arrow's schema of the columns `kinds` and the geometry, with GeoParquet's description of
-        the latter.
+        """Return Arrow's schema of the columns `kinds` and the geometry.
+
+        It has GeoParquet's description of the latter.
         """
         import pyarrow
         from pyproj import CRS
@@ -73,7 +76,7 @@ writer = GeoParquetWriter
 
 
 def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:
-    """Arrow arrays of `rows`, the outlines last."""
+    """Return Arrow arrays of `rows`, the outlines last."""
     import pyarrow
 
     columns = [

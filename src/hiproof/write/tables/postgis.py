@@ -1,5 +1,7 @@
-"""Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof
-surface, the area where a part shows; columns as in the GeoPackage.
+"""Models in PostGIS, with the columns of the GeoPackage.
+
+A building is a polyhedral surface with all attributes, a roof surface a polygon, and a part the
+area where it shows.
 
 The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners
 of a face that are stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a
@@ -58,8 +60,10 @@ WKB_POLYHEDRAL_Z, WKB_POLYGON_Z, WKB_POLYGON, WKB_MULTIPOLYGON, WKB_HAS_SRID = (
 
 
 class PostgisTable(NamedTuple):
-    """A table: the layer of the GeoPackage whose columns it has, the end of its name, the kind of
-    its geometry and the columns that name a row of a run.
+    """A table of PostGIS.
+
+    It has the layer of the GeoPackage whose columns it has, the end of its name, the kind of its
+    geometry and the columns that name a row of a run.
     """
 
     layer: str
@@ -77,8 +81,10 @@ POSTGIS_TABLES = (
 
 @dataclass(frozen=True)
 class Load:
-    """Which run is loaded, and into which tables: its `name`, the `folder` that it came from, the
-    `prefix` of the tables, the `srid` of its coordinates.
+    """The run that is loaded, and its tables.
+
+    It has its `name`, the `folder` from which it came, the `prefix` of the tables, and the `srid`
+    of its coordinates.
 
     Other runs in the tables are removed with `replace` and stay with `append`; without either they
     are a reason to refuse.
@@ -99,8 +105,10 @@ def load_tables(
     run: Load,
     damaged: Damaged = refuse,
 ) -> int:
-    """Load `buildings` of a `run` into the tables PREFIX_buildings, PREFIX_parts and PREFIX_roofs
-    of the database at `dsn`, coordinates in `units`; returns how many.
+    """Load `buildings` of a `run` into its tables, and return how many.
+
+    They are PREFIX_buildings, PREFIX_parts and PREFIX_roofs of the database at `dsn`, coordinates
+    in `units`.
 
     A building whose id comes again is told to `damaged` and left out. Raises InputError for a
     prefix that makes no names of tables, OutputError for a database that cannot be written or holds
@@ -126,7 +134,7 @@ def load_tables(
 
 
 def explain_not_written(error: Exception) -> OutputError:
-    """What a database says, with advice where it could not be reached."""
+    """Return a database's error, with advice where it could not be reached."""
     reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
     is_reached = isinstance(error, UnicodeError) or getattr(error, "sqlstate", None)
     advice = "" if is_reached else "; check the address"
@@ -134,8 +142,10 @@ def explain_not_written(error: Exception) -> OutputError:
 
 
 def add_extension(connection: Any, cursor: Any) -> None:
-    """Add PostGIS to the database where it is missing, one load at a time: PostgreSQL does not wait
-    by itself."""
+    """Add PostGIS to the database where it is missing.
+
+    One load does so at a time: PostgreSQL does not wait by itself.
+    """
     cursor.execute("select pg_advisory_xact_lock(%s, 0)", (LOCKS,))
     cursor.execute("create extension if not exists postgis")
     connection.commit()
@@ -174,8 +184,9 @@ class Loading:
         return count
 
     def refuse_other_runs(self) -> None:
-        """Raise OutputError where the tables hold a run that would be lost, or one of this name
-        from another folder.
+        """Raise OutputError where the tables hold a run that would be lost.
+
+        A run of this name from another folder counts too.
         """
         if self.run.replace or not self.table_exists("buildings"):
             return
@@ -196,8 +207,9 @@ class Loading:
         )
 
     def list_runs(self) -> list[tuple[str, str]]:
-        """(name, folder) of every run in the tables; of those that no load noted, one without a
-        name.
+        """Return (name, folder) of every run in the tables.
+
+        Those that no load noted have one without a name.
         """
         if not self.table_exists("runs"):
             return [("without a name", "another program")]
@@ -236,8 +248,9 @@ class Loading:
             self.cursor.execute(f"create index {name}_type on {name} (type)")
 
     def widen_table(self, table: PostgisTable, columns: dict[str, type]) -> dict[str, type]:
-        """Remove this run's rows, add the columns that a table lacks, and give one type to those of
-        two; returns the columns as the table has them.
+        """Remove this run's rows, and add the columns that a table lacks.
+
+        Columns of two types get one. Returns the columns as the table has them.
         """
         name = self.name(table.ending)
         self.cursor.execute(f"delete from {name} where run = %s", (self.run.name,))
@@ -259,7 +272,7 @@ class Loading:
         return columns
 
     def read_columns(self, name: str) -> tuple[dict[str, type], int]:
-        """The columns of a table with their types, and how many it has ever had."""
+        """Return a table's columns with types, and how many it has ever had."""
         self.cursor.execute(
             "select attname, format_type(atttypid, null), attisdropped from pg_attribute "
             "where attrelid = %s::regclass and attnum > 0",
@@ -269,8 +282,9 @@ class Loading:
         return {c: KIND_OF_TYPE.get(t, str) for c, t, dropped in rows if not dropped}, len(rows)
 
     def settle_srid(self, table: PostgisTable, name: str) -> None:
-        """Give the run's reference system to an empty table. Raises OutputError for one that holds
-        runs in another.
+        """Give the run's reference system to an empty table.
+
+        Raises OutputError for one that holds runs in another.
         """
         self.cursor.execute("select Find_SRID(current_schema()::text, %s, 'geom')", (name,))
         (srid,) = self.cursor.fetchone()
@@ -300,8 +314,9 @@ class Loading:
         kinds: dict[str, type],
         columns: dict[str, type],
     ) -> None:
-        """Send the rows; `kinds` are their values by name, `columns` those of the table in the same
-        order.
+        """Send the rows to a table.
+
+        `kinds` are their values by name, `columns` those of the table in the same order.
         """
         names = ", ".join(map(quote, ("run", *columns, "geom")))
         with self.cursor.copy(f"copy {self.name(table.ending)} ({names}) from stdin") as copy:
@@ -345,7 +360,10 @@ def collect_rows(
 
 
 def database_rows(described: Described, units: FileUnits) -> Rows:
-    """The rows of a building as the GeoPackage has them, with its solid in place of its outline."""
+    """Return a building's rows as in the GeoPackage, with its solid.
+
+    It takes the place of the outline.
+    """
     building, figures, attributes = described
     rows = table_rows(building, figures, attributes, units.table)
     solid = None if building.built is None else polyhedral_wkb(building.solid, units.table)
@@ -353,7 +371,10 @@ def database_rows(described: Described, units: FileUnits) -> Rows:
 
 
 def polyhedral_wkb(solid: Solid, units: Units) -> bytes:
-    """The shell as triangles over the solid's own vertices, so that neighbours stay joined."""
+    """Return the shell as triangles over the solid's own vertices.
+
+    So neighbours stay joined.
+    """
     places = np.round(units.from_metres(solid.vertices), 4)
     triangles = np.concatenate(faces_triangles(solid.vertices, solid.faces))
     rows = np.zeros(len(triangles), TRIANGLE_WKB)
@@ -374,7 +395,10 @@ TRIANGLE_WKB = np.dtype(
 
 
 def encode_place(wkb: bytes, srid: int) -> str:
-    """Little-endian WKB as hexadecimal EWKB of a reference system, a polygon in plan as several."""
+    """Return little-endian WKB as hexadecimal EWKB of a reference system.
+
+    A polygon in plan becomes several.
+    """
     order, kind = struct.unpack_from("<BI", wkb)
     if kind == WKB_POLYGON:
         kind, wkb = WKB_MULTIPOLYGON, struct.pack("<BII", 1, WKB_MULTIPOLYGON, 1) + wkb
@@ -382,12 +406,12 @@ def encode_place(wkb: bytes, srid: int) -> str:
 
 
 def quote(name: str) -> str:
-    """A column's name in SQL."""
+    """Quote a column's name for SQL."""
     return '"' + name.replace('"', '""') + '"'
 
 
 def cut_name(name: str) -> str:
-    """A column's name as long as PostgreSQL allows, with room for a number.
+    """Cut a column's name to PostgreSQL's limit, with room for a number.
 
     >>> len(cut_name("é" * 60).encode())
     58

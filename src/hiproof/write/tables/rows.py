@@ -1,5 +1,6 @@
-"""The rows of one building in the tables of a run: its outline, its parts where they show, its roof
-surfaces.
+"""The rows of one building in the tables of a run.
+
+They are its outline, its parts where they show, and its roof surfaces.
 """
 
 from __future__ import annotations
@@ -32,13 +33,16 @@ class Rows(NamedTuple):
     roof_surfaces: tuple[Row, ...] = ()
 
     def to_text(self) -> bytes:
-        """The rows as JSON, a line a table, geometries in hexadecimal digits."""
+        """Return the rows as JSON, a line a table.
+
+        Geometries are in hexadecimal digits.
+        """
         tables = ([[wkb and wkb.hex(), values] for wkb, values in table] for table in self)
         return b"\n".join(ENCODER.encode(table).encode() for table in tables)
 
 
 def split_lines(text: bytes) -> dict[str, bytes]:
-    """The line of each table in what `Rows.to_text` wrote.
+    """Split the text of `Rows.to_text` into each table's line.
 
     Raises OutputError for what another version did.
 
@@ -60,7 +64,7 @@ def table_rows(
     attributes: dict[str, Any],
     units: Units = METRES,
 ) -> Rows:
-    """The rows of `building`, their geometry in `units`;
+    """Return the rows of `building`, their geometry in `units`.
 
     `attributes` are its own and `figures` those of its solid.
     """
@@ -71,8 +75,9 @@ def table_rows(
 
 
 def building_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
-    """The outline of `building` in `units` (None where it is unknown) and its attributes by
-    column.
+    """Return the outline of `building` and its attributes by column.
+
+    The outline is in `units`, None where it is unknown.
     """
     names = {
         f"{name}_input" if name.lower() == "id" else name: value
@@ -82,8 +87,9 @@ def building_row(building: Building, attributes: dict[str, Any], units: Units = 
 
 
 def find_outline(building: Building) -> shapely.Geometry | None:
-    """The building's outline in world coordinates: the modelled one, else the one asked for, else
-    None.
+    """Return the building's outline in world coordinates.
+
+    It is the modelled one, else the one requested, else None.
     """
     if building.built is None:
         return building.footprint
@@ -92,8 +98,9 @@ def find_outline(building: Building) -> shapely.Geometry | None:
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """A row a part: where it shows, its type, every parameter that it has and its standard
-    deviation.
+    """Return a row a part.
+
+    It has where the part shows, its type, every parameter and its standard deviation.
     """
     rows = []
     for number, visible in enumerate(building.compute_visible_areas()):
@@ -103,8 +110,10 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
 
 
 def part_values(building: Building, number: int, visible: shapely.Geometry) -> dict[str, Any]:
-    """What is known of a roof part by column: its type, the area where it is `visible`, place,
-    parameters and their standard deviations.
+    """Return a roof part's values by column.
+
+    They are its type, the area where it is `visible`, place, parameters and their standard
+    deviations.
     """
     part, (x, y, z) = (
         building.parts[number],
@@ -129,8 +138,9 @@ def part_values(building: Building, number: int, visible: shapely.Geometry) -> d
 
 
 def join_cants(part: Part) -> dict[str, str]:
-    """The column of a part's cants, where it has any: thirty columns that hardly a part fills would
-    hide the others.
+    """Return the column of a part's cants, where it has any.
+
+    Thirty columns that hardly a part fills would hide the others.
     """
     cants = list_cants(part.parameters)
     rows = [
@@ -141,7 +151,7 @@ def join_cants(part: Part) -> dict[str, str]:
 
 
 def list_sigmas(part: Part) -> dict[str, float]:
-    """Standard deviations by column, those of the angles in degrees."""
+    """Return standard deviations by column, those of angles in degrees."""
     columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
         name: f"{name}_sigma" for name in SHAPE
     }
@@ -155,7 +165,10 @@ def list_sigmas(part: Part) -> dict[str, float]:
 def surface_rows(
     building: Building, figures: RoofFigures | None, units: Units = METRES
 ) -> tuple[Row, ...]:
-    """A row a roof surface of the solid: its polygon, slope, azimuth, area and part."""
+    """Return a row a roof surface of the solid.
+
+    It has its polygon, slope, azimuth, area and part.
+    """
     if figures is None:
         return ()
     vertices = np.round(units.from_metres(building.solid.vertices), 4)
@@ -179,7 +192,7 @@ def surface_rows(
 
 
 def make_polygons(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
-    """The polygons (k,) of faces over `vertices` (n, 3), all made at once."""
+    """Return the polygons (k,) of faces over `vertices` (n, 3), made at once."""
     rings = [ring for face in faces for ring in face.rings]
     corners = vertices[[vertex for ring in rings for vertex in ring]]
     lines = shapely.linearrings(
@@ -195,7 +208,10 @@ def make_polygons(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
 
 
 def encode_geometry(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
-    """A plan geometry (world metres) in `units` as WKB, None of one that holds nothing."""
+    """Return a plan geometry (world metres) in `units` as WKB.
+
+    It is None for one that holds nothing.
+    """
     if geometry is None or geometry.is_empty:
         return None
     return shapely.to_wkb(

@@ -1,5 +1,6 @@
-"""How QGIS draws the layers of a GeoPackage: styles in the table `layer_styles`, whose defaults
-QGIS applies by itself.
+"""QGIS styles of the layers of a GeoPackage.
+
+They stand in the table `layer_styles`, whose defaults QGIS applies by itself.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ LINE_RGBA = "50,50,50,255"
 
 
 class Style(NamedTuple):
-    """A colour (#rrggbb) for each value of an expression over a layer's columns. The last colour is
-    that of all other values.
+    """A colour (#rrggbb) for each value of an expression over columns.
+
+    The last colour is that of all other values.
 
     `alpha` lets surfaces below show.
     """
@@ -63,8 +65,9 @@ STYLES = (
 
 
 def style_rows() -> list[dict[str, Any]]:
-    """The rows of `layer_styles`: by roof type, the default of every layer, and by the quality of
-    the models.
+    """Return the rows of `layer_styles`.
+
+    They are by roof type, the default of every layer, and by the quality of the models.
     """
     return [
         {
@@ -86,7 +89,7 @@ def style_rows() -> list[dict[str, Any]]:
 
 
 def style_qml(style: Style) -> str:
-    """A style in QGIS' own form.
+    """Return a style in QGIS' own form.
 
     >>> style_qml(STYLES[1]).count("<category ") == len(ROOF_COLOURS)
     True
@@ -111,7 +114,10 @@ def style_qml(style: Style) -> str:
 
 
 def fill_symbol(number: int, colour: str, alpha: float) -> str:
-    """A plain fill with thin lines around it; `colour` is #rrggbb."""
+    """Return a plain fill with thin lines around it.
+
+    `colour` is #rrggbb.
+    """
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     options = {
         "color": f"{red},{green},{blue},{round(255 * alpha)}",

@@ -1,4 +1,7 @@
-"""Rows of a table that wait until the last building has settled the type of every column."""
+"""Rows of a table that wait until every column's type is known.
+
+The last building settles it.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,9 @@ ROWS_AT_ONCE = 1000  # rows handed on at once: the overhead is a call's, the mem
 
 
 class WaitingRows:
-    """Rows of one table in a temporary file, as the text that their buildings brought, and the
-    types found in each column.
+    """Rows of one table in a temporary file, and each column's types.
+
+    They are the text that their buildings brought.
     """
 
     def __init__(self, layer: str, file: BinaryIO) -> None:
@@ -24,15 +28,16 @@ class WaitingRows:
         self.found: dict[str, set[type]] = {a.name: set() for a in DECLARED.get(layer, ())}
 
     def put(self, line: bytes) -> None:
-        """A building's rows, as a line of `Rows.to_text`."""
+        """Store a building's rows, as a line of `Rows.to_text`."""
         for _, values in json.loads(line):
             for name, value in values.items():
                 self.found.setdefault(name, set()).add(classify_value(value))
         self.file.write(line + b"\n")
 
     def kinds(self, prefix: str, limit: int | None = None) -> dict[str, type]:
-        """The one type of every column; of more than `limit`, the last of the input's own are left
-        out.
+        """Return the one type of every column.
+
+        Of more than `limit`, the last of the input's own are left out.
         """
         declared = {
             start + a.name: a.kind
@@ -54,7 +59,10 @@ class WaitingRows:
         return kinds or {"id": str}
 
     def batches(self) -> Iterator[list[Row]]:
-        """The rows, some thousands at a time; one empty batch if there are none."""
+        """Yield the rows, some thousands at a time.
+
+        There is one empty batch if there are none.
+        """
         self.file.seek(0)
         rows = (
             (wkb and bytes.fromhex(wkb), values)
@@ -67,13 +75,17 @@ class WaitingRows:
 
 
 def classify_value(value: Any) -> type:
-    """bool, int, float, str or NoneType; whole numbers beyond 64 bits count as text."""
+    """Return bool, int, float, str or NoneType.
+
+    Whole numbers beyond 64 bits count as text.
+    """
     return str if type(value) is int and abs(value) >= 2**63 else type(value)
 
 
 def column_kind(result: set[type], declared: str) -> type:
-    """The one type that holds all values found; a figure that is always unknown stays what it is
-    `declared`.
+    """Return the one type that holds all values.
+
+    A figure that is always unknown stays what it is `declared`.
     """
     kinds = result - {type(None)}
     if not kinds:
@@ -84,8 +96,9 @@ def column_kind(result: set[type], declared: str) -> type:
 
 
 def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str]:
-    """Names that SQLite, which does not tell upper from lower case, can hold beside the `reserved`
-    ones.
+    """Return names that SQLite can hold beside the `reserved` ones.
+
+    SQLite does not tell upper from lower case.
 
     >>> column_names(["id", "Year", "year", "fid"], ["fid"])
     ['id', 'Year', 'year_2', 'fid_2']

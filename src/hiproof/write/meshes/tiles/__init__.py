@@ -1,5 +1,6 @@
-"""3D Tiles 1.1: a quadtree of binary glTF tiles on the globe, each one draw call, with the
-buildings' attributes.
+"""3D Tiles 1.1: a quadtree of binary glTF tiles on the globe.
+
+Each tile is one draw call, with the buildings' attributes.
 
 `globe` says where coordinates lie on the Earth, `quadtree` which building is drawn in which tile,
 `meshes` how one looks, `properties` what is told of it, `content` makes a tile's file of these,

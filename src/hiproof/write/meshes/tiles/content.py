@@ -1,5 +1,6 @@
-"""A tile's file: binary glTF with one mesh of one primitive, whose feature ids are rows of the
-table of its buildings.
+"""A tile's file: binary glTF with one mesh of one primitive.
+
+Its feature ids are rows of the table of its buildings.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ PAINTED = {
 def tile_glb(
     meshes: Sequence[TileMesh], rows: Sequence[dict[str, Any]], properties: Sequence[Property]
 ) -> bytes:
-    """The file of the buildings `meshes`, of which `rows` tells by attribute's name.
+    """Return the file of the buildings `meshes`.
+
+    `rows` have their attributes by name.
 
     Coordinates are about the tile's middle, which the node's translation gives in float64, so that
     float32 is enough.
@@ -48,7 +51,10 @@ def tile_glb(
 def primitive(
     document: GlbDocument, meshes: Sequence[TileMesh], corners: np.ndarray
 ) -> dict[str, Any]:
-    """All triangles as one primitive; corners of a face that are one vertex are written once."""
+    """Return all triangles as one primitive.
+
+    Corners of a face that are one vertex are written once.
+    """
     ids = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
     corner_table = np.zeros(
         len(corners),

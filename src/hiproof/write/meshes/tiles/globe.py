@@ -1,4 +1,6 @@
-"""Places on the globe: world metres of a CRS as Earth-centred coordinates (EPSG:4978), and back.
+"""Places on the globe: world metres to Earth-centred ones, and back.
+
+Earth-centred coordinates are EPSG:4978.
 
 The plan goes through pyproj's best transformation at hand. Heights of 3D Tiles are above the
 ellipsoid, those of clouds mostly above the geoid, some tens of metres away: between them stands a
@@ -51,8 +53,9 @@ class Globe:
 
     @classmethod
     def of(cls, crs: Any, geoid_height_m: float | None = None) -> Globe:
-        """The globe as seen from `crs` (anything pyproj understands); a `geoid_height_m` given is
-        added to all heights.
+        """Return the globe as seen from `crs` (anything pyproj understands).
+
+        A `geoid_height_m` given is added to all heights.
 
         Raises InputError where there is no CRS, or none of a place on the Earth.
 
@@ -94,8 +97,9 @@ class Globe:
         )
 
     def geographic(self, world: np.ndarray) -> np.ndarray:
-        """Longitude, latitude (degrees) and height above the ellipsoid (n, 3) of world metres (n,
-        3).
+        """Return longitude, latitude (degrees) and height of world metres (n, 3).
+
+        They are (n, 3); height is above the ellipsoid.
         """
         x, y, z = self.units.from_metres(world).T
         if self.is_3d:
@@ -105,7 +109,7 @@ class Globe:
         )
 
     def to_earth(self, world: np.ndarray) -> np.ndarray:
-        """Earth-centred coordinates (n, 3) of world metres (n, 3).
+        """Return Earth-centred coordinates (n, 3) of world metres (n, 3).
 
         Raises InputError for places that have none.
         """
@@ -119,7 +123,7 @@ class Globe:
         return earth
 
     def from_earth(self, earth: np.ndarray) -> np.ndarray:
-        """World metres (n, 3) of Earth-centred coordinates (n, 3)."""
+        """Return world metres (n, 3) of Earth-centred coordinates (n, 3)."""
         longitude, latitude, height = self.to_centre.transform(
             *np.asarray(earth).T, direction="INVERSE"
         )
@@ -133,7 +137,7 @@ class Globe:
 
 
 def with_heights(crs: Any) -> Any:
-    """The transformation of plan and heights that is more than a guess;
+    """Return the transformer of plan and heights, if it is more than a guess.
 
     None where heights or a grid are missing.
     """
@@ -142,7 +146,7 @@ def with_heights(crs: Any) -> Any:
 
 
 def explain_heights(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[str, bool]:
-    """What was done with heights as a sentence, and whether they are known to be right."""
+    """Describe what was done with heights, and whether they are right."""
     if geoid_height_m is not None:
         return (
             f"heights above the ellipsoid are those of the models plus {geoid_height_m} m, as "
@@ -169,8 +173,9 @@ def explain_heights(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple
 
 
 def make_local_frame(longitude: float, latitude: float, origin: np.ndarray) -> np.ndarray:
-    """The transform (4, 4) from east, north, up about `origin` (3,), Earth-centred, to
-    Earth-centred coordinates.
+    """Return the transform (4, 4) from east, north, up to Earth-centred.
+
+    The local frame is about `origin` (3,), Earth-centred.
 
     >>> make_local_frame(0.0, 0.0, np.array([6378137.0, 0.0, 0.0]))[:3,
     ...     2].tolist()  # up is away from the centre

@@ -1,5 +1,6 @@
-"""One building as triangles of one draw call: places, normals and colours by corner, waiting in a
-file until its tile is known.
+"""One building as triangles of one draw call.
+
+Places, normals and colours by corner wait in a file until its tile is known.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from ..viewed import ViewedModel
 
 @dataclass(frozen=True)
 class TileMesh:
-    """Corners (3 t, 3), y up, their face's `normals` (3 t, 3) and `colours` (3 t, 4) as linear
-    bytes.
+    """Corners (3 t, 3), y up, with normals and colours.
+
+    Their face's `normals` are (3 t, 3), `colours` (3 t, 4) linear bytes.
     """
 
     corners: np.ndarray
@@ -34,13 +36,14 @@ class TileMesh:
 
     @classmethod
     def load(cls, file: BinaryIO) -> TileMesh:
-        """The mesh that `save` wrote where `file` stands now."""
+        """Load the mesh that `save` wrote where `file` stands now."""
         return cls(*(np.load(file, allow_pickle=False) for _ in range(3)))
 
 
 def make_mesh(model: ViewedModel, vertices: np.ndarray) -> TileMesh:
-    """The mesh of a model whose solid's `vertices` (n, 3) are east, north, up of the tileset's
-    frame.
+    """Return the mesh of a model.
+
+    Its solid's `vertices` (n, 3) are east, north, up of the tileset's frame.
     """
     corners, normals, colours = [], [], []
     for look, faces in model.faces_by_look().items():

@@ -1,5 +1,6 @@
-"""What is told of buildings in a tile: a class and a table of EXT_structural_metadata, numbers as
-float64, all else as text.
+"""The attributes of buildings in a tile.
+
+They are a class and a table of EXT_structural_metadata, numbers as float64, all else as text.
 
 The extension knows no null: what is unknown is `NO_NUMBER` or empty text, and the class says so.
 One class serves all tiles, so that a style made for one works on every other.
@@ -34,8 +35,9 @@ DESCRIPTIONS = {
 
 
 class Property(NamedTuple):
-    """A column: its `id` in the class, the attribute's `name`, and whether its values are
-    numbers.
+    """A column: its `id`, its attribute's `name`, whether it holds numbers.
+
+    `id` is that in the class.
     """
 
     id: str
@@ -56,8 +58,9 @@ class Found:
                 self.are_numbers[name] = was_number is not False and is_number(value)
 
     def properties(self) -> list[Property]:
-        """The columns that hold them, named as the extension allows: letters, digits,
-        underscores.
+        """Return the columns, named as the extension allows.
+
+        Names have letters, digits and underscores.
         """
         names = UniqueNames()
         return [
@@ -71,13 +74,13 @@ def is_number(value: Any) -> bool:
 
 
 def property_id(names: UniqueNames, name: str) -> str:
-    """`name` with all that an id forbids replaced; unique among `names`."""
+    """Return `name` without what an id forbids, unique among `names`."""
     plain = re.sub(r"\W", "_", name, flags=re.ASCII)
     return names.take(plain if re.match("[A-Za-z_]", plain) else f"_{plain}").replace("..", "_")
 
 
 def make_schema(properties: Iterable[Property]) -> dict[str, Any]:
-    """The schema: one class, a property a column."""
+    """Return the schema: one class, a property a column."""
     kinds: dict[bool, dict[str, Any]] = {
         True: {"type": "SCALAR", "componentType": "FLOAT64", "noData": NO_NUMBER},
         False: {"type": "STRING", "noData": ""},
@@ -93,9 +96,7 @@ def make_schema(properties: Iterable[Property]) -> dict[str, Any]:
 def add_table(
     document: GlbDocument, properties: Sequence[Property], rows: Sequence[dict[str, Any]]
 ) -> dict[str, Any]:
-    """The table of `rows`, values by attribute's name; its columns go to the buffer of
-    `document`.
-    """
+    """Add the table of `rows`, values by attribute's name."""
     columns = {p.id: add_column(document, p, [row.get(p.name) for row in rows]) for p in properties}
     return {"name": "buildings", "class": CLASS, "count": len(rows), "properties": columns}
 

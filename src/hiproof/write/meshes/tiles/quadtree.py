@@ -1,5 +1,6 @@
-"""Which building is drawn in which tile: a quadtree in plan whose upper tiles hold the largest
-buildings.
+"""The tile in which each building is drawn.
+
+It is a quadtree in plan whose upper tiles hold the largest buildings.
 
 Every building stands in one tile. A viewer far away draws the upper tiles alone, and what is
 missing is small: the error of a tile is told by the largest building below it.
@@ -17,8 +18,9 @@ WIDEST_M = 20_000.0  # beyond, coordinates about a tile's middle lose millimetre
 
 @dataclass(frozen=True)
 class Tile:
-    """A tile: `name` is its way from the root ("r", then a digit a level), `items` (k,) the indices
-    it draws.
+    """A tile: its `name`, and the `items` (k,) that it draws.
+
+    The name is its way from the root ("r", then a digit a level); items are indices.
     """
 
     name: str
@@ -26,7 +28,7 @@ class Tile:
     children: tuple[Tile, ...] = ()
 
     def list_below(self) -> np.ndarray:
-        """Indices drawn by the tiles below this one."""
+        """Return the indices drawn by the tiles below this one."""
         return np.concatenate(
             [
                 np.empty(0, int),
@@ -42,8 +44,9 @@ def quadtree(
     limit: int = MOST_TRIANGLES,
     widest: float = WIDEST_M,
 ) -> Tile:
-    """The root of the tree of buildings with `centres` (n, 2), `sizes` (n,) and numbers of
-    `triangles` (n,), metres.
+    """Return the root of the tree of buildings.
+
+    They have `centres` (n, 2), `sizes` (n,) and numbers of `triangles` (n,), in metres.
 
     A tile holds the largest buildings of its square, at least one and else at most `limit`
     triangles, the rest goes to its four quarters; squares wider than `widest` hold none. Indices in
@@ -65,7 +68,10 @@ def quadtree(
 
 
 def grow_tile(name: str, items: np.ndarray, lower: np.ndarray, side: float, tables: tuple) -> Tile:
-    """The tile of the square from `lower` (2,) over `side` metres, in which `items` stand."""
+    """Return the tile of a square, in which `items` stand.
+
+    The square goes from `lower` (2,) over `side` metres.
+    """
     centres, sizes, triangles, limit, widest = tables
     largest = items[np.argsort(-sizes[items], kind="stable")]
     fits = np.cumsum(triangles[largest]) <= limit

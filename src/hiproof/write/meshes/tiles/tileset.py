@@ -1,5 +1,6 @@
-"""The tileset of a city: buildings as they come wait in a file; when all are known, each tile is
-written once.
+"""The tileset of a city.
+
+Buildings wait in a file as they come; when all are known, each tile is written once.
 
 All coordinates are turned one by one into the plane's east, north, up about the first building, so
 that nothing is lost by the Earth's curvature; the root's transform puts that frame on the globe.
@@ -85,8 +86,9 @@ def warn_guesses(globe: Globe | None) -> None:
 
 
 class WaitingCity:
-    """Buildings in a file, and of each what decides where it is drawn: its triangles and its box,
-    east, north, up.
+    """Buildings in a file, and what decides their tile.
+
+    That is their triangles and their box, east, north, up.
     """
 
     def __init__(self, file: BinaryIO, globe: Globe | None) -> None:
@@ -110,14 +112,17 @@ class WaitingCity:
         mesh.save(self.file)
 
     def local(self, world: np.ndarray) -> np.ndarray:
-        """East, north, up (n, 3) of world metres; the first building's corner is the origin."""
+        """Return east, north, up (n, 3) of world metres.
+
+        The first building's corner is the origin.
+        """
         if not self.offsets:
             self.transform = frame_at(np.floor(world.min(axis=0)), self.globe)
         places = world if self.globe is None else self.globe.to_earth(world)
         return (places - self.transform[:3, 3]) @ self.transform[:3, :3]
 
     def at(self, index: int) -> tuple[dict[str, Any], TileMesh]:
-        """The row and the mesh of a building that was added."""
+        """Return the row and the mesh of a building that was added."""
         self.file.seek(self.offsets[index])
         return json.loads(self.file.readline()), TileMesh.load(self.file)
 
@@ -133,7 +138,7 @@ class TileFiles:
         (folder / "tiles").mkdir()
 
     def tileset(self, tree: Tile) -> dict[str, Any]:
-        """The content of tileset.json; the files of all tiles are written."""
+        """Write the files of all tiles, and return the content of tileset.json."""
         globe, transform, root = self.city.globe, self.city.transform, self.write_tile(tree)
         if globe is None:
             extras = {
@@ -152,7 +157,7 @@ class TileFiles:
         }
 
     def write_tile(self, tile: Tile) -> dict[str, Any]:
-        """`tile` as the tileset tells it, with all below; their files are written."""
+        """Write a tile and all below, and return it as the tileset names it."""
         below = tile.list_below()
         description: dict[str, Any] = {
             "boundingVolume": bound_boxes(self.boxes[np.append(tile.items, below)]),
@@ -176,8 +181,9 @@ class TileFiles:
 
 
 def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
-    """The transform (4, 4) from the tileset's frame at `origin` (3,), world metres, to the globe
-    or, without one, to the world.
+    """Return the transform (4, 4) from the tileset's frame at `origin` (3,).
+
+    It leads from world metres to the globe or, without one, to the world.
     """
     if globe is None:
         frame = np.eye(4)
@@ -188,7 +194,10 @@ def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
 
 
 def bound_boxes(boxes: np.ndarray) -> dict[str, list[float]]:
-    """The bounding volume around `boxes` (n, 2, 3): middle, then half of each axis."""
+    """Return the bounding volume around `boxes` (n, 2, 3).
+
+    It is the middle, then half of each axis.
+    """
     smallest, largest = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     return {
         "box": [
@@ -199,8 +208,9 @@ def bound_boxes(boxes: np.ndarray) -> dict[str, list[float]]:
 
 
 def make_room(folder: Path) -> None:
-    """Make the parent of `folder`; raise OutputError where `folder` is no tileset, so that nothing
-    else is ever replaced.
+    """Make the parent of `folder`, and protect other folders.
+
+    Raises OutputError where `folder` is no tileset, so that nothing else is ever replaced.
     """
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -218,8 +228,9 @@ def make_room(folder: Path) -> None:
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """Yield a hidden folder that takes the place of `folder` when the block ends well, and is
-    removed when not.
+    """Yield a hidden folder that takes the place of `folder`.
+
+    It does so when the block ends well, and is removed when not.
     """
     name = hidden_name(folder)
     older = name.with_name(name.name + "-older")
