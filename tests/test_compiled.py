@@ -87,7 +87,7 @@ def forget():
     for cached in (
         stamp.compute_stamp,
         stamp.list_imports,
-        stamp.read_text,
+        stamp.compiled_files,
         stamp.digest_file,
         kept.place_to_write,
         kept.warn_not_kept,
@@ -646,11 +646,11 @@ from hiproof.settings import Settings
 from hiproof.compiled import kept
 from hiproof.simulate import demo_files
 
-asked, load = set(), kept.Kept.load_overload
+asked, load = set(), kept.Kept.load
 def noted(self, signature, context):
     asked.add((self.name, str(signature)))
     return load(self, signature, context)
-kept.Kept.load_overload = noted
+kept.Kept.load = noted
 files = {{name: str(path) for name, path in demo_files().items()}}
 with_footprints = dict(footprints=files["footprints"], terrain=files["terrain"])
 few = dict(bbox=(91990, 451000, 92034, 451040))

@@ -6,9 +6,10 @@
 numba's own cache looks at the file of the function alone, though functions and constants of other
 files are compiled into it, and takes old code for new after an upgrade. Here code belongs to a
 stamp of all its sources (stamp.py) and is kept under it (kept.py). Wheels and images carry code for
-a kind of processors (kinds.py). Large functions are called, not copied (linking.py), and only
-functions that Python calls get a wrapper for that (dispatcher.py). numba's runtime is kept as well
-(runtime.py). Whoever wants to show that something is being compiled listens to news.py.
+a kind of processors (kinds.py). Large functions are called, not copied (linking.py), kept ones are
+loaded without a compiler (loading.py), and only functions that Python calls get a wrapper for that
+(dispatcher.py). numba's runtime is kept as well (runtime.py). Whoever wants to show that something
+is being compiled listens to news.py.
 """
 
 from __future__ import annotations

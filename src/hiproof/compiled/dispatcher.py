@@ -32,8 +32,17 @@ class Dispatcher(CPUDispatcher):
 
     def load(self, signature: Any) -> None:
         """Have the function's code in this process, from disk or compiled, for compiled callers."""
-        if tuple(sigutils.normalize_signature(signature)[0]) not in self.overloads:
-            super().compile(signature)
+        args = tuple(sigutils.normalize_signature(signature)[0])
+        with global_compiler_lock:
+            if args in self.overloads:
+                return
+            result = self._cache.load(signature, self.targetctx)
+            if result is None:
+                super().compile(signature)
+                return
+            self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
+            self.add_overload(result)
+            self._cache_hits[signature] += 1
 
     def get_call_template(self, args: tuple, kws: dict) -> tuple:
         """Answer numba's question, when it compiles a caller, what a call returns."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import pickle
 import tempfile
 import uuid
@@ -29,7 +30,7 @@ from numba.core import caching
 from numba.core.serialize import dumps
 
 from ..errors import NotKeptWarning
-from . import linking, news, runtime
+from . import linking, loading, news, runtime
 from .kinds import KIND, runs_kind
 from .stamp import PYTHON, compute_stamp
 
@@ -52,8 +53,8 @@ class Kept:
     def cache_path(self) -> str:
         return str(self.folders[0])
 
-    def load_overload(self, signature: Any, context: Any) -> Any:
-        """Return the code for these argument types, or None to have it compiled.
+    def load(self, signature: Any, context: Any) -> Any:
+        """Load the code for these argument types; return None where it has to be compiled.
 
         What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs
         its memory alone.
@@ -61,14 +62,17 @@ class Kept:
         start_runtime(context)
         for code in self.read("", signature, context):
             try:
-                result = linking.rebuilt(context, *code)
+                result = loading.rebuild(context, *code)
             except Exception:  # damaged inside
                 continue
             news.ready.add(self.name)
             return result
+        return None
+
+    def load_overload(self, signature: Any, context: Any) -> None:
+        """Answer numba, which asks before it compiles: nothing is kept, or it would be loaded."""
         place_to_write(self.folders)
         news.tell()
-        return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep what was just compiled, and remove what is out of date."""
@@ -96,9 +100,10 @@ class Kept:
 
         That for this machine's own processor comes first.
         """
-        for file in self.places(part, signature, context.codegen().magic_tuple()):
+        for path in self.places(part, signature, name_processor(context.codegen())):
             try:
-                selection, *content = pickle.loads(file.read_bytes())
+                with open(path, "rb") as file:
+                    selection, *content = pickle.load(file)
             except Exception:  # not there, or damaged, of which pickle makes errors of any kind
                 continue
             if selection == signature:
@@ -109,7 +114,7 @@ class Kept:
         folder = place_to_write(self.folders)
         if folder is None:
             return
-        file = folder / self.file_name(part, signature, context.codegen().magic_tuple())
+        file = folder / self.file_name(part, signature, name_processor(context.codegen()))
         sibling_path = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
             sibling_path.write_bytes(dumps((signature, *content)))
@@ -121,7 +126,7 @@ class Kept:
             return
         remove_outdated(folder, self.module, self.stamp)
 
-    def places(self, part: str, signature: Any, processor: tuple[str, str, str]) -> Iterator[Path]:
+    def places(self, part: str, signature: Any, processor: tuple[str, str, str]) -> Iterator[str]:
         """Yield the paths at which a part of the code may lie.
 
         That for this machine's own processor comes first.
@@ -129,7 +134,7 @@ class Kept:
         system, _, _ = processor
         for kind in (processor, (system, KIND, ""))[: 1 + runs_kind()]:
             name = self.file_name(part, signature, kind)
-            yield from (folder / name for folder in self.folders)
+            yield from (os.path.join(folder, name) for folder in self.folders)
 
     def file_name(self, part: str, signature: Any, processor: tuple[str, str, str]) -> str:
         """Return the name of the file of a part of the code.
@@ -147,6 +152,12 @@ class Kept:
         for folder in self.folders:
             for file in folder.glob(f"{self.start}-*.{PYTHON}.nbc"):
                 file.unlink(missing_ok=True)
+
+
+@functools.cache
+def name_processor(codegen: Any) -> tuple[str, str, str]:
+    """Return numba's names of the system, of the processor and of its features."""
+    return codegen.magic_tuple()
 
 
 def start_runtime(context: Any) -> None:

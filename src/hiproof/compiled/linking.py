@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 from numba.core import bytecode, compiler, types
-from numba.core.codegen import JITCodeLibrary
 
 # numba numbers the functions of its own library from 1 in every process, and the numbers stand in
 # their symbols: code that two processes kept would meet in a third with one symbol for two
@@ -36,25 +35,6 @@ class Callee(NamedTuple):
     def load(self) -> None:
         """Have its code in this process, from disk or compiled."""
         getattr(import_module(self.module), self.name).load(self.signature)
-
-
-class Loaded(JITCodeLibrary):
-    """numba's library of a function that was compiled before: its machine code as it is; what
-    callers would copy of it is read when one is compiled.
-    """
-
-    _shared_module: Any
-
-    def __init__(self, codegen: Any, name: str, machine_code: bytes, bitcode: bytes):
-        super().__init__(codegen, name)
-        self.bitcode = bitcode
-        codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(machine_code))
-        self._finalized = self._disable_inspection = True
-
-    def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            self._shared_module = llvm.parse_bitcode(self.bitcode)
-        return self._shared_module
 
 
 def make_pipeline(stamp: str) -> type[compiler.Compiler]:
@@ -110,41 +90,3 @@ def called_by(library: Any) -> Iterator[Callee]:
 def is_large(function: Any) -> bool:
     instructions = (1 for block in function.blocks for _ in block.instructions)
     return next(itertools.islice(instructions, LARGE, None), None) is not None
-
-
-def rebuilt(
-    context: Any, code: tuple, calls: tuple[Callee, ...], is_called_as: Callee | None
-) -> Any:
-    """The result of compiling from what was kept of it, after what it calls."""
-    for callee in calls:
-        callee.load()
-    (
-        (name, _, selection),
-        described,
-        constants,
-        signature,
-        objectmode,
-        lifted,
-        _,
-        _,
-        environments,
-    ) = code
-    codegen = context.codegen()
-    codegen._engine._defined_symbols.add(described.llvm_func_name)
-    library = Loaded(codegen, name, *selection)
-    library.calls, library.is_called_as = calls, is_called_as
-    for environment in environments:
-        codegen.set_env(environment.env_name, environment)
-    return compiler.compile_result(
-        target_context=context,
-        typing_context=context.typing_context,
-        library=library,
-        environment=constants,
-        entry_point=library,  # a key of numba's; what Python calls is made when it calls
-        fndesc=described,
-        signature=signature,
-        objectmode=objectmode,
-        lifted=lifted,
-        type_annotation=None,
-        referenced_envs=environments,
-    )

@@ -10,7 +10,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from numba.core.runtime import _nrt_python, rtsys
 
-from .linking import Loaded
+from .loading import Loaded
 
 
 def is_started() -> bool:

@@ -45,11 +45,12 @@ def compute_common_stamp() -> str:
 @functools.cache
 def count_compiled() -> int:
     """Count the functions that hiproof compiles."""
-    return sum(read_text(file).count(b"\n@compiled") for file in compiled_files())
+    return sum(file.read_bytes().count(b"\n@compiled") for file in compiled_files())
 
 
-def compiled_files() -> list[Path]:
-    return [file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in read_text(file)]
+@functools.cache
+def compiled_files() -> tuple[Path, ...]:
+    return tuple(file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in file.read_bytes())
 
 
 def digest(files: Iterable[Path]) -> str:
@@ -67,7 +68,8 @@ def digest(files: Iterable[Path]) -> str:
 def digest_file(file: Path) -> bytes:
     """Return the digests of a file's place and of its text, one after the other."""
     return b"".join(
-        hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), read_text(file))
+        hashlib.sha256(text).digest()
+        for text in (place_in_package(file).encode(), file.read_bytes())
     )
 
 
@@ -77,11 +79,6 @@ def read_version(library: str) -> str:
     from importlib.metadata import version
 
     return version(library)
-
-
-@functools.cache
-def read_text(file: Path) -> bytes:
-    return file.read_bytes()
 
 
 def closure(file: Path) -> set[Path]:
@@ -109,7 +106,7 @@ def list_imports(file: Path) -> frozenset[Path]:
     These are files of the two packages.
     """
     result: set[Path] = set()
-    for statement in IMPORT.finditer(read_text(file).decode()):
+    for statement in IMPORT.finditer(file.read_bytes().decode()):
         for path in resolve_import(file, statement):
             result.update(
                 source
