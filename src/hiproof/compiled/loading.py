@@ -16,9 +16,12 @@ class Loaded(JITCodeLibrary):
     callers would copy of it is read when one is compiled.
     """
 
+    _shared_module: Any
+
     def __init__(self, codegen: Any, name: str, machine_code: bytes, bitcode: bytes):
         super(CPUCodeLibrary, self).__init__(codegen, name)  # a LLVM module is only for compiling
-        self._linking_libraries, self._final_module, self._shared_module = [], None, None
+        self._linking_libraries: list[Any] = []
+        self._final_module = self._shared_module = None
         self.bitcode = bitcode
         codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(machine_code))
         self._finalized = self._disable_inspection = True

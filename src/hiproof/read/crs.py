@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pyproj import CRS, Transformer
+from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
 from ..errors import InputError
@@ -271,12 +271,18 @@ def make_transformer(source: CRS, target: CRS) -> Transformer:
 def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
     """Longitude and latitude (n, 2) of positions (n, 2) in the plan of `crs`, NaN where it leaves
     the place open.
+
+    Those of a projected CRS are of its own datum, up to a kilometre from WGS 84: to look for the
+    operation between the two takes 50 ms.
     """
+    plan = horizontal_crs(crs)
     if not names_place(crs):
         return np.full(xy.shape, np.nan)
     try:
-        return np.column_stack(make_transformer(horizontal_crs(crs), WGS84).transform(*xy.T))
-    except InputError:
+        if plan.is_projected:
+            return np.column_stack(Proj(plan)(xy[:, 0], xy[:, 1], inverse=True))
+        return np.column_stack(make_transformer(plan, WGS84).transform(*xy.T))
+    except (InputError, ProjError):
         return np.full(xy.shape, np.nan)
 
 
