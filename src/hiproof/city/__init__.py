@@ -1,4 +1,6 @@
-"""Many buildings: an area becomes tasks, tasks become part files, part files become the output.
+"""Many buildings: from an area to the files of its models.
+
+An area becomes tasks, tasks become part files, and part files become the output.
 
 request       what the user asked for
 checks        what is wrong with that before any file is read

@@ -1,4 +1,6 @@
-"""Keep the input of buildings that hiproof failed on, so that their failures can be repeated.
+"""Bundles: the input of buildings that hiproof failed on.
+
+With a bundle the failure can be repeated.
 
 A bundle is a folder `failures/NAME` in the output folder of a run:
 
@@ -59,18 +61,21 @@ class RecordedTerrain:
     """Terrain heights at the places where they were looked up; unknown elsewhere."""
 
     def __init__(self, source: str, rows: np.ndarray):
-        """`rows` (n, 4) are x, y, the height, and 1 where the raster holds a code for "no data"."""
+        """Index `rows` (n, 4) of recorded heights.
+
+        A row is x, y, the height, and 1 where the raster holds a code for "no data".
+        """
         self.source = source
         self.known = {(x, y): (z, bool(coded)) for x, y, z, coded in rows.tolist()}
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Heights (n,) at `xy_world` (n, 2), NaN where none was looked up."""
+        """Return heights (n,) at `xy_world` (n, 2), NaN where none was recorded."""
         return np.array(
             [self.known.get((x, y), (np.nan, False))[0] for x, y in xy_world.tolist()], float
         )
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Whether (n,) the raster held a code for "no data" at `xy_world` (n, 2)."""
+        """Return whether (n,) the raster held a "no data" code at `xy_world` (n, 2)."""
         return np.array(
             [self.known.get((x, y), (np.nan, False))[1] for x, y in xy_world.tolist()], bool
         )
@@ -83,12 +88,12 @@ class TerrainRecorder:
         self.model, self.source, self.rows = model, model.source, [np.zeros((0, 4))]
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """The model's heights (n,) at `xy_world` (n, 2)."""
+        """Return the model's heights (n,) at `xy_world` (n, 2), and record them."""
         self.note(xy_world)
         return self.model.height_at(xy_world)
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Whether (n,) the raster holds a code for "no data" at `xy_world` (n, 2)."""
+        """Return whether (n,) the raster holds a "no data" code at `xy_world` (n, 2)."""
         self.note(xy_world)
         return self.model.is_coded_at(xy_world)
 
@@ -128,7 +133,7 @@ def keep_failure(
 
 
 def folder_name(id: str) -> str:
-    """A name for the bundle of building `id` that every file system takes.
+    """Return a name for the bundle of building `id` on any file system.
 
     >>> folder_name("0363100012168777"), folder_name("../Town Hall")
     ('0363100012168777', 'town-hall-ea5e75b2')
@@ -141,12 +146,15 @@ def folder_name(id: str) -> str:
 
 
 def bundles_in(out: Path) -> list[Path]:
-    """The bundles in the output folder of a run; nobody else's folders."""
+    """Return the bundles in the output folder of a run.
+
+    Folders of others are left out.
+    """
     return sorted(facts.parent for facts in (Path(out) / FAILURES_FOLDER).glob(f"[!.]*/{FACTS}"))
 
 
 def find_bundle_folder(out: Path) -> Path | None:
-    """The folder of the bundles of a run, None where it has none."""
+    """Return the folder of the bundles of a run, None where it has none."""
     return Path(out) / FAILURES_FOLDER if bundles_in(out) else None
 
 
@@ -214,7 +222,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 
 
 def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str, np.ndarray]:
-    """Those of a tile's points (n, 3), by kind, that the building may see."""
+    """Return a tile's points (n, 3), by kind, that the building may see."""
     reaches = {
         "roof": max(plan.around_m, ROOF_REACH_M),
         "ground": plan.terrain_reach_m,
@@ -232,7 +240,10 @@ def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict
 
 
 def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
-    """Write points (n, 3) by kind as a LAZ file that holds their exact coordinates as well."""
+    """Write points (n, 3) by kind as a LAZ file with exact coordinates.
+
+    They come in addition to those of the format.
+    """
     import laspy
 
     xyz = np.concatenate(list(points.values()))
@@ -254,7 +265,10 @@ def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
 
 
 def read_exact_points(path: Path) -> dict[str, np.ndarray]:
-    """Read the points (n, 3) by kind from `write_points`. Raises InputError for other files."""
+    """Read the points (n, 3) by kind from `write_points`.
+
+    Raises InputError for other files.
+    """
     import laspy
 
     with translate_errors(path):
@@ -274,7 +288,7 @@ def write_outline(path: Path, job: Job) -> None:
 
 
 def override_record(root: Path, job: Job) -> dict[str, Any] | None:
-    """The building's override without what a person noted; None where it has none."""
+    """Return the building's override without its note, None where there is none."""
     path = root / OVERRIDES_FILE
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
         index, record = json.loads(line)
@@ -286,7 +300,9 @@ def override_record(root: Path, job: Job) -> dict[str, Any] | None:
 def load_bundle(
     folder: Path,
 ) -> tuple[WorkPlan, dict[str, np.ndarray], RecordedTerrain | None, Override | None]:
-    """Read a bundle: a plan of its building alone, points by kind, terrain and override.
+    """Read a bundle: a plan of its building, points, terrain and override.
+
+    Points are by kind.
 
     Raises InputError or SettingsError, one sentence, for a folder that is none.
     """

@@ -1,5 +1,6 @@
-"""A run whose footprints changed since: what became of a building stays where the building is the
-same, and the rest is done.
+"""A run whose footprints changed since.
+
+Results stay where the building is the same, and the rest is done.
 
 A building's answer depends on the building alone, so its texts are those of a run from the start:
 they move with it to the work tile and the place that the new plan gives it.
@@ -25,8 +26,9 @@ from .plan import PLAN_FILE, WorkPlan
 
 
 class StoredText(NamedTuple):
-    """Where a building's texts stand: its position in the old plan, its tile, and how many stand
-    before it there.
+    """The place of a building's texts.
+
+    It is the building's position in the old plan, its tile, and how many stand before it there.
     """
 
     position: int
@@ -35,8 +37,9 @@ class StoredText(NamedTuple):
 
 
 def take_over(new: WorkPlan, old: WorkPlan, state: Path, ledger: Ledger) -> bool:
-    """Put the run in `state` on the plan `new`, with all that is known of buildings that `old` has
-    too; whether that could be.
+    """Put the run in `state` on the plan `new`, and keep what still holds.
+
+    All that is known of buildings that `old` has too stays. Returns whether that could be done.
 
     It could not where the two plans tell buildings apart, read them or write them in different
     ways.
@@ -77,12 +80,15 @@ def take_over(new: WorkPlan, old: WorkPlan, state: Path, ledger: Ledger) -> bool
 
 
 def describe_common_inputs(plan: WorkPlan) -> tuple:
-    """What all texts of a plan have in common."""
+    """Return what all texts of a plan have in common."""
     return plan.settings, plan.crs_wkt, plan.translate.tolist(), plan.around_m
 
 
 def digest_building(plan: WorkPlan, index: int) -> str:
-    """What a building's texts depend on beside the points, as a digest."""
+    """Return a digest of what a building's texts depend on.
+
+    The points are not part of it.
+    """
     job = plan.jobs[index]
     attributes = job.footprint.attributes if job.footprint else None
     inputs = [
@@ -96,12 +102,12 @@ def digest_building(plan: WorkPlan, index: int) -> str:
 
 
 def find_row_outlines(plan: WorkPlan, index: int) -> list[str]:
-    """The outlines that a building's footprint is moved with."""
+    """Return the outlines with which a building's footprint is moved."""
     return [polygon.wkb_hex for polygon in plan.outlines.row(index)] if plan.moves_rows else []
 
 
 def find_stored_texts(plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, StoredText]:
-    """Where the texts of every building stand that was solved, by its digest."""
+    """Return the places of solved buildings' texts, by their digests."""
     names, redo = {task.name for task in ledger.tasks() if task.state == "done"}, load_redo(state)
     result = {}
     for tile, members in plan.tiles.items():
@@ -116,8 +122,9 @@ def find_stored_texts(plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, 
 def move_texts(
     plan: WorkPlan, state: Path, selection: dict[int, StoredText], redo: dict[str, list[int]]
 ) -> None:
-    """Write the tiles' files anew from those that are there, and drop these; points are sorted
-    again.
+    """Write the tiles' files anew from those that exist, and drop these.
+
+    Points are sorted again.
     """
     previous, updated = state / "tiles", state / "tiles.new"
     shutil.rmtree(updated, ignore_errors=True)
@@ -144,12 +151,15 @@ def move_texts(
 
 
 def to_do(plan: WorkPlan) -> Fragments:
-    """What stands in a tile's file where a building is to be solved."""
+    """Return the placeholder in a tile's file for a building to be solved."""
     return dict.fromkeys(requested_fragments(plan.settings.write), Fragment(b""))
 
 
 def select_sorting_tasks(tasks: list[Task], repeat: bool) -> list[Task]:
-    """The tasks that sort points, all of them open where buildings wait for their points."""
+    """Return the tasks that sort points.
+
+    All of them are open where buildings wait for their points.
+    """
     selected_tasks = [task for task in tasks if task.kind == "sort"]
     return (
         [task._replace(state="open", losses=0) for task in selected_tasks]
@@ -159,7 +169,7 @@ def select_sorting_tasks(tasks: list[Task], repeat: bool) -> list[Task]:
 
 
 def select_solving_tasks(plan: WorkPlan, redo: dict[str, list[int]]) -> list[Task]:
-    """The tasks that solve tiles, open where a building is to be solved."""
+    """Return the tasks that solve tiles, open where a building is to be solved."""
     return [
         Task(f"solve:{tile}", "solve", len(members), "open" if tile in redo else "done")
         for tile, members in plan.tiles.items()

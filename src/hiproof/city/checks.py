@@ -1,5 +1,6 @@
-"""What can be known to be wrong with a request before any file is read: one sentence then, and not
-after an hour.
+"""Checks of a request before any file is read.
+
+What is wrong is reported at once, and not after an hour.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill a
 
 
 def refuse_unusable(request: Any) -> None:
-    """Raise SettingsError or InputError for options of a `run.Request` that cannot be met here."""
+    """Raise SettingsError or InputError for options that cannot be met.
+
+    They are those of a `run.Request`.
+    """
     processes = request.processes
     if processes is not None and not (type(processes) is int and 1 <= processes <= MOST_PROCESSES):
         raise SettingsError(
@@ -34,8 +38,9 @@ def refuse_unusable(request: Any) -> None:
 
 
 def refuse_missing_packages(request: Any) -> None:
-    """Raise InputError where a package is not installed that this request needs, and most
-    do not.
+    """Raise InputError where a package is missing that this request needs.
+
+    Most requests do not need it.
     """
     from ..read import geoparquet
     from ..read.database import import_psycopg, is_database
@@ -64,8 +69,9 @@ def refuse_missing_packages(request: Any) -> None:
 
 
 def refuse_settings(settings: Settings) -> None:
-    """Raise SettingsError or InputError for values that are well formed, but that nothing here can
-    be done with.
+    """Raise SettingsError or InputError for values that cannot be used.
+
+    They are well formed.
     """
     refuse_unknown_types(settings.fit)
     refuse_crs(settings.read)
@@ -78,7 +84,7 @@ def refuse_settings(settings: Settings) -> None:
 
 
 def refuse_unknown_types(fit: Any) -> None:
-    """Roof types must be those of the catalogue."""
+    """Raise SettingsError for roof types outside the catalogue."""
     from ..primitives import CATALOGUE
 
     allowed = tuple(CATALOGUE)
@@ -97,8 +103,9 @@ def refuse_unknown_types(fit: Any) -> None:
 
 
 def refuse_crs(read: Any) -> None:
-    """The CRS that settings give the clouds must be known, projected, and of the unit that they
-    give.
+    """Raise an error unless the CRS given to the clouds can be used.
+
+    It must be known, projected, and of the unit that the settings give.
     """
     from ..read.crs import find_units, parse_crs
 

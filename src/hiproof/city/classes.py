@@ -1,5 +1,6 @@
-"""Which of the clouds' classes may hold roofs, settled once for a run: those named, or all where
-none is a building's.
+"""The classes of the clouds that may hold roofs, chosen once for a run.
+
+They are those named, or all where none is a building's.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ PEEK_POINTS = RUN_POINTS
 
 
 def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
-    """`settings`, or where roofs are to be found by shape or stand alone those with that said, and
-    the classes that may hold roofs.
+    """Return settings with the classes that may hold roofs.
+
+    The settings also say where roofs are to be found by shape or stand alone.
 
     Classes other than the default that were asked for are taken as they are. Otherwise all classes
     but ground, water, noise, low vegetation and bridges may hold roofs where no point has the
@@ -74,8 +76,9 @@ def choose_classes(settings: Settings, **changes: Any) -> Settings:
 
 
 def count_classes(clouds: tuple[str, ...], is_enough: tuple[int, ...]) -> Counter[int]:
-    """Points by class, 0 where a file has none, of all readable files; counted no further than a
-    point of class `is_enough`.
+    """Count points by class, of all readable files.
+
+    A file without classes counts as 0. Counting ends at a point of class `is_enough`.
     """
     counts: Counter[int] = Counter()
     for name in clouds:

@@ -19,7 +19,10 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def cores() -> int:
-    """Those that this process may use, by the system and by the quota of its container."""
+    """Return the number of cores that this process may use.
+
+    The system and the quota of its container limit it.
+    """
     count = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
@@ -31,8 +34,9 @@ def cores() -> int:
 
 
 def as_many_as_pay(buildings: int, tiles: int, footprints: bool = True) -> int:
-    """Processes for so many buildings in so many work tiles, with `footprints` or split from the
-    cloud.
+    """Return how many processes pay for so many buildings and work tiles.
+
+    There are `footprints`, or buildings are split from the cloud.
 
     >>> as_many_as_pay(40, 3)
     1
@@ -44,8 +48,9 @@ def as_many_as_pay(buildings: int, tiles: int, footprints: bool = True) -> int:
 
 
 def has_semaphores() -> bool:
-    """Whether processes can be handed work here: sandboxes without shared memory have none of what
-    that takes.
+    """Return whether processes can be handed work here.
+
+    Sandboxes without shared memory lack what that takes.
     """
     try:
         get_context("spawn").Semaphore()
@@ -56,8 +61,9 @@ def has_semaphores() -> bool:
 
 @contextmanager
 def limit_threads() -> Iterator[None]:
-    """Processes started in here do linear algebra in one thread, unless the user said otherwise:
-    there are as many of them as cores.
+    """Let processes started in here do linear algebra in one thread.
+
+    There are as many of them as cores. What the user set stays.
     """
     own_names = [name for name in THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(own_names, "1"))

@@ -1,4 +1,6 @@
-"""Where tasks run: in this process, in processes of this machine, or on a Dask cluster.
+"""Executors: where tasks run.
+
+It is this process, processes of this machine, or a Dask cluster.
 
 One verb: `run`.
 
@@ -130,8 +132,9 @@ class Processes:
             return lost
 
     def bury(self, running: dict[Future, tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        """A worker died and the pool with it: hand back what finished, report the rest as lost,
-        start a new pool.
+        """Hand back what finished, and report the rest as lost.
+
+        A worker died and the pool with it; a new pool is started.
         """
         wait(running)
         self.close()
@@ -155,7 +158,9 @@ class Processes:
 
 
 def begin_worker(parent: int, heard: Connection, logging: tuple) -> None:
-    """What a worker process starts with: it logs as the main process does, and ends with it.
+    """Set up a worker process.
+
+    It logs as the main process does, and ends with it.
 
     That compiled code cannot be kept, the main process has said.
     """
@@ -165,8 +170,9 @@ def begin_worker(parent: int, heard: Connection, logging: tuple) -> None:
 
 
 def leave_with_parent(parent: int, heard: Connection) -> None:
-    """Make a worker end when its parent closes the pipe, or is gone: kill -9 of the main process
-    leaves nothing running.
+    """Make a worker end when its parent closes the pipe, or is gone.
+
+    A kill -9 of the main process leaves nothing running.
 
     Ctrl-C, which a terminal sends to all, is the parent's to answer.
     """
@@ -181,8 +187,9 @@ def leave_with_parent(parent: int, heard: Connection) -> None:
 
 
 class Dask:
-    """A Dask cluster at `address`; its workers must have hiproof installed and see the same files
-    (a shared file system).
+    """A Dask cluster at `address`.
+
+    Its workers must have hiproof installed and see the same files (a shared file system).
     """
 
     def __init__(self, address: str):
@@ -196,8 +203,9 @@ class Dask:
             ) from error
 
     def prepare(self, pieces: Sequence[str]) -> None:
-        """One worker of each host compiles, the others then load it; a host that joins later has to
-        compile while it works.
+        """Compile in one worker of each host, then load in the others.
+
+        A host that joins later has to compile while it works.
         """
         one_of_each = {urlsplit(address).hostname: address for address in self.client.nthreads()}
         ends: SimpleQueue = SimpleQueue()
@@ -231,13 +239,13 @@ class Dask:
             yield running.pop(future), *self.outcome(future)
 
     def submit(self, ends: SimpleQueue, function: Callable, task: tuple, **where: Any) -> Any:
-        """A future that is put into `ends` when it has ended."""
+        """Submit a task, and return a future that goes into `ends` when it ends."""
         future = self.client.submit(function, *task, pure=False, **where)
         future.add_done_callback(ends.put)
         return future
 
     def next_end(self, ends: SimpleQueue) -> Any:
-        """The next future that ends.
+        """Return the next future that ends.
 
         Where all workers are gone and none comes, the run ends: Dask itself would wait for ever.
         """
@@ -253,7 +261,7 @@ class Dask:
         )
 
     def outcome(self, future: Any) -> tuple[Any, Exception | None]:
-        """(result, error).
+        """Return (result, error).
 
         Dask has tried a task whose worker died on other workers before it gives up with
         KilledWorker.
@@ -283,12 +291,12 @@ class Dask:
 
 
 def import_distributed() -> Any:
-    """What speaks to a Dask cluster. Raises InputError where it is missing."""
+    """Import distributed. Raises InputError where it is missing."""
     return import_extra("distributed", "city", "--scheduler")
 
 
 def make_executor(processes: int, scheduler: str | None = None) -> InProcess | Processes | Dask:
-    """The executor that the options ask for."""
+    """Make the executor of the options."""
     if scheduler:
         return Dask(scheduler)
     return Processes(processes) if processes > 1 else InProcess()

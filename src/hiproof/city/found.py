@@ -1,5 +1,6 @@
-"""The roof of one building among points that nobody has classified: what lies on no surface, or on
-the ground, is left out.
+"""The roof of one building among points without classes.
+
+Points that lie on no surface, or on the ground, are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ FOOTPRINT_ODDS = 0.7
 
 @dataclass(frozen=True)
 class FoundRoof:
-    """`points` (n, 3) of the roof;
+    """`points` (n, 3) of a roof, and what is known of it.
 
     `remark` says what hides it, `is_seen` whether enough of it is there to be modelled; `ground`
     (m, 3) are points on the ground inside the outline.
@@ -40,8 +41,9 @@ class FoundRoof:
 def found_roof(
     nearby: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False
 ) -> FoundRoof:
-    """The roof within `area`, from the points `nearby` (n, 3) it and their `height` (n,) above
-    ground, NaN where unknown.
+    """Find the roof within `area`, from the points in and around it.
+
+    `nearby` are (n, 3), their `height` (n,) is above ground, NaN where unknown.
 
     `is_asked_for`: the area is a footprint, not one that was found by these points. Shares are of
     points thinned to one a voxel, so that a wall or a crown hit often does not count as more.
@@ -72,8 +74,9 @@ def found_roof(
 
 
 def find_lone_roof(nearby: np.ndarray, area: shapely.Geometry) -> FoundRoof:
-    """The roof within `area` of points (n, 3) that are roofs' or leaves': without these, unless
-    hardly anything would be left.
+    """Find the roof within `area` among points of roofs and leaves.
+
+    Points are (n, 3). Leaves go, unless hardly anything would be left.
     """
     roof = found_roof(nearby, area, np.full(len(nearby), np.nan))
     return roof if roof.is_seen else FoundRoof(roof.points)

@@ -1,5 +1,6 @@
-"""In which CRS and units an area is worked out: what its clouds and its footprints name, and what
-is assumed if they do not.
+"""The CRS and units in which an area is worked out.
+
+Clouds and footprints name them, and assumptions are made if they do not.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ MOST_STRETCH = 0.01
 
 @dataclass(frozen=True)
 class AreaFrame:
-    """The pyproj CRSs that the clouds and the footprints name, None where they name none, and the
-    units of the area's.
+    """The CRSs of clouds and footprints, and the area's units.
+
+    CRSs are pyproj's, None where none is named.
     """
 
     cloud: Any
@@ -43,14 +45,15 @@ class AreaFrame:
 
     @property
     def crs(self) -> Any:
-        """The CRS of everything written: the clouds', else the footprints', None where neither
-        names one.
+        """The CRS of everything written, None where no input names one.
+
+        It is the clouds', else the footprints'.
         """
         return self.cloud or self.footprints
 
 
 def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
-    """The frame of a `run.Request` whose point files have `headers`.
+    """Choose the frame of a `run.Request` whose point files have `headers`.
 
     The CRS that the settings give the clouds goes before that of their headers, and clouds that
     name none are taken to be in the footprints'; whatever is assumed is said by an InputWarning.
@@ -74,8 +77,9 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
 
 
 def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
-    """The CRS of clouds that leave their place open: the footprints' with the clouds' heights, else
-    the clouds' local one.
+    """Return the CRS of clouds that leave their place open.
+
+    It is the footprints' with the clouds' heights, else the clouds' local one.
 
     None where they name no plan at all. Raises InputError where the units of clouds and footprints
     differ.
@@ -108,8 +112,9 @@ def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
 
 
 def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -> None:
-    """One line where the CRS puts the clouds far from the area it is made for, so that it is
-    another or of another unit, or where its lengths there are not those on the ground.
+    """Warn once where the CRS is not made for the place of the clouds.
+
+    It is another or of another unit then, or its lengths there are not those on the ground.
     """
     bounds = plan_bounds(headers)
     if not len(bounds):
@@ -132,7 +137,10 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
 
 
 def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
-    """Boxes (n, 4) of the point files in plan, in their own unit; those without points left out."""
+    """Return boxes (n, 4) of the point files in plan, in their own unit.
+
+    Those without points are left out.
+    """
     bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
     return bounds[np.isfinite(bounds).all(axis=1)]
 
@@ -140,8 +148,10 @@ def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
 def refuse_degrees_in_inputs(
     path: str | None, footprints: Any, headers: list[PointFileHeader]
 ) -> None:
-    """Clouds that name no CRS may not count in degrees, nor can footprints in degrees stand in for
-    their CRS.
+    """Refuse clouds or footprints in degrees.
+
+    Clouds that name no CRS may not be in degrees, nor can footprints in degrees stand in for their
+    CRS.
     """
     if footprints is not None and footprints.is_geographic:
         raise InputError(
@@ -155,9 +165,7 @@ def refuse_degrees_in_inputs(
 
 
 def log_assumed_crs(path: str, frame: AreaFrame) -> None:
-    """One line where no cloud names a CRS: what is then taken for granted would else be taken in
-    silence.
-    """
+    """Log once what is assumed where no cloud names a CRS."""
     if frame.footprints is None:
         text = f"its unit is taken as {frame.units}"
     else:

@@ -1,5 +1,6 @@
-"""The buildings of a run without footprints: what a cloud of roof points, whose class is known or
-found, falls into.
+"""The buildings of a run without footprints.
+
+They come from a cloud of roof points, whose class is known or found.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from .plan import Job
 def jobs_from_cloud(
     clouds: tuple[str, ...], settings: Settings
 ) -> tuple[tuple[Job, ...], Settings]:
-    """A job a building found, and the settings by which its points are chosen: all of them in a
-    cloud of roofs alone.
+    """Return one job a building found, and the settings for its points.
+
+    These choose all points in a cloud of roofs alone.
     """
     from ..classify.split import split_buildings
 
@@ -38,7 +40,10 @@ def jobs_from_cloud(
 
 
 def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
-    """The points of all files that can be read; the step that sorts points names the others."""
+    """Read the points of all files that can be read.
+
+    The step that sorts points names the others.
+    """
     from ..read.pointcloud import read_points
 
     try:
@@ -51,7 +56,7 @@ def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
 
 
 def is_readable(name: str) -> bool:
-    """Whether a point file can be read from end to end."""
+    """Return whether a point file can be read from end to end."""
     from ..read.pointcloud import iter_points
 
     try:

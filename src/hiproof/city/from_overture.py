@@ -1,5 +1,6 @@
-"""Footprints of an Overture Maps release for a run's clouds: kept as a GeoPackage, and read from
-there like those of any file.
+"""Footprints of an Overture Maps release for a run's clouds.
+
+They are kept as a GeoPackage, and read from there like those of any file.
 
 Overture deletes its old releases, so that what a run was made from is only known where it is kept.
 """
@@ -41,8 +42,9 @@ SIDE_PARTS = 16  # of each side of a cloud's box: its sides are curves in longit
 
 
 def with_overture(request: Request, headers: list[PointFileHeader]) -> Request:
-    """`request` with footprints that are a file: those of Overture's release are fetched and kept
-    in the run's own folder.
+    """Return `request` with footprints that are a file.
+
+    Those of Overture's release are fetched and kept in the run's own folder.
     """
     if not is_overture(request.footprints):
         return request
@@ -52,17 +54,19 @@ def with_overture(request: Request, headers: list[PointFileHeader]) -> Request:
 
 
 def kept_file(out: Path) -> Path:
-    """Where the run in the folder `out` keeps the footprints that it fetches."""
+    """Return the path of the footprints that a run in `out` fetches."""
     return Path(out) / ".hiproof" / KEPT_FILE
 
 
 def choose_footprints(request: Request) -> str | None:
-    """The footprints from which a run is made: what it has kept, else what the request names."""
+    """Return the footprints of a run: the kept ones, else those it names."""
     return str(kept_file(request.out)) if is_overture(request.footprints) else request.footprints
 
 
 def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path) -> dict[str, Any]:
-    """Write the footprints of Overture's release that lie in the clouds' extent to a GeoPackage.
+    """Write the footprints of Overture's release to a GeoPackage.
+
+    They are those in the clouds' extent.
 
     The layer of `request` names one of Overture's types. Returns where they come from. Raises
     SettingsError for another layer, InputError for clouds without a CRS and where the release
@@ -86,7 +90,9 @@ def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path
 
 
 def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.Geometry:
-    """The boxes of the point files in longitude and latitude, as one geometry.
+    """Return the boxes of the point files in longitude and latitude.
+
+    They are one geometry.
 
     Raises InputError where no file names a CRS, and for an extent across the 180th meridian.
     """
@@ -120,7 +126,7 @@ def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.
 
 
 def write_geopackage(found: OvertureFootprints, path: Path) -> None:
-    """Write footprints with where they come from; the file appears whole or not at all."""
+    """Write footprints with their source; the file appears whole or not at all."""
     import pyogrio
 
     options: dict[str, Any] = {
@@ -141,8 +147,9 @@ def write_geopackage(found: OvertureFootprints, path: Path) -> None:
 
 
 def read_source(path: str | None) -> dict[str, Any] | None:
-    """Where the footprints of a GeoPackage come from, None where it does not tell or is not
-    there.
+    """Return the source of a GeoPackage's footprints, None if it names none.
+
+    It is None too where there is no file.
     """
     if not path or not is_geopackage(path):
         return None

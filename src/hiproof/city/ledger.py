@@ -1,4 +1,6 @@
-"""What is done, what failed and why: SQLite in WAL mode, from the standard library.
+"""The record of what is done, what failed and why.
+
+It is SQLite in WAL mode, from the standard library.
 
 SQLite rather than DuckDB: it needs no further dependency, survives kill -9 at any moment, and
 `hiproof status` may read while the run writes. Only the main process writes; a row changes after
@@ -32,7 +34,7 @@ create table if not exists output (name text primary key, bytes integer, digest 
 
 
 class Task(NamedTuple):
-    """A row of the tasks: what is to be done, of how many buildings, and what became of it."""
+    """A row of the tasks: its work, its number of buildings, its state."""
 
     name: str
     kind: str
@@ -44,8 +46,9 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A row of the buildings: `position` in the plan, what came of it, how good it is, and what it
-    took.
+    """A row of the buildings.
+
+    It has the `position` in the plan, the outcome, the quality, and the cost.
     """
 
     position: int
@@ -66,8 +69,9 @@ class Failure(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """A file that the run says it has written: its name within the run's folder, its size and its
-    digest.
+    """A file that the run has written: its name, size and digest.
+
+    The name is that within the run's folder.
     """
 
     name: str
@@ -76,7 +80,7 @@ class Claim(NamedTuple):
 
 
 def read_only_address(path: Path) -> str:
-    """How SQLite is to open a ledger that is only read.
+    """Return SQLite's address of a ledger that is only read.
 
     It wants to make a file beside one in WAL mode: where another person's folder allows none, and
     no run is at work, the ledger is read as it stands.
@@ -134,7 +138,10 @@ class Ledger:
         )
 
     def overrides(self) -> dict[int, str]:
-        """Digests of the overrides that buildings were made with, by position."""
+        """Return digests of the overrides with which buildings were made.
+
+        They are by position.
+        """
         return dict(self.database.execute("select position, digest from override"))
 
     def set_overrides(self, digests: dict[int, str]) -> None:
@@ -147,8 +154,9 @@ class Ledger:
         self.database.executemany("insert into override values (?, ?)", list(digests.items()))
 
     def open_again(self, solved: list[str], digests: dict[int, str]) -> None:
-        """Open the tasks `solved` and the reading of all point files, for buildings whose overrides
-        are now of `digests`.
+        """Open the tasks `solved` and the reading of all point files.
+
+        Overrides of buildings now have the `digests`.
         """
         self.database.execute("begin")
         self.database.executemany(
@@ -165,7 +173,10 @@ class Ledger:
             self.database.execute(f"delete from {table}")
 
     def add_tasks(self, tasks: list[Task]) -> None:
-        """Enter those open tasks of a kind, in the order of the plan, that are not there yet."""
+        """Enter open tasks of a kind, in the order of the plan.
+
+        Those that exist already stay.
+        """
         self.database.execute("begin")
         sql = "insert or ignore into task (name, kind, position, buildings) values (?, ?, ?, ?)"
         self.database.executemany(
@@ -174,8 +185,9 @@ class Ledger:
         self.database.execute("commit")
 
     def open_tasks(self, kind: str) -> list[str]:
-        """Names of the tasks still to do, the largest first, so that at the end no worker waits
-        long for another.
+        """Return names of the tasks still to do, the largest first.
+
+        So at the end no worker waits long for another.
         """
         sql = (
             "select name from task where kind = ? and state = 'open' order by buildings desc, "
@@ -187,19 +199,25 @@ class Ledger:
         self.database.execute("update task set state = 'running' where name = ?", (name,))
 
     def lose(self, name: str) -> None:
-        """The process that worked on the task died."""
+        """Record that the process that worked on the task died."""
         self.database.execute(
             "update task set state = 'open', losses = losses + 1 where name = ?", (name,)
         )
 
     def reopen(self) -> None:
-        """What was running when the main process ended was lost with it."""
+        """Reopen what was running when the main process ended.
+
+        It was lost with it.
+        """
         self.database.execute(
             "update task set state = 'open', losses = losses + 1 where state = 'running'"
         )
 
     def interrupt(self) -> None:
-        """The main process ends in order: what was running is open again, and no loss."""
+        """Reopen what was running, without a loss.
+
+        The main process ends in order.
+        """
         self.database.execute("update task set state = 'open' where state = 'running'")
 
     def sort_again(self) -> None:
@@ -226,8 +244,9 @@ class Ledger:
     def begin_again(
         self, tasks: list[Task], outcomes: dict[int, Outcome], overrides: dict[int, str]
     ) -> None:
-        """Enter the tasks of another plan as far as they are, and what is known of its buildings,
-        by position.
+        """Enter the tasks of another plan, and what is known of its buildings.
+
+        That is by position.
         """
         self.database.execute("begin")
         sql = (
@@ -251,7 +270,7 @@ class Ledger:
         )
 
     def outcomes(self) -> dict[int, Outcome]:
-        """What came of the buildings that were solved, by position."""
+        """Return the outcomes of the buildings that were solved, by position."""
         sql = f"select {', '.join(Outcome._fields)} from building"
         return {
             outcome.position: outcome for outcome in map(Outcome._make, self.database.execute(sql))
@@ -262,12 +281,18 @@ class Ledger:
         return list(map(Task._make, self.database.execute(sql)))
 
     def counts(self, column: str) -> dict[str, int]:
-        """Buildings by `column` ("status", "quality" or "type"), most frequent first."""
+        """Count buildings by `column`, most frequent first.
+
+        It is "status", "quality" or "type".
+        """
         sql = f"select {column}, count(*) from building group by 1 order by 2 desc, 1"
         return {key: number for key, number in self.database.execute(sql) if key is not None}
 
     def doubts(self) -> dict[Doubt, int]:
-        """Buildings whose detail tells of a doubt, of those doubts that any has."""
+        """Count buildings by the doubts in their details.
+
+        Doubts that no building has are left out.
+        """
         sql = "select count(*) from building where instr(detail, ?)"
         counts = {
             doubt: self.database.execute(sql, (doubt.value,)).fetchone()[0] for doubt in Doubt
@@ -275,14 +300,12 @@ class Ledger:
         return {doubt: count for doubt, count in counts.items() if count}
 
     def overview(self) -> Overview:
-        """How many of the buildings solved so far were modelled, how well, and what needs
-        attention.
-        """
+        """Count the buildings modelled so far, how well, and what needs attention."""
         rows = self.database.execute("select status, quality, detail, share from building")
         return Overview.of(map(BuildingOutcome._make, rows))
 
     def failed_ids(self) -> list[str]:
-        """Ids of all buildings that hit an internal error."""
+        """Return the ids of all buildings that hit an internal error."""
         return [
             id
             for (id,) in self.database.execute(
@@ -291,7 +314,7 @@ class Ledger:
         ]
 
     def failures(self, limit: int = 20) -> list[Failure]:
-        """The first buildings that hit an internal error."""
+        """Return the first buildings that hit an internal error."""
         sql = (
             "select id, detail from building where status = 'internal_error' order by position "
             "limit ?"

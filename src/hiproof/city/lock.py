@@ -1,4 +1,6 @@
-"""One run a folder: whoever works in it holds a lock that ends with its process, however that ends.
+"""The lock of a run's folder: one run at a time.
+
+It ends with its process, however that ends.
 
 SQLite does the locking, as it does for the ledger: the standard library's, one way on every system,
 across processes and over network drives that know locks; a library for nothing but this would be

@@ -26,20 +26,25 @@ SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was r
 
 
 def describe_inputs(request: Request) -> dict[str, Any]:
-    """Everything that decides the result of a building, by name: values, and size and time of the
-    files they name.
+    """Return everything that decides the result of a building, by name.
+
+    These are values, and size and time of the files that they name.
     """
     return {"version": __version__} | dict(named_values("", request, "the result"))
 
 
 def describe_selection(request: Request) -> dict[str, Any]:
-    """Everything that decides which buildings there are, as `describe_inputs` tells it."""
+    """Return everything that decides which buildings there are.
+
+    It is by name, as from `describe_inputs`.
+    """
     return dict(named_values("", request, "which buildings"))
 
 
 def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any]]:
-    """(name, JSON value) of each leaf of the dataclass `value` whose declaration says that it
-    `decides` so; the names of fields in fields are joined by dots.
+    """Yield (name, JSON value) of each deciding leaf of a dataclass.
+
+    `decides` is in the leaf's declaration; the names of fields in fields are joined by dots.
 
     What stands at a path counts of leaves that are declared to name files alone: any word may be
     the name of a folder, too.
@@ -60,7 +65,7 @@ def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any
 
 
 def with_files(value: Any) -> Any:
-    """`value` for JSON; a text that names a file or a folder goes with what stands there."""
+    """Return `value` for JSON, with the state of a file or folder it names."""
     if isinstance(value, (tuple, list)):
         return [with_files(inner) for inner in value]
     stamps = file_stamps(Path(value)) if value and isinstance(value, (str, Path)) else []
@@ -68,8 +73,9 @@ def with_files(value: Any) -> Any:
 
 
 def file_stamps(path: Path) -> list[tuple[str, int, int]]:
-    """(name, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none
-    if nothing is there.
+    """Return (name, bytes, time in ns) of a file and its companions.
+
+    They are those of the file at `path`, or of a folder's files; there are none if nothing exists.
 
     The names are those within its folder: what was moved whole is the same.
     """
@@ -90,8 +96,10 @@ def file_stamps(path: Path) -> list[tuple[str, int, int]]:
 
 
 def changed_files(new_stamps: Any, old_stamps: Any) -> str:
-    """Which files of an input differ, in brackets, from the values of `with_files` as JSON gives
-    them; empty where it names none.
+    """Return which files of an input differ, in brackets.
+
+    Stamps are the values of `with_files` as JSON gives them; the text is empty where they name
+    none.
 
     >>> changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20,
     ...     2]]])
@@ -103,7 +111,7 @@ def changed_files(new_stamps: Any, old_stamps: Any) -> str:
 
 
 def stamps_in(value: Any) -> set[tuple[str, int, int]]:
-    """All (name, bytes, time in ns) in nested lists."""
+    """Return all (name, bytes, time in ns) in nested lists."""
     if not isinstance(value, list):
         return set()
     if (
@@ -116,7 +124,7 @@ def stamps_in(value: Any) -> set[tuple[str, int, int]]:
 
 
 def compute_mark(inputs: dict[str, Any], salt: str) -> str:
-    """The mark of a run.
+    """Return the mark of a run.
 
     A slow digest with a salt where an address holds a password: nobody shall try them out on it.
     """

@@ -1,5 +1,6 @@
-"""Join the texts that the workers made into the output files, in plan order, one tile in memory at
-a time.
+"""Joining of the workers' texts into the output files.
+
+It goes in plan order, with one tile in memory at a time.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: 
 def merge(
     plan: WorkPlan, state: Path, out: Path, progress: Callable[[str, int, int], None]
 ) -> None:
-    """Write the files of the run, each whole or not at all, and remove what a killed merge left
-    unfinished.
+    """Write the files of the run, each whole or not at all.
+
+    What a killed merge left unfinished is removed.
     """
     for name in (format.file for format in FORMATS.values() if format.fragment):
         for leftover in out.glob(f".{name}-*"):
@@ -39,12 +41,15 @@ def iterate_fragments(
 
 
 def tile_parts(state: Path, tile: str) -> Path:
-    """Where the buildings of a work tile wait to be joined."""
+    """Return where the buildings of a work tile wait to be joined."""
     return state / "tiles" / f"{tile}.npz"
 
 
 def output_files(plan: WorkPlan, out: Path) -> list[Path]:
-    """All files that a run of this plan says it has written, the record of the run aside."""
+    """Return all files that a run of this plan writes.
+
+    The record of the run is left out.
+    """
     return [
         *whole_files(plan, out).values(),
         *(file for tile in plan.tiles for file in tile_files(plan, out, tile).values()),
@@ -52,22 +57,31 @@ def output_files(plan: WorkPlan, out: Path) -> list[Path]:
 
 
 def whole_files(plan: WorkPlan, out: Path) -> dict[str, Path]:
-    """Files of the whole area by format."""
+    """Return the files of the whole area by format."""
     return requested_files(plan.settings, out)
 
 
 def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
-    """Files of one work tile's models by format, where the settings ask for them."""
+    """Return the files of one work tile's models by format.
+
+    There are none unless the settings ask for them.
+    """
     return requested_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
 def write_tile(plan: WorkPlan, out: Path, tile: str, parts: list[Fragments]) -> None:
-    """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
+    """Write the models of a work tile into the folder of tiles.
+
+    That is done where the settings ask for it.
+    """
     join_fragments(tile_files(plan, out, tile), parts, plan.head)
 
 
 def remove_tiles(out: Path, pattern: str = "*") -> None:
-    """Remove the models of work tiles whose names match `pattern`; nobody else's files."""
+    """Remove the models of work tiles whose names match `pattern`.
+
+    Files of others stay.
+    """
     for file in (out / TILE_FOLDER).glob(pattern):
         if TILE_FILE.fullmatch(file.name):
             file.unlink(missing_ok=True)

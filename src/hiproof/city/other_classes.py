@@ -1,5 +1,6 @@
-"""What the points that are not of the building's class say of a building: why it has none of that
-class, or whether it stood there whenever it was scanned.
+"""The evidence of points that are not of the building's class.
+
+They tell why a building has none of that class, or whether it stood there whenever it was scanned.
 
 All is told in whole-metre cells, as the ground and the lowest of the other points are kept of a
 work tile.
@@ -30,8 +31,10 @@ ROWS = 2**32  # cells from north to south, more than a world has metres
 
 @dataclass(frozen=True)
 class OtherPoints:
-    """What lies inside a building's `area` beside the points of its class: of each cell the ground
-    (m, 3) and, where they lie high above it, the lowest of the other points (n, 3).
+    """What lies inside a building's `area` beside the points of its class.
+
+    It is of each cell the ground (m, 3) and, where they lie high above it, the lowest of the other
+    points (n, 3).
     """
 
     area: shapely.Geometry
@@ -42,7 +45,7 @@ class OtherPoints:
     def inside(
         cls, area: shapely.Geometry, ground: np.ndarray, other: np.ndarray, terrain: Terrain
     ) -> OtherPoints:
-        """Those among the `ground` and the lowest `other` points (k, 3) around the building;
+        """Select the `ground` and lowest `other` points (k, 3) inside the area.
 
         `terrain` says how high they lie.
         """
@@ -54,13 +57,14 @@ class OtherPoints:
         )
 
     def share(self, cells: np.ndarray) -> float:
-        """The share of the area that so many cells are."""
+        """Return the share of the area that so many cells are."""
         return min(1.0, len(cells) * CELL_M2 / self.area.area)
 
 
 def find_bare_cells(points: OtherPoints) -> np.ndarray:
-    """The ground points (k, 3) in whose cells nothing of another class lies high: no leaves, no
-    roof without a class.
+    """Return the ground points (k, 3) under which nothing else lies high.
+
+    There are no leaves and no roof without a class in their cells.
     """
     if not len(points.high):
         return points.ground
@@ -68,8 +72,9 @@ def find_bare_cells(points: OtherPoints) -> np.ndarray:
 
 
 def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
-    """The detail of a building without points of the building `classes`, empty where nothing else
-    was seen either.
+    """Return the detail of a building without points of its `classes`.
+
+    It is empty where nothing else was seen either.
     """
     bare = list_cells(points.ground)
     share, share_bare = (
@@ -89,8 +94,10 @@ def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
 
 
 def remark_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
-    """A remark where, over much of a building, only points of other classes lie high: in cells
-    without `roof` points (n, 3) and without ground. Empty otherwise.
+    """Return a remark where only points of other classes lie high.
+
+    They do so over much of a building, in cells without `roof` points (n, 3) and without ground. It
+    is empty otherwise.
     """
     if not is_much(points.high, points):  # a point a cell: most buildings need no further look
         return ""
@@ -105,15 +112,17 @@ def remark_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
 
 
 def is_much(cells: np.ndarray, points: OtherPoints) -> bool:
-    """Whether so many cells (n, ...) are more than chance, and more than a small share of
-    the area.
+    """Return whether so many cells (n, ...) are more than chance.
+
+    They have to be more than a small share of the area too.
     """
     return len(cells) >= FEWEST_CELLS and points.share(cells) > HALF_CLASSIFIED
 
 
 def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
-    """A remark where ground points lie under much of a building's `roof` points (n, 3), empty
-    otherwise.
+    """Return a remark where ground lies under much of a roof.
+
+    `roof` are points (n, 3). It is empty otherwise.
 
     One flight sees no ground through a roof, but two do where a house was built or pulled down
     between them.
@@ -136,16 +145,16 @@ def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
 
 
 def select_inside(area: shapely.Geometry, points: np.ndarray) -> np.ndarray:
-    """Whether (n,) points (n, 3) lie in `area` in plan."""
+    """Return whether (n,) points (n, 3) lie in `area` in plan."""
     return shapely.intersects_xy(area, points[:, 0], points[:, 1])
 
 
 def list_cells(points: np.ndarray) -> np.ndarray:
-    """The whole-metre cells (k,) that points (n, 3) lie in, each once, as one number."""
+    """Return the whole-metre cells (k,) of points (n, 3), each once, as a number."""
     return np.unique(cell_numbers(points))
 
 
 def cell_numbers(points: np.ndarray) -> np.ndarray:
-    """The whole-metre cell (n,) of each of the points (n, 3), as one number."""
+    """Return the whole-metre cell (n,) of each of the points (n, 3), as a number."""
     column, row = np.floor(points[:, :2]).astype(np.int64).T
     return column * ROWS + row

@@ -1,4 +1,4 @@
-"""The outlines of all buildings around those of a run, and the rows that touching ones form.
+"""The outlines of all buildings around a run's, and the rows they form.
 
 Outlines of neighbours are input, whether a run asks for these buildings or not. A row is all
 outlines that touch, one through the other: it is moved onto its roofs as a whole, or not at all.
@@ -27,8 +27,9 @@ shift of all footprints alone.
 
 
 class Outlines:
-    """Plan polygons in world metres: first those of a run's buildings by their number, then those
-    of others around.
+    """Plan polygons in world metres.
+
+    Those of a run's buildings come first, by their number, then those of others around.
     """
 
     def __init__(self, polygons: list[shapely.Polygon]):
@@ -43,8 +44,9 @@ class Outlines:
 
     @functools.cached_property
     def boxes(self) -> np.ndarray:
-        """Boxes (n, 4) of what each outline is moved with: its row, or itself where that is too
-        long.
+        """Boxes (n, 4) of what each outline is moved with.
+
+        That is its row, or itself where the row is too long.
         """
         bounds, labels = shapely.bounds(self.polygons), self.labels
         lower, upper = (
@@ -63,8 +65,9 @@ class Outlines:
         return np.split(order, np.cumsum(np.bincount(self.labels))[:-1])
 
     def row(self, index: int) -> list[shapely.Polygon]:
-        """The outlines of the row of outline `index`, itself among them, in an order of their own;
-        none of too long a row.
+        """Return the outlines of the row of outline `index`, itself among them.
+
+        They have an order of their own; there are none of too long a row.
         """
         row = self.polygons[self.members[self.labels[index]]]
         bounds = shapely.total_bounds(row)
@@ -74,7 +77,7 @@ class Outlines:
 
 
 def row_outline(row: list[shapely.Polygon]) -> shapely.Polygon:
-    """One outline around a row, slits between its houses closed."""
+    """Return one outline around a row, slits between its houses closed."""
     if len(row) == 1:
         return row[0]
     grown = shapely.union_all(shapely.buffer(row, TOUCH_M / 2, join_style="mitre"))

@@ -1,5 +1,6 @@
-"""What a run says that it has written, and whether it still stands: size and digest of each file,
-kept in the ledger.
+"""The files that a run has written: size and digest, in the ledger.
+
+They show whether a file still stands.
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ RESTLESS = ((18, 20), (24, 28), (92, 100))
 
 
 def claims(files: Iterable[Path], out: Path) -> list[Claim]:
-    """What a run in `out` says of each of `files`."""
+    """Return the record of each of `files` of a run in `out`."""
     return [
         Claim(file.relative_to(out).as_posix(), file.stat().st_size, digest(file)) for file in files
     ]
 
 
 def broken_claims(claims: Iterable[Claim], out: Path) -> list[str]:
-    """Names of those files that are gone or not as they were written; sizes are asked before
-    digests.
+    """Return the names of files that are missing or changed.
+
+    Sizes are compared before digests.
     """
     return [claim.name for claim in claims if not stands(out / claim.name, claim)]
 
@@ -39,9 +41,7 @@ def stands(file: Path, claim: Claim) -> bool:
 
 
 def digest(file: Path) -> str:
-    """SHA-256 of a file's content, without what changes in a GeoPackage that is merely
-    looked at.
-    """
+    """Return the SHA-256 of a file's content."""
     sha = hashlib.sha256()
     with open(file, "rb") as content:
         head = bytearray(content.read(CHUNK_BYTES))

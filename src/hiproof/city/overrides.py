@@ -1,5 +1,6 @@
-"""Overrides of a run: read, matched to its buildings, and remembered, so that a run with others
-redoes those buildings alone.
+"""Overrides of a run: read, matched to its buildings, and remembered.
+
+A run with others redoes those buildings alone.
 """
 
 from __future__ import annotations
@@ -35,9 +36,10 @@ MOST_SHOWN_IDS = 5  # ids in a sentence; more would hide what is said
 def settle_overrides(
     path: str | None, plan: WorkPlan, state: Path, ledger: Ledger, is_new: bool
 ) -> None:
-    """Keep the overrides at `path` for the workers; of a run that is not `is_new`, open the tiles
-    of buildings whose override is another than before. Raises InputError for a file that cannot be
-    read or contradicts itself.
+    """Keep the overrides at `path` for the workers.
+
+    Of a run that is not `is_new`, the tiles are opened of buildings whose override is another than
+    before. Raises InputError for a file that cannot be read or contradicts itself.
     """
     records = match_overrides(dict(read_overrides(path)) if path else {}, plan)
     digests = {index: digest_override(record) for index, record in records.items()}
@@ -63,8 +65,9 @@ def settle_overrides(
 def tiles_to_redo(
     changed: set[int], plan: WorkPlan, state: Path, ledger: Ledger
 ) -> dict[str, list[int]]:
-    """By tile the buildings to solve: those `changed`, what a killed run left to redo, and all of a
-    tile not solved yet.
+    """Return the buildings to solve, by tile.
+
+    They are those `changed`, what a killed run left to redo, and all of a tile not solved yet.
     """
     finished = {task.name for task in ledger.tasks() if task.state == "done"}
     remainder, redo = load_redo(state), {}
@@ -80,8 +83,9 @@ def tiles_to_redo(
 
 
 def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """(id, record) of every override in a JSONL file or a table; those of a parameters.jsonl are
-    lists of parts.
+    """Yield (id, record) of every override in a JSONL file or a table.
+
+    Those of a parameters.jsonl are lists of parts.
     """
     visited: dict[str, dict[str, Any]] = {}
     for where, record in override_records(path):
@@ -99,7 +103,7 @@ def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """(where, record) of every line or row."""
+    """Yield (where, record) of every line or row."""
     if str(path).lower().endswith(TABLE_ENDINGS):
         yield from (
             (f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1)
@@ -118,8 +122,9 @@ def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def is_other_line(record: Any) -> bool:
-    """Whether a line of a parameters.jsonl says nothing of how to build: its head, and buildings
-    without a model.
+    """Return whether a line of a parameters.jsonl is no override.
+
+    Its head and buildings without a model say nothing of how to build.
     """
     return isinstance(record, dict) and (
         HEAD_KEY in record or ("status" in record and not record.get("parts"))
@@ -127,7 +132,10 @@ def is_other_line(record: Any) -> bool:
 
 
 def table_records(path: str) -> list[dict[str, Any]]:
-    """The rows of a table; numbers that a CSV holds as text become numbers."""
+    """Return the rows of a table.
+
+    Numbers that a CSV holds as text become numbers.
+    """
     import pyogrio
 
     from ..read.vector_file import translate_read_errors
@@ -155,8 +163,9 @@ def table_records(path: str) -> list[dict[str, Any]]:
 def match_overrides(
     records: dict[str, dict[str, Any]], plan: WorkPlan
 ) -> dict[int, dict[str, Any]]:
-    """The overrides by the number of their building, with those that columns of the footprints
-    hold; unknown ones are told.
+    """Return the overrides by the number of their building.
+
+    Those that columns of the footprints hold are among them; unknown ones are reported.
     """
     names, result, remainder = pair_columns(plan), {}, dict(records)
     impossible = SkippedValues("columns of the footprints")
@@ -181,7 +190,9 @@ def match_overrides(
 
 
 def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str) -> dict[str, Any]:
-    """What a file says of building `id`, and of what columns say that which can be beside it.
+    """Merge a file's override of building `id` with that of columns.
+
+    Values of columns stay that can stand beside the file's.
 
     Raises InputError where columns contradict themselves.
 
@@ -206,7 +217,9 @@ def is_override(record: dict[str, Any]) -> bool:
 
 
 def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
-    """(column of the footprints, key of an override) as the settings pair them.
+    """Pair columns of the footprints with keys of an override.
+
+    The settings name the pairs.
 
     Raises InputError for those that are not there.
     """
@@ -233,8 +246,9 @@ def refuse_others(names: list[str], allowed: Sequence[str], subject: str) -> Non
 def column_override(
     job: Job, names: list[tuple[str, str]], impossible: SkippedValues
 ) -> dict[str, Any]:
-    """The override in the columns of a building's footprint, empty where they say nothing; what
-    cannot be is noted.
+    """Return the override in the columns of a building's footprint.
+
+    It is empty where they hold nothing; impossible values are noted.
     """
     attributes = job.footprint.attributes if job.footprint else {}
     result = impossible.possible(
@@ -248,7 +262,9 @@ def digest_override(record: dict[str, Any]) -> str:
 
 
 def load_redo(state: Path) -> dict[str, list[int]]:
-    """The buildings to redo by tile, empty where whole tiles are to be solved.
+    """Load the buildings to redo by tile.
+
+    It is empty where whole tiles are to be solved.
 
     Raises OutputError for a damaged file.
     """
@@ -264,8 +280,9 @@ def load_redo(state: Path) -> dict[str, list[int]]:
 
 
 def load_overrides(state: Path) -> dict[int, Override]:
-    """The overrides of the run whose state is in `state`, by the number of their building; read
-    once a process.
+    """Load the overrides of a run by the number of their building.
+
+    The run's state is in `state`; it is read once a process.
     """
     path = state / OVERRIDES_FILE
     return parse_overrides(path, path.stat().st_mtime_ns) if path.exists() else {}

@@ -1,5 +1,6 @@
-"""What is to be done: the buildings asked for, the work tile that owns each, and the
-point files.
+"""The plan of a run.
+
+It has the requested buildings, the work tile that owns each, and the point files.
 """
 
 from __future__ import annotations
@@ -58,8 +59,9 @@ class Job:
 
 @dataclass(frozen=True)
 class WorkPlan:
-    """Everything a worker needs to know, kept as JSON in the run's folder: a line for the whole,
-    then a line a building.
+    """Everything a worker needs to know, kept as JSON in the run's folder.
+
+    The file has a line for the whole, then a line a building.
 
     What a task reads (its point file, the terrain model) comes with the task: an address may hold a
     password. `names` are the CityJSON id and the gml:id of those buildings whose own id will not
@@ -85,15 +87,17 @@ class WorkPlan:
 
     @property
     def terrain_reach_m(self) -> float:
-        """How far around a building terrain matters: farther where the ground must be found
-        first.
+        """How far around a building terrain matters.
+
+        It is farther where the ground must be found first.
         """
         return FOUND_GROUND_REACH_M if self.settings.read.roofs == "shape" else GROUND_REACH_M
 
     @functools.cached_property
     def around_m(self) -> float:
-        """How far beyond its area a building sees roof points: those of neighbours tell where its
-        own roof ends.
+        """How far beyond its area a building sees roof points.
+
+        Those of neighbours show where its own roof ends.
         """
         sees = self.settings.read.by_class and any(job.footprint is not None for job in self.jobs)
         return AROUND_M if sees else 0.0
@@ -110,7 +114,9 @@ class WorkPlan:
 
     @functools.cached_property
     def roof_boxes(self) -> np.ndarray:
-        """Whole-metre boxes (n, 4) in which buildings see roof points, upper sides excluded;
+        """Whole-metre boxes (n, 4) in which buildings see roof points.
+
+        Upper sides are excluded.
 
         NaN where an area is empty.
 
@@ -124,16 +130,18 @@ class WorkPlan:
 
     @functools.cached_property
     def units(self) -> Units:
-        """Units of the clouds' and the footprints' coordinates; everything in between counts in
-        metres.
+        """Units of the coordinates of clouds and footprints.
+
+        Everything in between is in metres.
         """
         from ..read.crs import find_units
 
         return find_units(self.crs(), unit_name=self.settings.read.unit)
 
     def crs(self) -> Any:
-        """The output's reference system, None where no input names one; by its code where that says
-        all of it, so that also its plan alone has one.
+        """Return the output's reference system, None where no input names one.
+
+        It is made by its code where that is complete, so that also its plan alone has one.
         """
         return parse_crs(crs_text(self.crs_wkt))
 
@@ -170,7 +178,10 @@ class WorkPlan:
 
     @staticmethod
     def load(path: Path) -> WorkPlan:
-        """The plan at `path`. Raises OutputError where it is missing or damaged."""
+        """Load the plan at `path`.
+
+        Raises OutputError where it is missing or damaged.
+        """
         try:
             with path.open(encoding="utf-8") as file:
                 whole, rows = json.loads(file.readline()), [json.loads(line) for line in file]
@@ -197,8 +208,9 @@ class WorkPlan:
 
 
 def read_job(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
-    """A building of the plan's file: [id, area, attributes, error]; no attributes without a
-    footprint.
+    """Read a building of the plan's file.
+
+    It is [id, area, attributes, error], without attributes if there is no footprint.
     """
     id, _, attributes, error = row
     if attributes is None:
@@ -207,14 +219,14 @@ def read_job(index: int, row: list, area: shapely.Polygon, shift: tuple[float, f
 
 
 def make_job(index: int, footprint: Footprint, shift: tuple[float, float]) -> Job:
-    """The building of a footprint that lies `shift` beside its roof."""
+    """Make the job of a footprint that lies `shift` beside its roof."""
     area = without_needless_vertices(footprint.polygon)[0]
     area = shapely.transform(area, lambda xy: xy + shift) if any(shift) else area
     return Job(index, footprint.id, area, dataclasses.replace(footprint, shift=shift))
 
 
 def load_plan(folder: Path) -> WorkPlan:
-    """The plan of the run whose state is in `folder`, read once a process."""
+    """Load the plan of the run whose state is in `folder`, once a process."""
     path = folder / PLAN_FILE
     return loaded_plan(path, path.stat().st_mtime_ns)
 
@@ -225,8 +237,9 @@ def loaded_plan(path: Path, stamp: int) -> WorkPlan:
 
 
 def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
-    """Names in CityJSON and CityGML of the jobs that cannot go by their own id there, or where two
-    ids would meet.
+    """Return names in CityJSON and CityGML of some jobs.
+
+    They are those that cannot go by their own id there, or whose ids would meet.
     """
     json_names, gml_names, unusual = UniqueNames(), UniqueNames(), {}
     for job in jobs:
@@ -237,14 +250,18 @@ def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
 
 
 def choose_file_offset(jobs: tuple[Job, ...], units: Units) -> np.ndarray:
-    """The CityJSON file's offset (3,) in its `units`, from the first area that is one."""
+    """Return the CityJSON file's offset (3,), by the first area.
+
+    It is in the file's `units`.
+    """
     corners = (units.from_metres(job.area.bounds[:2]) for job in jobs if not job.area.is_empty)
     return next(map(choose_offset, corners), np.zeros(3))
 
 
 def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, limit: int) -> dict[str, tuple[int, ...]]:
-    """Work tiles by name: the buildings whose area starts in the same square, at most `limit` in a
-    tile.
+    """Return the work tiles by name, with their buildings.
+
+    A tile has at most `limit` buildings, whose area starts in the same square.
 
     A building belongs to the square of its lower left corner, so ownership needs no geometry and
     has no ties.
@@ -263,7 +280,10 @@ def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, limit: int) -> dict[str
 def make_jobs(
     footprints: tuple[Footprint, ...], shift: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[Job, ...]:
-    """One job a footprint, in the order of the file; all lie `shift` beside their roofs."""
+    """Return one job a footprint, in the order of the file.
+
+    All lie `shift` beside their roofs.
+    """
     if not footprints:
         raise InputError(
             "expected at least one polygon in the footprints, got none; check the file and its "
@@ -273,8 +293,9 @@ def make_jobs(
 
 
 def neighbourhood(job: Job, reach_m: float) -> np.ndarray:
-    """Box (xmin, ymin, xmax, ymax) around a job's area in which terrain points matter, on whole
-    metres of the world.
+    """Return the box around a job's area in which terrain points matter.
+
+    It is (xmin, ymin, xmax, ymax), on whole metres of the world.
 
     Whole metres keep the terrain cells of a building the same whatever tile it is computed in.
     """

@@ -1,4 +1,4 @@
-"""Make the plan of a run: which buildings there are, from footprints or from the cloud itself."""
+"""Making the plan of a run, from footprints or from the cloud itself."""
 
 from __future__ import annotations
 
@@ -44,7 +44,10 @@ MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a kille
 
 
 def make_plan(request: Request) -> WorkPlan:
-    """The plan of a request. Raises InputError when nothing can be read."""
+    """Make the plan of a request.
+
+    Raises InputError when nothing can be read.
+    """
     from ..read.terrain import read_terrain
     from .frame import plan_bounds, settle_frame
 
@@ -86,7 +89,10 @@ def make_plan(request: Request) -> WorkPlan:
 
 
 def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> None:
-    """One line where the CRS of the files is made for another place than that of the buildings."""
+    """Warn once where the files' CRS is made for another place.
+
+    That is another place than that of the buildings.
+    """
     from ..read.overlap import doubtful_place
 
     boxes = shapely.bounds([job.area for job in jobs])
@@ -101,9 +107,10 @@ def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> N
 
 
 def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
-    """Read what lies under the buildings, so that damage ends the run before work is spent, and
-    warn in one line where no building has a height there: the ground points that stand in for it
-    would else be taken in silence.
+    """Read the terrain under the buildings before work is spent.
+
+    Damage ends the run. A line warns where no building has a height there: the ground points that
+    stand in for it would else be taken in silence.
     """
     corners = shapely.get_coordinates([job.area for job in jobs])
     if not len(corners) or terrain.knows_any(corners):
@@ -121,8 +128,9 @@ def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
 
 
 def list_places(corners: np.ndarray) -> np.ndarray:
-    """Places (k, 2), 8 by 8 of them over the box of `corners` (n, 2): where buildings are to be
-    looked for first.
+    """Return places (k, 2), 8 by 8 of them, over the box of `corners` (n, 2).
+
+    Buildings are looked for there first.
     """
     x, y = (
         np.linspace(lower, upper, 8)
@@ -132,15 +140,18 @@ def list_places(corners: np.ndarray) -> np.ndarray:
 
 
 def limit_buildings_per_tile(settings: Settings) -> int:
-    """Progress is told by tiles, and the paper's objective takes seconds a building: there each is
-    a tile of its own.
+    """Return the most buildings of a tile.
+
+    Progress counts tiles, and the paper's objective takes seconds a building: there each is a tile
+    of its own.
     """
     return 1 if settings.fit.objective == "paper" else MOST_BUILDINGS_A_TILE
 
 
 def read_headers(clouds: tuple[str, ...]) -> list:
-    """Headers of the point files that can be read and hold points; one that does not ends
-    no run.
+    """Return the headers of the point files that hold points.
+
+    A file that cannot be read does not end the run.
     """
     from ..read.pointcloud import as_input_error, format_others, read_header
 
@@ -167,8 +178,10 @@ def read_headers(clouds: tuple[str, ...]) -> list:
 def jobs_from_footprints(
     request: Request, headers: list, frame: AreaFrame, settings: Settings
 ) -> tuple[tuple[Job, ...], tuple[shapely.Polygon, ...], Registration | None]:
-    """A job a footprint, the outlines around that were not asked for, and the common shift by which
-    all are moved; None where it is not looked for.
+    """Return one job a footprint, other outlines, and the common shift.
+
+    The outlines are those around that were not requested. All are moved by the shift, None where it
+    is not looked for.
     """
     from ..read.overlap import check_overlap
     from .frame import plan_bounds
@@ -201,7 +214,10 @@ def jobs_from_footprints(
 def select_neighbours(
     footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]
 ) -> list[Footprint]:
-    """Those of the data set near the footprints that are asked for, and not these."""
+    """Return those of a data set near the requested footprints.
+
+    These themselves are left out.
+    """
     if data_set is footprints:
         return []
     polygons_requested = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
@@ -219,8 +235,9 @@ def select_neighbours(
 
 
 def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[Footprint, ...]:
-    """The footprints within the clouds, whichever are asked for; of a database those that its own
-    condition lets through.
+    """Return the footprints within the clouds, requested or not.
+
+    Of a database they are those that its own condition lets through.
 
     What is odd about them has been said of those that are asked for.
     """
@@ -259,8 +276,9 @@ def read_requested_footprints(
 def footprint_operations(
     request: Request, frame: AreaFrame, jobs: tuple[Job, ...]
 ) -> list[Operation]:
-    """The operation by which footprints came to the clouds' CRS; said by a warning when they were
-    read.
+    """Return the operation that took footprints to the clouds' CRS.
+
+    A warning said so when they were read.
     """
     if frame.cloud is None or frame.footprints is None:
         return []
@@ -272,8 +290,9 @@ def footprint_operations(
 def terrain_operations(
     terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job, ...]
 ) -> list[Operation]:
-    """The operation by which places come to the terrain model's CRS, with a warning where it is
-    coarse.
+    """Return the operation that takes places to the terrain model's CRS.
+
+    A warning says where it is coarse.
     """
     from ..read.operations import warn_if_coarse
 
@@ -286,8 +305,9 @@ def terrain_operations(
 
 
 def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> list[Operation]:
-    """The operation by which coordinates come to the CRS of the files, with a warning where it is
-    coarse.
+    """Return the operation that takes coordinates to the files' CRS.
+
+    A warning says where it is coarse.
     """
     from ..read.operations import warn_if_coarse
 
@@ -300,8 +320,9 @@ def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> li
 def list_operations(
     subject: str, source: Any, target: Any, frame: AreaFrame, jobs: tuple[Job, ...]
 ) -> list[Operation]:
-    """The operation from `source` to `target` in plan where the buildings stand; none where both
-    are the same.
+    """Return the operation between two CRSs in plan, at the buildings.
+
+    There is none where both are the same.
     """
     from ..read.crs import horizontal_crs, names_place, same_horizontal
     from ..read.operations import find_operation
@@ -325,8 +346,9 @@ def list_operations(
 
 
 def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) -> None:
-    """One line, before any work, where footprints have more attributes than a GeoPackage has
-    columns.
+    """Warn before any work of more attributes than a GeoPackage has columns.
+
+    They are the footprints'.
     """
     count = len({name for footprint in footprints for name in footprint.attributes})
     if count > (room := attributes_with_a_column()):
@@ -339,7 +361,9 @@ def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) 
 
 
 def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[Job, ...]:
-    """Those of the `jobs` that meet the box asked for, numbered again; all where none is.
+    """Return the `jobs` that meet the requested box, numbered again.
+
+    Without a box they are all.
 
     Raises InputError where none does.
     """
@@ -354,8 +378,9 @@ def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[
 
 
 def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
-    """A box that meets none of the clouds' boxes (n, 4), both in the clouds' own unit, is refused
-    before anything is read.
+    """Refuse a box that meets none of the clouds' boxes (n, 4).
+
+    Both are in the clouds' own unit. It is refused before anything is read.
     """
     if (
         bbox is None

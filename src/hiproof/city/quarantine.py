@@ -1,4 +1,6 @@
-"""Work that keeps killing its process: run it alone, and find the building that does it.
+"""Work that keeps killing its process.
+
+It runs alone, so that the building that does it is found.
 
 A process may also die of what others do (a kill from outside, memory taken by a neighbour). So
 nothing is blamed before it has died TRIES times with nothing beside it.
@@ -18,8 +20,9 @@ TRIES = 3
 
 
 def run_isolated(single: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
-    """(result, error) of `function(*task)` in an isolated executor, tried again when its process
-    dies.
+    """Return (result, error) of `function(*task)` in an isolated executor.
+
+    It is tried again when its process dies.
     """
     for _ in range(TRIES):
         ((_, result, error),) = single.run(function, [task])
@@ -29,15 +32,17 @@ def run_isolated(single: Any, function: Callable, task: tuple) -> tuple[Any, Exc
 
 
 def is_loss(error: Exception | None) -> bool:
-    """Whether a task ended because its process died or had no memory left."""
+    """Return whether a task ended with its process or for want of memory."""
     return isinstance(error, (WorkerLost, MemoryError))
 
 
 def solve_in_quarantine(
     single: Any, function: Callable, task: tuple
 ) -> tuple[Any, Exception | None]:
-    """The rows of `solve_tile` for its arguments `task` (folder, tile, terrain), without the
-    buildings that kill their process: they become internal errors.
+    """Solve a tile without the buildings that kill their process.
+
+    `task` (folder, tile, terrain) are the arguments of `solve_tile`, whose rows are returned. Such
+    buildings become internal errors.
 
     Where the tile as a whole kills its process even alone, its buildings are tried one by one.
     """

@@ -1,4 +1,6 @@
-"""The common shift of a run's footprints onto its roofs, estimated before there are work tiles.
+"""The common shift of a run's footprints onto its roofs.
+
+It is estimated before there are work tiles.
 
 The data set is all footprints of the file within the clouds, whichever of them --where or --bbox
 choose, and the roof points in a sample of its squares of CELL_M. The sample follows from the places
@@ -42,8 +44,9 @@ Cell = tuple[int, int]
 
 
 def is_registered(settings: Settings) -> bool:
-    """Whether footprints of a run with these settings are registered: where classes tell roof
-    points.
+    """Return whether footprints of a run with these settings are registered.
+
+    They are where classes mark roof points.
     """
     return settings.reconstruct.align != "off" and settings.read.by_class
 
@@ -54,8 +57,9 @@ def find_registration(
     units: Units,
     settings: Settings,
 ) -> Registration:
-    """Estimate the common shift of `footprints` onto the roof points of the files with
-    `headers`.
+    """Estimate the common shift of `footprints` onto roof points.
+
+    Points are those of the files with `headers`.
     """
     polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
     boxes = read_boxes(headers, units)
@@ -84,7 +88,10 @@ def warn_if_moved(registration: Registration, path: str) -> None:
 
 
 def read_boxes(headers: list[PointFileHeader], units: Units) -> np.ndarray:
-    """Boxes (n, 4) of point files in world metres; the whole plane where a header knows none."""
+    """Return boxes (n, 4) of point files in world metres.
+
+    It is the whole plane where a header knows none.
+    """
     bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
     boxes = units.to_metres(bounds.reshape(-1, 2)).reshape(-1, 4)
     unknown = ~np.isfinite(boxes).all(axis=1)
@@ -93,7 +100,7 @@ def read_boxes(headers: list[PointFileHeader], units: Units) -> np.ndarray:
 
 
 def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
-    """How many footprints have their lower left corner in each square that has any."""
+    """Count the footprints with their lower left corner in each square."""
     lower = np.floor(shapely.bounds(polygons).reshape(-1, 4)[:, :2] / SAMPLE_CELL_M).astype(
         np.int64
     )
@@ -102,8 +109,9 @@ def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
 
 
 def sample_cells(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:
-    """Squares to look at, drawn by a hash of their place, and the numbers of the files that hold
-    them.
+    """Sample squares, and return the numbers of the files that hold them.
+
+    A hash of their place draws them.
 
     `number_of` counts the footprints of each square, `boxes` (n, 4) are those of the files.
     """
@@ -123,23 +131,23 @@ def sample_cells(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Ce
 
 
 def hash_cell(cell: Cell) -> bytes:
-    """A number as good as a draw, the same on every machine."""
+    """Return a number as good as a draw, the same on every machine."""
     return hashlib.blake2b(f"{cell[0]} {cell[1]}".encode(), digest_size=8).digest()
 
 
 def expand_cell(cell: Cell, around_m: float = 0.0) -> tuple[float, float, float, float]:
-    """The square of a cell with a margin: (xmin, ymin, xmax, ymax)."""
+    """Return the square of a cell with a margin: (xmin, ymin, xmax, ymax)."""
     x, y = SAMPLE_CELL_M * cell[0], SAMPLE_CELL_M * cell[1]
     return x - around_m, y - around_m, x + SAMPLE_CELL_M + around_m, y + SAMPLE_CELL_M + around_m
 
 
 def meets(boxes: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
-    """Which of `boxes` (n, 4) meet `box`."""
+    """Return which of `boxes` (n, 4) meet `box`."""
     return np.all(boxes[:, :2] <= box[2:], axis=1) & np.all(boxes[:, 2:] >= box[:2], axis=1)
 
 
 def find_polygons(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
-    """The footprints in and around a cell."""
+    """Return the footprints in and around a cell."""
     return list(
         tree.geometries[np.sort(tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M))))]
     )
@@ -148,8 +156,9 @@ def find_polygons(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
 def points_by_cell(
     cells: list[Cell], paths: list[str], units: Units, building_classes: tuple[int, ...]
 ) -> dict[Cell, np.ndarray]:
-    """Roof points (n, 2) of the `cells`, of all files that can be read: the step that sorts points
-    names the others.
+    """Return the roof points (n, 2) of the `cells`, of all readable files.
+
+    The step that sorts points names the others.
     """
     result: dict[Cell, list[np.ndarray]] = {}
     targets = set(cells)
@@ -162,7 +171,7 @@ def points_by_cell(
 
 
 def split_by_cell(xy: np.ndarray, targets: set[Cell]) -> Iterator[tuple[Cell, np.ndarray]]:
-    """The points (n, 2) of each wanted cell among `xy`."""
+    """Yield the points (n, 2) of each wanted cell among `xy`."""
     places, number = number_cells(np.floor(xy / SAMPLE_CELL_M))
     for k, (i, j) in enumerate(places.tolist()):
         if (i, j) in targets:
@@ -170,7 +179,10 @@ def split_by_cell(xy: np.ndarray, targets: set[Cell]) -> Iterator[tuple[Cell, np
 
 
 def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[PointCloud]:
-    """The chunks of a file that may hold points of the cells, up to where it breaks off."""
+    """Yield the chunks of a file that may hold points of the cells.
+
+    They go up to where the file breaks off.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # the step that sorts points says them
         try:
@@ -184,7 +196,10 @@ def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[Poin
 
 
 def read_chunks(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[PointCloud]]:
-    """What to read of a file: of one with a spatial index only what lies near the cells."""
+    """Return what to read of a file.
+
+    Of one with a spatial index it is only what lies near the cells.
+    """
     boxes = [expand_cell(cell) for cell in cells]
     if file_kind(path) != "las":
         return [iter_points(path, units=units)]

@@ -1,4 +1,4 @@
-"""Run a building again that a run failed on, from the bundle that the run kept of it."""
+"""Running a building again on which a run failed, from its bundle."""
 
 from __future__ import annotations
 
@@ -39,8 +39,9 @@ def solve_bundle(folder: Path, out: Path) -> tuple[Building, str]:
 
 
 def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
-    """Repeat the search for buildings in the area of the plan's building where it ended in an
-    error.
+    """Search again for buildings in the area where the search failed.
+
+    It is the area of the plan's building.
 
     `points` (n, 3) by kind are those of the bundle.
     """

@@ -16,8 +16,9 @@ FILES_FIELD = {"names": "files"}
 
 @dataclass(frozen=True)
 class Request:
-    """A run: the point clouds (files, addresses), the folder `out` for the results, and how the one
-    becomes the other.
+    """A run: point clouds, the folder `out` for the results, and options.
+
+    Clouds are files and addresses.
 
     `footprints` (file, address or database) with their `layer`, the `id_attribute` that names them,
     an SQL condition `where` and a `bbox` (xmin, ymin, xmax, ymax) in the coordinates of the clouds

@@ -1,4 +1,7 @@
-"""A run's own folder: opened, held against what is asked for, and gone on from or begun anew."""
+"""A run's own folder.
+
+It is opened, compared with the request, and resumed or begun anew.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,10 @@ LEDGER_BYTES = 200_000  # of an empty one with its journal; where less is free t
 
 
 def open_state(out: Path) -> Path:
-    """The run's own folder inside the output folder, made if need be."""
+    """Return the run's own folder inside the output folder.
+
+    It is made if need be.
+    """
     state = Path(out) / ".hiproof"
     try:
         state.mkdir(parents=True, exist_ok=True)
@@ -46,8 +52,9 @@ def open_state(out: Path) -> Path:
 
 
 def open_ledger(state: Path, restart: bool) -> Ledger:
-    """The ledger of a run; one that is damaged or of another version is dropped where the run
-    begins anew.
+    """Open the ledger of a run.
+
+    One that is damaged or of another version is dropped where the run begins anew.
     """
     path = state / "ledger.sqlite"
     try:
@@ -73,8 +80,10 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
 
 
 def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
-    """The plan of an earlier run of the same request whose files stand as it left them, else a new
-    one; where the footprints changed since, a new one that takes over what is known of the others.
+    """Return the plan of an earlier run of the same request, or a new one.
+
+    The earlier one holds where its files stand as it left them. Where the footprints changed since,
+    the new one takes over what is known of the others.
     """
     new_items = False
     plan = None if request.restart else plan_to_go_on(request, state, ledger)
@@ -103,7 +112,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
 
 
 def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | None:
-    """The plan of the run that the folder holds, None where it holds none to go on from.
+    """Return the plan of the run in the folder that may resume, or None.
 
     Raises OutputError for another's.
     """
@@ -142,19 +151,23 @@ def enter(request: Request, ledger: Ledger) -> None:
 
 
 def is_of(inputs: dict, ledger: Ledger) -> bool:
-    """Whether the run in the folder is that of these inputs."""
+    """Return whether the run in the folder is that of these inputs."""
     return ledger.get("mark") == compute_mark(inputs, ledger.get("salt") or "")
 
 
 def is_begun(ledger: Ledger) -> bool:
-    """Whether any task is done: a run that ended before, by a setting that is wrong, is nothing to
-    keep.
+    """Return whether any task is done.
+
+    A run that ended before, by a wrong setting, is nothing to keep.
     """
     return any(task.state == "done" for task in ledger.tasks())
 
 
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
-    """Raise OutputError, naming what differs, where the folder holds a run of another request."""
+    """Raise OutputError where the folder holds a run of another request.
+
+    The error names what differs.
+    """
     if is_of(inputs, ledger):
         return
     old_inputs, new_inputs = (
@@ -175,8 +188,9 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
 
 
 def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
-    """Raise OutputError where PROJ no longer transforms coordinates as it did when the run was
-    planned.
+    """Raise OutputError where PROJ transforms coordinates in another way.
+
+    That is another way than when the run was planned.
     """
     from ..read.operations import is_current
 
@@ -191,8 +205,9 @@ def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
 
 
 def stands(out: Path, ledger: Ledger) -> bool:
-    """Whether a run may go on from what is there: not where files of a finished run were removed or
-    changed since.
+    """Return whether a run may resume from what exists.
+
+    It may not where files of a finished run were removed or changed since.
     """
     broken = broken_claims(ledger.claims(), Path(out)) if ledger.get("merged") == "yes" else []
     if broken:
@@ -204,12 +219,15 @@ def stands(out: Path, ledger: Ledger) -> bool:
 
 
 def has_parts(plan: WorkPlan, state: Path) -> bool:
-    """Whether the texts of all work tiles are still there."""
+    """Return whether the texts of all work tiles still exist."""
     return all(tile_parts(state, tile).exists() for tile in plan.tiles)
 
 
 def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
-    """Remove files that an earlier run wrote and this one will not: they would pass for its own."""
+    """Remove files that an earlier run wrote and this one will not.
+
+    They would pass for its own.
+    """
     earlier, requested = {claim.name for claim in ledger.claims()}, whole_files(plan, out).values()
     for name in (format.file for format in FORMATS.values() if format.fragment):
         if name in earlier and out / name not in requested:
@@ -217,8 +235,9 @@ def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
 
 
 def forget(state: Path, ledger: Ledger) -> None:
-    """Drop all that an earlier run in this folder has left of its state (output files that it will
-    replace stay until then).
+    """Drop all state of an earlier run in this folder.
+
+    Output files that this run will replace stay until then.
     """
     remove_tiles(state.parent)
     remove_bundles(state.parent)

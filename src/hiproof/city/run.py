@@ -1,5 +1,6 @@
-"""The main job over an area: plan, sort, solve, merge; each step goes on where an earlier run
-stopped.
+"""The main job over an area: plan, sort, solve, merge.
+
+Each step resumes where an earlier run stopped.
 """
 
 from __future__ import annotations
@@ -48,8 +49,10 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Summary:
-    """What came of it: where the models are, how many buildings were modelled and how well,
-    buildings by status and type, input that could not be used, seconds by step.
+    """The result of a run.
+
+    It says where the models are, how many buildings were modelled and how well, counts buildings by
+    status and type, and names input that could not be used, with the seconds of each step.
     """
 
     models: tuple[Path, ...]
@@ -71,8 +74,10 @@ class Summary:
 
     @property
     def exit_code(self) -> int:
-        """0 all modelled or explained by their data, 1 an internal error, 2 some input could not be
-        read.
+        """The exit code of the run.
+
+        0 is for all modelled or explained by their data, 1 for an internal error, 2 for input that
+        could not be read.
         """
         if self.by_status.get("internal_error"):
             return 1
@@ -82,8 +87,9 @@ class Summary:
 def reconstruct_area(
     request: Request, progress: Progress = lambda step, done, total: None
 ) -> Summary:
-    """Reconstruct every building of an area into `request.out`; see the package's docstring for the
-    steps.
+    """Reconstruct every building of an area into `request.out`.
+
+    The package's docstring has the steps.
 
     Raises InputError, SettingsError or OutputError (full sentences) when the run cannot start or go
     on, or when another one works in that folder; what was done so far stays, and the same call goes
@@ -96,7 +102,7 @@ def reconstruct_area(
 
 
 def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> Summary:
-    """The steps of a run that has its folder `state` to itself."""
+    """Run the steps of a run that has its folder `state` to itself."""
     clock = Clock()
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
@@ -142,7 +148,7 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
 
 
 def count_processes(request: Request, plan: WorkPlan, state: Path, ledger: Ledger) -> int:
-    """As many as pay for the buildings that are left to do."""
+    """Return as many processes as pay for the buildings left to do."""
     remainder, redo = (
         [name.partition(":")[2] for name in ledger.open_tasks("solve")],
         load_redo(state),
@@ -152,7 +158,7 @@ def count_processes(request: Request, plan: WorkPlan, state: Path, ledger: Ledge
 
 
 def list_compiled_pieces(request: Request) -> tuple[str, ...]:
-    """What of the compiled code the run needs."""
+    """Return the pieces of compiled code that the run needs."""
     besides = RECOGNISING if asks_network(request.settings) else ()
     if request.footprints is None:
         return (*WITHOUT_FOOTPRINTS, *besides)
@@ -179,8 +185,9 @@ def work_off(
     arguments: Callable[[str], tuple],
     progress: Progress,
 ) -> None:
-    """Run all open tasks of a kind; one whose process dies is tried again, and after MOST_LOSSES
-    alone.
+    """Run all open tasks of a kind.
+
+    One whose process dies is tried again, and after MOST_LOSSES alone.
 
     `arguments` are those of `function` by the name of a task.
     """
@@ -210,15 +217,20 @@ def work_off(
 def iterate_started(
     ledger: Ledger, names: list[str], arguments: Callable[[str], tuple]
 ) -> Iterator[tuple]:
-    """The tasks' arguments, each entered as running when an executor takes it."""
+    """Yield the tasks' arguments, and record each as running.
+
+    That happens when an executor takes it.
+    """
     for name in names:
         ledger.start(name)
         yield arguments(name)
 
 
 def task_arguments(request: Request, state: Path, name: str) -> tuple:
-    """The arguments of a task: the run's folder, the number or name of what it works on, and the
-    address that it reads.
+    """Return the arguments of a task.
+
+    They are the run's folder, the number or name of what it works on, and the address that it
+    reads.
     """
     kind, key = name.split(":", 1)
     folder = str(state.absolute())
@@ -228,7 +240,10 @@ def task_arguments(request: Request, state: Path, name: str) -> tuple:
 
 
 def absolute(name: str) -> str:
-    """A path that means the same to a worker started elsewhere; addresses stay as they are."""
+    """Return a path that means the same to a worker started elsewhere.
+
+    Addresses stay as they are.
+    """
     return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
 
 
@@ -262,7 +277,10 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
 def run_task_isolated(
     ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple
 ) -> None:
-    """A task whose process died again and again, in a process of its own; see quarantine.py."""
+    """Run a task whose process kept dying in a process of its own.
+
+    See quarantine.py.
+    """
     LOGGER.warning(
         "%s was lost %s and is now tried alone", name, count_things(ledger.losses(name), "time")
     )
@@ -278,7 +296,9 @@ def run_task_isolated(
 
 
 def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
-    """A clear sentence when no file could be read, or none holds a point of the building classes.
+    """Raise InputError when no file holds usable points.
+
+    None could be read, or none holds a point of the building classes.
 
     A run that goes on is past the second: it may have read a few runs of points alone, near what it
     does again.
@@ -333,8 +353,9 @@ def request_name(task: str, request: Request) -> str:
 
 
 def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
-    """run.json: version, effective settings, inputs, counts, timings: the only file of a run that
-    knows the time.
+    """Write run.json: version, settings, inputs, counts and timings.
+
+    It is the only file of a run that knows the time.
     """
     footprints = choose_footprints(request)
     record = {

@@ -1,5 +1,6 @@
-"""Reconstruct the buildings of one work tile and leave their parts of the output files, ready to be
-joined.
+"""Reconstruction of the buildings of one work tile.
+
+Their parts of the output files are left ready to be joined.
 """
 
 from __future__ import annotations
@@ -68,8 +69,9 @@ BESIDE_ALL_M = 10.0
 
 
 class Surroundings:
-    """All points of a work tile, ready to be asked building by building, and the terrain model if
-    there is one.
+    """All points of a work tile, and its terrain model if there is one.
+
+    They are looked up building by building.
     """
 
     def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
@@ -80,7 +82,7 @@ class Surroundings:
         self.shifts: dict[int, Shift] = {}
 
     def find_row_shift(self, job: Job) -> Shift:
-        """How far the job's area lies beside its roof, as that of its whole row does."""
+        """Return the shift of a job's area from its roof, that of its whole row."""
         row = (
             self.plan.outlines.row(job.index)
             if self.plan.moves_rows and not job.area.is_empty
@@ -101,7 +103,10 @@ class Surroundings:
         return self.shifts[label]
 
     def move(self, job: Job) -> tuple[Job, str]:
-        """The job with its area on its roof, and a remark where its row was moved there."""
+        """Return the job with its area on its roof, and a remark.
+
+        The remark is for a row that was moved there.
+        """
         shift = self.find_row_shift(job)
         if job.footprint is None:
             return job, ""
@@ -115,8 +120,9 @@ class Surroundings:
         return make_job(job.index, job.footprint, whole), remark
 
     def select_roof_points(self, job: Job) -> FoundRoof:
-        """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be
-        moved onto them.
+        """Return the roof points (n, 3) inside the job's area, or near it.
+
+        Its footprint may have to be moved onto those near.
 
         A point that stands in two files comes twice. Roofs found by shape, or alone, are those
         inside the area.
@@ -133,8 +139,10 @@ class Surroundings:
         return found_roof(nearby, job.area, height, job.footprint is not None)
 
     def select_noise(self, job: Job, roof: np.ndarray) -> np.ndarray:
-        """Points (m, 3) of noise classes in the job's area that lie higher than half of its `roof`
-        points (n, 3): where they are many they are a spire, not birds.
+        """Return noise points (m, 3) over the job's area that lie high.
+
+        They lie higher than half of its `roof` points (n, 3): where they are many they are a spire,
+        not birds.
         """
         if job.area.is_empty or not len(roof) or not len(self.noise):
             return np.zeros((0, 3))
@@ -142,8 +150,9 @@ class Surroundings:
         return without_repeats(noise[noise[:, 2] > np.median(roof[:, 2])])
 
     def select_points(self, job: Job, reach_m: float) -> np.ndarray:
-        """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the
-        building, each once.
+        """Return points (n, 3) that may be roofs around a building, each once.
+
+        They lie in the whole-metre box that reaches so far.
         """
         lower, upper = neighbourhood(job, reach_m).reshape(2, 2)
         nearby = self.roof[self.grid.candidates((*lower, *upper))]
@@ -152,8 +161,10 @@ class Surroundings:
         )
 
     def ground_to_leave_out(self, job: Job) -> TerrainChain:
-        """The ground around the building; the terrain model's alone among roofs cut out beforehand,
-        whose lowest are no ground.
+        """Return the ground around the building.
+
+        Among roofs cut out beforehand, whose lowest points are no ground, it is the terrain model's
+        alone.
         """
         from ..classify.cut_out import is_cut_out
 
@@ -168,8 +179,9 @@ class Surroundings:
         )
 
     def find_grounds(self, job: Job) -> list[Terrain | None]:
-        """The terrain model, the ground points in the whole-metre box around the building, and the
-        ground found there.
+        """Return the terrain model, ground points and ground of a building.
+
+        They are those in the whole-metre box around it.
         """
         box = neighbourhood(job, self.plan.terrain_reach_m)
         result = WhereSeen(BareAround(self.low, box), lambda: self.has_points_around(job, box))
@@ -177,8 +189,9 @@ class Surroundings:
         return [self.model and WhereLikeGround(self.model, points), points, result]
 
     def has_points_around(self, job: Job, box: np.ndarray) -> bool:
-        """Whether anything beside the building is known: else the lowest points are the roof's
-        own.
+        """Return whether anything beside the building is known.
+
+        Otherwise the lowest points are the roof's own.
         """
         points = self.low.inside(box)
         outline = grow_polygon(shapely.simplify(job.area, COARSEST_THINNING_M), BESIDE_M)
@@ -188,8 +201,9 @@ class Surroundings:
         )
 
     def choose_terrain(self, job: Job) -> TerrainChain | None:
-        """What answers for the ground around the building: that of `find_grounds`, else the lowest
-        points.
+        """Return the terrain around the building.
+
+        It is that of `find_grounds`, else the lowest points.
         """
         if job.area.is_empty:
             return None
@@ -198,8 +212,9 @@ class Surroundings:
         return TerrainChain([*self.find_grounds(job), lowest])
 
     def remark_terrain(self, job: Job) -> str:
-        """A remark where the terrain model contradicts the ground points around a building; empty
-        otherwise.
+        """Return a remark where the terrain model contradicts ground points.
+
+        They lie around a building. It is empty otherwise.
         """
         if self.model is None or job.area.is_empty:
             return ""
@@ -209,7 +224,7 @@ class Surroundings:
         )
 
     def select_other_points(self, job: Job) -> OtherPoints | None:
-        """What lies inside the building's area beside the points of its class;
+        """Return the points of other classes inside the building's area.
 
         None where classes tell no roofs.
         """
@@ -220,9 +235,10 @@ class Surroundings:
         return OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
 
     def bare(self, job: Job, result: FoundRoof, neighbours: OtherPoints | None) -> np.ndarray:
-        """Points (n, 3) of bare ground inside the building's area: those of the ground class where
-        nothing of another class stands over them, and those that were told from the roof by their
-        height.
+        """Return points (n, 3) of bare ground inside the building's area.
+
+        They are of the ground class where nothing of another class stands over them, or were told
+        from the roof by their height.
         """
         if job.area.is_empty or job.footprint is None:
             return result.ground
@@ -232,7 +248,9 @@ class Surroundings:
         return np.concatenate([result.ground, classified])
 
     def inspect(self, building: Building, points: OtherPoints | None, roof: np.ndarray) -> Building:
-        """The building with what the points of other classes say of it, where classes tell roofs;
+        """Return the building with the remarks of other classes' points.
+
+        They are made where classes mark roofs.
 
         `roof` (n, 3) are its own.
         """
@@ -254,7 +272,9 @@ class Surroundings:
 def solve_tile(
     folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
 ) -> list[Outcome]:
-    """Reconstruct all buildings of `tile` over the terrain model `terrain` and write its part file.
+    """Reconstruct all buildings of `tile`, and write its part file.
+
+    They stand on the terrain model `terrain`.
 
     `avoid` are the buildings that killed their worker before: they become internal errors without
     being tried again. Returns a row a building for the ledger.
@@ -288,8 +308,9 @@ def solve_tile(
 
 
 def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
-    """The texts of buildings that need not be made again, by number: all of a tile but those whose
-    override changed.
+    """Return the texts of buildings that need not be made again, by number.
+
+    They are all of a tile but those whose override changed.
     """
     redo = load_redo(root).get(tile)
     if redo is None or set(redo) == set(plan.tiles[tile]):
@@ -302,7 +323,10 @@ def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
 def terrain_model(
     path: str | None, crs_wkt: str | None, units: Units, thread: int
 ) -> RasterTerrain | None:
-    """The terrain model, opened once a thread: GDAL's data sets are not to be shared."""
+    """Return the terrain model, opened once a thread.
+
+    GDAL's data sets are not to be shared.
+    """
     from pyproj import CRS
 
     return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
@@ -323,7 +347,9 @@ def solve_one(
     override: Override | None = None,
     keep: Callable[[Job, str, Callable[[], TerrainRecorder | None]], None] = keep_nothing,
 ) -> tuple[Building, Fragments]:
-    """One building and its texts, whatever happens: an exception becomes its status.
+    """Return one building and its texts, whatever happens.
+
+    An exception becomes its status.
 
     `keep` is called with the traceback.
 
@@ -376,7 +402,7 @@ def solve_one(
 def recorded_terrain(
     plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None
 ) -> TerrainRecorder | None:
-    """Solve the building again to record the heights of the terrain model that it looks up;
+    """Solve the building again, recording the terrain heights it looks up.
 
     None without a model.
     """
@@ -396,8 +422,9 @@ def reconstruct_job(
     surroundings: Surroundings,
     override: Override | None,
 ) -> Building:
-    """The building fitted to the `used_points` of its `points` (n, 3) and judged by all, noise over
-    it included; or as its override says.
+    """Reconstruct a building from `used_points`, or by its override.
+
+    It is fitted to these and judged by all `points` (n, 3), noise over it included.
 
     `bare` (m, 3) are points of bare ground inside its area.
     """
@@ -419,15 +446,16 @@ def reconstruct_job(
 
 
 def thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:
-    """Those of `points` (n, 3), each once, that are not among the `used_points` (m, 3)."""
+    """Return the `points` (n, 3), each once, not among `used_points` (m, 3)."""
     if len(used_points) == len(points):
         return points[:0]
     return points[~np.isin(hashes(points), hashes(used_points))]
 
 
 def add_full_density(building: Building, in_use: int, count: int) -> Building:
-    """The building with the density of all its `count` points, not of those `in_use`; a model says
-    that it is fitted to these.
+    """Add the density of all `count` points to a building.
+
+    A model says that it is fitted to those `in_use`.
     """
     quality = dataclasses.replace(
         building.quality, density=building.quality.density * count / in_use
@@ -439,8 +467,9 @@ def add_full_density(building: Building, in_use: int, count: int) -> Building:
 
 
 def remark_missing_ground(building: Building) -> str:
-    """A remark where no ground was found around a building: volume and height over ground then hang
-    on a wall's usual height.
+    """Return a remark where no ground was found around a building.
+
+    Volume and height over ground then depend on a wall's usual height.
     """
     if building.built is None or not building.ground_source.startswith("assumed"):
         return ""
@@ -451,18 +480,18 @@ def remark_missing_ground(building: Building) -> str:
 
 
 def keeps_empty(plan: WorkPlan) -> bool:
-    """Whether a footprint on which nothing stands is to have a model."""
+    """Return whether a footprint on which nothing stands gets a model."""
     return plan.settings.reconstruct.empty_footprints == "model"
 
 
 def make_unseen_building(job: Job, result: FoundRoof) -> Building:
-    """A building whose outline holds no roof, as far as its points tell."""
+    """Make a building whose outline holds no roof, as far as points show."""
     status = Status.NO_BUILDING if result.is_ground and job.footprint else Status.NO_ROOF
     return add_input(Building(job.id, status, result.remark), job)
 
 
 def add_input(building: Building, job: Job) -> Building:
-    """Add the outline and the attributes that the input has for a building without a model."""
+    """Add the input's outline and attributes to a building without a model."""
     if job.footprint is None:
         return dataclasses.replace(building, footprint=largest_polygon(job.area))
     footprint, attributes = largest_polygon(job.footprint.polygon), job.footprint.attributes

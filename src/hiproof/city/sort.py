@@ -1,5 +1,6 @@
-"""Read each point file once, in chunks, and leave for each work tile the points its buildings may
-need.
+"""Sorting of points into work tiles.
+
+Each point file is read once, in chunks, and each tile gets the points that its buildings may need.
 
 Roof points are those of the building classes in the whole-metre box of a building; terrain points
 those of the ground classes in the wider box around it; of all others the lowest a cell is kept, in
@@ -47,8 +48,9 @@ QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its p
 
 @dataclass(frozen=True)
 class Reach:
-    """Where the points of a tile's buildings may lie: whole-metre boxes (m, 4) of the areas and of
-    their surroundings.
+    """The boxes in which points of a tile's buildings may lie.
+
+    They are whole-metre boxes (m, 4) of the areas and of their surroundings.
     """
 
     roof_boxes: np.ndarray
@@ -62,8 +64,9 @@ class Reach:
 
     @cached_property
     def mask(self) -> np.ndarray:
-        """A byte a whole-metre cell (columns, rows): bit 0 in a roof box, bit 1 in a terrain
-        box.
+        """A byte a whole-metre cell (columns, rows).
+
+        Bit 0 is in a roof box, bit 1 in a terrain box.
         """
         lower, upper = self.bounds[:2], self.bounds[2:]
         mask = np.zeros((upper - lower).astype(int), np.uint8)
@@ -73,15 +76,17 @@ class Reach:
         return mask
 
     def bits(self, xy: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """The mask (k,) at the points `xy[index]` of (n, 2 or more), 0 outside the bounds; boxes
-        exclude upper sides.
+        """Return the mask (k,) at the points `xy[index]` of (n, 2 or more).
+
+        It is 0 outside the bounds; boxes exclude upper sides.
         """
         return mask_at(self.mask, xy, index, *self.bounds[:2])
 
 
 class Reaches:
-    """Reach of every work tile that has an area to gather points for, found by place; made once a
-    process.
+    """The reach of every work tile that needs points, found by place.
+
+    It is made once a process.
 
     Where `only` names tiles, and of each the buildings that points are wanted for, it is the reach
     of these alone.
@@ -109,11 +114,14 @@ class Reaches:
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
 
     def near(self, box: Iterable[float]) -> list[str]:
-        """Names, in plan order, of the tiles whose reach meets `box` (xmin, ymin, xmax, ymax)."""
+        """Return names of the tiles whose reach meets a box, in plan order.
+
+        `box` is (xmin, ymin, xmax, ymax).
+        """
         return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
 
     def compute_bounds(self, tiles: Sequence[str]) -> np.ndarray:
-        """Boxes (t, 4) of the tiles' reaches."""
+        """Return boxes (t, 4) of the tiles' reaches."""
         return self.bounds[[self.place[tile] for tile in tiles]].reshape(-1, 4)
 
     def of(self, tile: str) -> Reach:
@@ -123,15 +131,17 @@ class Reaches:
 
 @functools.lru_cache(maxsize=1)
 def load_reaches(root: Path, stamp: int) -> Reaches:
-    """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone,
-    theirs alone.
+    """Load the reaches of the plan in `root`.
+
+    Its file has the time `stamp`. Where buildings are redone, they are theirs alone.
     """
     return Reaches(load_plan(root), load_redo(root) or None)
 
 
 class Gatherer:
-    """Collects the points of one file by work tile and writes them to `folder`, as often as memory
-    asks for it.
+    """A collector of one file's points by work tile.
+
+    It writes them to `folder`, as often as memory asks for it.
     """
 
     def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
@@ -173,7 +183,10 @@ class Gatherer:
             self.flush()
 
     def classify_las_classes(self) -> np.ndarray:
-        """ROOF, GROUND, OTHER or NOISE (256,) by LAS class; a class that is both counts as roof."""
+        """Return ROOF, GROUND, OTHER or NOISE (256,) by LAS class.
+
+        A class that is both counts as roof.
+        """
         kinds = np.full(256, OTHER, np.uint8)
         for classes, kind in (
             (NOISE_CLASSES, NOISE),
@@ -189,7 +202,10 @@ class Gatherer:
             self.held += len(points)
 
     def flush(self) -> None:
-        """Write what is held, a file a tile; done again after a kill it writes the same files."""
+        """Write what is held, a file a tile.
+
+        Done again after a kill, it writes the same files.
+        """
         for tile, result in sorted(self.found.items()):
             with atomic_file(self.folder / tile / f"{self.number}-{self.flushes}.npz") as file:
                 arrays: dict[str, Any] = {
@@ -233,16 +249,18 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
 
 
 def newest(*paths: Path) -> int:
-    """The latest time [ns] of those files that are there."""
+    """Return the latest time [ns] of those files that exist."""
     return max(path.stat().st_mtime_ns for path in paths if path.exists())
 
 
 def wanted_points(
     path: str, reaches: Reaches, units: Units, noted: Path, result: list[np.ndarray] | None = None
 ) -> Iterator[PointCloud]:
-    """All chunks of a file in `units`; of one with a spatial index, or where a part of the area is
-    wanted and `noted` is the file that tells where its points lie, only what holds buildings'
-    surroundings. Where it is read from end to end, `result` is told so (noted.py).
+    """Yield the chunks of a file in `units` that may be needed.
+
+    They are all of its chunks; of a file with a spatial index, or where a part of the area is
+    wanted and `noted` is the file with the places of its points, only what holds buildings'
+    surroundings. Where it is read from end to end, `result` gets these places (noted.py).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)
@@ -261,7 +279,9 @@ def wanted_points(
 
 
 def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
-    """Points of a COPC file in the boxes that hold buildings' surroundings.
+    """Yield a COPC file's points around buildings.
+
+    They lie in the boxes that hold buildings' surroundings.
 
     The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at
     their common borders are decoded twice. A point on a border may come twice, as in files that
@@ -290,7 +310,10 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
 
 
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
-    """Points (n, 3) of a work tile from all files, by kind: "roof", "ground", "low", "noise"."""
+    """Load the points (n, 3) of a work tile from all files, by kind.
+
+    Kinds are "roof", "ground", "low" and "noise".
+    """
     # a name that starts with a dot is what a killed worker left unfinished
     files = sorted(
         path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith(".")

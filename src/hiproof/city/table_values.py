@@ -1,4 +1,6 @@
-"""Values of a table's or the footprints' columns as the keys of an override want them.
+"""Values of columns, converted to those of an override.
+
+Columns are a table's or the footprints'.
 
 Columns are filled by people and programs: text stands where numbers should, and codes such as
 -9999, or a block height of 0, stand for "unknown". What no building can have is left out and
@@ -32,7 +34,10 @@ class SkippedValues:
     values: dict[str, list[str]] = field(default_factory=dict)
 
     def possible(self, record: Mapping[str, Any], id: str) -> dict[str, Any]:
-        """The record without values that say nothing or cannot be; the latter are noted."""
+        """Return the record without empty and impossible values.
+
+        The latter are noted.
+        """
         result = {}
         for key, value in record.items():
             value = convert_value(key, value)
@@ -45,7 +50,7 @@ class SkippedValues:
         return result
 
     def warn(self) -> None:
-        """One line for each key of which values were left out."""
+        """Warn once for each key of which values were left out."""
         for key, values in self.values.items():
             lower, upper = possible_range(key) or (0.0, 0.0)
             subset = ", ".join(values[:MOST_SHOWN_VALUES]) + (
@@ -60,7 +65,7 @@ class SkippedValues:
 
 
 def convert_value(key: str, value: Any) -> Any:
-    """A table's value as the override's key wants it.
+    """Convert a table's value to that of the override's key.
 
     >>> convert_value("z_ground", "0"), convert_value("leave_out", "0"), convert_value("id", 7)
     (0.0, False, '7')
@@ -76,7 +81,7 @@ def convert_value(key: str, value: Any) -> Any:
 
 
 def is_empty(value: Any) -> bool:
-    """Whether a cell is empty. A 0 is a value.
+    """Return whether a cell is empty. A 0 is a value.
 
     >>> is_empty(0.0), is_empty(None), is_empty(" ")
     (False, True, True)
@@ -87,7 +92,9 @@ def is_empty(value: Any) -> bool:
 
 
 def is_possible(key: str, value: Any) -> bool:
-    """Whether a building can have the value: a number within the key's range; other keys have none.
+    """Return whether a building can have the value.
+
+    It is a number within the key's range; other keys have none.
 
     >>> is_possible("z_ground", -9999), is_possible("parts", 0), is_possible("parts",
     ...     [{}]), is_possible("note", -9999)

@@ -26,7 +26,7 @@ ALL = (*WITHOUT_FOOTPRINTS, *RECOGNISING)
 
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:
-    """See sort.py."""
+    """Sort a point file; see sort.py."""
     from . import sort
 
     return sort.sort_cloud(folder, number, address)
@@ -35,14 +35,14 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
 def solve_tile(
     folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
 ) -> list[Outcome]:
-    """See solve.py."""
+    """Solve a work tile; see solve.py."""
     from . import solve
 
     return solve.solve_tile(folder, tile, terrain, avoid)
 
 
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:
-    """See warm.py."""
+    """Compile ahead of the work; see warm.py."""
     from . import warm
 
     warm.make_ready(pieces, own)

@@ -1,5 +1,6 @@
-"""A terrain model against the ground points around a building: where the two contradict each other,
-the points count.
+"""A terrain model against the ground points around a building.
+
+Where the two contradict each other, the points count.
 
 A terrain model may be of another height system or another date, and a raster may hold codes for "no
 data" that its file does not declare. The cloud's own ground points fit the cloud's roofs, so they
@@ -34,16 +35,18 @@ class TerrainModel(Terrain, Protocol):
 
 
 class WhereLikeGround:
-    """A terrain model that knows nothing where it lies far from the `ground` points; where these
-    are unknown it counts.
+    """A terrain model, unknown where it lies far from the `ground` points.
+
+    Where these are unknown it counts.
     """
 
     def __init__(self, model: Terrain, ground: Terrain):
         self.model, self.ground, self.source = model, ground, model.source
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """The model's height (n,) at `xy_world` (n, 2), NaN where it has none or contradicts the
-        ground points.
+        """Return the model's height (n,) at `xy_world` (n, 2).
+
+        It is NaN where it has none or contradicts the ground points.
         """
         heights = self.model.height_at(xy_world)
         gap = np.abs(heights - self.ground.height_at(xy_world))
@@ -51,8 +54,10 @@ class WhereLikeGround:
 
 
 def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
-    """A remark where the terrain model has no true height at some of the corners `xy` (n, 2) of an
-    outline, or lies far above or below the ground points there. Empty otherwise.
+    """Return a remark where the terrain model has no true height.
+
+    It has none at some of the corners `xy` (n, 2) of an outline, or lies far above or below the
+    ground points there. The remark is empty otherwise.
     """
     coded = model.is_coded_at(xy)
     if coded.any():

@@ -1,5 +1,6 @@
-"""Compile before any work starts, in as many processes as there are cores; later runs only look at
-a mark.
+"""Compiling before any work starts, in as many processes as cores.
+
+Later runs only look at a mark.
 
 The processes are fresh ones that run `warm_pieces`, one piece of the code after the other, so that
 what pieces share of numba's own is compiled once a process: where they cannot be started, or one
@@ -26,8 +27,9 @@ from .cores import cores
 
 
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:
-    """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news`
-    tells.
+    """Compile those of the `pieces` that no run compiled before.
+
+    It takes a minute or so, which `news` reports.
 
     Code that came with hiproof for processors like this one will do, unless it is to be its `own`.
     """
@@ -78,8 +80,10 @@ def keep_mark(file: Path) -> None:
 
 
 def compiled_pieces(remainder: Iterator[str]) -> Iterator[str]:
-    """Have a process of its own compile pieces while any are `remainder`, which other threads take
-    from as well; each that came to its end. The process' functions count as ready here too.
+    """Compile pieces in a process while any remain.
+
+    `remainder` is shared with other threads. Yields each that came to its end. The process'
+    functions count as ready here too.
     """
     command = [sys.executable, "-m", "hiproof.city.warm_pieces"]
     pipes: dict[str, Any] = {
@@ -106,13 +110,17 @@ def compiled_pieces(remainder: Iterator[str]) -> Iterator[str]:
 
 
 def environment() -> dict[str, str]:
-    """This process's, with its places to import from, and the processor to compile for."""
+    """Return the environment of a compiling process.
+
+    It has this process's places to import from, and the processor for which code is compiled.
+    """
     path = os.pathsep.join(filter(None, sys.path))
     return {**os.environ, "PYTHONPATH": path, "NUMBA_CPU_NAME": read_processor()}
 
 
 def mark(piece: str, stamp: str, processor: str) -> str:
-    """The name of a piece's mark: another state of any compiled source, another processor or Python
-    has another.
+    """Return the name of a piece's mark.
+
+    Another state of any compiled source, another processor or Python has another.
     """
     return f"warm.{piece}.{processor}-{stamp}-run.{kept.PYTHON}.nbc"

@@ -1,5 +1,6 @@
-"""What a run compiles, in pieces that share next to nothing, so that several processes can compile
-at the same time.
+"""The compiled code of a run, in pieces that share next to nothing.
+
+So several processes can compile at the same time.
 
     echo check | python -m hiproof.city.warm_pieces # the names of functions as they become ready, a
     line each
@@ -30,7 +31,7 @@ L_OUTLINE = shapely.box(0.0, 0.0, 6.0, 7.0) | shapely.box(6.0, 2.0, 9.0, 7.0)
 
 
 def house() -> np.ndarray:
-    """Points (n, 3) of a gable and a flat annex over OUTLINE."""
+    """Return points (n, 3) of a gable and a flat annex over OUTLINE."""
     x, y = (
         axis.ravel() for axis in np.meshgrid(np.arange(0.3, 9.0, 0.6), np.arange(0.3, 7.0, 0.6))
     )
@@ -38,8 +39,9 @@ def house() -> np.ndarray:
 
 
 def moves() -> None:
-    """The search for volumes; their moves come first, so that `planes` is ready elsewhere when it
-    is needed.
+    """Compile the search for volumes.
+
+    Moves come first, so that `planes` is ready elsewhere when it is needed.
     """
     from ..fit.union import fit_building
     from ..fit.union.improve import improve, simplify
@@ -54,7 +56,7 @@ def moves() -> None:
 
 
 def planes() -> None:
-    """The planes and gables that the search begins with."""
+    """Compile the planes and gables with which the search begins."""
     from ..fit.union.candidates import HOUSE, candidates_of
 
     _, scene = make_house_scene()
@@ -62,7 +64,7 @@ def planes() -> None:
 
 
 def make_house_scene() -> tuple:
-    """The plan of the house and the scene that the search sees."""
+    """Return the plan of the house, and the search's scene."""
     from ..fit.union.allowed import allowed_shapes
     from ..fit.union.plan import lay_out_plan
     from ..fit.union.scene import directions_of, scene_of
@@ -74,7 +76,7 @@ def make_house_scene() -> tuple:
 
 
 def check() -> None:
-    """The check of a solid, and of a bent face."""
+    """Compile the check of a solid, and of a bent face."""
     from ..compose import check_solid
     from ..compose.bends import bent_faces
     from ..model import Face, Solid
@@ -88,8 +90,9 @@ def check() -> None:
 
 
 def solid() -> None:
-    """Plan cells, the closed shell, its quality and its texts; a building of three points is
-    composed without a fit.
+    """Compile plan cells, the closed shell, its quality and its texts.
+
+    A building of three points is composed without a fit.
     """
     from ..compose import compose
     from ..frames import LocalFrame
@@ -105,21 +108,27 @@ def solid() -> None:
 
 
 def single() -> None:
-    """One primitive by itself: what a roof without a footprint, or `--parts one`, begins with."""
+    """Compile the fit of one primitive by itself.
+
+    A roof without a footprint, or `--parts one`, begins with it.
+    """
     from ..fit import fit_roof
 
     fit_roof(house())
 
 
 def warm_recognition() -> None:
-    """What the network is given of a cloud."""
+    """Compile the arrangement of a cloud for the network."""
     from ..segment.arrange import Layout, arrange
 
     arrange(house(), Layout())
 
 
 def outlines() -> None:
-    """What runs without footprints draw: touching houses told apart, the outline of each."""
+    """Compile what runs without footprints draw.
+
+    Touching houses are separated, and each gets an outline.
+    """
     from ..classify.houses import separate_houses
     from ..fit.outline import estimate_outline
 
@@ -128,8 +137,9 @@ def outlines() -> None:
 
 
 def points() -> None:
-    """Sorting points into work tiles, those of one building, the ground around it, whether its
-    footprint lies off.
+    """Compile the sorting of points, and what a building needs of them.
+
+    These are those of one building, the ground around it, and whether its footprint lies off.
     """
     from ..fit.align import find_shift
     from ..read.assign import PointGrid
@@ -151,8 +161,9 @@ PIECES: dict[str, Callable[[], None]] = {
 
 
 def main() -> None:
-    """Compile the pieces whose names come in, a line each, and print the names of functions as they
-    become ready; after each piece its own.
+    """Compile the pieces whose names come in, a line each.
+
+    Prints the names of functions as they become ready; after each piece its own.
     """
     reported: set[str] = set()
 
