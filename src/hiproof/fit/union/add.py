@@ -13,7 +13,7 @@ from .improve import improve
 from .nearby import look_around, put_back
 from .objective import costs, objective
 from .refit import refit
-from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, roof_heights
+from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, is_fixed, roof_heights
 
 MOST_VOLUMES = 24  # of one building: a bound on time
 TRIED_EACH_WAY = 2  # candidates of the largest gain that are tried in earnest
@@ -126,7 +126,9 @@ def with_neighbour_cut(volumes, joined, scene, best, lowest, value, least):
     where it begins."""
     last = len(joined) - 1
     for j in range(1, last):
-        if joined[j, DIRECTION] != joined[last, DIRECTION] or not overlap(joined[j], joined[last]):
+        if is_fixed(joined, j) or joined[j, DIRECTION] != joined[last, DIRECTION]:
+            continue
+        if not overlap(joined[j], joined[last]):
             continue
         for edge in range(4):
             low, high = joined[j, U0 + (edge & 2)], joined[j, U1 + (edge & 2)]

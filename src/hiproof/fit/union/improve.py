@@ -25,7 +25,7 @@ from .moves import (
 )
 from .nearby import look_around, put_back
 from .objective import objective
-from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1
+from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1, is_fixed
 
 AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
 DIGEST_STEP = 0.02  # of metres and of slopes: changes smaller than this are none
@@ -42,7 +42,7 @@ def improve(volumes, scene, value, slopes, rounds):
     for _ in range(rounds):
         before = value
         for k in range(len(volumes)):
-            if k == 0 or is_unsettled(volumes, k):
+            if is_unsettled(volumes, k) or (k == 0 and not is_fixed(volumes, k)):
                 volumes, value = refitted(volumes, scene, value, k)
         for k in range(1, len(volumes)):
             if is_unsettled(volumes, k):
@@ -112,8 +112,8 @@ def without_base(volumes, scene, value):
 
 @compiled
 def is_unsettled(volumes, k):
-    """Whether volume k or what is around it changed since no move helped there."""
-    return volumes[k, SETTLED] != surroundings(volumes, k)
+    """Whether volume k may change, and it or what is around it did since no move helped there."""
+    return not is_fixed(volumes, k) and volumes[k, SETTLED] != surroundings(volumes, k)
 
 
 @compiled

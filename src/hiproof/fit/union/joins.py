@@ -30,6 +30,7 @@ from .volumes import (
     V0,
     V1,
     distance_up,
+    is_fixed,
     plane_count,
 )
 
@@ -54,7 +55,9 @@ def merge_volumes(volumes, scene, value, steepest):
 def merge_with_others(volumes, scene, value, k, steepest):
     """Volume k and another become one over both rectangles, where neither is steeper than `steepest`."""
     for j in range(1, len(volumes)):
-        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or max_slope(volumes, j, k) > steepest:
+        if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
+            continue
+        if max_slope(volumes, j, k) > steepest:
             continue
         trial = volumes.copy()
         for edge in range(4):
@@ -94,7 +97,9 @@ def join_neighbours(volumes, scene, value, k):
 def take_in(volumes, scene, value, k):
     """Volume k takes the one plane of a volume at its end as its own: a steep end is no roof in front of a gable."""
     for j in range(1, len(volumes)):
-        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or plane_count(volumes[j]) != 1:
+        if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
+            continue
+        if plane_count(volumes[j]) != 1:
             continue
         side = np.argmin(volumes[j, OFFSET : OFFSET + PLANES])
         if side == LEVEL or volumes[k, OFFSET + side] < np.inf or plane_count(volumes[k]) < 2:
@@ -165,7 +170,9 @@ def running_on(volumes, k, side):
         return 0
     across = 2 - 2 * (side // 2)
     for j in range(1, len(volumes)):
-        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or volumes[j, OFFSET + side] == np.inf:
+        if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
+            continue
+        if volumes[j, OFFSET + side] == np.inf:
             continue
         along = np.abs(volumes[j, U0 + across : U0 + across + 2] - volumes[k, U0 + across : U0 + across + 2]).max()
         within = volumes[k, U0 + 2 * (side // 2)] < volumes[j, U0 + (side ^ 1)] < volumes[k, U1 + 2 * (side // 2)]
@@ -189,7 +196,9 @@ def sloping_towards(volumes, k, side):
     across, sign = 2 - 2 * (side // 2), -1.0 if side % 2 == 0 else 1.0
     low, high = volumes[k, U0 + across], volumes[k, U1 + across]
     for j in range(1, len(volumes)):
-        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or volumes[j, OFFSET + side] == np.inf:
+        if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
+            continue
+        if volumes[j, OFFSET + side] == np.inf:
             continue
         overlap = min(high, volumes[j, U1 + across]) - max(low, volumes[j, U0 + across])
         begins = sign * (volumes[j, U0 + (side ^ 1)] - volumes[k, U0 + side])

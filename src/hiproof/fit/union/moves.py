@@ -37,6 +37,7 @@ from .volumes import (
     coefficients,
     distance_up,
     equalise_slopes,
+    is_fixed,
     is_within,
     lowest,
     plane_count,
@@ -79,6 +80,8 @@ def without(volumes, k):
 def refit_each(volumes, scene, value):
     """Every volume refitted once, where that helps."""
     for k in range(len(volumes)):
+        if is_fixed(volumes, k):
+            continue
         volumes, value = refitted(volumes, scene, value, k)
     return volumes, value
 
@@ -105,8 +108,10 @@ def drop_volumes(volumes, scene, value):
     """Volumes that do not pay go."""
     k = 1
     while k < len(volumes):
-        trial = without(volumes, k)
-        found = objective(trial, scene, value - LEAST_GAIN)
+        trial, found = volumes, np.inf
+        if not is_fixed(volumes, k):
+            trial = without(volumes, k)
+            found = objective(trial, scene, value - LEAST_GAIN)
         if found < np.inf:
             volumes, value = trial, found
         else:

@@ -14,7 +14,7 @@ from .improve import change_planes
 from .moves import refitted, settled, without
 from .objective import objective
 from .scene import Scene
-from .volumes import DIRECTION, NUMBER, SETTLED, U0, U1, V0, V1, roof_heights
+from .volumes import DIRECTION, NUMBER, SETTLED, U0, U1, V0, V1, is_fixed, roof_heights
 from .whole import PLACE, Whole
 from .window import change_in_window
 
@@ -136,6 +136,7 @@ def leave_out(whole: Whole, rows: np.ndarray, scene: Scene, value: float, k: int
         return (trial, found) if found < value - LEAST_GAIN else (rows, value)
     around = whole.extent_of(rows[k]).widen(TOUCH_M)
     near = [q for q in range(1, len(trial)) if around.overlaps(whole.extent_of(trial[q]))]
+    near = [q for q in near if not is_fixed(trial, q)]
     for _ in range(LEFT_OUT_ROUNDS):
         for q in near:
             found = move_edges(trial, scene, q, found, EVERYWHERE)

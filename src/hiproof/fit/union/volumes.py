@@ -24,7 +24,8 @@ U0, U1, V0, V1 = 1, 2, 3, 4  # columns of a volume's row: its rectangle
 SLOPE, OFFSET = 5, 9  # columns of the four slopes, and of the five planes' offsets
 TIE, REPLACES = 14, 15  # columns: which slopes are equal, and whether it replaces what lies below
 LEAN = 16  # first column of how far each plane faces off its axis
-SETTLED = 20  # column: a digest of the surroundings in which no move was found for it
+# column: a digest of the surroundings in which no move was found for it, infinite where it is fixed
+SETTLED = 20
 # column: the number of a volume among the whole roof's while a window of it is searched, 0 for a new volume
 NUMBER = 21
 COLUMNS = 22  # of a row
@@ -61,6 +62,12 @@ def coefficients(volumes, k):
 def rectangle(volumes, k):
     """Where volume k begins and ends along u and along v."""
     return volumes[k, 1], volumes[k, 2], volumes[k, 3], volumes[k, 4]
+
+
+@compiled(inline="always")
+def is_fixed(volumes, k):
+    """Whether no move may change volume k, because it reaches out of the window that is searched."""
+    return volumes[k, SETTLED] == np.inf
 
 
 @compiled(inline="always")

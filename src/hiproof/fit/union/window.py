@@ -116,13 +116,14 @@ def change_in_window(
     scene = open_window(whole, box, most_points)
     if scene is None:
         return False
+    fixed = fixed_in(whole, box, numbers, movable)
     rows = whole.volumes[[0, *numbers]]
+    rows[np.isin([0, *numbers], [0, *fixed]), SETTLED] = np.inf
     before = objective(rows, scene, np.inf)
-    found, value = operation(rows.copy(), scene, before)
+    found, value = operation(rows, scene, before)
     if value >= before - LEAST_GAIN:
         return False
-    fixed = fixed_in(whole, box, numbers, movable)
-    found = restore(found, whole.volumes, fixed)
+    found = forget_settled(restore(found, whole.volumes, fixed))
     changed = ~np.isin(found[:, NUMBER], fixed)
     changed[0] = False
     found[changed] = end_at_border(whole, found[changed], box)
