@@ -1,4 +1,7 @@
-"""The command line: one thin module a command, imported only when that command runs."""
+"""The command line: one thin module a command.
+
+It is imported only when that command runs.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +20,9 @@ KEPT = (
 
 
 def main() -> None:
-    """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C
-    exit code 130.
+    """Run `hiproof`, and return its exit code.
+
+    Errors meant for the user become one line and exit code 2, Ctrl-C exit code 130.
 
     An error of our own making shows its traceback, passwords masked as in all of the log, and ends
     with exit code 1.
@@ -50,8 +54,10 @@ def main() -> None:
 
 
 def addresses_in(arguments: list[str]) -> Iterator[str]:
-    """Yield what may be addresses: arguments, values of options, and passwords that a blank has cut
-    into several arguments.
+    """Yield arguments that may be addresses.
+
+    They are arguments, values of options, and passwords that a blank has cut into several
+    arguments.
 
     >>> list(addresses_in(["load", "--prefix=a", "password=S3", "cr3t", "-x"]))
     ['load', '--prefix=a', 'a', 'password=S3', 'password=S3 cr3t', 'cr3t', '-x']

@@ -1,5 +1,6 @@
-"""The command `hiproof`: its commands are imported when they are named, so that its help shows at
-once.
+"""The command `hiproof`.
+
+Its commands are imported when they are named, so that its help shows at once.
 """
 
 from __future__ import annotations
@@ -49,7 +50,10 @@ def import_command(name: str) -> Any:
 
 
 class Commands(TyperGroup):
-    """The commands in groups; complaints about wrong usage hold no password of an argument."""
+    """The commands in groups.
+
+    Complaints about wrong usage hold no password of an argument.
+    """
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -59,7 +63,10 @@ class Commands(TyperGroup):
         return list(COMMANDS)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the groups of commands, then the options, as plain text: rich takes a while."""
+        """Write the groups of commands, then the options, as plain text.
+
+        rich takes a while.
+        """
         self.format_usage(ctx, formatter)
         self.format_help_text(ctx, formatter)
         for group, names in groupby(COMMANDS, lambda name: COMMANDS[name].group):
@@ -81,8 +88,9 @@ class Commands(TyperGroup):
 
 @contextmanager
 def mask_complaints() -> Iterator[None]:
-    """Mask what click, which some versions of typer hold inside, says of wrong usage: it names
-    arguments as they are.
+    """Mask click's complaints about wrong usage.
+
+    They name arguments as they are. Some versions of typer hold click inside.
     """
     try:
         yield

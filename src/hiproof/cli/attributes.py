@@ -1,4 +1,4 @@
-"""`hiproof attributes`: every attribute and table of a run's files, with unit and meaning."""
+"""`hiproof attributes`: all attributes and tables, with unit and meaning."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import typer
 
 
 def attributes() -> None:
-    """Print every attribute and table that a run writes, with kind, unit and meaning, as
-    Markdown."""
+    """Print every attribute and table of a run as Markdown.
+
+    Each has its kind, unit and meaning.
+    """
     from ..write.attribute_list import attributes_text
 
     typer.echo(attributes_text(), nl=False)

@@ -1,4 +1,4 @@
-"""`hiproof build`: models of parameters, as a run wrote them or as a person changed them."""
+"""`hiproof build`: models of parameters, as written by a run or a person."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ def build(
     ] = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
-    """Make all files of a run again from its parameters.jsonl, which you may have edited.
+    """Make all files of a run again from its parameters.jsonl.
+
+    You may have edited the parameters.
 
     Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid
     solid, or unusable input.

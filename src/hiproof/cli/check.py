@@ -17,8 +17,10 @@ from .progress import Update, show_progress
 
 @dataclass
 class CheckedFile:
-    """How many solids of a file are valid, how many buildings are damaged, and which solids break
-    which rules (by val3dity's codes).
+    """The result of checking a file.
+
+    It counts valid solids and damaged buildings, and lists which solids break which rules (by
+    val3dity's codes).
     """
 
     path: Path
@@ -43,7 +45,7 @@ class CheckedFile:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The same for `--json`, with every finding."""
+        """Return the same for `--json`, with every finding."""
         return {
             "file": str(self.path),
             "solids": self.solids,
@@ -90,7 +92,10 @@ def check_file(
     say: Callable[[str], None] = typer.echo,
     update: Update = lambda *_: None,
 ) -> CheckedFile:
-    """Check every solid of a file, and say a line for each invalid one and a count at the end."""
+    """Check every solid of a file.
+
+    Prints a line for each invalid one and a count at the end.
+    """
     from ..compose import check_solid
     from ..read.damage import SkippedBuildings
     from ..read.solids import read_solids

@@ -1,4 +1,7 @@
-"""`hiproof classify`: a copy of a LAS or LAZ file in which ground and buildings have a class."""
+"""`hiproof classify`: a copy of a LAS or LAZ file with classes.
+
+Ground and buildings get a class.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +23,9 @@ def classify(
         str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
     ] = None,
 ) -> None:
-    """Find ground (class 2) and buildings (6) by the shape of the cloud, and write a copy with
-    these classes.
+    """Find ground (class 2) and buildings (6), and write a copy with classes.
+
+    The shape of the cloud tells them.
 
     Points of these classes that turn out to be neither become unclassified (1). Noise, water and
     bridges keep their classes, as does everything else in the file.

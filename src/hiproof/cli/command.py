@@ -1,5 +1,6 @@
-"""What commands have in common: a help of the options that people need first, `--quiet` and
-`--verbose`.
+"""What commands have in common.
+
+It is a help of the options that people need first, `--quiet` and `--verbose`.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ ALL_OPTIONS = "hiproof.all_options"  # key of a context whose help shows every o
 
 
 class Command(TyperCommand):
-    """A command whose help shows its `first_options`, and every option with `--help-all`; without
-    `first_options` it always shows every option.
+    """A command whose help shows its `first_options`.
+
+    `--help-all` shows every option; without `first_options` help always does.
     """
 
     first_options: tuple[str, ...] = ()
@@ -53,7 +55,10 @@ def print_every_option(ctx: typer.Context, is_asked_for: bool) -> None:
 
 
 def with_log_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add `--quiet` and `--verbose` to a command; the log starts at the level that they choose."""
+    """Add `--quiet` and `--verbose` to a command.
+
+    The log starts at the level that they choose.
+    """
     signature = inspect.signature(command, eval_str=True)
 
     def run_command(*, quiet: bool, verbose: bool, **values: Any) -> None:
@@ -76,7 +81,9 @@ def with_log_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def join_lines(text: str) -> str:
-    """Make each paragraph of a docstring one line, which the help wraps to the terminal.
+    """Make each paragraph of a docstring one line.
+
+    The help wraps it to the terminal.
 
     >>> join_lines("a\\n    b\\n\\n    c")
     'a b\\n\\nc'
@@ -91,7 +98,10 @@ def make_switch(name: str, help: str) -> inspect.Parameter:
 
 
 def choose_level(quiet: bool, verbose: bool) -> Level:
-    """Return the level of the log that the options choose; SettingsError where both are given."""
+    """Return the level of the log that the options choose.
+
+    Raises SettingsError where both are given.
+    """
     if quiet and verbose:
         raise SettingsError("expected --quiet or --verbose, got both; leave one out")
     if verbose:

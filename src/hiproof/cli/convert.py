@@ -50,7 +50,9 @@ def convert(
         ),
     ] = None,
 ) -> None:
-    """Convert models to another format: those of a run, with their parameters, or of a file.
+    """Convert models of a run or of a file to another format.
+
+    Models of a run come with their parameters.
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
@@ -72,8 +74,10 @@ def convert(
 def convert_models(
     source: Path, path: Path, name: str, crs: str | None = None, **given: Any
 ) -> SkippedBuildings:
-    """Write the models of `source` to `path` in the format `name`; returns what damage left
-    out."""
+    """Write the models of `source` to `path` in the format `name`.
+
+    Returns what damage left out.
+    """
     from ..parametric.finished import open_run
     from ..write.described import write_format
 
@@ -85,7 +89,10 @@ def convert_models(
 
 
 def name_format(out: Path | None) -> str:
-    """The format that a name ends in. Raises InputError where that is none."""
+    """Return the format in which a name ends.
+
+    Raises InputError where that is none.
+    """
     name = DEFAULT if out is None else choose_format(out.name)
     if name is None:
         suffixes = ", ".join(dict.fromkeys(Path(f.file).suffix for f in CONVERTED.values()))
@@ -96,8 +103,9 @@ def name_format(out: Path | None) -> str:
 
 
 def default_path(source: Path, name: str) -> Path:
-    """Where a format is written that no name is given for. Raises InputError where a file of that
-    name is one of the run itself.
+    """Return the path of a converted file without a name.
+
+    Raises InputError where a file of that name is one of the run itself.
     """
     path = (source if source.is_dir() else source.parent) / CONVERTED[name].file
     if CONVERTED[name].fragment and path.exists():

@@ -11,7 +11,10 @@ import typer
 def demo(
     out: Annotated[Path, typer.Option(help="folder for the results")] = Path("demo"),
 ) -> None:
-    """Model the 26 houses of a bundled, simulated neighbourhood, which has every roof type."""
+    """Model the 26 houses of a bundled, simulated neighbourhood.
+
+    It has every roof type.
+    """
     from .running import run_request
 
     raise typer.Exit(run_request(lambda: make_request(out)))
@@ -32,8 +35,9 @@ def make_request(out: Path) -> Any:
 
 
 def refuse_other_run(folder: Path, cloud: str) -> None:
-    """Raise OutputError where the folder holds a run of other clouds than the demo's, which would
-    replace it.
+    """Raise OutputError where the folder holds a run of other clouds.
+
+    The demo would replace it.
     """
     from ..errors import OutputError
     from ..evaluate.run import run_record

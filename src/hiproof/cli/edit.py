@@ -1,4 +1,4 @@
-"""`hiproof edit`: a page in which a person mends the buildings of a run that need eyes."""
+"""`hiproof edit`: a page to correct the buildings that need attention."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def edit(
 
 
 def user_name() -> str:
-    """The user's name, "somebody" where the system knows none."""
+    """Return the user's name, "somebody" where the system knows none."""
     try:
         return getpass.getuser()
     except (OSError, KeyError, ImportError):

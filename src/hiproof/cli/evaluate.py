@@ -1,5 +1,6 @@
-"""`hiproof evaluate`: how well the models of a run stand for points, footprints and a reference
-model.
+"""`hiproof evaluate`: figures of a run's models.
+
+They are measured against points, footprints and a reference model.
 """
 
 from __future__ import annotations
@@ -60,8 +61,10 @@ def evaluate(
         bool, typer.Option("--json", help="print the figures as JSON instead of tables")
     ] = False,
 ) -> None:
-    """Measure the models of a run: distances of points, shares, IoU and volume of each building, of
-    each type and of all.
+    """Measure the models of a run.
+
+    The figures are distances of points, shares, IoU and volume of each building, of each type and
+    of all.
 
     The figures of each building go into evaluation.csv and evaluation.json.
     """
@@ -112,8 +115,9 @@ def describe_gaps(figures: Sequence[Any]) -> None:
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:
-    """Means of the figures over the buildings of each roof type; those against a reference in a
-    table of their own, so that both fit a terminal of 80 columns.
+    """Print means of the figures over the buildings of each roof type.
+
+    Those against a reference have a table of their own, so that both fit a terminal of 80 columns.
     """
     from rich.console import Console
 
@@ -126,7 +130,7 @@ def print_summary(summary: dict, has_reference: bool) -> None:
 
 
 def make_table(summary: dict, columns: dict[str, str], title: str, caption: str) -> Any:
-    """A line a roof type."""
+    """Return a table with a line a roof type."""
     from rich.table import Column, Table
 
     table = Table(

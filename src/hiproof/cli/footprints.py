@@ -25,7 +25,9 @@ def footprints(
         Path | None, typer.Option(help="settings file (default: hiproof.toml next to the data)")
     ] = None,
 ) -> None:
-    """Fetch the building footprints of the clouds' extent from Overture Maps (extra `parquet`).
+    """Fetch building footprints from Overture Maps (extra `parquet`).
+
+    They are those of the clouds' extent.
 
     Pass the file to `hiproof reconstruct --footprints`, with or without a network.
     """
@@ -44,7 +46,10 @@ def footprints(
 def fetch_footprints(
     clouds: list[str], out: Path, layer: str | None, crs: str | None, config: Path | None
 ) -> dict[str, Any]:
-    """Write the footprints of the clouds' extent to `out`; returns where they come from."""
+    """Write the footprints of the clouds' extent to `out`.
+
+    Returns their source.
+    """
     from ..city.from_overture import keep_footprints
     from ..city.prepare import read_headers
     from ..city.request import Request

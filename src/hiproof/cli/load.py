@@ -34,7 +34,9 @@ def load(
         bool, typer.Option("--append", help="add the run beside those that the tables hold")
     ] = False,
 ) -> None:
-    """Load the models of a run into PostGIS tables; loading the same run again replaces it.
+    """Load the models of a run into PostGIS tables.
+
+    Loading the same run again replaces it.
 
     Exit code: 0 all buildings were loaded, 2 damaged ones were left out, or unusable input.
     """

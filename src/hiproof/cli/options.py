@@ -1,5 +1,6 @@
-"""Options of the command line that settings declare: name, help and default are told once, in
-`settings.py`.
+"""Options of the command line that settings declare.
+
+Name, help and default are declared once, in `settings.py`.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from ..settings import Settings, format_value, toml_value
 
 
 class Declared(NamedTuple):
-    """A setting that the command line has: its section's name, the heading of that, and its
-    field.
+    """A setting of the command line.
+
+    It has its section's name, the heading of that, and its field.
     """
 
     section: str
@@ -32,8 +34,9 @@ class Declared(NamedTuple):
 
 
 def with_settings(*sections: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make of `command(..., changes)` one with an option for each setting that declares one, of all
-    sections or those named.
+    """Add an option to a command for each setting that declares one.
+
+    The command is `command(..., changes)`; settings are those of all sections or those named.
 
     What is given of them comes as `changes`. The options follow the command's own, a panel of its
     help a section.
@@ -42,8 +45,9 @@ def with_settings(*sections: str) -> Callable[[Callable[..., None]], Callable[..
 
 
 def with_options(command: Callable[..., None], sections: tuple[str, ...]) -> Callable[..., None]:
-    """`command` with the options of the settings in `sections`, of all where none is named; see
-    `with_settings`.
+    """Return `command` with the options of the settings in `sections`.
+
+    They are of all sections where none is named; see `with_settings`.
     """
     selection = [item for item in declared_settings() if not sections or item.section in sections]
     declared = [item for item in selection if item.field.metadata["option"]]
@@ -65,7 +69,7 @@ def with_options(command: Callable[..., None], sections: tuple[str, ...]) -> Cal
 
 
 def declared_settings() -> list[Declared]:
-    """Every setting, in the order of `settings.py`."""
+    """Return every setting, in the order of `settings.py`."""
     sections = [(s.name, getattr(Settings(), s.name)) for s in dataclasses.fields(Settings)]
     return [
         Declared(name, f"Settings: {(section.__doc__ or '').partition('] ')[2].rstrip('.')}", field)
@@ -103,7 +107,7 @@ joined by commas.
 
 
 def format_help(field: dataclasses.Field) -> str:
-    """A setting's meaning and default."""
+    """Return a setting's meaning and default."""
     default = toml_value(field.default).strip("[]").replace('"', "")
     return field.metadata["help"] + (f" (default: {default})" if default else "")
 
@@ -111,8 +115,9 @@ def format_help(field: dataclasses.Field) -> str:
 def collect_changes(
     declared: list[Declared], arguments: dict[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Settings by section and name, of the options `arguments`; those that are None are
-    left out.
+    """Return settings by section and name, of the options `arguments`.
+
+    Those that are None are left out.
     """
     changes: dict[str, dict[str, Any]] = {}
     for item in declared:
@@ -125,7 +130,7 @@ def collect_changes(
 
 
 def parse_box(text: str) -> tuple[float, float, float, float]:
-    """The box that `--bbox` names.
+    """Parse the box that `--bbox` names.
 
     Raises SettingsError for anything else than four numbers in order.
 

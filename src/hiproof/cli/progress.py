@@ -58,8 +58,9 @@ def show_progress(stage: str) -> Iterator[Update]:
 
 
 class StageLines:
-    """A line when a stage begins, and one every LINE_S seconds while it goes on; none before the
-    command has run for FIRST_S.
+    """A line when a stage begins, and one every LINE_S seconds meanwhile.
+
+    There is none before the command has run for FIRST_S.
     """
 
     def __init__(self, stage: str):
@@ -163,7 +164,9 @@ class StageBars:
 
 
 def describe(finished: int, total: int | None, seconds: float, unit: str, first: int = 0) -> str:
-    """Describe in words how far a stage is, that began at `first` of `total` so many `seconds` ago.
+    """Describe in words how far a stage is.
+
+    It began at `first` of `total` so many `seconds` ago.
 
     >>> describe(120, 1000, 10.0, "building")
     '120 of 1,000 buildings, 12 a second, 73 s left'

@@ -135,7 +135,9 @@ def reconstruct(
 
 
 def find_settings_file(*inputs: str | None) -> Path | None:
-    """The settings file in the folder of any input, which the log names; None where there is none.
+    """Return the settings file in the folder of any input, None without one.
+
+    The log names it.
 
     Raises SettingsError where there are two: which of them counts is not to be guessed.
     """

@@ -26,8 +26,9 @@ def report(
         Path | None, typer.Option(help="file to write (default: report.html in the folder)")
     ] = None,
 ) -> None:
-    """Write a self-contained HTML page about a run: a map, quality charts and the 20 worst
-    buildings in 3D.
+    """Write a self-contained HTML page about a run.
+
+    It has a map, quality charts and the 20 worst buildings in 3D.
 
     Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable
     input.

@@ -1,4 +1,7 @@
-"""`hiproof repro`: one building that a run failed on, run again from what the run kept of it."""
+"""`hiproof repro`: a building on which a run failed, run again.
+
+The run kept what this takes.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,9 @@ def repro(
     ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
 ) -> None:
-    """Run a building again on which hiproof failed, to repeat the failure or to see that it is
-    fixed.
+    """Run a building again on which hiproof failed.
+
+    The failure repeats, or it is fixed.
 
     Exit code: 0 the building has an outcome, 1 the failure repeats, 2 the folder cannot be used.
     """

@@ -33,7 +33,7 @@ def run_request(make_request: Callable[[], Request]) -> int:
 
 
 def graded_words(by_quality: Mapping[str, int]) -> str:
-    """How many models are good, fair and poor.
+    """Describe how many models are good, fair and poor.
 
     >>> graded_words({"poor": 2, "good": 97})
     '97 good, 0 fair, 2 poor'
@@ -42,7 +42,10 @@ def graded_words(by_quality: Mapping[str, int]) -> str:
 
 
 def print_summary(summary: Summary, out: str) -> None:
-    """Print what came of a run: models, how well they fit, what needs attention, the files."""
+    """Print the result of a run.
+
+    It has models, how well they fit, what needs attention, and the files.
+    """
     for line in describe_overview(summary.overview, summary.by_quality, out):
         typer.echo(line)
     if summary.doubts:
@@ -62,8 +65,10 @@ def print_summary(summary: Summary, out: str) -> None:
 
 
 def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: str) -> list[str]:
-    """Describe the overview of the run in the folder `out` in lines: the result, how well the
-    models fit, and what needs attention with the command that shows it.
+    """Describe the overview of the run in the folder `out` in lines.
+
+    They are the result, how well the models fit, and what needs attention with the command that
+    shows it.
     """
     lines = [typer.style(overview.headline, bold=True), *filter(None, [overview.fit])]
     if by_quality:

@@ -1,5 +1,6 @@
-"""`hiproof segment`: label the points of buildings with roof types and write them with a table of
-types.
+"""`hiproof segment`: label points with roof types.
+
+They are written with a table of types.
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ def segment(
     ] = "",
     device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
-    """Label every point with a roof type or not-roof, and name the type of each building (extra
-    `network`).
+    """Label every point with a roof type or not-roof (extra `network`).
+
+    Each building also gets the name of its type.
 
     The LAZ has the extra dimensions roof_type (number of the type in the columns of the table, from
     1; 0 is no roof), not_roof (a probability) and building (number of the file on the command line,

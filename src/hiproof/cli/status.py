@@ -1,5 +1,6 @@
-"""`hiproof status`: how far a run is, and its summary, read from its ledger while the run may still
-be writing it.
+"""`hiproof status`: the progress and summary of a run.
+
+They come from its ledger, while the run may still be writing it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ def status(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of text")] = False,
 ) -> None:
-    """Show how far a run is and what came of its buildings, while it runs or afterwards."""
+    """Show the progress of a run and the state of its buildings.
+
+    The run may be going on, or finished.
+    """
     from ..city.ledger import Ledger
 
     path = folder / ".hiproof" / "ledger.sqlite"
@@ -46,7 +50,10 @@ def status(
 
 
 def read_state(ledger: Ledger) -> dict[str, Any]:
-    """How far a run is, for `--json`: tasks and buildings done, rate, summary, failures."""
+    """Return the progress of a run, for `--json`.
+
+    It has tasks and buildings done, rate, summary and failures.
+    """
     tasks = ledger.tasks()
     sort, solve = ([task for task in tasks if task.kind == kind] for kind in ("sort", "solve"))
     finished, total = count_buildings(solve), sum(task.buildings for task in solve)
@@ -76,8 +83,9 @@ def count_buildings(tasks: list[Task]) -> int:
 
 
 def measure_rate(tasks: list[Task]) -> float | None:
-    """Buildings a second between the first task that was done and the last, None before there are
-    two.
+    """Return buildings a second between the first task done and the last.
+
+    It is None before there are two.
     """
     by_time = sorted((t.finished or 0.0, t.buildings) for t in tasks if t.state in CLOSED)
     if len(by_time) < 2 or (seconds := by_time[-1][0] - by_time[0][0]) <= 0:
@@ -86,7 +94,7 @@ def measure_rate(tasks: list[Task]) -> float | None:
 
 
 def describe(ledger: Ledger, state: dict[str, Any], folder: str) -> list[str]:
-    """Progress, summary and failures, a line each."""
+    """Return progress, summary and failures, a line each."""
     files, tiles, buildings = (state[name] for name in ("point_files", "work_tiles", "buildings"))
     lines = [
         f"point files read: {files['read']} of {files['total']}",

@@ -49,8 +49,9 @@ def view(
 
 @contextmanager
 def open_tiles(folder: Path) -> Iterator[Path]:
-    """Yield the folder's own tiles, or those of the run in it, made where they are missing or older
-    than the models.
+    """Yield the tiles in a folder, or those of the run in it.
+
+    They are made where they are missing or older than the models.
 
     Where the folder cannot be written, they are made in a temporary one, which goes when the block
     ends.

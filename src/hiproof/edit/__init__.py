@@ -1,5 +1,6 @@
-"""`hiproof edit`: a page on this machine in which a person mends the buildings of a run that need
-eyes.
+"""`hiproof edit`: a page on this machine for correcting buildings.
+
+It lists the buildings of a run that need attention.
 
 doubt       how much a building needs eyes, and why
 folder      the run's folder: buildings sorted by doubt, each read when it is asked for

@@ -1,5 +1,6 @@
-"""One edit of a building, as the page asks for it: parts in, a building out, by the functions of
-`parametric`.
+"""One edit of a building, as the page requests it.
+
+Parts go in, and a building comes out, by the functions of `parametric`.
 """
 
 from __future__ import annotations
@@ -60,12 +61,12 @@ def by_hand(record: Record) -> dict[str, Any]:
 
 
 def show_parts(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Nothing changed: the building as its parts say."""
+    """Return the parts unchanged."""
     return parts
 
 
 def change(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Part `part` with the values of `change`, as `Building.with_part` takes them."""
+    """Change part `part` by the values of `change`, as `Building.with_part`."""
     index = part_at(parts, requested, "part")
     return replace_part(
         parts,
@@ -88,7 +89,7 @@ def remove(record: Record, parts: list, requested: Record, points: np.ndarray) -
 
 
 def split_part_at(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Part `part` cut across `side` at `share` of it."""
+    """Cut part `part` across `side` at `share` of it."""
     index = part_at(parts, requested, "part")
     share = number(requested.get("share", 0.5), "share")
     return [
@@ -99,7 +100,7 @@ def split_part_at(record: Record, parts: list, requested: Record, points: np.nda
 
 
 def merge(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Parts `part` and `other` as one, in the place of the first."""
+    """Merge parts `part` and `other`, in the place of the first."""
     first, second = part_at(parts, requested, "part"), part_at(parts, requested, "other")
     if first == second:
         raise InputError("expected two parts to merge, got one twice; choose another")
@@ -110,21 +111,24 @@ def merge(record: Record, parts: list, requested: Record, points: np.ndarray) ->
 
 
 def dormer(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """A dormer on part `part` at `place`, [x, y, z] about the origin, or half-way up its slope."""
+    """Add a dormer to part `part` at `place`, or half-way up its slope.
+
+    `place` is [x, y, z] about the origin.
+    """
     index = part_at(parts, requested, "part")
     roof = read_building(record)[1]
     return [*parts, add_dormer(roof, index, read_click(requested))] if roof is not None else parts
 
 
 def recess(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """A recess in part `index` at `place`, or in its middle."""
+    """Add a recess to part `index` at `place`, or in its middle."""
     index = part_at(parts, requested, "part")
     roof = read_building(record)[1]
     return with_recess(parts, roof, index, read_click(requested)) if roof is not None else parts
 
 
 def read_click(requested: Record) -> tuple[float, float] | None:
-    """Where the roof was clicked, x and y about the origin."""
+    """Read where the roof was clicked, x and y about the origin."""
     if requested.get("place") is None:
         return None
     x, y, _ = place(requested["place"], "place").tolist()
@@ -132,7 +136,7 @@ def read_click(requested: Record) -> tuple[float, float] | None:
 
 
 def refit(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
-    """All parts fitted to the points again but for what is `held`."""
+    """Fit all parts to the points again but for what is `held`."""
     roof = read_building(record)[1]
     return (
         parts
@@ -154,7 +158,7 @@ ACTIONS: dict[str, Callable[[Record, list, Record, np.ndarray], list]] = {
 
 
 def part_at(parts: list, requested: Record, name: str) -> int:
-    """The index of a part that an edit names."""
+    """Return the index of a part that an edit names."""
     index = requested.get(name)
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(parts):
         raise InputError(
@@ -165,7 +169,7 @@ def part_at(parts: list, requested: Record, name: str) -> int:
 
 
 def read_held(requested: Record) -> dict[int, tuple[str, ...]]:
-    """What a refit holds: names of parameters, and "z", by part."""
+    """Read what a refit holds: names of parameters, and "z", by part."""
     mapping = require_mapping(requested.get("held") or {}, "held")
     try:
         return {int(index): tuple(map(str, names)) for index, names in mapping.items()}

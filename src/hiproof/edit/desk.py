@@ -1,5 +1,7 @@
-"""What the page may ask: the list of buildings, one building, its points, an edit, and the two that
-write: accept, take back.
+"""The requests that the page may make.
+
+They are the list of buildings, one building, its points, an edit, and the two that write: accept,
+and take back.
 """
 
 from __future__ import annotations
@@ -40,9 +42,10 @@ SAID = ("z_ground", "leave_out")  # of the building as a whole, by a person
 
 
 class Desk:
-    """The buildings of the run in `folder`, and the edits that `who` accepts; the run's files may
-    have `moved_to` another folder. `only` names kinds of attention or ids of buildings, and limits
-    the list to these.
+    """The buildings of the run in `folder`, and the edits that `who` accepts.
+
+    The run's files may have `moved_to` another folder. `only` names kinds of attention or ids of
+    buildings, and limits the list to these.
     """
 
     def __init__(
@@ -61,7 +64,7 @@ class Desk:
         )
 
     def buildings(self, find: str = "") -> dict[str, Any]:
-        """The most doubtful buildings, of those whose id holds `find`."""
+        """Return the most doubtful buildings, of those whose id holds `find`."""
         self.run.refresh()
         self.edits.of("")
         wanted = self.select_rows()
@@ -99,14 +102,20 @@ class Desk:
         }
 
     def record(self, id: str) -> tuple[dict[str, Any], dict[str, Any] | None, str]:
-        """A building's object with what was accepted of it, that override, and its version."""
+        """Return a building's object, its override, and its version.
+
+        The object has what was accepted of it.
+        """
         record, (override, version) = self.run.record(id), self.edits.of(id)
         if override and isinstance(override.get("parts"), list):
             record = record | {name: override[name] for name in BELONGS if name in override}
         return record, override, version
 
     def building(self, id: str) -> dict[str, Any]:
-        """A building as it is now: its mesh and parts, or a sentence why there are none."""
+        """Return a building as it is now.
+
+        It has its mesh and parts, or a sentence why there are none.
+        """
         record, override, version = self.record(id)
         authorship = {name: (override or {}).get(name) for name in ("who", "when", "note")}
         result = {
@@ -130,7 +139,7 @@ class Desk:
             return result | {"error": str(error)}
 
     def cloud(self, id: str) -> dict[str, Any]:
-        """The points drawn of a building, about the origin of its roof;
+        """Return the points drawn of a building, about the origin of its roof.
 
         `missing` says why there are none.
         """
@@ -143,8 +152,9 @@ class Desk:
         return {"places": places, "count": len(points), "missing": missing}
 
     def draft(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """A building's object as the page has it: with its `parts`, and with its `z_ground` where a
-        person said one.
+        """Return a building's object as the page has it.
+
+        It has its `parts`, and its `z_ground` where a person gave one.
         """
         record = self.record(id)[0] | {
             "parts": list_at(body, "parts"),
@@ -158,8 +168,9 @@ class Desk:
         }
 
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """The building with the page's `parts` after the edit `asked`; while a hand drags
-        (`dragged`) it is not measured.
+        """Return the building with the page's `parts` after the edit `asked`.
+
+        While a hand drags (`dragged`) it is not measured.
         """
         record = self.draft(id, body)
         points = self.points.of(id, read_outline(record))
@@ -169,8 +180,9 @@ class Desk:
         return describe_building(edit, select_points(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Every type that part `part` may have, refitted: the share of points it explains, the best
-        first.
+        """Return every type that part `part` may have, refitted.
+
+        Each has the share of points that it explains, the best first.
         """
         record = self.draft(id, body)
         points, candidates = self.points.of(id, read_outline(record)), []
@@ -189,8 +201,9 @@ class Desk:
         return {"types": sorted(candidates, key=lambda row: -(row["share"] or 0.0))}
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Keep what the page has as an override of the building, if it is still of the `version`
-        that the page knows.
+        """Keep what the page has as an override of the building.
+
+        It has to be still of the `version` that the page knows.
         """
         override = {
             "id": id,
@@ -206,8 +219,9 @@ class Desk:
         return {"version": self.edits.put(id, override, text_at(body, "version")), "when": current}
 
     def make_override(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """What an override says of a building as the page has it, which must be one that can be
-        built.
+        """Return the override of a building as the page has it.
+
+        It must be one that can be built.
         """
         nothing = np.zeros((0, 3))
         record = building_record(
@@ -221,8 +235,9 @@ class Desk:
         return {name: record[name] for name in override}
 
     def make_exclusion(self, id: str) -> dict[str, Any]:
-        """What an override says of a building, which must be one of the run, that no model is to be
-        made of.
+        """Return the override that leaves a building without a model.
+
+        The building must be one of the run.
         """
         self.run.record(id)
         return {"leave_out": True}
@@ -235,7 +250,10 @@ class Desk:
 
 @functools.cache
 def render_drawing(kind: str) -> str:
-    """The figure of a roof type with its parameters, as SVG. Raises InputError for no type."""
+    """Return the figure of a roof type with its parameters, as SVG.
+
+    Raises InputError for no type.
+    """
     if kind not in CATALOGUE:
         raise InputError(
             f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r:.40}; choose one"
@@ -244,7 +262,10 @@ def render_drawing(kind: str) -> str:
 
 
 def names_of(row: BuildingRow) -> set[str]:
-    """Return the names under which `--only` finds a building: its id and its kinds of attention."""
+    """Return the names under which `--only` finds a building.
+
+    They are its id and its kinds of attention.
+    """
     return {row.id, *(kind.code for kind in row.attention)}
 
 
@@ -253,7 +274,9 @@ def number_or_none(value: float) -> float | None:
 
 
 def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str, Any]]:
-    """The overrides that the run in `folder` obeyed, so that one file holds them and the edits.
+    """Return the overrides that the run in `folder` used.
+
+    One file then holds them and the edits.
 
     Where edits were accepted already, these hold them.
     """

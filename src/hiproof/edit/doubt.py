@@ -1,4 +1,7 @@
-"""How much a building needs eyes, told from what the run wrote of it: a number, and why."""
+"""How much a building needs attention: a number, and the reasons.
+
+They follow from what the run wrote of it.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +25,17 @@ REMARKED = 0.3
 
 @dataclass(frozen=True)
 class BuildingDoubt:
-    """`amount` is 0 where nothing speaks against the model; `reasons` are short phrases."""
+    """The doubt about a model: its `amount`, and `reasons`.
+
+    The amount is 0 where nothing speaks against the model; reasons are short phrases.
+    """
 
     amount: float
     reasons: tuple[str, ...]
 
 
 def measure_doubt(record: Mapping[str, Any]) -> BuildingDoubt:
-    """The doubt about a building, from its object in parameters.jsonl.
+    """Return the doubt about a building, from its object in parameters.jsonl.
 
     >>> measure_doubt({"status": "modelled", "quality": "poor", "parts": [],
     ...     "residuals": {"share_within_20cm": 0.6}})
@@ -51,7 +57,10 @@ def measure_doubt(record: Mapping[str, Any]) -> BuildingDoubt:
 
 
 def score_residuals(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Points away from the roof; buildings that fit well are still sorted by it."""
+    """Score points away from the roof.
+
+    Buildings that fit well are still sorted by it.
+    """
     share = (record.get("residuals") or {}).get("share_within_20cm")
     if share is None:
         return None
@@ -59,13 +68,13 @@ def score_residuals(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def unsure_grade(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """A verdict that is not good; the detail says why."""
+    """Score a verdict that is not good; the detail says why."""
     grade = record.get("quality")
     return (UNSURE_GRADES[grade], grade) if grade in UNSURE_GRADES else None
 
 
 def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """An outcome that the run itself calls doubtful."""
+    """Score an outcome that the run itself calls doubtful."""
     unsure = {status.code: status for status in UNSURE}
     status = unsure.get(record.get("status", ""))
     return (
@@ -76,15 +85,16 @@ def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def score_remarks(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """What the run says in the detail that it is not sure of: two surfaces, places without points,
-    an assumed ground, ...
+    """Score the remarks in the detail.
+
+    They are of two surfaces, places without points, an assumed ground, and others.
     """
     phrases = [remark.told for remark in Remark if remark.value in (record.get("detail") or "")]
     return (REMARKED, ", ".join(phrases)) if phrases else None
 
 
 def score_unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Area whose points lie more than half a metre off the roof."""
+    """Score the area whose points lie more than half a metre off the roof."""
     area, rings = record.get("unexplained_area_m2"), record.get("outline")
     if not area or not rings:
         return None
@@ -94,7 +104,7 @@ def score_unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Parts whose heights or lengths their points leave open."""
+    """Score parts whose heights or lengths their points leave open."""
     parts = record.get("parts") or []
     loose = sum(is_loose(part.get("sigma") or {}) for part in parts)
     if not loose:
@@ -111,7 +121,10 @@ def is_loose(sigma: Mapping[str, float]) -> bool:
 
 
 def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Two types about as probable as each other, as the fits or the network say."""
+    """Score two types that are about as probable as each other.
+
+    The fits or the network say so.
+    """
     types = record.get("types") or record.get("recognised") or {}
     ranked = sorted(((value or 0.0, name) for name, value in types.items()), reverse=True)
     if len(ranked) < 2 or ranked[0][0] - ranked[1][0] >= CLOSE_CALL:
@@ -120,6 +133,6 @@ def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def ring_area(ring: list) -> float:
-    """Area (m2) of a ring of [x, y]."""
+    """Return the area (m2) of a ring of [x, y]."""
     turned = zip(ring, ring[1:] + ring[:1], strict=True)
     return abs(sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in turned)) / 2

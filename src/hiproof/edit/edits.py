@@ -1,5 +1,6 @@
-"""The file of accepted edits: a file of overrides, one line a building, that `--overrides` of the
-next run obeys.
+"""The file of accepted edits: overrides, one line a building.
+
+`--overrides` of the next run takes it.
 
 Every change writes the whole file beside its place, synced, and renames it, so that kill -9 and
 power cuts leave the old or the new one. A change says on which version of its building it stands;
@@ -63,15 +64,16 @@ class Edits:
         self.stamp = stamp
 
     def of(self, id: str) -> tuple[dict[str, Any] | None, str]:
-        """The override of a building, None where there is none, and its version."""
+        """Return the override of a building, None without one, and its version."""
         with self.lock:
             self.refresh()
             record = self.records.get(id)
             return record, compute_version(record)
 
     def put(self, id: str, record: dict[str, Any] | None, version: str) -> str:
-        """Keep an override of the building in place of that of `version`, or with None drop it; the
-        new version, on disk.
+        """Replace the override of a building, or drop it with None.
+
+        It takes the place of that of `version`. Returns the new version, on disk.
 
         Raises OtherVersion where the building has another by now, InputError for what is no
         override, OutputError where the file cannot be written.
@@ -96,7 +98,7 @@ class Edits:
 
 @contextmanager
 def lock_edits(path: Path) -> Iterator[None]:
-    """Nobody else, in whatever process, changes the file at `path` within the block;
+    """Lock the file at `path` for the block, against all processes.
 
     SQLite locks, as for runs.
     """
@@ -116,14 +118,14 @@ def lock_edits(path: Path) -> Iterator[None]:
 
 
 def compute_version(record: dict[str, Any] | None) -> str:
-    """A name for what is said of a building: another for every other override."""
+    """Return a name for an override: another for every other one."""
     if record is None:
         return UNTOUCHED
     return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()[:20]
 
 
 def explain_conflict(id: str, record: dict[str, Any] | None) -> str:
-    """Who was faster, in a sentence."""
+    """Return a sentence on who was faster."""
     if record is None:
         return (
             f"expected building {id} as it was accepted, got it taken back in another window; look "
@@ -137,7 +139,7 @@ def explain_conflict(id: str, record: dict[str, Any] | None) -> str:
 
 
 def read_stamp(path: Path) -> tuple[int, int, int] | None:
-    """What tells a file from the one that stood there before; None where there is none."""
+    """Return what tells a file from its predecessor; None without a file."""
     try:
         result = os.stat(path)
     except FileNotFoundError:

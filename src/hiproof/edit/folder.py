@@ -1,5 +1,7 @@
-"""The run's folder: its buildings sorted by doubt, each read from parameters.jsonl when it is asked
-for."""
+"""The run's folder: its buildings sorted by doubt.
+
+Each is read from parameters.jsonl when it is requested.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,7 @@ MOST_DOUBT = 100.0  # more than all reasons together
 
 @dataclass(frozen=True)
 class BuildingRow:
-    """A building in the list: where its line starts in the file, and what speaks for looking at
-    it."""
+    """A building in the list: its place in the file, and its doubt."""
 
     id: str
     start: int
@@ -60,7 +61,10 @@ class RunFolder:
         self.by_id, self.stamp = {row.id: row for row in rows}, stamp
 
     def record(self, id: str) -> dict[str, Any]:
-        """The object of a building. Raises InputError for one that the run does not have."""
+        """Return the object of a building.
+
+        Raises InputError for one that the run does not have.
+        """
         self.refresh()
         row = self.by_id.get(id)
         if row is None:
@@ -83,12 +87,15 @@ class RunFolder:
 
 
 def read_settings(folder: Path, head: FileHead) -> Settings:
-    """How the run composed its solids and what it called poor, as far as its files tell."""
+    """Return the settings of the run, as far as its files have them.
+
+    They are how it composed its solids and what it called poor.
+    """
     return replace(Settings(), compose=head.compose)
 
 
 def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
-    """The head of the parameters at `path`, and a row a building."""
+    """Read the head of the parameters at `path`, and a row a building."""
     starts: list[int] = []
 
     def lines(file: Any):
@@ -115,7 +122,10 @@ def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
 
 
 def read_row(number: int, record: Any, start: int, path: Path) -> BuildingRow:
-    """The row of a building's object; one that cannot be read is the most doubtful."""
+    """Return the row of a building's object.
+
+    One that cannot be read is the most doubtful.
+    """
     if not isinstance(record, dict) or not isinstance(record.get("id"), str):
         raise InputError(
             f"expected a building in line {number} of {path}, got {excerpt(record)}; mend it there"

@@ -1,5 +1,6 @@
-"""The roof points of one building, read from the clouds of its run exactly as the run read them: by
-its plan, a work tile at once.
+"""The roof points of one building, read as its run read them.
+
+They come from the run's clouds by its plan, a work tile at once.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ KEPT_TILES, KEPT_BUILDINGS = 3, 64
 
 
 class RunPoints:
-    """Points of the run in `folder`, whose files may have `moved_to` another;
+    """Points of the run in `folder`.
+
+    Its files may have `moved_to` another.
 
     `missing` is a sentence where they cannot be had, empty otherwise.
     """
@@ -67,7 +70,7 @@ class RunPoints:
         return self.known
 
     def of(self, id: str, outline: shapely.Polygon | None) -> np.ndarray:
-        """World points (n, 3) inside the `outline` of building `id`;
+        """Return world points (n, 3) inside the `outline` of building `id`.
 
         (0, 3) where the run has none, or where its clouds cannot be read, which `missing` then
         says.
@@ -84,7 +87,10 @@ class RunPoints:
         return stages.usable(result, outline)[0]
 
     def read_job(self, index: int) -> np.ndarray:
-        """Points (n, 3) in and around the area of a building, as many as the run would use."""
+        """Return points (n, 3) in and around the area of a building.
+
+        They are as many as the run would use.
+        """
         job: Job = self.plan.jobs[index]
         surroundings = self.surroundings(self.tile_of[index])
         points = surroundings.select_roof_points(surroundings.move(job)[0]).points
@@ -96,8 +102,9 @@ class RunPoints:
         )
 
     def read_tile(self, tile: str) -> Surroundings:
-        """All points that the buildings of a work tile may need; of files of which it is known
-        where their points lie only these are read.
+        """Return all points that the buildings of a work tile may need.
+
+        Of files whose runs are noted only these are read.
         """
         reaches = Reaches(self.plan, {tile: self.plan.tiles[tile]})
         with tempfile.TemporaryDirectory(prefix="hiproof-edit-") as folder:
@@ -118,8 +125,9 @@ class RunPoints:
 
 
 def missing_reader() -> str:
-    """A sentence where the run's terrain model cannot be read for want of a package; empty
-    otherwise.
+    """Return a sentence where the run's terrain model cannot be read.
+
+    A package is missing. It is empty otherwise.
     """
     try:
         import_rasterio()

@@ -1,5 +1,6 @@
-"""What the page shows of a building: its mesh, parts with their handles, numbers, heights of points
-over the roof.
+"""What the page shows of a building.
+
+It is its mesh, parts with their handles, numbers, and heights of points over the roof.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PAGE_FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p
 
 
 def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
-    """The building as JSON, everything about the origin of its roof;
+    """Return the building as JSON, all about the origin of its roof.
 
     `points` (n, 3) are the world points drawn.
     """
@@ -44,13 +45,17 @@ def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
 
 
 def select_points(points: np.ndarray) -> np.ndarray:
-    """An even selection (m, 3) of the points, as many as the page draws."""
+    """Return an even selection (m, 3) of the points.
+
+    They are as many as the page draws.
+    """
     return points[:: max(1, -(-len(points) // MOST_PAGE_POINTS))]
 
 
 def place_handles(part: dict[str, Any]) -> dict[str, Any]:
-    """Where a hand takes hold of a part: its rectangle, its eave and its ridge, about the
-    origin.
+    """Return the handles of a part, about the origin.
+
+    They are its rectangle, its eave and its ridge.
     """
     try:
         sized = with_sizes(part)
@@ -71,7 +76,7 @@ def place_handles(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def list_figures(building: Building) -> dict[str, float | None]:
-    """The numbers under the model, null where they cannot be told."""
+    """Return the numbers under the model, null where they are unknown."""
     quality = dataclasses.asdict(building.quality)
     return {
         **{name: number(quality[name], 4) for name in PAGE_FIGURES},
@@ -82,8 +87,9 @@ def list_figures(building: Building) -> dict[str, float | None]:
 
 
 def make_mesh(building: Building) -> dict[str, str]:
-    """Triangles of the solid about the origin, the part that each roofs (-1: a wall), and the
-    roof's edges.
+    """Return triangles of the solid, their parts, and the roof's edges.
+
+    They are about the origin; the part is the one that each roofs (-1: a wall).
     """
     mesh = solid_mesh(building.solid.move(-building.roof.frame.origin))
     return {

@@ -64,7 +64,10 @@ class Service:
         return f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
     def answer(self, method: str, target: str, headers: Headers, body: bytes = b"") -> Answer:
-        """The answer to a request; a wrong one gets a sentence, never a traceback."""
+        """Return the answer to a request.
+
+        A wrong one gets a sentence, never a traceback.
+        """
         try:
             refused = self.refusal(method, target, headers)
             if refused is not None:
@@ -92,7 +95,7 @@ class Service:
             )
 
     def refusal(self, method: str, target: str, headers: Headers) -> Answer | None:
-        """An answer to those who may not ask, None to those who may."""
+        """Return an answer to those who may not ask, None to those who may."""
         if entries := refusal(headers, self.port):
             return make_answer(403, entries)
         first = urlsplit(target).path.split("/")[1:2]
@@ -106,7 +109,7 @@ class Service:
         return None
 
     def asset(self, name: str, query: Mapping[str, str]) -> Answer:
-        """What is read: a file of the page, a figure, or JSON."""
+        """Return what is read: a file of the page, a figure, or JSON."""
         if name in EDIT_ASSETS:
             package, file, kind = EDIT_ASSETS[name]
             return Answer(200, (files(package) / file).read_bytes(), kind)
@@ -117,7 +120,7 @@ class Service:
         return as_json(self.read[name](query))
 
     def change(self, name: str, body: bytes) -> Answer:
-        """What is asked with a body: {"id": ..., ...}."""
+        """Answer a request with a body: {"id": ..., ...}."""
         if name not in self.write:
             return make_answer(404, "expected something of this page, got another name")
         try:
@@ -130,7 +133,7 @@ class Service:
 
 
 def describe_start(desk: Desk) -> dict[str, Any]:
-    """What the page knows from the start."""
+    """Return what the page needs at the start."""
     return {
         "folder": str(desk.run.folder),
         "who": desk.who,
