@@ -1,5 +1,6 @@
-"""What the command does before anything else is imported: Ctrl-C ends it at once, for nothing is
-begun that could be left half done.
+"""Code of the command that runs before everything else is imported.
+
+Ctrl-C ends it at once, for nothing is begun that could be left half done.
 
 Python would show a traceback of whatever import it came in, and some packages make other errors of
 it.
@@ -21,8 +22,10 @@ def end_at_once(*_: Any) -> None:
 
 
 def is_command() -> bool:
-    """Whether this process was started as `hiproof` or `python -m hiproof`, rather than by a
-    program that imports the package."""
+    """Return whether this process was started as the command `hiproof`.
+
+    `python -m hiproof` counts too, a program that imports the package does not.
+    """
     started = os.path.basename(sys.argv[0]) if sys.argv else ""
     return started.removesuffix(".exe") == "hiproof" or (
         started == "-m" and "hiproof" in sys.orig_argv
@@ -30,8 +33,10 @@ def is_command() -> bool:
 
 
 def end_at_once_on_interrupt() -> None:
-    """Let Ctrl-C end the command at once, until `interrupt_as_usual`; where it is ignored, it stays
-    so."""
+    """Let Ctrl-C end the command at once, until `interrupt_as_usual`.
+
+    Where Ctrl-C is ignored, it stays so.
+    """
     is_main = threading.current_thread() is threading.main_thread()
     if is_command() and is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)

@@ -1,5 +1,6 @@
-"""The few kinds of error hiproof raises; every message is one sentence: what was expected, what
-came, what to try.
+"""The kinds of error that hiproof raises.
+
+Every message is one sentence: what was expected, what came, what to try.
 
 Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or
 another process.
@@ -23,19 +24,21 @@ class HiproofError(Exception):
 
 
 class InputError(HiproofError):
-    """A file or an array that cannot be used: unreadable, empty, of the wrong kind, without the
-    classes asked for.
+    """A file or an array that cannot be used.
+
+    It is unreadable, empty, of the wrong kind, or without the requested classes.
     """
 
 
 class DamagedRaster(InputError):
-    """A terrain model of which a part cannot be read: every building on it needs it, so the run
-    ends.
+    """A terrain model of which a part cannot be read.
+
+    Every building on it needs it, so the run ends.
     """
 
 
 class NoModelError(InputError):
-    """A model asked for of a building that got none;
+    """The model of a building that has none was requested.
 
     `Building.built` is None there, and the status says why.
     """
@@ -50,13 +53,16 @@ class OutputError(HiproofError):
 
 
 class FitError(HiproofError):
-    """Points from which no roof can be determined (fewer than a plane needs, all in one place, not
-    finite).
+    """Points that determine no roof.
+
+    They are fewer than a plane needs, all in one place, or not finite.
     """
 
 
 class CompositionError(HiproofError):
-    """A roof that cannot become a valid solid; the caller falls back to a simpler roof.
+    """A roof that cannot become a valid solid.
+
+    The caller falls back to a simpler roof.
 
     `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not
     known.
@@ -66,9 +72,11 @@ class CompositionError(HiproofError):
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Whether `error` is a Ctrl-C in disguise: of one that comes while compiled code runs Python
-    makes a SystemError, or several one of the other, and of one that comes in an import a package
-    may make an ImportError. What catches an `Exception` would take these for a failure.
+    """Return whether `error` is a Ctrl-C in disguise.
+
+    One that comes while compiled code runs Python becomes a SystemError, or several one of the
+    other, and one that comes in an import a package may turn into an ImportError. What catches an
+    `Exception` would take these for a failure.
     """
     cause: BaseException | None = error
     while isinstance(cause, (SystemError, ImportError)):
@@ -77,8 +85,9 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 class ErrorReport(NamedTuple):
-    """What is kept of an unexpected error: one line with its place in the code, and the
-    traceback.
+    """The record of an unexpected error.
+
+    It has one line with its place in the code, and the traceback.
     """
 
     detail: str
@@ -107,8 +116,9 @@ class HiproofWarning(UserWarning):
 
 
 class InputWarning(HiproofWarning):
-    """Input that was used after putting something right (points dropped, a CRS assumed); it says
-    what and how much.
+    """Input that was used after a correction; the message says what and how much.
+
+    Points were dropped, or a CRS was assumed.
     """
 
 
@@ -117,6 +127,7 @@ class OutputWarning(HiproofWarning):
 
 
 class NotKeptWarning(HiproofWarning):
-    """Compiled functions cannot be kept, so that every process compiles them again; it says what to
-    do.
+    """Compiled functions cannot be kept; the message says what to do.
+
+    Every process compiles them again.
     """

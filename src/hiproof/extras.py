@@ -1,5 +1,6 @@
-"""Packages that only some need: an extra of the install brings each, and one sentence names it
-where it is missing.
+"""Optional packages: an extra of the install brings each.
+
+One sentence names it where it is missing.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from .errors import InputError
 
 
 def import_extra(package: str, extra: str, purpose: str, alternative: str = "") -> Any:
-    """The module `package` for a `purpose`.
+    """Import the module `package` for a `purpose`.
 
     Raises InputError where it cannot be imported, with the `extra` that brings it.
 

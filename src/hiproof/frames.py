@@ -13,8 +13,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Units:
-    """Metres in one unit of a file's coordinates, in plan and in height, and the names of these
-    units.
+    """Metres in one unit of a file's coordinates, in plan and in height.
+
+    The names of these units come with them.
 
     >>> feet = Units(0.3048, 0.3048, "foot", "foot")
     >>> feet.to_metres([[10, 20, 30]]).round(4).tolist()
@@ -33,12 +34,12 @@ class Units:
         return self.plan == self.height == 1.0
 
     def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
-        """World metres of a file's coordinates (n, 2) or (n, 3)."""
+        """Convert a file's coordinates (n, 2) or (n, 3) to world metres."""
         coordinates = np.asarray(coordinates, float)
         return coordinates * self.factors[: coordinates.shape[-1]]
 
     def from_metres(self, world: np.ndarray) -> np.ndarray:
-        """A file's coordinates of world metres (n, 2) or (n, 3)."""
+        """Convert world metres (n, 2) or (n, 3) to a file's coordinates."""
         world = np.asarray(world, float)
         return world / self.factors[: world.shape[-1]]
 
@@ -59,8 +60,9 @@ METRES = Units()
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """A frame with the world's axes and its origin at `origin` (3,), in metres of the world frame
-    (the paper's T_G).
+    """A frame with the world's axes and its origin at `origin` (3,).
+
+    The origin is in metres of the world frame (the paper's T_G).
 
     >>> frame = LocalFrame.around(np.array([[85000.0, 446000.0, 3.0], [85002.0, 446002.0, 5.0]]))
     >>> frame.to_local(np.array([[85001.0, 446001.0, 4.0]])).tolist()
@@ -71,8 +73,9 @@ class LocalFrame:
 
     @classmethod
     def around(cls, points_world: np.ndarray) -> "LocalFrame":
-        """Frame at the centroid of `points_world` (n, 3), rounded to the millimetre so that it
-        writes out exactly.
+        """Return the frame at the centroid of `points_world` (n, 3).
+
+        It is rounded to the millimetre so that it writes out exactly.
         """
         return cls(np.round(np.asarray(points_world, float)[:, :3].mean(axis=0), 3))
 
@@ -89,18 +92,19 @@ class LocalFrame:
 
 @dataclass(frozen=True)
 class PlanFrame:
-    """A roof's own axes: origin (3,) in local coordinates, `rotation` (2, 2) with uv = rotation @
-    (xy - origin).
+    """A roof's own axes: an origin (3,) in local coordinates, and a `rotation`.
+
+    `rotation` is (2, 2) with uv = rotation @ (xy - origin).
     """
 
     origin: np.ndarray
     rotation: np.ndarray
 
     def to_plan(self, xyz_local: np.ndarray) -> np.ndarray:
-        """(n, 3) local coordinates to (n, 3) u, v, z."""
+        """Convert (n, 3) local coordinates to (n, 3) u, v, z."""
         shifted = xyz_local - self.origin
         return np.column_stack([shifted[:, :2] @ self.rotation.T, shifted[:, 2]])
 
     def xy_local(self, uv: np.ndarray) -> np.ndarray:
-        """(n, 2) plan coordinates back to local x, y."""
+        """Convert (n, 2) plan coordinates back to local x, y."""
         return uv @ self.rotation + self.origin[:2]

@@ -1,4 +1,4 @@
-"""Secrets never leave the process: whatever is written or printed goes through `mask`.
+"""Masking of secrets: all that is written or printed goes through `mask`.
 
 Addresses hold passwords in several ways (`scheme://user:password@host`, `?password=`, `PG:...
 password='...'`, signed links) and appear in the middle of others' error texts, so they are looked
@@ -76,8 +76,9 @@ SECRETS = Secrets()
 
 
 def remember(*addresses: object) -> None:
-    """Hide the passwords, tokens and signatures of these addresses in all that is written from now
-    on.
+    """Hide the passwords, tokens and signatures of these addresses.
+
+    They are hidden in all that is written from now on.
 
     What is no address, such as a condition or the name of a file that is there, holds none.
     """
@@ -98,8 +99,9 @@ def names_a_file(address: str) -> bool:
 
 
 def find_secrets(address: str) -> set[str]:
-    """The secrets in an address, however malformed, with the pieces into which a program may cut
-    them.
+    """Return the secrets in an address, however malformed, and their pieces.
+
+    A program may cut them into such pieces.
 
     >>> addresses = "postgresql//adm:S3cr3t@127.0.0.1/t", "host=h password=S3c r3t user=me"
     >>> [sorted(find_secrets(address)) for address in addresses]
@@ -119,8 +121,10 @@ def find_secrets(address: str) -> set[str]:
 
 
 def candidates(address: str) -> Iterator[str]:
-    """Yield what may be a secret of an address: what a user's name is followed by up to an @, and
-    values of named parameters."""
+    """Yield what may be a secret of an address.
+
+    It is what follows a user's name up to an @, and values of named parameters.
+    """
     remainder = SCHEME.sub("", address, count=1)
     for end in {
         remainder.find("@"),
@@ -140,8 +144,10 @@ def candidates(address: str) -> Iterator[str]:
 
 
 def values_at(text: str) -> Iterator[str]:
-    """Yield what may be the value that a parameter's text begins with: quoted, or up to the next
-    parameter, or to the first sign."""
+    """Yield what may be the value with which a parameter's text begins.
+
+    It is quoted, or goes up to the next parameter, or to the first sign.
+    """
     if not text:
         return
     if text[0] in "'\"":
@@ -154,8 +160,10 @@ def values_at(text: str) -> Iterator[str]:
 
 
 def list_forms(secret: str) -> set[str]:
-    """How a secret may be written: as it is, decoded, encoded, and as programs quote texts and
-    bytes."""
+    """Return the forms in which a secret may be written.
+
+    They are as it is, decoded, encoded, and as programs quote texts and bytes.
+    """
     plain = {secret, unquote(secret), unquote_plus(secret)}
     encoded = {encode(text) for text in plain for encode in (quote, quote_plus)} | {
         quote(text, safe="") for text in plain
@@ -171,8 +179,10 @@ def list_forms(secret: str) -> set[str]:
 
 
 def make_pattern(form: str) -> str:
-    """The pattern that finds a form of a secret; a short one, or one like a word, where no letter
-    stands beside it."""
+    """Return the pattern that finds a form of a secret.
+
+    A short one, or one like a word, counts where no letter stands beside it.
+    """
     is_word = form.isalpha() and (form.islower() or form.isupper() or form.istitle())
     if len(form) >= WHOLE_WORD_BELOW and not is_word:
         return re.escape(form)
@@ -180,8 +190,9 @@ def make_pattern(form: str) -> str:
 
 
 def mask(text: str) -> str:
-    """`text` with the passwords, tokens and signatures of all addresses in it replaced by three
-    dots.
+    """Replace the secrets of all addresses in `text` by three dots.
+
+    Secrets are passwords, tokens and signatures.
 
     >>> mask("expected a table at postgresql://me:secret@host/db?table=fp, got none")
     'expected a table at postgresql://me:...@host/db?table=fp, got none'
@@ -195,7 +206,7 @@ def mask(text: str) -> str:
 
 
 def masked_values(value: Any) -> Any:
-    """A copy of nested dictionaries and lists, each text in them masked."""
+    """Return a copy of nested dictionaries and lists, each text masked."""
     if isinstance(value, str):
         return mask(value)
     if isinstance(value, dict):

@@ -28,7 +28,7 @@ def setting(
     option: str = "",
     names: str = "",
 ) -> Any:
-    """Declare one setting of a section;
+    """Declare one setting of a section.
 
     `lower` and `upper` are inclusive bounds, `choices` the allowed values.
 
@@ -111,8 +111,9 @@ class ReadSettings:
 
     @property
     def by_class(self) -> bool:
-        """Whether roofs are the points of the building classes, of whole clouds or, with "auto",
-        where there are such.
+        """Whether roofs are the points of the building classes.
+
+        They are those of whole clouds or, with "auto", of clouds that have such classes.
         """
         return self.roofs in ("auto", "class")
 
@@ -336,7 +337,7 @@ class Settings:
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
-        """Settings with the given sections replaced.
+        """Return settings with the given sections replaced.
 
         Raises SettingsError for unknown names or values out of bounds.
         """
@@ -344,7 +345,7 @@ class Settings:
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Settings:
-        """Settings from a TOML file with one table a section.
+        """Read settings from a TOML file with one table a section.
 
         Raises SettingsError when it cannot be read.
         """
@@ -359,7 +360,7 @@ class Settings:
         return cls.from_dict(values)
 
     def replace(self, values: dict[str, dict[str, Any]]) -> Settings:
-        """A copy with `values[section][name]` replaced, each checked."""
+        """Return a copy with `values[section][name]` replaced, each checked."""
         sections: dict[str, Any] = {}
         for section_name, changes in values.items():
             section: Any = getattr(self, section_name, None)
@@ -389,7 +390,7 @@ class Settings:
         return dataclasses.replace(self, **sections)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """Plain nested dictionary, ready for JSON."""
+        """Return a plain nested dictionary, ready for JSON."""
         return {
             s.name: {
                 f.name: plain(getattr(getattr(self, s.name), f.name))
@@ -399,7 +400,10 @@ class Settings:
         }
 
     def to_toml(self) -> str:
-        """TOML text with every setting, its unit, bounds and meaning as comments."""
+        """Return TOML text with every setting, its unit, bounds and meaning.
+
+        The last three are comments.
+        """
         lines = []
         for section_field in fields(self):
             section = getattr(self, section_field.name)
@@ -412,7 +416,7 @@ class Settings:
 
 
 def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
-    """`value` as the declared setting's type.
+    """Convert `value` to the declared setting's type.
 
     Raises SettingsError with the full sentence when it does not fit.
     """
@@ -437,7 +441,10 @@ SETTING_KINDS: dict[Any, object] = {
 
 
 def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:
-    """One value of the type of `template`, within the bounds and among the choices declared."""
+    """Convert one value to the type of `template`, and check it.
+
+    It has to be within the bounds and among the choices declared.
+    """
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if isinstance(template, (bool, str)):
         fits = isinstance(value, type(template))
@@ -473,8 +480,9 @@ def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:
 
 
 def format_value(value: Any) -> str:
-    """A value as a message shows it: whole numbers of thousands of digits and long texts
-    cut short.
+    """Format a value for a message, cut short.
+
+    Whole numbers of thousands of digits and long texts are cut.
     """
     if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
         return f"a number of more than {len(str(LARGEST_INTEGER)) - 1} digits"
@@ -485,7 +493,7 @@ def format_value(value: Any) -> str:
 
 
 def describe(declared: dataclasses.Field) -> str:
-    """One line: meaning, unit, bounds or choices, default."""
+    """Return one line: meaning, unit, bounds or choices, default."""
     m = declared.metadata
     parts = [m["help"]]
     if m["low"] is not None or m["high"] is not None:

@@ -1,4 +1,4 @@
-"""What became of a building: an outcome is a value, and its text is the sentence the user reads."""
+"""The outcomes of a building: values with the sentence that users read."""
 
 from enum import Enum
 
@@ -46,8 +46,9 @@ class Grade(Enum):
 
 
 class Doubt(Enum):
-    """What the detail of a building may leave to doubt, by the words that stand in it; a run counts
-    them at its end.
+    """The doubts that a building's detail may name, by the words in it.
+
+    A run counts them at its end.
     """
 
     TWO_SURFACES = "points lie on two surfaces"
@@ -105,8 +106,10 @@ SIGNS_OF_CHANGE = (Doubt.BARE_GROUND, Doubt.BARE_GROUND_INSIDE, Doubt.GROUND_UND
 def find_attention(
     status: str, quality: str | None, detail: str, share: float | None
 ) -> tuple[Attention, ...]:
-    """Return the kinds of attention that a building needs, from what a run writes of it: the codes
-    of its status and grade, its detail and its share of roof points within 0.2 m of the roof.
+    """Return the kinds of attention that a building needs.
+
+    They follow from what a run writes of it: the codes of its status and grade, its detail and its
+    share of roof points within 0.2 m of the roof.
 
     >>> find_attention("modelled", "good", "modelled", 0.97)
     ()

@@ -1,5 +1,6 @@
-"""The ground around the buildings of a work tile, from one grid of whole-metre cells for all of
-them.
+"""The ground around the buildings of a work tile.
+
+It comes from one grid of whole-metre cells for all of them.
 
 A cell's height depends on the points in it alone, and a building asks only the cells of its own
 whole-metre box. So the answer is the same whatever tile the cells were gathered for, and costs a
@@ -24,12 +25,13 @@ LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
 
 
 class Cells:
-    """Known cells as dense tables `x`, `y`, `z` (rows, columns) in world metres, NaN where no point
-    is.
+    """Known cells as dense tables `x`, `y`, `z` (rows, columns).
+
+    They are world metres, NaN where no point is.
     """
 
     def __init__(self, xyz: np.ndarray):
-        """`xyz` (n, 3): at most one point a cell."""
+        """Make tables of `xyz` (n, 3), at most one point a cell."""
         self.low = (
             np.floor(xyz[:, :2].min(axis=0)).astype(np.int64) if len(xyz) else np.zeros(2, np.int64)
         )
@@ -40,8 +42,9 @@ class Cells:
         self.x, self.y, self.z = tables
 
     def inside(self, box: np.ndarray) -> np.ndarray:
-        """Points (m, 3) of the known cells inside the whole-metre `box` (xmin, ymin, xmax,
-        ymax).
+        """Return the points (m, 3) of known cells inside a whole-metre box.
+
+        `box` is (xmin, ymin, xmax, ymax).
         """
         left, lower, right, upper = (
             max(int(side) - first, 0)
@@ -54,8 +57,9 @@ class Cells:
 
 
 class GroundAround:
-    """Terrain for one building: a plane through the known cells around each position, the near ones
-    weighing most.
+    """Terrain for one building: a plane through the known cells around.
+
+    Near cells weigh most.
 
     Moving least squares (Lancaster and Salkauskas 1981) with weights 1 / (distance^2 + SOFT_M2).
     """
@@ -66,14 +70,18 @@ class GroundAround:
         self.cells, self.box = cells, box
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2); NaN where no cell within the last ring is known."""
+        """Return the height (n,) at `xy_world` (n, 2).
+
+        It is NaN where no cell within the last ring is known.
+        """
         xy, cells = np.ascontiguousarray(xy_world, float), self.cells
         return plane_heights(xy, cells.x, cells.y, cells.z, cells.low, self.box.astype(np.int64))
 
 
 class BareAround:
-    """Terrain for one building where no class says which points are the ground: the lowest cells,
-    without what stands on it.
+    """Terrain for one building where no class marks the ground.
+
+    It is the lowest cells, without what stands on it.
     """
 
     source = "ground found by its shape"
@@ -91,13 +99,17 @@ class BareAround:
         return GroundAround(Cells(bare_points(lowest) if len(lowest) else lowest), self.box)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN where no ground is found within the last ring."""
+        """Return the height (n,) at `xy_world` (n, 2).
+
+        It is NaN where no ground is found within the last ring.
+        """
         return self.bare.height_at(xy_world)
 
 
 class LowestAround:
-    """The last resort for one building: the lowest known cell around each position, whatever its
-    points' class.
+    """The last resort for one building: the lowest known cell around.
+
+    The class of its points does not matter.
 
     Where ten cells or more are known the second lowest is taken: one low point is noise, two are
     ground.
@@ -109,14 +121,15 @@ class LowestAround:
         self.cells, self.box = cells, box
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
+        """Return the height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
         xy = np.ascontiguousarray(xy_world, float)
         return lowest_heights(xy, self.cells.z, self.cells.low, self.box.astype(np.int64))
 
 
 class WhereSeen:
-    """A terrain that knows nothing unless `is_seen`, which is asked only where all better ones do
-    not know.
+    """A terrain that knows nothing unless `is_seen`.
+
+    That is evaluated only where all better terrains do not know.
     """
 
     def __init__(self, terrain: Terrain, is_seen: Callable[[], bool]):
@@ -124,7 +137,7 @@ class WhereSeen:
         self.is_guess = getattr(terrain, "is_guess", False)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """The terrain's height (n,) at `xy_world` (n, 2), NaN where it knows none."""
+        """Return the terrain's height (n,) at `xy_world` (n, 2), NaN if unknown."""
         return (
             self.terrain.height_at(xy_world) if self.is_seen() else np.full(len(xy_world), np.nan)
         )
@@ -132,8 +145,10 @@ class WhereSeen:
 
 @compiled
 def window(x, y, reach, lower, shape, box):
-    """Rows and columns, [first, end), of a table whose corner is cell `lower`: at most `reach` from
-    (x, y), inside `box`.
+    """Return rows and columns, [first, end), of a window of a table.
+
+    The table's corner is cell `lower`. The window reaches at most `reach` from (x, y), inside
+    `box`.
     """
     column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
     rows = (
@@ -149,8 +164,9 @@ def window(x, y, reach, lower, shape, box):
 
 @compiled
 def plane_heights(xy, x, y, z, lower, box):
-    """Heights (n,) at `xy` (n, 2) of the weighted planes through the known cells of the tables x,
-    y, z inside `box`.
+    """Return the heights (n,) at `xy` (n, 2) of weighted planes.
+
+    They go through the known cells of the tables x, y, z inside `box`.
     """
     heights = np.full(len(xy), np.nan)
     for i in range(len(xy)):
@@ -168,8 +184,9 @@ def plane_heights(xy, x, y, z, lower, box):
 
 @compiled
 def weighted_mean(position, x, y, z, bounds):
-    """Known cells within `bounds`, the sum of their weights, and their mean offset from `position`
-    (2,) and height.
+    """Return the known cells in `bounds`, their weight and their mean.
+
+    The mean is their offset from `position` (2,) and height.
     """
     count, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
     for row in range(bounds[0], bounds[1]):
@@ -190,8 +207,9 @@ def weighted_mean(position, x, y, z, bounds):
 
 @compiled
 def weighted_slope(position, x, y, z, bounds, total, mean_x, mean_y, mean_z):
-    """Rise of the plane through the known cells within `bounds` along x and along y, held back by
-    LEVELLING.
+    """Return the slope, along x and y, of the plane through known cells.
+
+    Cells are within `bounds`; LEVELLING holds the slope back.
     """
     xx, yy, xy, xz, yz = LEVELLING, LEVELLING, 0.0, 0.0, 0.0
     for row in range(bounds[0], bounds[1]):
@@ -208,8 +226,9 @@ def weighted_slope(position, x, y, z, bounds, total, mean_x, mean_y, mean_z):
 
 @compiled
 def lowest_heights(xy, z, lower, box):
-    """Lowest known height (n,) of the table z around `xy` (n, 2) and inside `box`, the second
-    lowest of ten or more.
+    """Return the lowest known height (n,) around `xy` (n, 2) inside `box`.
+
+    It is the second lowest of ten or more cells of the table z.
     """
     heights = np.full(len(xy), np.nan)
     for i in range(len(xy)):
@@ -227,15 +246,17 @@ def lowest_heights(xy, z, lower, box):
 
 
 def ground_cells(xyz: np.ndarray) -> Cells:
-    """Cells of ground points (n, 3) from any number of files: mean position and lower median height
-    a cell.
+    """Return the cells of ground points (n, 3) from any number of files.
+
+    A cell has their mean position and lower median height.
     """
     return Cells(thin_to_grid(without_repeats(xyz), 1.0))
 
 
 def lowest_in_cells(xyz: np.ndarray) -> np.ndarray:
-    """The lowest height of each whole-metre cell, at the cell's centre: the lowest of lowest is the
-    same however cut.
+    """Return the lowest height of each whole-metre cell, at its centre.
+
+    The lowest of lowest is the same however the points are cut.
     """
     lowest = rank_in_cells(xyz, 1.0, np.zeros_like)
     return np.column_stack([np.floor(lowest[:, :2]) + 0.5, lowest[:, 2]])

@@ -1,5 +1,6 @@
-"""Houses that touch, told apart where their roofs say so: a step, another ridge or another eave all
-along a straight line.
+"""Houses that touch, separated where their roofs differ.
+
+They differ by a step, another ridge or another eave all along a straight line.
 
 A bond joins two neighbouring points in plan; it holds where one surface goes on from one to the
 other. A line is crossed by bonds in runs; it may cut the block in those runs across which hardly
@@ -53,9 +54,10 @@ STRAIGHT_M = 0.7  # corners of the block's border that are none
 
 @dataclass(frozen=True)
 class Bonds:
-    """Pairs of points (b, 2), by their numbers: their places `ends` (b, 2, 2) in plan, `middle` (b,
-    2) between these, `state` (b,): HELD, LOOSE, or UNKNOWN between leaves, and `weight` (b,): short
-    ones count more.
+    """Pairs of neighbouring points (b, 2), by their numbers.
+
+    `ends` (b, 2, 2) are their places in plan and `middle` (b, 2) lies between these. `state` (b,)
+    is HELD, LOOSE, or UNKNOWN between leaves, and by `weight` (b,) short ones count more.
     """
 
     points: np.ndarray
@@ -65,7 +67,7 @@ class Bonds:
     weight: np.ndarray
 
     def among(self, selection: np.ndarray) -> Bonds:
-        """The `selection` (b,) ones."""
+        """Select bonds by `selection` (b,)."""
         number = np.flatnonzero(selection)
         return Bonds(*(getattr(self, f.name).take(number, axis=0) for f in fields(self)))
 
@@ -73,7 +75,7 @@ class Bonds:
         return self.among(shapely.intersects_xy(area, *self.middle.T))
 
     def across(self, cut: Cut) -> np.ndarray:
-        """How far (b, 2) the ends lie before the line of a cut."""
+        """Return how far (b, 2) the ends lie before the line of a cut."""
         return (self.ends.reshape(-1, 2) @ cut.normal - cut.offset).reshape(-1, 2)
 
 
@@ -82,8 +84,10 @@ HELD_BOND, LOOSE, UNKNOWN_BOND = 0, 1, 2  # states of a bond between neighbourin
 
 @dataclass(frozen=True)
 class Cut:
-    """The line at `offset` (m) along `normal` (2,), which bonds cross in `runs` (r, 4): low, high
-    (m along it), whether it may be cut there, and what speaks for that (m).
+    """The line at `offset` (m) along `normal` (2,), which bonds cross in runs.
+
+    `runs` (r, 4) are low and high (m along it), whether it may be cut there, and the evidence for
+    that (m).
     """
 
     normal: np.ndarray
@@ -113,11 +117,11 @@ class Cut:
         return self.at(self.longest[:2].mean())
 
     def at(self, u: float, v: float = 0.0) -> np.ndarray:
-        """The place (2,) `u` along the line and `v` before it."""
+        """Return the place (2,) `u` along the line and `v` before it."""
         return (self.offset + v) * self.normal + u * self.along
 
     def is_like(self, other: Cut) -> bool:
-        """Whether both run nearly the same way in nearly the same place."""
+        """Return whether both run nearly the same way in nearly the same place."""
         turn, distance = (
             abs(self.normal @ other.normal),
             abs(self.middle @ other.normal - other.offset),
@@ -130,8 +134,9 @@ class Cut:
 def separate_houses(
     xyz: np.ndarray, area: shapely.Geometry, gap_m: float
 ) -> list[shapely.Geometry]:
-    """The areas of the single houses among roof points (n, 3) in `area`, all in world metres: they
-    share it without a rest.
+    """Return the areas of the single houses among roof points (n, 3) in `area`.
+
+    All are in world metres. Together the houses are the area.
 
     Parts of the area within `gap_m` of each other are one block.
 
@@ -161,8 +166,9 @@ def separate_houses(
 
 
 def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[shapely.Geometry]:
-    """`area` in parts where hardly more than a few returns of what stands between two houses joins
-    them: a gutter, a tree.
+    """Split `area` where only a gutter or a tree joins its parts.
+
+    Hardly more than a few returns lie in such a neck between two houses.
     """
     wide = shapely.buffer(
         shapely.buffer(area, 0.5 * gap_m, join_style="mitre"),
@@ -178,7 +184,7 @@ def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[sh
 
 
 def houses_in(area: shapely.Geometry, roofs: Roofs, bonds: Bonds) -> list[shapely.Geometry]:
-    """`area` cut at the best cut that leaves a house on either side, and the sides again."""
+    """Cut `area` at the best cut that leaves a house on either side, repeatedly."""
     if roof_m2(area, roofs) < 2 * LEAST_HOUSE_M2:
         return [area]
     bonds = bonds.inside(area)
@@ -197,8 +203,9 @@ def is_roof(surfaces: Surfaces) -> np.ndarray:
 
 
 class Roofs(NamedTuple):
-    """Voxels on smooth surfaces that are no walls: places (r, 2), `m2` (r,) in plan, normals (r,
-    3).
+    """Voxels on smooth surfaces that are no walls.
+
+    They have places (r, 2), `m2` (r,) in plan, and normals (r, 3).
     """
 
     xy: np.ndarray
@@ -213,19 +220,22 @@ def find_roofs(surfaces: Surfaces) -> Roofs:
 
 
 def roof_m2(area: shapely.Geometry, roofs: Roofs) -> float:
-    """How much of `area` lies under roofs, in plan."""
+    """Return how much of `area` (m2) lies under roofs, in plan."""
     shapely.prepare(area)
     return float(roofs.m2[shapely.intersects_xy(area, *roofs.xy.T)].sum())
 
 
 def depth_m(side: shapely.Geometry, cut: Cut, roofs: Roofs) -> float:
-    """How far a `side` of the cut reaches away from it: twice what half of its roof does."""
+    """Return how far (m) a `side` of the cut reaches away from it.
+
+    It is twice what half of its roof does.
+    """
     inside = shapely.intersects_xy(side, *roofs.xy.T)
     return 2.0 * float(np.median(np.abs(roofs.xy[inside] @ cut.normal - cut.offset)))
 
 
 def find_bonds(surfaces: Surfaces) -> Bonds:
-    """All pairs of neighbours in plan, walls left out.
+    """Find all pairs of neighbours in plan, without walls.
 
     A surface holds both where the plane of one goes through the other, or where their planes meet
     between them (a ridge, a valley).
@@ -259,8 +269,9 @@ def find_bonds(surfaces: Surfaces) -> Bonds:
 
 
 def find_directions(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
-    """Azimuths (d,) in which cuts are looked for: those of slopes and of the block's border, and
-    across them.
+    """Return the azimuths (d,) in which cuts are looked for.
+
+    They are those of slopes and of the block's border, and across them.
     """
     shapely.prepare(area)
     normal = roofs.normal[shapely.intersects_xy(area, *roofs.xy.T)]
@@ -286,7 +297,7 @@ def find_directions(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
 
 
 def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
-    """Cuts in all `directions`, none near a better one, the best first."""
+    """Return the cuts in all `directions`, the best first, none near a better one."""
     cuts = [cut for angle in directions for cut in cuts_along(angle, bonds, LINE_M, COARSE_CUT_M)]
     best: list[Cut] = []
     for cut in sorted(cuts, key=lambda cut: -cut.gain):
@@ -296,7 +307,7 @@ def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
 
 
 def refine_cut(cut: Cut, bonds: Bonds) -> Cut | None:
-    """The best of the lines near `cut`, turned a little and at a tenth of a metre;
+    """Return the best line near `cut`, turned a little, at a tenth of a metre.
 
     None where it is none to cut at.
     """
@@ -327,7 +338,10 @@ def refine_cut(cut: Cut, bonds: Bonds) -> Cut | None:
 
 
 def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1.0) -> list[Cut]:
-    """Cuts along lines, `lines_m` apart, whose normal has the azimuth `angle`."""
+    """Return cuts along lines whose normal has the azimuth `angle`.
+
+    Lines are `lines_m` apart.
+    """
     if not len(bonds.state):
         return []
     normal = np.array([math.cos(angle), math.sin(angle)])
@@ -345,8 +359,10 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
 
 @compiled
 def crossings(ends, state, weight, normal, lines_m):
-    """How many bonds of each state cross each line in each stretch (3, lines, stretches), by their
-    `weight` (b,); the first line's number, and where the first stretch begins along it.
+    """Count the bonds of each state that cross each stretch of each line.
+
+    Returns counts (3, lines, stretches) by `weight` (b,), the first line's number, and where the
+    first stretch begins along it.
     """
     n, c, s = len(ends), normal[0] / lines_m, normal[1] / lines_m
     v, u, along = np.empty((2, n)), np.empty((2, n)), lines_m / STRETCH_M
@@ -371,8 +387,10 @@ def crossings(ends, state, weight, normal, lines_m):
 
 @compiled
 def is_between(points, ends, normal, lines_m, first, start, template):
-    """Whether something lies on both sides of each line, away from it, in each stretch, as a table
-    (lines, stretches) `template` this: along the border of a block there is nothing to be cut.
+    """Return whether points lie on both sides of each line in each stretch.
+
+    The table (lines, stretches) has the shape of `template`. Along the border of a block there is
+    nothing to be cut.
     """
     near_line, is_visited = (
         np.zeros((2, *template.shape), np.bool_),
@@ -399,8 +417,10 @@ def is_between(points, ends, normal, lines_m, first, start, template):
 
 @compiled
 def find_runs(crossed, start, least_apart):
-    """Line (m,) and low, high, whether hardly any bond holds, and gain (m, 4) of each run of
-    stretches that bonds cross; a run goes on beyond a single stretch that none crosses.
+    """Find the runs of stretches that bonds cross.
+
+    Returns for each its line (m,), and low, high, whether hardly any bond holds, and gain (m, 4). A
+    run goes on beyond a single stretch that none crosses.
     """
     line, runs, m = np.empty(crossed[0].size, np.int64), np.empty((crossed[0].size, 4)), 0
     for k in range(crossed.shape[1]):
@@ -419,8 +439,9 @@ def find_runs(crossed, start, least_apart):
 
 
 def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
-    """What `area` falls into where it is cut: all that goes on around its ends, or across it
-    elsewhere, stays together.
+    """Return the parts of `area` after a cut.
+
+    Parts that go on around the ends of the cut, or cross it elsewhere, stay together.
     """
     distant = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
     lower, upper = cut.middle @ cut.along - distant, cut.middle @ cut.along + distant
@@ -447,7 +468,7 @@ def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
 
 
 def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geometry]:
-    """The sides as large as a house, each with the smaller ones nearest to it."""
+    """Return the sides as large as a house, with the smaller ones nearest to each."""
     is_large = [roof_m2(side, roofs) >= LEAST_HOUSE_M2 for side in sides]
     houses = [[side] for side, large in zip(sides, is_large, strict=True) if large]
     if len(houses) < 2:
@@ -459,7 +480,7 @@ def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geo
 
 
 def join_areas(areas: list[shapely.Geometry]) -> shapely.Geometry:
-    """The union of polygons that share nothing but border."""
+    """Return the union of polygons that share nothing but border."""
     return (
         with_area(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
         if len(areas) > 1

@@ -1,5 +1,6 @@
-"""How smooth and how large the surface is that a point lies on: what tells roofs and walls from
-leaves.
+"""The smoothness and size of the surface on which each point lies.
+
+They tell roofs and walls from leaves.
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ LARGEST_M2 = 50.0  # surfaces of that size and larger are all alike
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Points thinned to one a voxel, (v, ...), and what each lies on;
+    """Points thinned to one a voxel, (v, ...), and their surfaces.
+
+    `voxel` (n,) is the voxel of each point given.
 
     `voxel` (n,) is the one of each point given.
 
@@ -41,13 +44,14 @@ class Surfaces:
     extent_m2: np.ndarray
 
     def around(self, values: np.ndarray) -> np.ndarray:
-        """Mean (v,) of each voxel's neighbours' `values` (v,)."""
+        """Return the mean (v,) of each voxel's neighbours' `values` (v,)."""
         return values[self.neighbours].mean(axis=1)
 
 
 def find_surfaces(xyz: np.ndarray) -> Surfaces:
-    """The surfaces that points (n, 3), in world metres, lie on; the same whatever order they come
-    in.
+    """Find the surfaces on which points (n, 3), in world metres, lie.
+
+    The order of the points does not matter.
 
     >>> x, y = np.meshgrid(np.arange(0, 8, 0.5), np.arange(0, 8, 0.5))
     >>> found = find_surfaces(np.column_stack([x.ravel(), y.ravel(), 0.5 * x.ravel()]))
@@ -72,8 +76,10 @@ def find_surfaces(xyz: np.ndarray) -> Surfaces:
 
 
 def thin_to_voxels(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the voxel
-    (n,) of each point.
+    """Thin points to one a voxel.
+
+    Returns the index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the
+    voxel (n,) of each point.
     """
     cell = np.floor(xyz / VOXEL_M).astype(np.int64)
     cell -= cell.min(axis=0)
@@ -87,8 +93,9 @@ def thin_to_voxels(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fit_planes(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centre (v, 3), unit normal (v, 3) and residual (v,), one sigma, of the plane through each
-    group of points (v, k, 3).
+    """Fit a plane to each group of points (v, k, 3).
+
+    Returns centre (v, 3), unit normal (v, 3) and residual (v,), one sigma.
     """
     centre = groups.mean(axis=1)
     offset = groups - centre[:, None]
@@ -99,8 +106,9 @@ def fit_planes(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def connect_voxels(
     xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbours: np.ndarray
 ) -> np.ndarray:
-    """Number (v,) of the surface of each voxel: neighbours are of one where both are smooth and lie
-    in each other's plane.
+    """Return the number (v,) of the surface of each voxel.
+
+    Neighbours are of one surface where both are smooth and lie in each other's plane.
     """
     item, other = np.repeat(np.arange(len(xyz)), neighbours.shape[1]), neighbours.ravel()
     mask = smooth[item] & smooth[other]

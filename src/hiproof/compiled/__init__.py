@@ -1,4 +1,4 @@
-"""Compiled functions that are kept on disk as long as nothing changes that they were compiled from.
+"""Compiled functions, kept on disk until one of their sources changes.
 
     @compiled
     def distance(points, planes): ...
@@ -21,8 +21,9 @@ from typing import Any
 
 
 def compiled(function: Callable | None = None, *, allocates: bool = True, **options: Any) -> Any:
-    """`numba.njit` with its options, as a decorator with or without them, for functions at the top
-    of a module.
+    """Compile a function at the top of a module, and keep its code.
+
+    This is `numba.njit` with its options, as a decorator with or without them.
 
     A division by zero gives infinity or NaN, as in NumPy. A function that makes no array and is
     called a million times says `allocates=False`: then it counts no references to those it reads,

@@ -1,4 +1,4 @@
-"""Python calls a compiled function through a wrapper, which is compiled when Python first calls it.
+"""Wrappers of compiled functions, compiled only when Python calls them.
 
 numba makes a wrapper for every function. It unpacks each array of each argument, which took a
 third of the time to compile. Most functions are only called by other compiled functions, and need
@@ -31,7 +31,7 @@ class Dispatcher(CPUDispatcher):
         self.entries: dict[tuple, Any] = {}
 
     def load(self, signature: Any) -> None:
-        """Have the function's code in this process, from disk or compiled, for compiled callers."""
+        """Load the function's code for compiled callers, from disk or compiled."""
         args = tuple(sigutils.normalize_signature(signature)[0])
         with global_compiler_lock:
             if args in self.overloads:
@@ -67,7 +67,10 @@ class Dispatcher(CPUDispatcher):
             return self.entries[args]
 
     def make_entry(self, signature: Any, result: Any) -> Any:
-        """The entry of a function for calls from Python, its wrapper read from disk or compiled."""
+        """Make the entry of a function for calls from Python.
+
+        Its wrapper is read from disk or compiled.
+        """
         context = self.targetctx.subtarget(enable_nrt=self.targetoptions.get("_nrt", True))
         described, environment = result.fndesc, result.environment
         if wrapper := self._cache.load_wrapper(signature, context):

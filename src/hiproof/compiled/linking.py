@@ -38,8 +38,9 @@ class Callee(NamedTuple):
 
 
 def make_pipeline(stamp: str) -> type[compiler.Compiler]:
-    """numba's compiler for functions of a source file with this `stamp`, which is part of their
-    symbols.
+    """Make numba's compiler for functions of a source file.
+
+    The file's `stamp` is part of their symbols.
     """
 
     class Stamped(compiler.Compiler):
@@ -55,14 +56,18 @@ def make_pipeline(stamp: str) -> type[compiler.Compiler]:
 
 
 def without_literals(args: tuple, kws: dict) -> tuple[tuple, dict]:
-    """Drop constants from the types of a call, so that nothing is compiled apart for them."""
+    """Drop constants from the types of a call.
+
+    So nothing is compiled apart for them.
+    """
     names = {name: types.unliteral(kind) for name, kind in kws.items()}
     return tuple(map(types.unliteral, args)), names
 
 
 def settle(result: Any, function: Callable, signature: Any) -> None:
-    """Note which large functions the code of a just compiled `result` calls, and be called as one
-    if it is one.
+    """Record which large functions the code of a compiled `result` calls.
+
+    If it is large itself, callers will call it instead of copying it.
     """
     library = result.library
     library.calls, library.is_called_as = tuple(dict.fromkeys(called_by(library))), None
@@ -74,13 +79,14 @@ def settle(result: Any, function: Callable, signature: Any) -> None:
 
 
 def links(result: Any) -> tuple[tuple[Callee, ...], Callee | None]:
-    """What of a `settle`d result has to be kept beside its code."""
+    """Return what has to be kept of a settled result beside its code."""
     return result.library.calls, result.library.is_called_as
 
 
 def called_by(library: Any) -> Iterator[Callee]:
-    """The large functions that a library's code refers to, by itself or in what was copied
-    into it.
+    """Yield the large functions to which a library's code refers.
+
+    It refers to them by itself or in what was copied into it.
     """
     for linked in library._linking_libraries:
         callee = getattr(linked, "is_called_as", None)

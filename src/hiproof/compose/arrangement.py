@@ -1,5 +1,6 @@
-"""The planar arrangement behind a solid: compiled, on an integer grid, so that every orientation
-test is exact.
+"""The planar arrangement behind a solid: compiled, on an integer grid.
+
+So every orientation test is exact.
 
 Plan coordinates are int64 in units of `GRID_M` (0.1 mm), which is also how CityJSON rounds: what is
 valid here stays valid when written. Segments are noded with a *reach*: afterwards no two vertices
@@ -28,7 +29,7 @@ COLLINEAR_UNITS = 5.0
 
 @compiled
 def grow_array(array):
-    """A copy of `array` with twice the rows."""
+    """Return a copy of `array` with twice the rows."""
     larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
     larger[: len(array)] = array
     return larger
@@ -36,8 +37,9 @@ def grow_array(array):
 
 @compiled
 def append_row(rows, count, a, b):
-    """`rows` (m, 2), of which `count` are used, with (a, b) as one more, and the count with it; a
-    copy where all were used.
+    """Append (a, b) to `rows` (m, 2), of which `count` are used.
+
+    Returns the rows and the count. Rows are copied where all were used.
     """
     if count == len(rows):
         rows = grow_array(rows)
@@ -58,7 +60,10 @@ def vertex_at(xy, count, x, y, reach):
 
 @compiled
 def is_beside(p, a, b, reach):
-    """Whether `p` lies beside the inner part of segment ab, closer than `reach`."""
+    """Return whether `p` lies beside the inner part of segment ab.
+
+    It then is closer than `reach`.
+    """
     abx, aby, apx, apy = b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1]
     along, length2 = abx * apx + aby * apy, abx * abx + aby * aby
     if along <= 0 or along >= length2:
@@ -69,7 +74,10 @@ def is_beside(p, a, b, reach):
 
 @compiled
 def find_vertex_near_segment(xy, count, a, b, reach):
-    """The vertex beside segment ab (other than its ends) nearest to a, -1 if there is none."""
+    """Return the vertex beside segment ab nearest to a, -1 if there is none.
+
+    The segment's ends do not count.
+    """
     r = np.int64(reach) + 1
     x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
     y_low, y_high = min(xy[a, 1], xy[b, 1]) - r, max(xy[a, 1], xy[b, 1]) + r
@@ -87,7 +95,9 @@ def find_vertex_near_segment(xy, count, a, b, reach):
 
 @compiled
 def turn(a, b, c):
-    """Twice the signed area of triangle abc: positive when c lies left of ab.
+    """Return twice the signed area of triangle abc.
+
+    It is positive when c lies left of ab, and exact for integers.
 
     Exact for integers.
     """
@@ -96,7 +106,7 @@ def turn(a, b, c):
 
 @compiled
 def find_first_crossing(xy, edges, count, a, b):
-    """The first live edge that properly crosses segment ab, -1 if there is none."""
+    """Return the first live edge that properly crosses segment ab, else -1."""
     x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
     y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
     for e in range(count):
@@ -118,7 +128,7 @@ def find_first_crossing(xy, edges, count, a, b):
 
 @compiled
 def crossing_point(a, b, c, d):
-    """Grid point nearest to the crossing of ab and cd."""
+    """Return the grid point nearest to the crossing of ab and cd."""
     left, right = float(turn(c, d, a)), float(turn(c, d, b))
     t = left / (left - right)
     return np.int64(np.rint(a[0] + t * (b[0] - a[0]))), np.int64(np.rint(a[1] + t * (b[1] - a[1])))
@@ -126,8 +136,9 @@ def crossing_point(a, b, c, d):
 
 @compiled
 def numbered_ends(segments, reach):
-    """End points of the segments as numbered vertices: (xy with room to grow, how many, ends (m,
-    2)).
+    """Number the end points of the segments as vertices.
+
+    Returns xy with room to grow, their number, and the ends (m, 2).
     """
     xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
     ends = np.empty((len(segments), 2), np.int64)
@@ -144,7 +155,7 @@ def numbered_ends(segments, reach):
 
 @compiled
 def has_edge(edges, count, a, b):
-    """Whether edge ab is there, in either direction."""
+    """Return whether edge ab exists, in either direction."""
     for e in range(count):
         c, d = edges[e, 0], edges[e, 1]
         if (c == a and d == b) or (c == b and d == a):
@@ -154,8 +165,9 @@ def has_edge(edges, count, a, b):
 
 @compiled
 def node(segments, reach):
-    """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by
-    `reach` grid units.
+    """Return the vertices (n, 2) and edges (e, 2) of an arrangement.
+
+    It is that of `segments` (m, 4), well separated by `reach` grid units.
 
     Earlier segments have the right of way: their end points stay, later ones within reach move onto
     them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
@@ -196,8 +208,9 @@ def node(segments, reach):
 
 @compiled
 def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
-    """Put every live edge that must go through the new `vertex`, the `crossed` one and those beside
-    it, back onto the stack; returns its new top.
+    """Put every live edge that must go through a new vertex back on the stack.
+
+    These are the `crossed` edge and those beside `vertex`. Returns the stack's new top.
     """
     for other in range(edge_count):
         c = edges[other, 0]
@@ -212,8 +225,9 @@ def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
 
 @compiled
 def half_edge_order(xy, edges):
-    """Half-edges sorted by origin, then counter-clockwise: (order (2e,), start (n + 1,) of each
-    vertex's run in it).
+    """Sort half-edges by origin, then counter-clockwise.
+
+    Returns the order (2e,) and the start (n + 1,) of each vertex's run in it.
     """
     size = 2 * len(edges)
     angle = np.empty(size)
@@ -234,7 +248,7 @@ def half_edge_order(xy, edges):
 
 @compiled
 def next_half_edges(edges, order, start):
-    """The half-edge that follows each around the face on its left."""
+    """Return the half-edge that follows each around the face on its left."""
     follow = np.empty(len(order), np.int64)
     for v in range(len(start) - 1):
         for k in range(start[v], start[v + 1]):
@@ -245,8 +259,9 @@ def next_half_edges(edges, order, start):
 
 @compiled
 def find_face_left(xy, edges, x, y):
-    """Half-edge first hit by the ray from (x, y) towards -x, with that point on its left; -1 if
-    none. y is no integer.
+    """Return the half-edge that the ray from (x, y) towards -x hits first.
+
+    The point lies on its left. It is -1 if there is none. y is no integer.
     """
     best, best_x = -1, -np.inf
     for e in range(len(edges)):
@@ -263,8 +278,9 @@ def find_face_left(xy, edges, x, y):
 
 @compiled
 def trace_faces(xy, edges, follow):
-    """Face on the left of each half-edge (2e,), and each face's area (f,) in square grid units;
-    face 0 is unbounded.
+    """Trace the face on the left of each half-edge (2e,), and faces' areas (f,).
+
+    Areas are in square grid units. Face 0 is unbounded.
 
     Holes belong to the face around them: the outer walk of every island is handed to the face found
     by a ray from its leftmost vertex.
@@ -305,8 +321,9 @@ def trace_faces(xy, edges, follow):
 
 @compiled
 def chord(xy, edges, h):
-    """Length of the ray from the middle of half-edge `h` to its left until the first edge, and its
-    unit direction.
+    """Return the length and direction of the chord left of half-edge `h`.
+
+    It is the ray from the half-edge's middle to the first edge; the direction is a unit vector.
     """
     a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
     ax, ay = 0.5 * (xy[a, 0] + xy[b, 0]), 0.5 * (xy[a, 1] + xy[b, 1])
@@ -331,8 +348,9 @@ def chord(xy, edges, h):
 
 @compiled
 def face_points(xy, edges, face, faces):
-    """A point (f, 2) well inside each face: the middle of its longest chord at right angles to an
-    edge's middle.
+    """Return a point (f, 2) well inside each face.
+
+    It is the middle of the face's longest chord at right angles to an edge's middle.
     """
     longest, best = np.zeros(faces), np.zeros(faces)
     points = np.zeros((faces, 2))
@@ -354,7 +372,7 @@ def face_points(xy, edges, face, faces):
 
 @compiled
 def covers(soup, lower, upper, x, y):
-    """Whether the polygon of soup[low:high] holds (x, y), by parity."""
+    """Return whether the polygon of soup[lower:upper] holds (x, y), by parity."""
     inside = False
     for e in range(lower, upper):
         if flips(soup[e, 0], soup[e, 1], soup[e, 2], soup[e, 3], x, y):
@@ -364,7 +382,9 @@ def covers(soup, lower, upper, x, y):
 
 @compiled
 def active_plane(x, y, soup, soup_start, planes, plane_start):
-    """Plane active at (x, y): the lowest of each covering piece, the highest of those;
+    """Return the plane that is active at (x, y).
+
+    It is the highest of the covering pieces' lowest planes.
 
     UNCOVERED, OUTSIDE the outline.
 
@@ -390,8 +410,10 @@ def active_plane(x, y, soup, soup_start, planes, plane_start):
 def label_faces(
     points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label
 ):
-    """Label of each face (f,): the group of the plane active at its point, or what the last patch
-    over it says; and which have a patch.
+    """Return the label of each face (f,), and which faces have a patch.
+
+    The label is the group of the plane active at the face's point, or that of the last patch over
+    it.
     """
     label, patched = np.full(len(points), OUTSIDE, np.int64), np.zeros(len(points), np.bool_)
     for f in range(1, len(points)):
@@ -405,7 +427,10 @@ def label_faces(
 
 @compiled
 def join_regions(edges, face, label):
-    """Region (f,) of each face: faces joined over edges that have the same label on both sides."""
+    """Return the region (f,) of each face.
+
+    Faces are joined over edges that have the same label on both sides.
+    """
     parent = np.arange(len(label))
     for e in range(len(edges)):
         if label[face[2 * e]] == label[face[2 * e + 1]]:
@@ -426,8 +451,9 @@ def edge_lengths(xy, edges):
 
 @compiled
 def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_width):
-    """Give every region too small or too thin to the neighbour it shares the longest border with,
-    smallest first.
+    """Give every region too small or thin to a neighbour, smallest first.
+
+    The neighbour is the one with the longest common border.
 
     A patch alone comes last, for what lies between it and the region it belongs to may become that
     region's. One that would carry its plane on to where no roof is around keeps out, unless nobody
@@ -478,8 +504,10 @@ def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_w
 
 @compiled
 def choose_heir(xy, edges, face, label, region, length, planes, sliver, anyone):
-    """The label of the region that shares the longest border with a sliver, of those whose planes
-    stay over it within the heights around it (or `anyone`'s); OUTSIDE where there is none.
+    """Return the label of the region that takes a sliver over.
+
+    It shares the longest border with the sliver, and its planes stay over it within the heights
+    around it (or it is `anyone`). It is OUTSIDE where there is none.
     """
     shared, fits = np.zeros(len(label)), np.ones(len(label), np.bool_)
     lower, upper = np.inf, -np.inf
@@ -514,8 +542,9 @@ def evaluate_height(plane, place):
 
 @compiled
 def keep_largest_component(edges, face, area, label):
-    """Turn everything but the largest connected inside to OUTSIDE (a neck thinner than the reach
-    was cut).
+    """Turn all but the largest connected inside to OUTSIDE.
+
+    A neck thinner than the reach has been cut.
     """
     parent = np.arange(len(label))
     for e in range(len(edges)):
@@ -534,8 +563,9 @@ def keep_largest_component(edges, face, area, label):
 
 @compiled
 def renumber_vertices(xy, edges, side):
-    """The edges that are left (first vertex not negative), their sides, and the vertices they use,
-    numbered anew.
+    """Renumber the vertices of the edges that are left.
+
+    Their first vertex is not negative. Returns the edges, their sides and the vertices they use.
     """
     number = np.full(len(xy), -1, np.int64)
     out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
@@ -556,7 +586,9 @@ def renumber_vertices(xy, edges, side):
 
 @compiled
 def dissolve(xy, edges, side):
-    """Drop edges with one label on both sides, then vertices on straight stretches;
+    """Drop edges with one label on both sides, then straight vertices.
+
+    Returns (xy, edges, side), compacted.
 
     (xy, edges, side) compacted.
 
@@ -621,8 +653,9 @@ def plan_cells(
     min_area,
     min_width,
 ):
-    """Cells of the plan in which one plane is active, as labelled edges: (xy (n, 2), edges (e, 2),
-    side (e, 2)).
+    """Return the cells of the plan in which one plane is active.
+
+    They are labelled edges: xy (n, 2), edges (e, 2), side (e, 2).
 
     `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones;
     what remains UNCOVERED is for the caller to see in `side`.
@@ -642,8 +675,9 @@ def plan_cells(
 
 @compiled
 def inside_intervals(soup, lower, upper, px, py, dx, dy):
-    """Sorted parameters (even in number) at which the line (px, py) + t (dx, dy) enters and leaves
-    a polygon.
+    """Return sorted parameters at which a line enters and leaves a polygon.
+
+    The line is (px, py) + t (dx, dy). Their number is even.
     """
     cuts = np.empty(upper - lower)
     count = 0
@@ -663,7 +697,10 @@ def inside_intervals(soup, lower, upper, px, py, dx, dy):
 
 @compiled
 def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
-    """Narrow [t_low, t_high] to where plane j is the lowest of planes[low:high] along the line."""
+    """Narrow [t_low, t_high] to where plane j is the lowest along the line.
+
+    It is among planes[lower:upper].
+    """
     for k in range(lower, upper):
         if k == j:
             continue
@@ -681,8 +718,9 @@ def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
 
 @compiled
 def meeting_lines(soup, soup_start, planes, plane_start):
-    """Segments (m, 4) in the plan along which the active plane changes, within a piece and between
-    overlapping ones.
+    """Return the segments (m, 4) in plan along which the active plane changes.
+
+    They lie within a piece and between overlapping ones.
     """
     out, count = np.empty((64, 4), np.int64), 0
     pieces = len(plane_start) - 1

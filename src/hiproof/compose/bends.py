@@ -1,5 +1,6 @@
-"""Which faces are bent: two triangles of their constrained Delaunay triangulation over 20 degrees
-apart (val3dity's 204).
+"""Bent faces, of which two triangles are over 20 degrees apart.
+
+The triangles are those of their constrained Delaunay triangulation (val3dity's 204).
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ def bent_faces(
     face_start: np.ndarray,
     normals: np.ndarray,
 ) -> np.ndarray:
-    """Those of `faces` (k,) that are bent; the solid is flattened as for `check_faces`, `normals`
-    (f, 3) its best planes'.
+    """Return those of `faces` (k,) that are bent.
+
+    The solid is flattened as for `check_faces`, and `normals` (f, 3) are those of its best planes.
 
     >>> saddle = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1,
     ...     0]]), np.arange(4), np.array([0, 4]), np.array([0, 1])
@@ -49,8 +51,9 @@ def bent_faces(
 
 @compiled
 def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
-    """Vertices (m, 3) of all rings of `faces`, the same in the planes of their faces (m, 2), and
-    each face's start.
+    """Return the vertices (m, 3) of `faces`, and the same (m, 2) in their planes.
+
+    They are those of all rings; each face's start comes with them.
     """
     start = np.zeros(len(faces) + 1, np.int64)
     for k in range(len(faces)):
@@ -72,7 +75,7 @@ def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
 
 @compiled
 def corner_at(x, y, flat, lower, upper):
-    """The vertex of flat[low:high] that lies at (x, y)."""
+    """Return the vertex of flat[lower:upper] that lies at (x, y)."""
     for i in range(lower, upper):
         if flat[i, 0] == x and flat[i, 1] == y:
             return i
@@ -81,8 +84,9 @@ def corner_at(x, y, flat, lower, upper):
 
 @compiled
 def triangle_normals(places, owner, corners, flat, start, normals):
-    """Unit normals (t, 3) of triangles given by their `places` (t, 4, 2) in their face's plane;
-    zero without an area.
+    """Return the unit normals (t, 3) of triangles, zero without an area.
+
+    Triangles have `places` (t, 4, 2) in their face's plane.
     """
     result = np.zeros((len(places), 3))
     for t in range(len(places)):
@@ -99,7 +103,7 @@ def triangle_normals(places, owner, corners, flat, start, normals):
 
 @compiled
 def are_bent(places, owner, corners, flat, start, normals):
-    """Whether each face (k,) has two triangles over 20 degrees apart;
+    """Return whether each face (k,) has two triangles over 20 degrees apart.
 
     `owner` (t,) is the face of each triangle.
     """

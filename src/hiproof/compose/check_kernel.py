@@ -1,4 +1,6 @@
-"""The compiled tests behind `check_solid`: each finding is a row (code, face, other face or -1).
+"""The compiled tests behind `check_solid`.
+
+Each finding is a row (code, face, other face or -1).
 
 Faces are flattened: ring r has vertices `index[ring_start[r]:ring_start[r + 1]]`, face f the rings
 `face_start[f]:face_start[f + 1]`, the outer one first. Polygons are tested in the projection along
@@ -25,7 +27,7 @@ SKEW = np.array([0.43, 0.61, 0.67])
 
 @compiled
 def weld(vertices, tolerance):
-    """For each vertex (n,) the lowest index of a vertex closer than `tolerance`."""
+    """Return for each vertex (n,) the lowest index of one within `tolerance`."""
     same = np.arange(len(vertices))
     # buildings are square to the axes: along none of them do so few vertices share a place
     along = SKEW[0] * vertices[:, 0] + SKEW[1] * vertices[:, 1] + SKEW[2] * vertices[:, 2]
@@ -63,7 +65,7 @@ def distance_to_segment(p, a, b):
 
 @compiled
 def crosses(a, b, c, d):
-    """Whether the open segments ab and cd cross in one point."""
+    """Return whether the open segments ab and cd cross in one point."""
     left, right = cross2(a, b, c), cross2(a, b, d)
     if not ((left > 0 and right < 0) or (left < 0 and right > 0)):
         return False
@@ -73,7 +75,7 @@ def crosses(a, b, c, d):
 
 @compiled
 def is_inside_ring(p, flat, index, lower, upper):
-    """Whether the plan point p lies in the ring, by parity."""
+    """Return whether the plan point p lies in the ring, by parity."""
     inside = False
     for k in range(lower, upper):
         a, b = flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
@@ -84,7 +86,10 @@ def is_inside_ring(p, flat, index, lower, upper):
 
 @compiled
 def depth_in_face(p, flat, index, ring_start, first, last):
-    """Distance of the plan point p from the border of a face, negative outside."""
+    """Return the distance of plan point p from a face's border.
+
+    It is negative outside.
+    """
     inside, nearest = False, np.inf
     for r in range(first, last):
         lower, upper = ring_start[r], ring_start[r + 1]
@@ -102,7 +107,10 @@ def depth_in_face(p, flat, index, ring_start, first, last):
 
 @compiled
 def segments_touch(a, b, c, d):
-    """Whether the plan segments ab and cd cross, or an end of one lies on the other."""
+    """Return whether plan segments ab and cd cross or touch.
+
+    They touch where an end of one lies on the other.
+    """
     return (
         crosses(a, b, c, d)
         or min(distance_to_segment(c, a, b), distance_to_segment(d, a, b)) <= ON_SEGMENT_M
@@ -112,8 +120,9 @@ def segments_touch(a, b, c, d):
 
 @compiled
 def is_simple_ring(flat, index, lower, upper):
-    """Whether a ring neither crosses nor touches nor folds back on itself (vertices already
-    welded).
+    """Return whether a ring neither crosses, touches nor folds back on itself.
+
+    Its vertices are already welded.
     """
     size = upper - lower
     for i in range(size):
@@ -150,7 +159,7 @@ def is_simple_ring(flat, index, lower, upper):
 
 @compiled
 def are_same_ring(index, lower, upper, low2, high2):
-    """Whether two rings hold the same vertices."""
+    """Return whether two rings hold the same vertices."""
     if upper - lower != high2 - low2:
         return False
     for k in range(lower, upper):
@@ -164,7 +173,10 @@ def are_same_ring(index, lower, upper, low2, high2):
 
 @compiled
 def rings_meet(flat, index, lower, upper, low2, high2):
-    """(whether two rings cross or share a stretch, in how many points they touch)."""
+    """Return whether two rings cross, and in how many points they touch.
+
+    Sharing a stretch counts as crossing.
+    """
     touches = 0
     for k in range(lower, upper):
         a, b = flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
@@ -190,8 +202,9 @@ def rings_meet(flat, index, lower, upper, low2, high2):
 
 @compiled
 def is_ring_in_ring(flat, index, lower, upper, low2, high2):
-    """Whether the first ring lies in the second, by its first vertex or edge middle that is not on
-    the second's border.
+    """Return whether the first ring lies in the second.
+
+    Its first vertex or edge middle that is not on the second's border decides.
     """
     for k in range(lower, upper):
         a, b = flat[index[k]], flat[index[k + 1 if k + 1 < upper else lower]]
@@ -211,7 +224,7 @@ def is_ring_in_ring(flat, index, lower, upper, low2, high2):
 
 @compiled
 def check_inner_rings(flat, index, ring_start, first, last, signed, result, count, f):
-    """Codes 201, 202, 205, 206, 207, 208 of one face;
+    """Find codes 201, 202, 205, 206, 207 and 208 of one face.
 
     `signed` are the rings' areas along the face's normal.
     """
@@ -254,7 +267,9 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, result, coun
 
 @compiled
 def may_bend(vertices, index, lower, upper, normal):
-    """Whether some three of a face's vertices span a triangle over 10 degrees off its `normal`.
+    """Return whether three vertices of a face may span a bent triangle.
+
+    Such a triangle is over 10 degrees off the face's `normal`.
 
     Where none do, no two triangles of any triangulation are over 20 degrees apart. Large faces are
     not asked.
@@ -278,8 +293,9 @@ def may_bend(vertices, index, lower, upper, normal):
 
 @compiled
 def ring_lengths_code(index, ring_start, first, last):
-    """Code 101 or 102 of the rings first to last, 0 where they have points enough and none twice in
-    a row.
+    """Return code 101 or 102 of the rings first to last, or 0.
+
+    0 is for rings that have enough points and none twice in a row.
     """
     code = 101 if first == last else 0
     for r in range(first, last):
@@ -294,8 +310,9 @@ def ring_lengths_code(index, ring_start, first, last):
 
 @compiled
 def check_faces(vertices, index, ring_start, face_start, planarity):
-    """Ring and face codes but 204: (rows found, unit normals (f, 3), offsets (f,), flatness (f,),
-    may bend (f,)).
+    """Find ring and face codes other than 204.
+
+    Returns the rows found, unit normals (f, 3), offsets (f,), flatness (f,), and may bend (f,).
     """
     faces = len(face_start) - 1
     normals, offsets, flatness = np.zeros((faces, 3)), np.zeros(faces), np.zeros(faces)
@@ -345,8 +362,9 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
 
 @compiled
 def best_plane(vertices, index, lower, upper, normal):
-    """The plane by least squares through index[low:high]: (unit normal, offset, how far vertices
-    lie off it).
+    """Return the least-squares plane through index[lower:upper].
+
+    It is (unit normal, offset, how far vertices lie off it).
 
     `normal` is about right and is turned to the best; that of the area goes far astray where a face
     is long and thin.
@@ -381,7 +399,7 @@ def best_plane(vertices, index, lower, upper, normal):
 
 @compiled
 def largest_axes(normals):
-    """For each normal (f, 3) the axis of its largest component."""
+    """Return for each normal (f, 3) the axis of its largest component."""
     axes = np.zeros(len(normals), np.int64)
     for f in range(len(normals)):
         axes[f] = np.argmax(np.abs(normals[f]))
@@ -390,7 +408,10 @@ def largest_axes(normals):
 
 @compiled
 def project(flat, vertices, index, lower, upper, axis):
-    """Write into flat (n, 2) the vertices index[low:high] without their coordinate along `axis`."""
+    """Write the vertices without their coordinate along `axis` into flat (n, 2).
+
+    They are index[lower:upper].
+    """
     first, second = 1 if axis == 0 else 0, 1 if axis == 2 else 2
     for k in range(lower, upper):
         flat[index[k], 0], flat[index[k], 1] = vertices[index[k], first], vertices[index[k], second]
@@ -398,8 +419,9 @@ def project(flat, vertices, index, lower, upper, axis):
 
 @compiled
 def directed_edges(index, ring_start, face_start):
-    """All directed edges sorted by their vertices: (edge (e, 4): low vertex, high vertex, +1 or -1,
-    face).
+    """Return all directed edges sorted by their vertices.
+
+    An edge (e, 4) is low vertex, high vertex, +1 or -1, and face.
     """
     edges = np.empty((len(index), 4), np.int64)
     count = 0
@@ -417,7 +439,10 @@ def directed_edges(index, ring_start, face_start):
 
 @compiled
 def check_edges(edges, faces, result, count):
-    """Codes 302, 303, 307 (every edge twice, in opposite directions) and 305 (one component)."""
+    """Find codes 302, 303, 307 and 305.
+
+    The first three want every edge twice, in opposite directions; 305 wants one component.
+    """
     parent = np.arange(faces)
     start, clean = 0, True
     while start < len(edges):
@@ -447,7 +472,7 @@ def check_edges(edges, faces, result, count):
 
 @compiled
 def check_umbrellas(index, ring_start, face_start, result, count):
-    """Code 303 where the faces around a vertex form more than one fan.
+    """Find code 303 where faces around a vertex form more than one fan.
 
     Only for shells whose edges are all paired.
 
@@ -506,7 +531,7 @@ def holds_vertex(index, lower, upper, v):
 
 @compiled
 def holds_edge(index, lower, upper, a, b):
-    """Whether the ring index[low:high] runs from a to b or from b to a."""
+    """Return whether the ring index[lower:upper] has the edge ab or ba."""
     for k in range(lower, upper):
         following = index[k + 1 if k + 1 < upper else lower]
         if (index[k] == a and following == b) or (index[k] == b and following == a):
@@ -516,7 +541,7 @@ def holds_edge(index, lower, upper, a, b):
 
 @compiled
 def measure_above(vertices, v, normal, offset):
-    """Height of vertex v over a plane."""
+    """Return the height of vertex v over a plane."""
     return (
         vertices[v, 0] * normal[0]
         + vertices[v, 1] * normal[1]
@@ -527,7 +552,7 @@ def measure_above(vertices, v, normal, offset):
 
 @compiled
 def is_outside(vertices, a, b, lower, upper, slack):
-    """Whether the edge from a to b lies beyond one side of a box."""
+    """Return whether the edge from a to b lies beyond one side of a box."""
     for axis in range(3):
         p, q = vertices[a, axis], vertices[b, axis]
         if min(p, q) > upper[axis] + slack or max(p, q) < lower[axis] - slack:
@@ -539,7 +564,9 @@ def is_outside(vertices, a, b, lower, upper, slack):
 def edges_pierce(
     vertices, index, ring_start, face_start, f, g, normal, offset, lower, upper, flat, slack
 ):
-    """Whether an edge of face g meets face f elsewhere than in shared vertices.
+    """Return whether an edge of face g pierces face f.
+
+    Shared vertices do not count.
 
     `normal` and `offset` are those of f, `lower` and `upper` its box; `slack` is how far off its
     plane counts.
@@ -580,7 +607,7 @@ def edges_pierce(
 
 @compiled
 def lies_across(flat, index, ring_start, first, last, a, b, slack):
-    """Whether edge ab, in the plane of a face, runs through its inside."""
+    """Return whether edge ab, in the plane of a face, runs through its inside."""
     p, q = flat[a], flat[b]
     for r in range(first, last):
         if holds_edge(index, ring_start[r], ring_start[r + 1], a, b):
@@ -598,7 +625,7 @@ def lies_across(flat, index, ring_start, first, last, a, b, slack):
 
 @compiled
 def face_boxes(vertices, index, ring_start, face_start):
-    """Lowest and highest corner (f, 3) of the box around each face."""
+    """Return the lowest and highest corner (f, 3) of each face's box."""
     faces = len(face_start) - 1
     low_box, high_box = np.empty((faces, 3)), np.empty((faces, 3))
     for f in range(faces):
@@ -612,8 +639,9 @@ def face_boxes(vertices, index, ring_start, face_start):
 
 @compiled
 def sweep_axis(low_box, high_box):
-    """The axis along which faces are shortest compared with the whole: sweeping along it meets the
-    fewest pairs.
+    """Return the axis along which faces are shortest against the whole.
+
+    Sweeping along it meets the fewest pairs.
     """
     best, minimum = 0, np.inf
     for axis in range(3):
@@ -628,8 +656,9 @@ def sweep_axis(low_box, high_box):
 def check_intersections(
     vertices, index, ring_start, face_start, normals, offsets, flatness, result, count
 ):
-    """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; only those
-    whose boxes meet are compared.
+    """Find code 306: faces that meet elsewhere than at shared edges or vertices.
+
+    Only those whose boxes meet are compared.
     """
     low_box, high_box = face_boxes(vertices, index, ring_start, face_start)
     slack = flatness + 2e-4
@@ -672,7 +701,7 @@ def check_intersections(
 
 @compiled
 def are_apart(lower, upper, low2, high2, slack):
-    """Whether two boxes are further apart than `slack` along some axis."""
+    """Return whether two boxes are further apart than `slack` along an axis."""
     for axis in range(3):
         if low2[axis] > upper[axis] + slack or lower[axis] > high2[axis] + slack:
             return True
@@ -681,7 +710,10 @@ def are_apart(lower, upper, low2, high2, slack):
 
 @compiled
 def check_shell(vertices, index, ring_start, face_start, normals, offsets, flatness):
-    """Findings (k, 3) of a shell of sound faces, whose lie is what `check_faces` returned."""
+    """Return the findings (k, 3) of a shell of sound faces.
+
+    Their planes are those that `check_faces` returned.
+    """
     faces = len(face_start) - 1
     result = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64)
     if faces < 4:

@@ -1,4 +1,4 @@
-"""Turn flat corners in, so that rounded heights cannot fold the face beside them. Compiled.
+"""Flat corners turned in, so that rounding cannot fold a face. Compiled.
 
 A plan vertex in the middle of a cell's straight border (another edge ends there) is a corner of the
 cell's face. It lies off the line between its neighbours by a fraction of a millimetre, and so do
@@ -25,7 +25,7 @@ INWARD_UNITS = (
 
 @compiled
 def borders_outside(edges, side, v):
-    """Whether the outline passes through vertex v."""
+    """Return whether the outline passes through vertex v."""
     for e in range(len(edges)):
         if (edges[e, 0] == v or edges[e, 1] == v) and (
             side[e, 0] == OUTSIDE or side[e, 1] == OUTSIDE
@@ -36,7 +36,10 @@ def borders_outside(edges, side, v):
 
 @compiled
 def is_free(xy, edges, v, x, y, reach):
-    """Whether vertex v can lie at (x, y): no edge but its own within reach, and no vertex."""
+    """Return whether vertex v can lie at (x, y).
+
+    No edge but its own and no vertex may lie within reach.
+    """
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]
         ax, ay, bx, by = float(xy[a, 0]), float(xy[a, 1]), float(xy[b, 0]), float(xy[b, 1])
@@ -54,8 +57,9 @@ def is_free(xy, edges, v, x, y, reach):
 
 @compiled
 def turn_flat_corners_in(xy, edges, side, ties, reach):
-    """Plan vertices (n, 2) with every flat corner moved to the cell's side of the line between its
-    neighbours.
+    """Move every flat corner to the inner side of its neighbours' line.
+
+    Returns plan vertices (n, 2). The inner side is the cell's.
 
     `edges` (e, 2), `side` (e, 2) and `ties` (k, 3) as `split_at_crossings` returns them. Corners of
     the outline stay, and so do those with a tie and those without room.

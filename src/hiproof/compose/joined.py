@@ -1,5 +1,6 @@
-"""Sets that are joined one after the other (union-find): each member names another of its set, the
-root names itself.
+"""Sets that are joined one after the other (union-find).
+
+Each member names another of its set, and the root names itself.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from ..compiled import compiled
 
 @compiled
 def find_root(parent, i):
-    """The root of the set of `i`; `parent` (n,) is shortened on the way."""
+    """Return the root of the set of `i`, shortening `parent` (n,) on the way."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]

@@ -1,5 +1,6 @@
-"""Heights over the plan: which levels meet at each plan vertex, and where faces of neighbours
-cross. Compiled.
+"""Heights over the plan. Compiled.
+
+They are the levels that meet at each plan vertex, and the places where faces of neighbours cross.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def evaluate_plane(planes, label, x, y):
 
 @compiled
 def has_room(xy, edges, e, x, y, reach):
-    """Whether (x, y) is at least `reach` from every edge but edge `e`."""
+    """Return whether (x, y) is at least `reach` from every edge but edge `e`."""
     for other in range(len(edges)):
         a, b = xy[edges[other, 0]], xy[edges[other, 1]]
         if other == e or min(a[0], b[0]) - reach > x or max(a[0], b[0]) + reach < x:
@@ -37,8 +38,9 @@ def has_room(xy, edges, e, x, y, reach):
 
 @compiled
 def crossing_place(xy, edges, side, planes, e, x, y, reach):
-    """Grid point for the crossing at (x, y) of the planes on both sides of edge e, a millimetre
-    aside where there is room.
+    """Return the grid point for a crossing of the planes beside edge e.
+
+    The crossing is at (x, y); the point lies a millimetre aside where there is room.
 
     On the edge itself rounding would leave it hundredths of a millimetre off the line between its
     neighbours, and so make a triangle of any slope. It moves along the line on which the planes
@@ -123,7 +125,7 @@ def split_at_crossings(xy, edges, side, planes, reach):
 
 @compiled
 def is_tied(ties, v, lower, upper):
-    """Whether some tie at vertex v spans the gap from low to high."""
+    """Return whether a tie at vertex v spans the gap from `lower` to `upper`."""
     for k in range(len(ties)):
         if ties[k, 0] == v and ties[k, 1] <= lower and upper <= ties[k, 2]:
             return True
@@ -132,7 +134,7 @@ def is_tied(ties, v, lower, upper):
 
 @compiled
 def stack_levels(xy, edges, side, planes, z_ground, ties):
-    """Levels over every plan vertex. All in grid units.
+    """Stack levels over every plan vertex, in grid units.
 
     Returns (order, start, follow, face) of the half-edges, `level` (2e,) the 3D vertex over each
     half-edge's origin at the height of the cell on its left, and `vertices` (m, 3). Vertices over
@@ -172,7 +174,7 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
 
 @compiled
 def first_saddle(order, start, level, face, label):
-    """First plan vertex around which the solid is no clean manifold, -1 if there is none.
+    """Return the first plan vertex that is no clean manifold, -1 if none.
 
     That is where the levels rise and fall more than once, or where one cell has two sectors that do
     not adjoin.

@@ -1,4 +1,7 @@
-"""Plan cells without steps a millimetre or two long, which no face can be flat beside. Compiled."""
+"""Plan cells without steps a millimetre or two long. Compiled.
+
+No face can be flat beside such a step.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,10 @@ SHORT_UNITS = 30.0
 
 @compiled
 def edges_at(edges, v):
-    """The first two edges that end in vertex v (-1: none), and how many do."""
+    """Return the first two edges that end in vertex v, and how many do.
+
+    A missing edge is -1.
+    """
     result, count = (-1, -1), 0
     for e in range(len(edges)):
         if edges[e, 0] == v or edges[e, 1] == v:
@@ -25,7 +31,7 @@ def edges_at(edges, v):
 
 @compiled
 def gap_at(xy, side, planes, e, v):
-    """How far apart the planes left and right of edge e are over vertex v."""
+    """Return how far apart the planes beside edge e are over vertex v."""
     return abs(
         evaluate_plane(planes, side[e, 0], xy[v, 0], xy[v, 1])
         - evaluate_plane(planes, side[e, 1], xy[v, 0], xy[v, 1])
@@ -34,8 +40,9 @@ def gap_at(xy, side, planes, e, v):
 
 @compiled
 def is_clear(xy, edges, missing, stays, distant, reach):
-    """Whether edge (gone, far) can become (stays, far): no vertex in the triangle between them or
-    within reach of it.
+    """Return whether edge (missing, distant) can become (stays, distant).
+
+    No vertex may lie in the triangle between them or within reach of it.
     """
     for e in range(len(edges)):
         for v in edges[e]:
@@ -55,8 +62,9 @@ def is_clear(xy, edges, missing, stays, distant, reach):
 
 @compiled
 def without_short_edges(xy, edges, side, planes, reach):
-    """Drop an end of every edge between two cells that is shorter than 3 mm: (xy, edges, side)
-    compacted.
+    """Drop an end of every edge between two cells that is shorter than 3 mm.
+
+    Returns (xy, edges, side), compacted.
 
     Only an end where nothing else meets can go, of two the one over which the cells are further
     apart. Outlines stay.

@@ -1,5 +1,6 @@
-"""Exact distances from points to bounded planar polygons, compiled: the measure under every
-residual figure.
+"""Exact distances from points to bounded planar polygons, compiled.
+
+All residual figures build on them.
 
 The distance of a point to a polygon is the distance to its plane where the foot of the
 perpendicular lies inside the polygon, else the distance to the nearest edge. The plane distance
@@ -27,8 +28,9 @@ first, holes after.
 def point_surface_distances(
     points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
 ) -> np.ndarray:
-    """Distance (n,) in metres from `points` (n, 3) to the nearest of the bounded `polygons`, all in
-    one frame.
+    """Return the distance (n,) in metres of `points` (n, 3) to the polygons.
+
+    It is that to the nearest of the bounded `polygons`, all in one frame.
 
     inf without polygons. Raises InputError for arrays of another shape.
 
@@ -41,8 +43,9 @@ def point_surface_distances(
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
-    """Least |dz| (n,) from `points` (n, 3) to the polygons over or under them; inf where none
-    covers a point in plan.
+    """Return the least |dz| (n,) from `points` (n, 3) to the polygons.
+
+    Polygons count that lie over or under the point; it is inf where none does.
 
     >>> square = np.array([[0.0, 0, 0], [2, 0, 2], [2, 2, 2], [0, 2, 0]])
     >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
@@ -55,21 +58,25 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
 def surface_and_vertical_distances(
     points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`point_surface_distances` and `vertical_distances` of the same points and polygons."""
+    """Return surface distances and vertical distances of the same points.
+
+    They are as from `point_surface_distances` and `vertical_distances`.
+    """
     points, flat = checked_points(points), flatten_polygons(polygons)
     return nearest_distances(points, *flat), vertical_gaps(points, *flat)
 
 
 def checked_points(points: np.ndarray) -> np.ndarray:
-    """Points as compiled code takes them."""
+    """Convert points to the form that compiled code takes."""
     return np.ascontiguousarray(as_xyz(points))
 
 
 def flatten_polygons(
     polygons: Sequence[Ring | Sequence[Ring]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All vertices (m, 3), where each ring starts in them, and each polygon in the rings (both with
-    the end).
+    """Return all vertices (m, 3), ring starts and polygon starts.
+
+    Rings start in the vertices, polygons in the rings (both with the end).
     """
     rings: list[np.ndarray] = []
     polygon_start = [0]
@@ -90,8 +97,9 @@ def flatten_polygons(
 
 @compiled
 def nearest_distances(points, vertices, ring_start, polygon_start):
-    """Distance (n,) of each point (n, 3) to the nearest polygon, these as `flatten_polygons` has
-    them.
+    """Return the distance (n,) of each point (n, 3) to the nearest polygon.
+
+    Polygons are as from `flatten_polygons`.
     """
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
@@ -119,8 +127,9 @@ def nearest_distances(points, vertices, ring_start, polygon_start):
 
 @compiled
 def vertical_gaps(points, vertices, ring_start, polygon_start):
-    """Least height (n,) between each point (n, 3) and a polygon over or under it, inf where there
-    is none.
+    """Return the least height (n,) between points (n, 3) and polygons.
+
+    Polygons count that lie over or under the point; it is inf where there is none.
     """
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
@@ -141,8 +150,9 @@ def vertical_gaps(points, vertices, ring_start, polygon_start):
 
 @compiled
 def fit_ring_plane(vertices, rings):
-    """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without
-    area.
+    """Return unit normal (Newell) and centroid of the outer ring.
+
+    The flag is false for a ring without area.
     """
     origin, normal = np.zeros(3), np.zeros(3)
     begin, end = rings[0], rings[1]
@@ -163,8 +173,9 @@ def fit_ring_plane(vertices, rings):
 
 @compiled
 def plan_axes(normal):
-    """The two coordinate axes onto which a polygon of this normal projects with the largest
-    area.
+    """Return the two axes onto which a polygon projects with most area.
+
+    `normal` is the polygon's.
     """
     largest = np.argmax(np.abs(normal))
     return (largest + 1) % 3, (largest + 2) % 3
@@ -172,8 +183,9 @@ def plan_axes(normal):
 
 @compiled
 def contains(vertices, rings, first, second, x, y):
-    """Even-odd rule over all rings, so that holes are outside; a point on a shared edge belongs to
-    one side only.
+    """Return whether a place is inside by the even-odd rule over all rings.
+
+    Holes are outside. A point on a shared edge belongs to one side only.
     """
     inside = False
     for ring in range(rings.shape[0] - 1):
@@ -194,7 +206,7 @@ def contains(vertices, rings, first, second, x, y):
 
 @compiled
 def edge_distance(vertices, rings, p):
-    """Distance of the point `p` (3,) to the nearest edge of all rings."""
+    """Return the distance of the point `p` (3,) to the nearest edge of all rings."""
     nearest_squared = np.inf
     for ring in range(rings.shape[0] - 1):
         j = rings[ring + 1] - 1

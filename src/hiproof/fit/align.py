@@ -1,4 +1,4 @@
-"""How far a footprint lies beside the roof that it stands for, and how sure that is.
+"""The shift of a footprint beside its roof, and its uncertainty.
 
 First the footprint is slid to where it holds most points: its area is the same everywhere, so that
 is where an outline of its shape is most likely. Then each side that has free ground before it is
@@ -61,10 +61,11 @@ LEAST_BEYOND_M = 0.3  # m that the roof's sides must lie off the footprint's to 
 
 @dataclass(frozen=True)
 class Shift:
-    """Where a footprint's roof lies: `xy` (2,) m from it with standard deviations `sigma` (2,),
-    infinite along which nothing is known; `beyond` (m) how far the roof reaches over the moved
-    footprint, negative where it stays behind, and its `beyond_sigma`; `disagreement` (m) of the
-    sides.
+    """The place of a footprint's roof.
+
+    `xy` (2,) m is its shift from the footprint with standard deviations `sigma` (2,), infinite
+    along which nothing is known. `beyond` (m) is how far the roof reaches over the moved footprint,
+    negative where it stays behind, with `beyond_sigma`, and `disagreement` (m) that of the sides.
     """
 
     xy: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -92,14 +93,18 @@ class Shift:
 
     @property
     def is_size_clear(self) -> bool:
-        """Whether the roof surely reaches beyond the footprint on all sides, or stays behind it."""
+        """Whether the roof surely is larger than the footprint, or smaller.
+
+        It reaches beyond it on all sides, or stays behind it.
+        """
         agreed = self.disagreement < MOST_DISAGREEMENT_M
         return bool(agreed and abs(self.beyond) > max(LEAST_BEYOND_M, SIGMAS * self.beyond_sigma))
 
 
 def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
-    """The shift of `footprint` onto roof points `xy` (n, 2) in and AROUND_M around it, both in one
-    local frame in metres.
+    """Find the shift of `footprint` onto roof points `xy` (n, 2).
+
+    Points lie in it and AROUND_M around it, in one local frame in metres.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8,
     ...     0.4)))
@@ -127,8 +132,9 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
 
 
 def is_alone(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
-    """Whether points cover no more square metres than the roof over the footprint may with the
-    largest overhang.
+    """Return whether points cover no more area than one roof may.
+
+    That is the footprint's area with the largest overhang.
     """
     covered = count_cells(np.floor(xy))
     return bool(
@@ -145,8 +151,9 @@ def settled_shift(
     footprint: shapely.Polygon,
     overhang: float,
 ) -> Shift:
-    """The shift by the sides of a footprint that is grown by `overhang` (m), from where it holds
-    most points on.
+    """Return the shift by the sides of a grown footprint.
+
+    It is grown by `overhang` (m), and starts where it holds most points.
     """
     shift = Shift(count_points_within(xy, footprint, overhang))
     for _ in range(ROUNDS):
@@ -161,8 +168,9 @@ def settled_shift(
 
 
 def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
-    """Whether points were cut off at the footprint, which looks like a roof that ends there; mostly
-    a few of them say no.
+    """Return whether points were cut off at the footprint.
+
+    Such a cut looks like a roof that ends there; mostly a few of the points lie beyond it.
     """
     shapely.prepare(footprint)
     for subset in (xy[::FEW], xy):
@@ -173,8 +181,10 @@ def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
 
 
 def count_points_within(xy: np.ndarray, footprint: shapely.Polygon, overhang: float) -> np.ndarray:
-    """The shift (2,) at which the footprint, grown by `overhang` (m), holds most of `xy`, the least
-    of those that hold as many: coarse, then fine.
+    """Return the shift (2,) at which the grown footprint holds most of `xy`.
+
+    It is grown by `overhang` (m). The search is coarse, then fine, and the shortest shift wins
+    where several hold as many.
     """
     lower = np.array(footprint.bounds[:2]) - STRAY_FROM_M - overhang
     count = np.ceil(
@@ -202,14 +212,17 @@ def count_points_within(xy: np.ndarray, footprint: shapely.Polygon, overhang: fl
 
 @functools.cache
 def list_moves(step: float, reach: float) -> np.ndarray:
-    """Moves (m, 2), `step` apart, up to `reach` along either axis."""
+    """Return moves (m, 2), `step` apart, up to `reach` along either axis."""
     moves = np.arange(-reach, reach + 0.5 * step, step)
     return np.array(list(product(moves, moves)))
 
 
 @compiled
 def costs_at(depth):
-    """What a point of the roof costs at each `depth` (n,) inside the footprint, in blurs."""
+    """Return the cost of a roof point at each `depth` (n,), in blurs.
+
+    Depth is inside the footprint.
+    """
     costs = np.empty(len(depth))
     for k in range(len(depth)):
         costs[k] = cost_at_depth(depth[k], False, STRAY)
@@ -218,8 +231,9 @@ def costs_at(depth):
 
 @compiled
 def slid_costs(xy, costs, lower, pitch, moves):
-    """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first
-    node lies at `lower`.
+    """Return the cost of points `xy` (n, 2) under each of `moves` (m, 2).
+
+    `costs` is a raster whose first node lies at `lower`.
     """
     result, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
     (rows, columns), flat = costs.shape, costs.ravel()
@@ -244,8 +258,10 @@ def by_sides(
     overhang: float,
     density: float,
 ) -> Shift | None:
-    """The shift and the reach beyond that all free sides of the footprint, slid by `start` and
-    grown by `overhang` (m), agree on best; None of too few.
+    """Return the shift and reach on which all free sides agree best.
+
+    The footprint is slid by `start` and grown by `overhang` (m). It is None where there are too few
+    sides.
     """
     ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
@@ -271,8 +287,9 @@ def by_sides(
 
 @compiled
 def free_sides(xy, normals, distances, ends):
-    """Which of the footprint's sides (m,) have points behind them and hardly any before, where
-    roofs of neighbours would go on.
+    """Return which of the footprint's sides (m,) are free.
+
+    They have points behind them and hardly any before, where roofs of neighbours would go on.
     """
     previous, behind = np.zeros(len(normals)), np.zeros(len(normals))
     for m in range(len(normals)):

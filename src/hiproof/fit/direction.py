@@ -1,5 +1,6 @@
-"""Plan directions of a roof before any fit: of its slopes, of its smallest rectangle, of a given
-outline. Compiled.
+"""Plan directions of a roof before any fit. Compiled.
+
+They are those of its slopes, of its smallest rectangle, and of a given outline.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ PEAK_RAD, NEAR_PEAK_RAD = math.radians(3.0), math.radians(5.0)
 
 @compiled
 def nearest(points, i, indices, distances):
-    """Indices of the points nearest to point `i`, itself included; returns how many were found.
+    """Write the indices of the points nearest to point `i`, and count them.
+
+    The point itself is included.
 
     `points` ascend in x.
 
@@ -51,7 +54,9 @@ def nearest(points, i, indices, distances):
 
 @compiled
 def local_slope(points, indices):
-    """(a, b, mean squared residual) of the least-squares plane through `points[indices]`;
+    """Return (a, b, mean squared residual) of a least-squares plane.
+
+    It goes through `points[indices]`.
 
     NaN where they are a line.
     """
@@ -76,8 +81,9 @@ def local_slope(points, indices):
 
 @compiled
 def slope_direction(points, queries, neighbours):
-    """(kappa, confidence 0..1) of the four-fold harmonic of the azimuths of local slopes at about
-    `queries` points.
+    """Return (kappa, confidence 0..1) of the slopes' common direction.
+
+    It is that of the four-fold harmonic of the azimuths of local slopes, at about `queries` points.
 
     Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak. `points`
     (n, 3 or more) ascend in x.
@@ -113,8 +119,9 @@ def slope_direction(points, queries, neighbours):
 
 @compiled
 def rectangle_direction(points, trim, angles):
-    """Direction in 0..pi/2, out of `angles`, of the smallest rectangle that holds all but `trim` of
-    the points per side.
+    """Return the direction in 0..pi/2 of the smallest rectangle.
+
+    It is one of `angles`. The rectangle holds all but `trim` of the points per side.
     """
     extents = np.empty(2 * angles)
     across = np.empty(len(points))
@@ -130,7 +137,7 @@ def rectangle_direction(points, trim, angles):
 
 @compiled
 def trimmed_range(values, trim):
-    """(low, high) between which all but a share `trim` at each end of `values` lie."""
+    """Return the range of all `values` but a share `trim` at each end."""
     ordered = np.sort(values)
     cut = int(trim * len(values))
     return ordered[cut], ordered[len(values) - 1 - cut]
@@ -138,8 +145,9 @@ def trimmed_range(values, trim):
 
 @compiled
 def rectangle_in_direction(points, kappa, trim):
-    """Plan (5,) cx, cy, kappa, V, U of the trimmed rectangle of the points in the direction
-    `kappa`.
+    """Return the trimmed rectangle of the points in the direction `kappa`.
+
+    It is a plan (5,): cx, cy, kappa, V, U.
     """
     c, s = math.cos(kappa), math.sin(kappa)
     low_u, high_u = trimmed_range(c * points[:, 0] + s * points[:, 1], trim)
@@ -151,8 +159,9 @@ def rectangle_in_direction(points, kappa, trim):
 
 
 def quarter_gap(angle):
-    """How far each `angle` (rad) is from the nearest quarter turn, in [-45, 45) degrees: of arrays,
-    or compiled, of one.
+    """Return how far `angle` (rad) is from the nearest quarter turn.
+
+    It is in [-45, 45) degrees, for arrays or, compiled, for one angle.
     """
     return angle - np.floor(angle / (0.5 * math.pi) + 0.5) * (0.5 * math.pi)
 
@@ -160,8 +169,9 @@ def quarter_gap(angle):
 def measure_support(
     candidates: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float
 ) -> np.ndarray:
-    """Weight (k,) of those of the directions `angle` (n,) that lie near each one `candidates` (k,),
-    all modulo 90 degrees.
+    """Return the weight (k,) of the directions near each candidate.
+
+    Directions are `angle` (n,), `candidates` (k,), all modulo 90 degrees.
 
     >>> measure_support(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0,
     ...     3.0,
@@ -173,8 +183,9 @@ def measure_support(
 
 
 def main_direction(outline: shapely.Polygon) -> float:
-    """Angle (rad) of the outline's main direction modulo 90 degrees: the peak of its edges'
-    lengths, then their mean.
+    """Return the angle (rad) of the outline's main direction modulo 90 degrees.
+
+    It is at the peak of its edges' lengths, then at their mean.
 
     >>> round(math.degrees(main_direction(shapely.box(0, 0, 4, 3))) % 90, 6)
     0.0
@@ -191,7 +202,8 @@ def main_direction(outline: shapely.Polygon) -> float:
 
 
 def outline_rectangle(outline: shapely.Polygon, kappa: float) -> np.ndarray:
-    """Plan (5,) cx, cy, kappa, V, U of the outline's bounding rectangle in the direction
-    `kappa`.
+    """Return the outline's bounding rectangle in the direction `kappa`.
+
+    It is a plan (5,): cx, cy, kappa, V, U.
     """
     return rectangle_in_direction(np.asarray(outline.exterior.coords)[:, :2], kappa, 0.0)

@@ -1,5 +1,6 @@
-"""The compiled core: one likelihood of one roof, its gradient and Hessian, and its minimisation,
-for every primitive alike.
+"""The compiled core: the likelihood of one roof, for every primitive.
+
+It has its gradient, its Hessian and its minimisation.
 
 Each point is drawn from a mixture: inside the plan rectangle with soft sides, normal about the
 roof's height, or an outlier anywhere in the cloud's volume,
@@ -37,8 +38,9 @@ SQRT_2PI = math.sqrt(2 * math.pi)
 
 
 class Tables(NamedTuple):
-    """Primitives as data, one row a variant (T of them); terms of variant t are
-    first_term[t]:first_term[t + 1].
+    """Primitives as data, one row a variant (T of them).
+
+    Terms of variant t are first_term[t]:first_term[t + 1].
     """
 
     size: np.ndarray  # (T,) used entries of theta
@@ -91,7 +93,10 @@ def new_space():
 
 @compiled
 def integer_power(base, exponent):
-    """base ** exponent for the small, possibly negative exponents of the term table."""
+    """Return base ** exponent for small, possibly negative exponents.
+
+    They are those of the term table.
+    """
     if exponent == 1:
         return base
     result = 1.0
@@ -102,7 +107,10 @@ def integer_power(base, exponent):
 
 @compiled
 def planes_from_terms(tables, kind, theta, planes):
-    """Fill `planes` (k, 3), z = a u + b v + c, at `theta`; return the number of planes."""
+    """Fill `planes` (k, 3) at `theta`, and return their number.
+
+    A plane is z = a u + b v + c.
+    """
     count = tables.planes[kind]
     planes[:count] = 0.0
     for m in range(tables.first_term[kind], tables.first_term[kind + 1]):
@@ -159,7 +167,9 @@ def active_plane(planes, count, strips, half_width, u, v):
 
 @compiled(fastmath=True)
 def sum_moments(problem, tables, kind, theta, noise, space):
-    """Minus the log likelihood at `theta`; fills planes, moments and sides of `space`.
+    """Return minus the log likelihood at `theta`, and fill `space`.
+
+    `space` has planes, moments and sides.
 
     Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
     """
@@ -219,7 +229,10 @@ def sum_moments(problem, tables, kind, theta, noise, space):
 
 @compiled
 def share_inside(margin):
-    """How much of a soft edge lies within it, of a point `margin` softnesses inside."""
+    """Return how much of a soft edge lies within it.
+
+    The point is `margin` softnesses inside.
+    """
     return 1.0 / (1.0 + math.exp(-margin)) if margin < SOFT else 1.0
 
 
@@ -249,8 +262,9 @@ def add_side(side, push, stiffness, along):
 
 @compiled
 def add_height_terms(tables, kind, theta, space, gradient, hessian):
-    """Add the part of the residuals to `gradient` (9,) and the lower triangle of `hessian`
-    (9, 9).
+    """Add the residuals' part to `gradient` (9,) and `hessian` (9, 9).
+
+    Only the lower triangle of `hessian` is filled.
     """
     jacobian_from_terms(tables, kind, theta, space.planes, space.jacobian)
     for j in range(tables.planes[kind]):
@@ -270,8 +284,9 @@ def add_height_terms(tables, kind, theta, space, gradient, hessian):
 
 @compiled
 def add_side_terms(space, theta, inliers, gradient, hessian):
-    """Add the part of the soft sides and of the area: margin = half extent - |u|, alpha + beta *
-    (position along the side).
+    """Add the part of the soft sides and of the area.
+
+    margin = half extent - |u| has the derivative alpha + beta * (position along the side).
     """
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     gradient[HALF_WIDTH] += inliers / theta[HALF_WIDTH]
@@ -299,8 +314,9 @@ def add_side_terms(space, theta, inliers, gradient, hessian):
 
 @compiled
 def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
-    """Minus the log likelihood with its `gradient` (9,) and Gauss-Newton `hessian` (9, 9) at
-    `theta` (9,).
+    """Return minus the log likelihood, and fill its derivatives.
+
+    These are `gradient` (9,) and the Gauss-Newton `hessian` (9, 9) at `theta` (9,).
 
     Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
     """
@@ -318,7 +334,7 @@ def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
 
 @compiled
 def solve_damped(hessian, gradient, damping, size, step, factor):
-    """Step of (H + damping diag H) step = -gradient by Cholesky;
+    """Solve (H + damping diag H) step = -gradient by Cholesky.
 
     False where that is not positive definite.
     """
@@ -363,7 +379,10 @@ def freeze_at_bounds(theta, lower, upper, size, gradient, hessian):
 
 @compiled
 def take_step(theta, step, lower, upper, size, moved):
-    """`moved` = theta + step, shortened to the step caps and kept within the bounds."""
+    """Set `moved` to theta + step, shortened and within the bounds.
+
+    Steps are shortened to the step caps.
+    """
     share = 1.0
     for k in range(size):
         cap = STEP_CAP_RAD if k == KAPPA else STEP_CAP_M
@@ -376,7 +395,9 @@ def take_step(theta, step, lower, upper, size, moved):
 
 @compiled
 def minimise(problem, tables, kind, theta, lower, upper, noise, iterations, tolerance):
-    """Levenberg-Marquardt within the box [low, high]; `theta` (9,) is moved in place.
+    """Minimise from `theta` (9,), in place, by Levenberg-Marquardt.
+
+    It stays within the box [lower, upper].
 
     A parameter with low = high is fixed. Ends after `iterations` or when a step gains less than
     `tolerance` (nats). Returns (value, inliers, squares, number of evaluations), the middle two as
@@ -422,7 +443,7 @@ def minimise(problem, tables, kind, theta, lower, upper, noise, iterations, tole
 
 @compiled
 def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations, tolerance):
-    """`minimise` from every row of `thetas` (m, 9), in place.
+    """Minimise from every row of `thetas` (m, 9), in place.
 
     Returns (values (m,), evaluations).
     """
@@ -438,8 +459,9 @@ def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations
 
 @compiled
 def learn_noise(points_count, inliers, squares, noise, prior):
-    """EM step: `noise` with sigma and eps that maximise the expected likelihood under the prior on
-    sigma.
+    """Update `noise` by one EM step.
+
+    sigma and eps maximise the expected likelihood under the prior on sigma.
 
     `prior` is (sigma, its worth in points, smallest, largest).
     """
@@ -450,8 +472,9 @@ def learn_noise(points_count, inliers, squares, noise, prior):
 
 @compiled
 def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, rounds):
-    """Fit theta and noise in turns from every row of `thetas` (m, 9) and `noises` (m, 3), both in
-    place.
+    """Fit theta and noise in turns from every row, in place.
+
+    Rows are `thetas` (m, 9) and `noises` (m, 3).
 
     Returns (values (m,), evaluations).
     """
@@ -481,7 +504,7 @@ def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, ro
 
 @compiled
 def sharpen_sides(problem, tables, kind, theta, lower, upper, noise, prior, taus):
-    """Re-fit with harder and harder sides, keeping the best;
+    """Fit again with harder and harder sides, and keep the best.
 
     `theta` in place. Returns (value, noise, evaluations).
 
@@ -509,8 +532,9 @@ def sharpen_sides(problem, tables, kind, theta, lower, upper, noise, prior, taus
 
 @compiled
 def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
-    """Log likelihood ratio (4, k) of moving each side (+u, -u, +v, -v) outward by `shifts` (2, k),
-    along u and along v.
+    """Return log likelihood ratios (4, k) of moving each side outward.
+
+    Sides are +u, -u, +v and -v; `shifts` (2, k) are along u and along v.
     """
     points, planes = problem.points, space.planes
     count = planes_from_terms(tables, kind, theta, planes)
@@ -546,8 +570,9 @@ def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
 
 @compiled
 def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
-    """Posterior (mean shift of the centre, of the half extent, and their variances) of an axis on
-    the grid of `shifts`.
+    """Return the posterior of an axis on the grid of `shifts`.
+
+    It has the mean shift of the centre, of the half extent, and their variances.
 
     `plus` and `minus` (k,) are the sides' log likelihood ratios; the heights hold the centre with
     `centre_precision`.
@@ -576,7 +601,10 @@ def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
 
 @compiled
 def height_hessian(problem, tables, kind, theta, noise):
-    """Hessian (9, 9) of the heights alone (no sides) and the sum of inlier probabilities."""
+    """Return the Hessian (9, 9) of the heights and the sum of inliers.
+
+    Sides do not count. The sum is that of inlier probabilities.
+    """
     space = new_space()
     gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     _, inliers, _ = sum_moments(problem, tables, kind, theta, noise, space)
@@ -617,7 +645,7 @@ def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, g
 
 @compiled
 def mode(values, bin_m, counts):
-    """(count, position) of the fullest pair of neighbouring bins of `values`;
+    """Return (count, position) of the fullest pair of neighbouring bins.
 
     `counts` is working space.
     """
@@ -637,7 +665,9 @@ def mode(values, bin_m, counts):
 
 @compiled
 def vote(problem, tables, kind, theta, space, heights, counts):
-    """Best slope and height of `kind` in the plan of `theta` (in place): a small Hough transform.
+    """Find the best slope and height of `kind` in a plan, in place.
+
+    It is a small Hough transform in the plan of `theta`.
 
     Returns the votes.
     """
@@ -676,8 +706,9 @@ def vote(problem, tables, kind, theta, space, heights, counts):
 
 @compiled
 def vote_each(problem, tables, rectangles):
-    """Starts of every voting variant in every plan of `rectangles` (d, 5): cx, cy, kappa, V, U, and
-    in its quarter turns.
+    """Return the starts of every voting variant in every rectangle.
+
+    `rectangles` (d, 5) are cx, cy, kappa, V, U, and each is tried in its quarter turns.
 
     Returns (kinds (m,), thetas (m, 9), votes (m,)).
     """

@@ -1,4 +1,6 @@
-"""Which points lie on walls: beside them, nearer than any roof is steep, stand points much higher.
+"""Points that lie on walls.
+
+Points much higher stand beside them, nearer than any roof is steep.
 
 Compiled.
 """
@@ -15,8 +17,9 @@ STEEPEST_ROOF = 2.0  # slope of a roof: 63 degrees
 
 @compiled
 def on_walls(points, neighbours, spacing):
-    """Which of `points` (n, 3) lie on a wall of the roof that `neighbours` (m, 3) are of, about
-    `spacing` (m) apart in plan.
+    """Return which of `points` (n, 3) lie on a wall of a roof.
+
+    The roof is that of `neighbours` (m, 3), about `spacing` (m) apart in plan.
 
     >>> roof = np.array([[0.0, 0.0, 5.0], [0.4, 0.0, 5.0], [0.8, 0.0, 5.0]])
     >>> on_walls(np.array([[-0.05, 0.0, 2.0], [-0.05, 0.0, 4.8]]), roof, 0.5)

@@ -13,14 +13,15 @@ from ..compiled import compiled
 
 @compiled
 def dot(a, b):
-    """The inner product of two vectors (3,); `@` would bring BLAS along for it."""
+    """Return the inner product of two vectors (3,); `@` would load BLAS for it."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def newell(vertices, index, lower, upper):
-    """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the
-    normal.
+    """Return the area vector (3,) of the ring index[lower:upper].
+
+    Half its length is the area, and its direction is the normal.
     """
     total = np.zeros(3)
     origin = vertices[index[lower]]
@@ -35,7 +36,10 @@ def newell(vertices, index, lower, upper):
 
 @compiled
 def enclosed_volume(vertices, index, ring_start, face_start):
-    """Volume of a shell by the divergence theorem; positive when its faces point outwards."""
+    """Return the volume of a shell by the divergence theorem.
+
+    It is positive when the faces point outwards.
+    """
     total = 0.0
     for f in range(len(face_start) - 1):
         anchor = vertices[index[ring_start[face_start[f]]]]

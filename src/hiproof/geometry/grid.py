@@ -6,7 +6,9 @@ import numpy as np
 
 
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number the distinct cells among `cells` (n, 2) of whole numbers, by column, then by row.
+    """Number the distinct cells among `cells` (n, 2), by column, then by row.
+
+    Cells are pairs of whole numbers.
 
     Returns the distinct cells (k, 2), int64, and the number (n,) of each of the `cells`. It is
     `np.unique(cells, axis=0)`, which compares rows and takes ten times as long.

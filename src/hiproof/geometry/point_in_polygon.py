@@ -7,8 +7,9 @@ from ..compiled import compiled
 
 @compiled
 def flips(x0, y0, x1, y1, x, y):
-    """Whether the edge from (x0, y0) to (x1, y1) lies between (x, y) and all that is far away
-    towards larger x.
+    """Return whether an edge crosses the ray from (x, y) towards larger x.
+
+    The edge runs from (x0, y0) to (x1, y1).
 
     A point is inside those rings of whose edges an odd number do; on a shared edge it is on one
     side only.

@@ -1,6 +1,4 @@
-"""Rings: the grid on which those of polygons are united, what they enclose, which way those in
-space face, and how large they are.
-"""
+"""Rings: the grid for unions, repair, direction and size."""
 
 from __future__ import annotations
 
@@ -16,8 +14,9 @@ OVERLAY_GRID_M = 1e-6
 
 
 def repair_polygons(polygons: Any) -> Any:
-    """What the rings of a polygon, or of each of several, enclose: crossing and touching ones made
-    valid, a spike of no width none.
+    """Return valid areas that the rings of one or several polygons enclose.
+
+    Crossing and touching rings are resolved. A spike without width encloses nothing.
 
     >>> repair_polygons(shapely.Polygon([(0, 0), (2, 0), (2, 1), (3, 1), (2, 1), (2, 2), (0,
     ...     2)])).area
@@ -27,7 +26,7 @@ def repair_polygons(polygons: Any) -> Any:
 
 
 def clockwise(polygon: shapely.Polygon) -> shapely.Polygon:
-    """The polygon with its outer ring clockwise and its holes the other way round.
+    """Return the polygon with a clockwise outer ring and counter-clockwise holes.
 
     >>> clockwise(shapely.Polygon([(0, 0), (1, 0), (1, 1)])).exterior.is_ccw
     False
@@ -36,8 +35,9 @@ def clockwise(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
-    """Coordinates (n + 1, 2) of a ring in plan, its first corner last again, with what it encloses
-    to the left.
+    """Return the coordinates (n + 1, 2) of a ring, counter-clockwise.
+
+    The first corner is repeated at the end.
 
     >>> counterclockwise(shapely.LinearRing([(0, 0), (0, 1), (1, 1)])).tolist()
     [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
@@ -46,7 +46,7 @@ def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
 
 
 def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and ends (m, 2) of all edges of the outline, holes included."""
+    """Return starts and ends (m, 2) of all edges of an outline, holes included."""
     if not outline.interiors:
         ring = shapely.get_coordinates(outline)
         return ring[:-1], ring[1:]
@@ -55,8 +55,9 @@ def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
 
 
 def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
-    """What of a geometry has an area: areas that only touch have lines and points in common, with
-    which nothing more can be intersected.
+    """Keep the parts of a geometry that have an area.
+
+    An intersection of areas that only touch has lines and points, which later intersections refuse.
 
     >>> one, other = shapely.box(0, 0, 2, 2), shapely.Polygon([(1, 0), (3, 0), (3, 4), (2, 4), (2,
     ...     1), (1, 1)])
@@ -68,12 +69,15 @@ def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
 
 
 def ring_normal(ring: np.ndarray) -> np.ndarray:
-    """Vector area (3,) of a closed ring (m, 3) without its repeated last vertex (Newell)."""
+    """Return the vector area (3,) of a closed ring (m, 3), by Newell's method.
+
+    The first vertex is not repeated at the end.
+    """
     return ring_normals([ring])[0]
 
 
 def ring_normals(rings: Sequence[np.ndarray]) -> np.ndarray:
-    """Vector areas (n, 3) of n rings at once, each as `ring_normal` has it."""
+    """Return the vector areas (n, 3) of n rings, each as from `ring_normal`."""
     sizes = np.array([len(ring) for ring in rings])
     first = np.cumsum(sizes) - sizes
     following = np.arange(1, sizes.sum() + 1)

@@ -20,8 +20,9 @@ from .solid import Solid
 
 @dataclass(frozen=True)
 class Quality:
-    """How well a model stands for its points; metres unless named otherwise, NaN where it cannot be
-    told.
+    """How well a model fits its points, in metres unless named otherwise.
+
+    A measure that cannot be computed is NaN.
     """
 
     points: int = 0
@@ -38,8 +39,9 @@ class Quality:
 
 @dataclass(frozen=True)
 class Model:
-    """What was built of a building: its `roof` in a local frame and the `solid` that it closes, in
-    world coordinates.
+    """The model of a building: its `roof` in a local frame, and its `solid`.
+
+    The solid stands in world coordinates.
 
     `compose` says how, None for the defaults: a changed building is composed as it was.
     """
@@ -50,7 +52,7 @@ class Model:
 
     @cached_property
     def visible_m2(self) -> tuple[float, ...]:
-        """Plan area that each part of the roof shows from above, 0 of one that others hide."""
+        """Plan area (m2) of each roof part as seen from above; 0 if it is hidden."""
         return measure_visible_areas(self.roof, self.solid)
 
     @property
@@ -64,7 +66,9 @@ class Model:
 
 @dataclass(frozen=True)
 class Building:
-    """Everything known of one building after reconstruction;
+    """All that is known of one building after its reconstruction.
+
+    `solid` and `terrain_intersection` are in world coordinates.
 
     `solid` and `terrain_intersection` in world coordinates.
 
@@ -95,7 +99,7 @@ class Building:
 
     @property
     def model(self) -> Model:
-        """Roof and solid. Raises NoModelError, which says why, for a building that has none.
+        """Roof and solid; raises NoModelError with the reason if there is no model.
 
         >>> from hiproof.status import Status
         >>> try:
@@ -147,8 +151,9 @@ class Building:
         return self.solid.volume
 
     def compute_visible_areas(self) -> list[shapely.Geometry]:
-        """Where each part shows, in world coordinates; empty where others hide all of it, none
-        without a model.
+        """Return the visible area of each roof part, in world coordinates.
+
+        The area of a hidden part is empty. Without a model the list is empty.
 
         >>> from hiproof import build
         >>> ring = [[0, 0], [10, 0], [10, 6], [0, 6]]
@@ -162,8 +167,9 @@ class Building:
         return [] if self.built is None else compute_visible_areas(self.roof, self.solid)
 
     def with_part(self, index: int, **change: Any) -> Building:
-        """The building with part `index` changed, or with one more part where `index` is the number
-        of parts.
+        """Return the building with part `index` changed or added.
+
+        A part is added where `index` equals the number of parts.
 
         A change names any of `type`, `ridge_height` and `eave_height` (world metres), `position`
         (x, y of the rectangle's centre and z of the lowest eave, about `roof.frame.origin`),
@@ -183,7 +189,9 @@ class Building:
         return METHODS["with_part"](self, index, **change)
 
     def without_part(self, index: int) -> Building:
-        """The building without part `index`; what it roofed alone is roofed by the part beside it.
+        """Return the building without part `index`.
+
+        The part beside it roofs what this part alone roofed.
 
         Raises as `with_part`.
         """
@@ -192,8 +200,9 @@ class Building:
     def refit(
         self, points: np.ndarray, fixed: dict[int, tuple[str, ...]] | None = None
     ) -> Building:
-        """The building with all heights, pitches and inner lengths of its parts fitted to `points`
-        (n, 3) world metres.
+        """Fit the heights, pitches and inner lengths of all parts to `points` again.
+
+        `points` (n, 3) are in world metres. Returns a new building.
 
         Types, rectangles and what `fixed` names (parameters by part, "z" the position's height)
         stay as they are. The quality and grade are measured on the points. Raises FitError for
@@ -202,5 +211,5 @@ class Building:
         return METHODS["refit"](self, points, fixed)
 
     def _repr_html_(self) -> str:
-        """A small view in a notebook, turned by dragging; it asks nothing of the network."""
+        """Return a small 3D view for notebooks, which needs no network."""
         return METHODS["render_building"](self)

@@ -40,7 +40,9 @@ class Fit:
     faces: tuple[tuple[int, ...], ...]
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Roof height (n,) at `xy` (n, 2), both in the frame of the points given;
+        """Return the roof height (n,) at `xy` (n, 2), in the frame of the points.
+
+        It is NaN outside the outline.
 
         NaN outside the outline.
         """

@@ -13,9 +13,11 @@ from .roof import Part
 
 
 def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Height (n,) of the roof of `parts` at `xy` (n, 2), minus infinity beside it, and the part
-    (n,) it is of, the first of several, by its number: `Part.height_at` for many points. On a
-    border that two pieces share it is one of them that holds a point.
+    """Return the height (n,) of the roof of `parts` at `xy` (n, 2), and the part.
+
+    Beside the roof the height is minus infinity. The part (n,) is given by its number, the first of
+    several. This is `Part.height_at` for many points. On a border that two pieces share, one piece
+    that holds the point counts.
     """
     z, top, (x, y) = (
         np.full(len(xy), -np.inf),
@@ -32,8 +34,10 @@ def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.
 
 @compiled
 def raise_over(z, top, number, x, y, starts, ends, planes):
-    """Raise heights z (n,) at x, y to the lowest of `planes` (k, 3) inside the edges `starts`,
-    `ends` (m, 2), `top` (n,) there becomes `number`.
+    """Raise heights z (n,) inside a polygon to the lowest of `planes` (k, 3).
+
+    The polygon has edges from `starts` to `ends` (m, 2). Where z rises, `top` (n,) becomes
+    `number`.
     """
     inside = np.zeros(len(x), np.bool_)
     for e in range(len(starts)):

@@ -14,8 +14,9 @@ from ..frames import METRES, Units
 
 @dataclass(frozen=True)
 class PointCloud:
-    """Points of some files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a
-    pyproj CRS or None.
+    """Points of one or several files, in world metres.
+
+    `xyz` is (n, 3), `classification` (n,) or None, `crs` a pyproj CRS or None.
 
     World metres are the files' coordinates times their units, `units`: of a CRS in feet they are
     not its coordinates.
@@ -32,12 +33,12 @@ class PointCloud:
 
     @property
     def classes(self) -> np.ndarray:
-        """The classification (n,), 0 ("created, never classified") where the files have none."""
+        """The classification (n,); 0 ("created, never classified") if there is none."""
         return np.zeros(len(self), np.uint8) if self.classification is None else self.classification
 
 
 def as_xyz(points: Any) -> np.ndarray:
-    """Points as float64 (n, 3), none as (0, 3).
+    """Return points as float64 (n, 3); no points give (0, 3).
 
     Raises InputError for another shape: columns taken for rows make a roof of anything.
     """
@@ -59,8 +60,9 @@ def as_xyz(points: Any) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Footprint:
-    """One building asked for: a plan polygon in world coordinates (empty if unusable) and what the
-    user knew of it.
+    """One requested building: its plan polygon and what the user knows of it.
+
+    The polygon is in world coordinates, and empty if it is unusable.
 
     `shift` (x, y in m) is how far it lies beside its roof where that is known; (0, 0) where it is
     not.

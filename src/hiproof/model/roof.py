@@ -1,4 +1,6 @@
-"""A roof is a max of mins of planes. Over the plan,
+"""A roof is a max of mins of planes.
+
+Over the plan,
 
 z(x, y) = max over pieces whose outline holds (x, y) of min over that piece's planes of a x + b y +
 c
@@ -16,19 +18,23 @@ from ..frames import LocalFrame
 
 @dataclass(frozen=True)
 class Piece:
-    """Where `outline` covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the
-    outline's frame.
+    """The lower envelope of `planes` (k, 3) over an `outline`.
+
+    A plane is z = a x + b y + c, in the outline's frame.
     """
 
     outline: shapely.Polygon
     planes: np.ndarray
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Height (n,) of the lower envelope at `xy` (n, 2), the outline not asked."""
+        """Return the height (n,) of the lower envelope at `xy` (n, 2).
+
+        The outline is not taken into account.
+        """
         return (np.asarray(xy, float) @ self.planes[:, :2].T + self.planes[:, 2]).min(axis=1)
 
     def move(self, shift: np.ndarray) -> Piece:
-        """The piece moved by `shift` (3,): its outline, and its planes with it."""
+        """Return the piece moved by `shift` (3,), with its outline and planes."""
         planes = self.planes.copy()
         planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
         return Piece(shapely.transform(self.outline, lambda xy: xy + shift[:2]), planes)
@@ -36,8 +42,9 @@ class Piece:
 
 @dataclass(frozen=True)
 class Part:
-    """One primitive of a roof: its type (a name of the catalogue, or "free"), parameters and the
-    pieces it covers.
+    """One primitive of a roof: its type, its parameters and its pieces.
+
+    The type is a name of the catalogue, or "free".
 
     `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L
     (3,) in the roof's local frame, `sigma` the standard deviation by parameter name. A saw-tooth
@@ -56,8 +63,9 @@ class Part:
         return float(sum(piece.outline.area for piece in self.pieces))
 
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_local` (n, 2) in the roof's frame; minus infinity beside the part, for
-        roofs are the max of these.
+        """Return the height (n,) at `xy_local` (n, 2) in the roof's frame.
+
+        It is minus infinity beside the part, since a roof is the max of its parts.
         """
         z = np.full(len(xy_local), -np.inf)
         for piece in self.pieces:
@@ -69,8 +77,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Roof:
-    """All parts of one building's roof in the local `frame`, over the plan `outline` (may have
-    holes).
+    """All parts of one building's roof, in the local `frame`, over `outline`.
+
+    `outline` is in plan and may have holes.
     """
 
     parts: tuple[Part, ...]
@@ -82,7 +91,10 @@ class Roof:
         return tuple(piece for part in self.parts for piece in part.pieces)
 
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
-        """Roof height (n,) at `xy_local` (n, 2) in the local frame; NaN where no piece covers."""
+        """Return the roof height (n,) at `xy_local` (n, 2) in the local frame.
+
+        It is NaN where no piece covers the place.
+        """
         xy_local = np.asarray(xy_local, float)
         z = np.max([part.height_at(xy_local) for part in self.parts], axis=0)
         return np.where(np.isfinite(z), z, np.nan)

@@ -1,5 +1,7 @@
-"""Where each part of a roof shows from above: the plan of its surfaces, so that parts share no area
-and together are the outline.
+"""The areas in which the parts of a roof show from above.
+
+The areas are the plan of the parts' surfaces. They do not overlap, and together they make up the
+outline.
 
 A surface that several parts have in common, for they lie in one plane, names one of them: it is cut
 along their outlines.
@@ -26,7 +28,10 @@ SURFACE_SLIVER_M2 = 0.05
 
 
 def compute_visible_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
-    """Where each part shows, in world coordinates; empty where others hide all of it."""
+    """Return the visible area of each part, in world coordinates.
+
+    The area of a hidden part is empty.
+    """
     united = [
         with_area(shapely.union_all(areas, grid_size=GRID_M))
         for areas in compute_visible_pieces(roof, solid)
@@ -35,7 +40,10 @@ def compute_visible_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
 
 
 def measure_visible_areas(roof: Roof, solid: Solid) -> tuple[float, ...]:
-    """Plan area that each part shows, rounded, so that parts which show the same are equal."""
+    """Return the visible plan area (m2) of each part, rounded.
+
+    Rounding makes the areas of equal parts equal.
+    """
     return tuple(
         round(float(shapely.area(pieces).sum()), AREA_DIGITS)
         for pieces in compute_visible_pieces(roof, solid)
@@ -43,7 +51,10 @@ def measure_visible_areas(roof: Roof, solid: Solid) -> tuple[float, ...]:
 
 
 def compute_visible_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
-    """Where each part shows, in the roof's local frame, as pieces that share no area."""
+    """Return the visible pieces of each part, in the roof's local frame.
+
+    Pieces do not overlap.
+    """
     local = solid.move(-roof.frame.origin)
     visible: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
     faces = local.select_faces(ROOF)
@@ -61,7 +72,10 @@ def compute_visible_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geomet
 
 
 def list_planes(roof: Roof) -> np.ndarray:
-    """All planes of a roof (k, 4): the number of the part, then z = a x + b y + c."""
+    """Return all planes of a roof (k, 4): the part's number, then a, b and c.
+
+    A plane is z = a x + b y + c.
+    """
     parts = enumerate(roof.parts)
     return np.array(
         [
@@ -76,8 +90,9 @@ def list_planes(roof: Roof) -> np.ndarray:
 def parts_in_plane(
     faces: Sequence[Face], vertices: np.ndarray, planes: np.ndarray
 ) -> list[list[int]]:
-    """Of each of the faces over `vertices` (n, 3) the parts, other than its own, that have a plane
-    in which it lies.
+    """Return for each face the other parts that have a plane in which it lies.
+
+    The corners of the faces are `vertices` (n, 3).
     """
     if not faces or len(set(planes[:, 0].tolist())) < 2:
         return [[] for _ in faces]
@@ -94,8 +109,10 @@ def parts_in_plane(
 def share_surface(
     area: shapely.Geometry, drawn_area: shapely.Geometry, other: shapely.Geometry
 ) -> tuple[shapely.Geometry, shapely.Geometry]:
-    """What is left of `area` to the part drawn as `drawn_area`, and what goes to the one drawn as
-    `other`: where that one alone is drawn, and slivers beside it.
+    """Divide `area` between the part drawn as `drawn_area` and another part.
+
+    Returns what remains, and what goes to the part drawn as `other`: the area where that part alone
+    is drawn, and slivers beside it.
     """
     slivers = without_slivers(shapely.difference(area, drawn_area, grid_size=GRID_M))
     others_own = without_slivers(shapely.intersection(slivers, other, grid_size=GRID_M))
@@ -110,8 +127,9 @@ def share_surface(
 def without_slivers(
     area: shapely.Geometry, least_m2: float = SURFACE_SLIVER_M2
 ) -> shapely.Geometry:
-    """Those polygons of an area that are large enough, without the lines to which others shrank on
-    the grid.
+    """Return the polygons of an area that are at least `least_m2` large.
+
+    Lines, to which others shrank on the grid, are left out.
     """
     pieces = shapely.get_parts(area)
     polygons = shapely.get_dimensions(pieces) == 2
@@ -119,7 +137,8 @@ def without_slivers(
 
 
 def unite_outlines(part: Part) -> shapely.Geometry:
-    """The outlines of a part as one area; rounded, an outline may touch itself, and a spike of no
-    width is none.
+    """Return the outlines of a part as one area.
+
+    A rounded outline may touch itself. A spike without width has no area.
     """
     return shapely.union_all(repair_polygons([piece.outline for piece in part.pieces]))

@@ -12,8 +12,9 @@ ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
 
 @dataclass(frozen=True)
 class Face:
-    """A planar polygon of a solid: `rings` of vertex indices (outer ring first, counter-clockwise
-    seen from outside).
+    """A planar polygon of a solid: `rings` of vertex indices.
+
+    The outer ring comes first, counter-clockwise when seen from outside.
 
     `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part of a
     RoofSurface, else -1.
@@ -26,8 +27,9 @@ class Face:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented
-    outwards.
+    """A closed shell: `vertices` (n, 3) and `faces` that point outwards.
+
+    A Building's solid is in world coordinates.
 
     `defects` are (ISO 19107 code, face) of a shell read from a file that its vertices cannot show,
     such as an open ring.
@@ -51,8 +53,10 @@ class Solid:
         )
 
     def flatten(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Vertex indices of all rings one after the other, the start of each ring, and of each face
-        among the rings.
+        """Return the shell as arrays, for compiled code.
+
+        These are the vertex indices of all rings one after the other, the start of each ring, and
+        the first ring of each face.
         """
         rings = [ring for face in self.faces for ring in face.rings]
         index = np.array([vertex for ring in rings for vertex in ring], np.int64)
@@ -64,6 +68,6 @@ class Solid:
         return tuple(face for face in self.faces if face.kind == kind)
 
     def project_face(self, face: Face) -> shapely.Polygon:
-        """A face of the solid in plan, its holes left out."""
+        """Return a face of the solid in plan, its holes left out."""
         outer, *holes = (self.vertices[list(ring), :2] for ring in face.rings)
         return shapely.Polygon(outer, holes)

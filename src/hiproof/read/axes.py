@@ -1,4 +1,4 @@
-"""The axes of a coordinate reference system: which way they run and in which unit they count.
+"""The directions and units of a coordinate reference system's axes.
 
 Models are built in x to the right, y upwards and heights above, all in units of length. A system
 whose axes cannot be used so is refused with an InputError.
@@ -44,7 +44,9 @@ COMPASS = (
 
 
 def check_plan_axes(plan: Any, source: str) -> None:
-    """Refuse a plan CRS whose axes are not two lengths in one unit, x to the right of y.
+    """Refuse a plan CRS unless its axes are lengths, x to the right of y.
+
+    Both lengths have to be in one unit.
 
     `source` names the coordinates in the message. Files hold east before north whatever order a CRS
     declares, so north before east is usual. A local system may be turned, but not mirrored.
@@ -75,7 +77,7 @@ def check_plan_axes(plan: Any, source: str) -> None:
 
 
 def runs_east_and_north(directions: Sequence[str], is_local: bool) -> bool:
-    """Whether two axes may be taken as x to the right and y upwards.
+    """Return whether two axes may be taken as x to the right and y upwards.
 
     Both axes of a polar CRS run away from the pole.
 
@@ -107,7 +109,7 @@ def check_height_axis(axis: Any, crs: Any, source: str) -> None:
 
 
 def check_unit(axis: Any, crs: Any, source: str) -> None:
-    """Refuse an axis in a unit that is no length, or longer or shorter than any in use."""
+    """Refuse an axis whose unit is no length that is in use."""
     is_angle = axis.unit_name.lower().startswith(ANGULAR_UNITS)
     if is_angle or not LEAST_UNIT_M <= axis.unit_conversion_factor <= MOST_UNIT_M:
         raise InputError(

@@ -1,5 +1,6 @@
-"""Points and cells, compiled: the inner loops behind PointGrid, thinning and the sorting of a
-city's points.
+"""Compiled inner loops on points and cells.
+
+They serve PointGrid, thinning and the sorting of a city's points.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from ..compiled import compiled
 
 @compiled
 def cell_keys(xy, cell_m, first_column, first_row, columns):
-    """Number (n,) of each point's cell, row by row;
+    """Return the number (n,) of each point's cell, row by row.
 
     `first_column`, `first_row` are the first cell's in the world's grid.
     """
@@ -25,8 +26,9 @@ def cell_keys(xy, cell_m, first_column, first_row, columns):
 
 @compiled
 def mask_at(mask, xy, index, x_low, y_low):
-    """The mask's byte (k,) at the whole-metre cells of the points `xy[index]`, 0 outside; its
-    corner is (x_low, y_low).
+    """Return the mask's bytes (k,) at the whole-metre cells of `xy[index]`.
+
+    Outside the mask they are 0. The mask's corner is (x_low, y_low).
     """
     result = np.zeros(len(index), np.uint8)
     for k in range(len(index)):
@@ -39,8 +41,9 @@ def mask_at(mask, xy, index, x_low, y_low):
 
 @compiled
 def is_first(xyz, hashes):
-    """Whether each of the points (n, 3) is the first with its coordinates, by open addressing on
-    their hashes (n,).
+    """Return whether each of the points (n, 3) is the first at its coordinates.
+
+    The search is open addressing on the points' hashes (n,).
     """
     size = 16
     while size < 2 * len(xyz):

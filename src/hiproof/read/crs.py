@@ -1,6 +1,4 @@
-"""Coordinate reference systems: are two the same in plan, in which units do they count, how do two
-combine.
-"""
+"""Coordinate reference systems: equality in plan, units, combination."""
 
 from __future__ import annotations
 
@@ -37,7 +35,7 @@ class UnknownCRS:
 
 
 def parse_crs(value: Any) -> CRS | None:
-    """A pyproj CRS from an EPSG number, "EPSG:7415", WKT or a CRS;
+    """Return the pyproj CRS of an EPSG number, "EPSG:7415", WKT or a CRS.
 
     None and "" stay None. Raises InputError otherwise.
 
@@ -58,7 +56,7 @@ def parse_crs(value: Any) -> CRS | None:
 
 
 def explain_crs_error(error: CRSError) -> str:
-    """What PROJ says is wrong, without the definition, which pyproj repeats whole.
+    """Return PROJ's explanation without the definition, which pyproj repeats.
 
     >>> inner = "Internal Proj Error: proj_create: unrecognized format"
     >>> explain_crs_error(CRSError(f"Invalid projection: FOO[1]: ({inner})"))
@@ -69,7 +67,10 @@ def explain_crs_error(error: CRSError) -> str:
 
 
 def horizontal_crs(crs: CRS) -> CRS:
-    """The plan component of a compound CRS; a 3D CRS becomes 2D; any other is returned as it is."""
+    """Return the plan component of a CRS.
+
+    A 3D CRS becomes 2D. A CRS that is neither compound nor 3D is returned as it is.
+    """
     if crs.is_compound:
         return horizontal_crs(crs.sub_crs_list[0])
     if crs.is_bound and crs.source_crs is not None:
@@ -78,7 +79,7 @@ def horizontal_crs(crs: CRS) -> CRS:
 
 
 def vertical_crs(crs: CRS) -> CRS | None:
-    """The height component of a compound CRS, None where there is none."""
+    """Return the height component of a compound CRS, None where there is none."""
     if crs.is_bound and crs.source_crs is not None and not crs.is_vertical:
         return vertical_crs(crs.source_crs)
     heights = [part for part in crs.sub_crs_list if part.is_vertical]
@@ -86,7 +87,7 @@ def vertical_crs(crs: CRS) -> CRS | None:
 
 
 def names_place(crs: CRS | None) -> bool:
-    """Whether coordinates in `crs` lie anywhere on the Earth.
+    """Return whether coordinates in `crs` have a place on the Earth.
 
     A local CRS and one of heights alone leave that open.
 
@@ -99,12 +100,17 @@ def names_place(crs: CRS | None) -> bool:
 
 
 def names_heights_alone(crs: CRS) -> bool:
-    """Whether `crs` has no plan. pyproj calls a compound CRS vertical as well."""
+    """Return whether `crs` has heights but no plan.
+
+    pyproj calls a compound CRS vertical as well.
+    """
     return horizontal_crs(crs).is_vertical
 
 
 def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
-    """Whether coordinates in plan mean the same place in both, whatever the heights.
+    """Return whether plan coordinates mean the same place in both CRSs.
+
+    Heights are ignored.
 
     An unknown CRS equals nothing.
 
@@ -122,15 +128,16 @@ def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
 
 @functools.lru_cache(maxsize=64)
 def epsg_code(crs: CRS) -> int | None:
-    """EPSG number of `crs` where pyproj is sure of it, else None; kept, for looking it up takes a
-    millisecond or several.
+    """Return the EPSG number of `crs` where pyproj is sure of it, else None.
+
+    It is cached, since looking it up takes a millisecond or several.
     """
     authority = crs.to_authority("EPSG", min_confidence=70)
     return int(authority[1]) if authority else None
 
 
 def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
-    """Compound CRS of a plan and a height system;
+    """Combine a plan and a height system into a compound CRS.
 
     `horizontal` alone where it has heights already or none are given.
     """
@@ -145,8 +152,9 @@ def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
 
 
 def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str = "auto") -> Units:
-    """Units that coordinates in `crs` count in; heights of a CRS without any are taken to be in the
-    plan's unit.
+    """Return the units of coordinates in `crs`.
+
+    Heights of a CRS without any are taken to be in the plan's unit.
 
     `unit_name` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS
     in degrees, and for a name that contradicts the CRS; `source` is what the message calls the
@@ -187,7 +195,7 @@ def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str
 
 
 def height_axis(crs: CRS) -> Any:
-    """The axis (pyproj's) along which `crs` counts heights, None where it has no heights."""
+    """Return pyproj's axis of the heights of `crs`, None if it has no heights."""
     height = vertical_crs(crs)
     if height is not None:
         return height.axis_info[0]
@@ -195,8 +203,9 @@ def height_axis(crs: CRS) -> Any:
 
 
 def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
-    """Units of coordinates whose CRS names heights alone: the plan's unit has to be that of the
-    heights.
+    """Return units of coordinates whose CRS names heights alone.
+
+    The plan's unit has to be that of the heights.
     """
     units, vertical = NAMED_UNITS[unit_name], heights.axis_info[0]
     check_height_axis(vertical, heights, source)
@@ -210,8 +219,9 @@ def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
 
 
 def find_named_units(name: str | None, alternative: Units = METRES) -> Units:
-    """Units of the CRS that a file names by URN or address, `alternative` where it names none that
-    is known.
+    """Return the units of the CRS that a file names by URN or address.
+
+    Returns `alternative` where the file names none that is known.
     """
     try:
         crs = parse_crs(name)
@@ -221,8 +231,9 @@ def find_named_units(name: str | None, alternative: Units = METRES) -> Units:
 
 
 def same_heights(first: CRS, second: CRS) -> bool:
-    """Whether heights mean the same in both; a CRS that names none goes with any whose heights are
-    in its unit.
+    """Return whether heights mean the same in both CRSs.
+
+    A CRS that names no heights goes with any whose heights are in its unit.
 
     >>> same_heights(CRS("EPSG:7415"), CRS("EPSG:28992")), same_heights(CRS("EPSG:2263+6360"),
     ...     CRS("EPSG:2263+5703"))
@@ -238,7 +249,7 @@ def same_heights(first: CRS, second: CRS) -> bool:
 
 
 def describe_crs(crs: CRS | None) -> str:
-    """What a message calls a CRS: its EPSG code and name.
+    """Return a CRS's EPSG code and name, for messages.
 
     >>> describe_crs(CRS("EPSG:28992")), describe_crs(None)
     ('EPSG:28992 (Amersfoort / RD New)', 'no CRS')
@@ -250,7 +261,7 @@ def describe_crs(crs: CRS | None) -> str:
 
 
 def make_transformer(source: CRS, target: CRS) -> Transformer:
-    """The transformation of plans from `source` to `target`, x before y.
+    """Return the transformer of plans from `source` to `target`, x before y.
 
     Raises InputError where there is none.
     """
@@ -269,8 +280,9 @@ def make_transformer(source: CRS, target: CRS) -> Transformer:
 
 
 def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
-    """Longitude and latitude (n, 2) of positions (n, 2) in the plan of `crs`, NaN where it leaves
-    the place open.
+    """Return longitude and latitude (n, 2) of plan positions (n, 2) in `crs`.
+
+    They are NaN where the CRS leaves the place open.
 
     Those of a projected CRS are of its own datum, up to a kilometre from WGS 84: to look for the
     operation between the two takes 50 ms.
@@ -287,8 +299,9 @@ def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
 
 
 def find_best_transformer(crs: Any, target: Any, **options: Any) -> Any:
-    """pyproj's best transformation from `crs` to `target` that can be carried out here, None where
-    there is none.
+    """Return pyproj's best transformer to `target` that works here.
+
+    Returns None where there is none.
     """
     from pyproj.transformer import TransformerGroup
 

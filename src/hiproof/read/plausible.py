@@ -1,5 +1,7 @@
-"""What no input may say: coordinates that no reference system of this Earth gives, and counts that
-no file has room for.
+"""Bounds on what an input may say.
+
+No reference system of this Earth gives coordinates beyond them, and no file has room for larger
+counts.
 """
 
 from __future__ import annotations
@@ -21,12 +23,16 @@ lower. Codes for "no data" such as -9999, 9999 and -32767 lie beyond, also in de
 
 
 class Implausible(ValueError):
-    """What a file says cannot be so; the message is the reason, the caller adds the file's name."""
+    """A file's content cannot be true.
+
+    The message is the reason, and the caller adds the file's name.
+    """
 
 
 def is_plausible(xyz: np.ndarray) -> np.ndarray:
-    """Whether each point of (n, 2) or (n, 3) has coordinates that can be; those that are no numbers
-    have not.
+    """Return whether each point of (n, 2) or (n, 3) has possible coordinates.
+
+    Coordinates that are no numbers are not possible.
 
     >>> is_plausible(np.array([[85000.0, 446000.0, 2.0], [1e300, 0.0, 0.0], [0.0, np.nan,
     ...     0.0]])).tolist()
@@ -37,7 +43,7 @@ def is_plausible(xyz: np.ndarray) -> np.ndarray:
 
 
 def compute_bounds(xyz: np.ndarray) -> np.ndarray:
-    """The lowest and the highest coordinates (2, 3) of points (n, 3), n of 1 or more;
+    """Return the lowest and highest coordinates (2, 3) of points (n, 3), n > 0.
 
     NaN where one is.
 

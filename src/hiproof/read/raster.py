@@ -1,4 +1,7 @@
-"""A raster terrain model: its pixels read in tiles when asked for, as heights in metres.
+"""A raster terrain model, read in tiles, as heights in metres.
+
+Values that the file calls no data are no heights, nor are values that stand for no data without
+being declared so.
 
 What its file calls no data, and values that stand for no data without its saying so, are no
 heights.
@@ -98,7 +101,9 @@ class RasterTerrain:
     """
 
     def __init__(self, path: str | Path, crs: Any = None, units: Units | None = None):
-        """Open `path` to be asked in `crs`, None for the raster's own, counted in world metres.
+        """Open `path`, to be queried in world metres of `crs`.
+
+        None is for the raster's own CRS.
 
         Raises InputError.
 
@@ -133,7 +138,7 @@ class RasterTerrain:
             ) from error
 
     def __getstate__(self) -> dict:
-        """Without the open file and the tiles, so that a worker process opens its own."""
+        """Leave out the open file and tiles, so that a worker opens its own."""
         return {
             **{k: v for k, v in vars(self).items() if k not in ("dataset", "transformer")},
             "tiles": OrderedDict(),
@@ -148,7 +153,7 @@ class RasterTerrain:
         return parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
 
     def make_transformer(self):
-        """From the coordinates asked for to the raster's;
+        """Make the transformer from the coordinates of queries to the raster's.
 
         None where they are the same in plan, or one is unknown or local.
         """
@@ -160,8 +165,9 @@ class RasterTerrain:
         return make_transformer(self.crs, own_crs)
 
     def height_unit(self) -> float:
-        """Metres in one unit of the raster's heights: as its band says, else its CRS, else as the
-        cloud counts.
+        """Return the metres in one unit of the raster's heights.
+
+        The band names the unit, else its CRS, else it is the cloud's.
 
         Heights over a plan in degrees are metres. Those over a plan in feet that name no unit are
         taken for feet.
@@ -188,8 +194,9 @@ class RasterTerrain:
         return tuple(self.dataset.bounds)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) in metres at `xy_world` (n, 2), NaN outside the raster and where it has
-        none.
+        """Return the height (n,) in metres at `xy_world` (n, 2).
+
+        It is NaN outside the raster and where the raster has none.
         """
         row, column, inside = self.pixels_at(xy_world)
         heights = np.full(len(row), np.nan)
@@ -208,8 +215,9 @@ class RasterTerrain:
         return heights
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Whether (n,) the pixel at each of `xy_world` (n, 2) holds a value that is no height,
-        though its file calls it data.
+        """Return whether (n,) the pixels at `xy_world` (n, 2) hold a code.
+
+        A code is a value that is no height, though the file calls it data.
         """
         row, column, inside = self.pixels_at(xy_world)
         coded = np.zeros(len(row), bool)
@@ -225,8 +233,9 @@ class RasterTerrain:
         return coded
 
     def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows and columns (n,) of the raster at `xy_world` (n, 2), and whether (n,) they are
-        inside it.
+        """Return the rows and columns (n,) at `xy_world` (n, 2) of the raster.
+
+        A third array (n,) tells which of them lie inside.
         """
         xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
         if self.transformer is not None:
@@ -244,7 +253,7 @@ class RasterTerrain:
         )
 
     def knows_any(self, xy_world: np.ndarray) -> bool:
-        """Whether there is a height at any of `xy_world` (n, 2).
+        """Return whether there is a height at any of `xy_world` (n, 2).
 
         Raises DamagedRaster where it cannot be read.
 
@@ -258,8 +267,9 @@ class RasterTerrain:
         return bool(np.isfinite(self.height_at(sample)).any())
 
     def tile(self, row: int, column: int) -> np.ndarray:
-        """Heights (m) of a tile and one more row and column, where the raster has them: NaN without
-        data, infinite where what is stored is no height.
+        """Return the heights (m) of a tile and one more row and column.
+
+        They are NaN without data, and infinite where the stored value is no height.
         """
         key = (row, column)
         if key not in self.tiles:
@@ -274,8 +284,10 @@ class RasterTerrain:
         return self.tiles[key]
 
     def stored_and_heights(self, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
-        """What a tile stores, NaN without data, and that in metres, infinite where no ground is so
-        low or so high.
+        """Return the stored values of a tile, and their heights in metres.
+
+        Stored values are NaN without data. Heights are infinite where no ground is so low or so
+        high.
         """
         from rasterio.errors import RasterioError
         from rasterio.windows import Window
@@ -303,8 +315,9 @@ class RasterTerrain:
 
     @cached_property
     def codes(self) -> tuple[float, ...]:
-        """Those of CODES that are no heights here: pixels hold them that lie far from all others of
-        some tiles.
+        """Those of CODES that are no heights in this raster.
+
+        Pixels hold them that lie far from all others of some tiles.
         """
         pairs = [
             self.stored_and_heights(*tile)
@@ -316,7 +329,7 @@ class RasterTerrain:
 
 
 def by_tile(row: np.ndarray, column: np.ndarray) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
-    """(tile, indices) of all tiles that rows and columns (n,) lie in."""
+    """Yield (tile, indices) of all tiles in which rows and columns (n,) lie."""
     places = np.column_stack([row, column]) // TILE_PX
     tiles, index = np.unique(places.astype(int), axis=0, return_inverse=True)
     order = np.argsort(index.ravel(), kind="stable")
@@ -328,8 +341,9 @@ def by_tile(row: np.ndarray, column: np.ndarray) -> Iterator[tuple[tuple[int, in
 
 
 def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
-    """SAMPLED_TILES by SAMPLED_TILES tiles of a raster, evenly spread, or all where it has
-    fewer.
+    """Return a sample of the tiles of a raster, evenly spread.
+
+    There are SAMPLED_TILES by SAMPLED_TILES, or all where it has fewer.
     """
     along = [
         np.unique(np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int)).tolist()
@@ -339,7 +353,7 @@ def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
 
 
 def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
-    """Whether pixels have one height, far from all other `heights` (n,) but for few;
+    """Return whether pixels of one height lie far from nearly all others.
 
     False where there are no others.
     """
@@ -351,8 +365,9 @@ def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
 
 
 def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Weighted mean (n,) of the four pixels around each position, those that are not finite left
-    out; NaN where all are.
+    """Return the weighted mean (n,) of the four pixels around each position.
+
+    Pixels that are not finite are left out. It is NaN where all are.
     """
     row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
     row1, column1 = (
@@ -374,5 +389,5 @@ def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
 
 
 def import_rasterio() -> Any:
-    """What reads rasters. Raises InputError where it is missing."""
+    """Import rasterio. Raises InputError where it is missing."""
     return import_extra("rasterio", "terrain", "terrain models")

@@ -1,4 +1,6 @@
-"""Whether a raster can be a terrain model: its position, its bands, and in which unit they count.
+"""Checks that a raster can be a terrain model.
+
+They cover its position, its bands and their unit.
 
 Every refusal is one sentence, raised before any height is read.
 """
@@ -46,8 +48,9 @@ PICTURE = (
 
 
 def refuse_without_position(dataset: Any, path: str) -> None:
-    """Raise InputError for a raster whose pixels lie nowhere: no geotransform, or one that maps
-    them onto a line.
+    """Raise InputError for a raster whose pixels have no position.
+
+    It has no geotransform, or one that maps pixels onto a line.
     """
     transform = dataset.transform
     if transform.is_identity:
@@ -68,7 +71,7 @@ def refuse_without_position(dataset: Any, path: str) -> None:
 
 
 def height_band(dataset: Any, path: str) -> int:
-    """The number of the band that holds heights: the first that is no transparency.
+    """Return the number of the band of heights, the first that is opaque.
 
     Raises InputError for pictures.
 
@@ -100,7 +103,7 @@ def height_band(dataset: Any, path: str) -> int:
 
 
 def alpha_band(dataset: Any) -> int | None:
-    """The number of the band of transparency, None without one.
+    """Return the number of the band of transparency, None without one.
 
     GDAL takes no notice of it beside heights in decimals.
     """
@@ -109,7 +112,7 @@ def alpha_band(dataset: Any) -> int | None:
 
 
 def read_scaling(dataset: Any, band: int, path: str) -> tuple[float, float]:
-    """What a stored value is multiplied by and what is added to it then.
+    """Return the factor and the offset of stored values.
 
     Raises InputError where they give no height.
     """
@@ -124,7 +127,7 @@ def read_scaling(dataset: Any, band: int, path: str) -> tuple[float, float]:
 
 
 def band_unit(name: str | None, path: str) -> float | None:
-    """Metres in the unit that a band names, None where it names none.
+    """Return the metres in the unit that a band names, None if it names none.
 
     Raises InputError for units that are no lengths.
 
@@ -145,6 +148,9 @@ def band_unit(name: str | None, path: str) -> float | None:
 
 
 def spellings(name: str) -> Iterator[str]:
-    """The name of a unit in small letters alone, whole and without the datum that follows it."""
+    """Yield spellings of a unit's name in small letters.
+
+    They are the whole name, and the name without the datum that follows it.
+    """
     for text in (name.lower(), DATUM.sub("", name.lower())):
         yield re.sub(r"[^a-z]", "", text)

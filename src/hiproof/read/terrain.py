@@ -18,7 +18,7 @@ from .raster import RasterTerrain, import_rasterio
 
 
 class Terrain(Protocol):
-    """Heights of the ground in world coordinates;
+    """Heights of the ground in world coordinates.
 
     `source` is the text a building's output names it by.
     """
@@ -27,12 +27,12 @@ class Terrain(Protocol):
     def source(self) -> str: ...
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN where unknown."""
+        """Return the height (n,) at `xy_world` (n, 2), NaN where unknown."""
         ...
 
 
 class TerrainChain:
-    """Several terrains by preference: each position is answered by the first that knows it."""
+    """Several terrains by preference; the first that knows a place answers."""
 
     def __init__(self, terrains: Iterable[Terrain | None]):
         self.terrains = tuple(terrain for terrain in terrains if terrain is not None)
@@ -42,12 +42,14 @@ class TerrainChain:
         return ", else ".join(terrain.source for terrain in self.terrains)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN where none knows."""
+        """Return the height (n,) at `xy_world` (n, 2), NaN where none knows it."""
         return self.heights_and_sources(xy_world)[0]
 
     def find_known_heights(self, xy_world: np.ndarray, minimum: int) -> np.ndarray:
-        """Heights (n,) of the first terrain that knows so many of `xy_world` (n, 2) and does not
-        guess (by a true `is_guess`); NaN where there is none.
+        """Return the heights (n,) of the first terrain that knows enough places.
+
+        It knows at least `minimum` of `xy_world` (n, 2) and does not guess (by a true `is_guess`).
+        Heights are NaN where there is none.
         """
         for terrain in self.terrains:
             heights = (
@@ -60,9 +62,7 @@ class TerrainChain:
         return np.full(len(xy_world), np.nan)
 
     def heights_and_sources(self, xy_world: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Heights (n,) and the sources that answered at least once, by preference: what a
-        building's output names.
-        """
+        """Return the heights (n,) and the sources that answered at least once."""
         xy = np.asarray(xy_world, float)[:, :2]
         heights, sources = np.full(len(xy), np.nan), []
         for terrain in self.terrains:
@@ -76,7 +76,7 @@ class TerrainChain:
 
 
 def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) -> RasterTerrain:
-    """The terrain model at `path`, to be asked in world metres of `crs`, the cloud's.
+    """Open the terrain model at `path` for queries in world metres of `crs`.
 
     Raises InputError.
 

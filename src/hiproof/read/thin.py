@@ -1,5 +1,6 @@
-"""Thinning to one point a cell of the world's own grid: the result depends neither on the order of
-points nor on tiles.
+"""Thinning to one point a cell of the world's own grid.
+
+The result depends neither on the order of points nor on tiles.
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cell
 
 
 def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
-    """One point (m, 3) a cell: the mean position in plan and the lower median height of the cell's
-    points (n, 3).
+    """Return one point (m, 3) a cell of points (n, 3).
+
+    It has the mean position in plan and the lower median height of the cell's points.
 
     >>> thin_to_grid(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.6, 0.4, 2.0], [1.5, 0.5,
     ...     7.0]]), 1.0).tolist()
@@ -29,8 +31,9 @@ def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
 
 
 def thin_to_count(xyz: np.ndarray, limit: int) -> np.ndarray:
-    """At most `limit` of the points (n, 3): those whose coordinates' hashes are the lowest, in the
-    order they came in.
+    """Keep at most `limit` of the points (n, 3), in their order.
+
+    They are those whose coordinates have the lowest hashes.
 
     A hash is as good as a draw, so density falls evenly, but it depends on the point alone: the
     same set of points leaves the same ones, however it was cut and whatever order it came in.
@@ -41,8 +44,9 @@ def thin_to_count(xyz: np.ndarray, limit: int) -> np.ndarray:
 
 
 def without_repeats(xyz: np.ndarray) -> np.ndarray:
-    """The points (n, 3) each once, in the order they came in: what stands in two overlapping files
-    counts once.
+    """Return the points (n, 3) each once, in the order they came in.
+
+    A point that stands in two overlapping files counts once.
 
     >>> len(without_repeats(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.2, 0.2, 1.0]])))
     2
@@ -52,7 +56,9 @@ def without_repeats(xyz: np.ndarray) -> np.ndarray:
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
-    """A 64-bit hash (n,) of each point's coordinates (splitmix64's mixing steps, Steele et al.
+    """Return a 64-bit hash (n,) of each point's coordinates.
+
+    It mixes bits as splitmix64 does (Steele et al. 2014).
 
     2014).
     """
@@ -71,8 +77,9 @@ def hashes(xyz: np.ndarray) -> np.ndarray:
 def rank_in_cells(
     xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """One point a cell, its height the one of `rank(counts)` among the cell's heights in ascending
-    order.
+    """Return one point a cell, its height that of `rank(counts)`.
+
+    The rank is among the cell's heights in ascending order.
     """
     if not len(xyz):
         return np.empty((0, 3))
@@ -94,8 +101,9 @@ def rank_in_cells(
 
 
 def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The first cell (column, row) of the world's grid that holds one of `xy` (n, 2 or more), n >
-    0, and the (columns, rows).
+    """Return the first cell of the world's grid, and the numbers of cells.
+
+    Both are (column, row). The cells hold `xy` (n, 2 or more), n > 0.
     """
     lower = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
     upper = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
@@ -103,8 +111,9 @@ def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[in
 
 
 def occupied_cells(keys: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """np.unique of `keys` (n,) below `cells`, with inverse and counts; by a table where that is not
-    much larger.
+    """Return np.unique of `keys` (n,) below `cells`, with inverse and counts.
+
+    It uses a table where that is not much larger.
     """
     if cells > MOST_CELLS_A_POINT * len(keys):
         return np.unique(keys, return_inverse=True, return_counts=True)

@@ -1,5 +1,6 @@
-"""Compiled arrangement of a cloud: the parts of PointNet++ that choose, describe and group points
-and carry no weights.
+"""Compiled arrangement of a cloud.
+
+These parts of PointNet++ choose, describe and group points; they carry no weights.
 
 `arrange_cloud` is the one entry; everything it calls is compiled into it, so that a process loads
 one function.
@@ -37,7 +38,9 @@ HARMONIC_WIDTH = math.radians(12.0)
 
 @compiled
 def arrange_cloud(xyz, count, level1, level2, level3, group_size):
-    """Everything the network takes of a cloud `xyz` (n, 3), metres about an origin near it, n >= 1.
+    """Return all that the network needs of a cloud `xyz` (n, 3).
+
+    It is in metres about an origin near it, n >= 1.
 
     `count` points are chosen, of which each level keeps a prefix; where n is smaller, they repeat
     from the start. Returns the `order` of the choice (min(count, n),), indices into `xyz`;
@@ -72,8 +75,9 @@ def arrange_cloud(xyz, count, level1, level2, level3, group_size):
 
 @compiled
 def describe_points(x, y, z, surface, spacing, count):
-    """Features (count, 11) of points (s,) and their `surface` (s, 7) in the building's own axes,
-    repeated to `count`.
+    """Return features (count, 11) of points in the building's own axes.
+
+    There are points (s,) and their `surface` (s, 7), repeated to `count`.
     """
     cosine, sine = canonical_axes(x, y, surface)
     features = np.empty((count, len(POINT_FEATURES)), np.float32)
@@ -95,7 +99,7 @@ def describe_points(x, y, z, surface, spacing, count):
 
 @compiled
 def farthest_points(x, y, z, count):
-    """Farthest-point sampling of n points: a prefix of the order is a coarser sample.
+    """Sample n points by the farthest first: a prefix is a coarser sample.
 
     The first is the farthest from the centroid, so that the order depends neither on the points'
     order nor on the frame. Returns `order` (min(count, n),); `cover`, the largest distance of any
@@ -133,9 +137,10 @@ def farthest_points(x, y, z, count):
 
 @compiled
 def cover_points(x, y, z, current, distance, uncovered, bits):
-    """Squared distances of all points from the `current` one into `distance`, and into `uncovered`
-    those from the nearest chosen one, the largest of whose `bits` are returned: LLVM compares
-    several integers at a time, but not floats.
+    """Write squared distances of all points from the `current` one.
+
+    They go into `distance`, and into `uncovered` those from the nearest chosen one, the largest of
+    whose `bits` are returned: LLVM compares several integers at a time, but not floats.
     """
     cx, cy, cz = x[current], y[current], z[current]
     for i in range(len(x)):
@@ -150,7 +155,10 @@ def cover_points(x, y, z, current, distance, uncovered, bits):
 
 @compiled
 def insert(shortest, indices, place, distance, index):
-    """Put `distance` and `index` into their ascending lists of place + 1, pushing out the last."""
+    """Insert `distance` and `index` into their ascending lists.
+
+    Lists have place + 1 entries, and the last is pushed out.
+    """
     while place > 0 and shortest[place - 1] > distance:
         shortest[place], indices[place] = shortest[place - 1], indices[place - 1]
         place -= 1
@@ -159,7 +167,9 @@ def insert(shortest, indices, place, distance, index):
 
 @compiled
 def local_surfaces(x, y, z, order, nearest, reach):
-    """What the `nearest` (s, k) points around each of `order` (s,) say, as rows of seven.
+    """Describe the surface around each of `order` (s,), as rows of seven.
+
+    It follows from the `nearest` (s, k) points.
 
     The upward normal of their plane (3), the roughness across it (m), the point's height above
     their mean along it (convexity, m), and the plan vector to their mean over their `reach` (2):
@@ -189,8 +199,9 @@ def local_surfaces(x, y, z, order, nearest, reach):
 
 @compiled
 def plane_normal(xx, xy, xz, yy, yz, zz):
-    """Upward unit eigenvector of the smallest eigenvalue of a covariance, and that eigenvalue
-    (Smith 1961).
+    """Return the upward unit normal of a covariance, and its eigenvalue.
+
+    They belong to the smallest eigenvalue (Smith 1961).
 
     Points in one place or on a line have no plane: their normal would be a draw of the rounding, so
     call it vertical.
@@ -230,7 +241,9 @@ def plane_normal(xx, xy, xz, yy, yz, zz):
 
 @compiled
 def canonical_axes(x, y, surface):
-    """Cosine and sine of the building's own direction in plan, in the full circle.
+    """Return cosine and sine of the building's own direction in plan.
+
+    The direction is in the full circle.
 
     Up to quarter turns it is the four-fold harmonic of the normals' azimuths (slopes and walls both
     point along a roof's axes; rough neighbourhoods, trees and edges, count less), re-weighted
@@ -270,9 +283,10 @@ def canonical_axes(x, y, surface):
 
 @compiled
 def group_points(x, y, z, centres, sources, count, radius):
-    """The nearest `count` of the first `sources` points within `radius` of each of the first
-    `centres`, which repeat from the start where the points end: indices and distances (centres,
-    count).
+    """Group points: the nearest `count` within `radius` of each centre.
+
+    Sources are the first `sources` points. Centres are the first `centres`, which repeat from the
+    start where the points end. Returns indices and distances (centres, count).
 
     Missing neighbours repeat the nearest one, which a maximum over the group does not notice. Every
     ball must hold a source, as it does where the centres are among them.
@@ -298,7 +312,7 @@ def group_points(x, y, z, centres, sources, count, radius):
 
 @compiled
 def inverse_shares(distances):
-    """Inverse-distance weights (s, k) of a sum of 1."""
+    """Return inverse-distance weights (s, k) with a sum of 1."""
     weights = 1.0 / (distances + 1e-3)
     for s in range(len(weights)):
         weights[s] /= weights[s].sum()
@@ -306,8 +320,9 @@ def inverse_shares(distances):
 
 
 def thin_to_grid(xyz, count, chunk=500_000):
-    """Indices of one point a grid cell, the cell chosen so that about `count` or fewer of `xyz` (n,
-    3) remain.
+    """Return the indices of one point a grid cell.
+
+    The cell is chosen so that about `count` or fewer of `xyz` (n, 3) remain.
 
     Works in pieces of `chunk` points, so that memory beyond the input is bounded. Clouds of `count`
     points or fewer are kept whole.
@@ -326,7 +341,7 @@ def thin_to_grid(xyz, count, chunk=500_000):
 
 
 def thin_to_cells(xyz, lower, cell, chunk):
-    """Indices of the first point in each cube of side `cell`, ascending."""
+    """Return indices of the first point in each cube of side `cell`, ascending."""
     visited = np.empty(0, np.int64)
     selection = []
     for start in range(0, len(xyz), chunk):

@@ -1,4 +1,4 @@
-"""Compiled laser beams against a scene: the first surface a beam meets on its way down.
+"""Compiled laser beams: the first surface that a beam meets on its way down.
 
 A beam is written by height: p(z) = (x0 + sx z, y0 + sy z, z), so that a body bounded by half-spaces
 n . p <= d is entered at the lowest of the heights its upward-facing sides allow and left at the
@@ -15,7 +15,9 @@ from ..compiled import compiled
 
 @compiled
 def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
-    """Lower `z_hit` (n,) is raised to the entry height wherever a convex body lies above it;
+    """Raise `z_hit` (n,) to the entry height where a body lies above it.
+
+    Bodies are convex.
 
     `face` (n,) gets its side.
 
@@ -51,7 +53,9 @@ def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
 
 @compiled
 def cast_triangles(xy0, slope, triangles, z_hit, face):
-    """The same for `triangles` (m, 3, 3); `face` gets the triangle's index.
+    """Raise `z_hit` where one of `triangles` (m, 3, 3) lies above it.
+
+    `face` gets the triangle's index.
 
     Each corner is carried along the beam to z = 0, where the beam is a point: its barycentric
     weights give the height.
@@ -76,8 +80,9 @@ def cast_triangles(xy0, slope, triangles, z_hit, face):
 
 @compiled
 def cast_crowns(xy0, slope, crowns, free_path, z_crown):
-    """Raise `z_crown` (n,) to where a beam is caught in a tree's crown, after `free_path` (n,)
-    metres of leaves.
+    """Raise `z_crown` (n,) to where a tree's crown catches a beam.
+
+    It is caught after `free_path` (n,) metres of leaves.
 
     `crowns` (t, 5) = (x, y, z of the centre, horizontal and vertical half axes) of upright
     ellipsoids. A beam whose way through a crown is shorter than its free path comes out below, so
@@ -103,8 +108,9 @@ def cast_crowns(xy0, slope, crowns, free_path, z_crown):
 
 @compiled
 def cast_waves(xy0, slope, waves, base):
-    """Heights (n,) where the beams meet the terrain z = base + sum of amplitude sin(kx x + ky y +
-    phase).
+    """Return the heights (n,) at which the beams meet a wavy terrain.
+
+    It is z = base + sum of amplitude sin(kx x + ky y + phase).
 
     `waves` (w, 4) = (kx, ky, phase, amplitude). Three Newton steps from the base reach far less
     than a millimetre, as the terrain's slope and curvature are small.

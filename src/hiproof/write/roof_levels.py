@@ -1,5 +1,6 @@
-"""Levels below which a share of a roof lies, compiled: exact areas of its triangles below a level,
-and a search.
+"""Levels below which a share of a roof lies. Compiled.
+
+Exact areas of its triangles below a level are searched.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is 
 
 @compiled
 def measure_area_below(level, z, plan):
-    """Plan area of the triangles with sorted heights `z` (t, 3) and signed plan areas `plan` (t,)
-    at or below `level`.
+    """Return the plan area of triangles at or below `level`.
+
+    They have sorted heights `z` (t, 3) and signed plan areas `plan` (t,).
     """
     area = 0.0
     for t in range(len(z)):
@@ -31,8 +33,7 @@ def measure_area_below(level, z, plan):
 
 @compiled
 def find_level(share, z, plan):
-    """The level that `share` of the roof's plan area lies below; triangles as in
-    `measure_area_below`.
+    """Return the level below which `share` of the roof's plan area lies.
 
     Between corner heights the area below a level is quadratic in the level, at the height of a
     level triangle it jumps: both are solved exactly.

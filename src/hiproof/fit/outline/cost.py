@@ -1,5 +1,6 @@
-"""What an outline costs: how badly it explains where points lie, and how many lines it is drawn
-with. Compiled.
+"""The cost of an outline. Compiled.
+
+It says how badly the outline explains the points, and with how many lines it is drawn.
 
 Points of the roof are spread evenly over it, those of its walls lie on the outline. So an outline
 of area A around roof points of `density` has the likelihood
@@ -48,7 +49,10 @@ Drawing = namedtuple("Drawing", "lines kappa corners own structure cost")
 
 @compiled
 def make_drawing(lines, kappa, border):
-    """The drawing of `lines`; its cost is infinite where they are no polygon."""
+    """Return the drawing of `lines`.
+
+    Its cost is infinite where they are no polygon.
+    """
     corners, costs = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
         return Drawing(lines, kappa, corners, costs, np.inf, np.inf)
@@ -66,8 +70,9 @@ def make_drawing(lines, kappa, border):
 
 @compiled
 def is_allowed(corners, border):
-    """Whether the ring runs as it has to, clockwise where it is a court's, and lies where
-    it may.
+    """Return whether a ring runs as it has to, and lies where it may.
+
+    A court's ring runs clockwise.
     """
     if not border.court:
         return compute_area(corners) > 0.0
@@ -80,8 +85,9 @@ def is_allowed(corners, border):
 
 @compiled
 def structure_cost(lines, kappa, border):
-    """Price of the lines, of directions other than the main one, of lines in these, and of sharp
-    corners.
+    """Return the price of the lines, of their directions and of sharp corners.
+
+    Directions other than the main one cost, and lines in these.
     """
     cost, ways = border.line * len(lines), np.empty(len(lines))
     for i in range(len(lines)):
@@ -95,8 +101,9 @@ def structure_cost(lines, kappa, border):
 
 @compiled
 def is_among(way, ways):
-    """Whether one of `ways` (n,), angles from -45 to 45 degrees, is the same as `way`; those at the
-    ends are one.
+    """Return whether one of `ways` (n,) is the same as `way`.
+
+    They are angles from -45 to 45 degrees; those at the ends are one.
     """
     result = False
     for other in ways:
@@ -107,8 +114,9 @@ def is_among(way, ways):
 
 @compiled
 def nearest_sides(corners, x, y, court, reach):
-    """Squared distances (n,) to the nearest side of points at x, y (n,), ascending in y, at most
-    that of `reach`; and whether each is inside (n,).
+    """Return squared distances (n,) to the nearest side, and what lies inside.
+
+    Points at x, y (n,) ascend in y. A distance is at most that of `reach`.
 
     Side after side, without branches, so that a processor does several points at once.
     """
@@ -127,7 +135,7 @@ def nearest_sides(corners, x, y, court, reach):
 
 @compiled
 def update_nearest(x0, y0, x1, y1, x, y, squared, inside):
-    """What `nearest_sides` says of points at x, y (n,) after one side more."""
+    """Update the answer of `nearest_sides` for one side more."""
     dx, dy = x1 - x0, y1 - y0
     length = max(dx * dx + dy * dy, 1e-18)
     for k in range(len(x)):
@@ -138,8 +146,10 @@ def update_nearest(x0, y0, x1, y1, x, y, squared, inside):
 
 @compiled
 def point_cost(squared, inside, wall, border):
-    """Minus the logarithm of how likely a point at that `squared` distance from the nearest side
-    is, against one deep inside; that of a `wall` is compared with one on the border.
+    """Return the cost of a point at a `squared` distance from a side.
+
+    It is minus the logarithm of its likelihood, against one deep inside; a point of a `wall` is
+    compared with one on the border.
     """
     depth = math.sqrt(squared) / border.blur
     return interpolate_cost(depth if inside else -depth, wall, border.costs)
@@ -147,7 +157,7 @@ def point_cost(squared, inside, wall, border):
 
 @compiled
 def interpolate_cost(depth, wall, costs):
-    """`cost_at_depth` from its table `costs`, straight between its places."""
+    """Return `cost_at_depth` from its table `costs`, by linear interpolation."""
     place = (min(max(depth, -SURE_BLURS), SURE_BLURS) + SURE_BLURS) * TABLE_STEPS_PER_M
     k = min(int(place), costs.shape[1] - 2)
     table = costs[int(wall)]
@@ -156,8 +166,9 @@ def interpolate_cost(depth, wall, costs):
 
 @functools.cache
 def costs_by_depth(stray: float) -> np.ndarray:
-    """What points of the roof and of walls cost (2, 2 SURE_BLURS FINE + 1) from sure outside to
-    sure inside.
+    """Tabulate costs of roof and wall points by depth.
+
+    The table is (2, 2 SURE_BLURS FINE + 1), from sure outside to sure inside.
     """
     depths = np.linspace(-SURE_BLURS, SURE_BLURS, round(2 * SURE_BLURS * TABLE_STEPS_PER_M) + 1)
     return np.array(
@@ -167,7 +178,7 @@ def costs_by_depth(stray: float) -> np.ndarray:
 
 @compiled
 def cost_at_depth(depth, wall, stray):
-    """What a point so deep inside (blurs) costs, of a wall or of the roof."""
+    """Return the cost of a point of the wall or the roof by its depth (blurs)."""
     if wall:
         return -math.log(stray + (1.0 - stray) * math.exp(-0.5 * depth * depth))
     if abs(depth) >= SURE_BLURS:
@@ -177,8 +188,9 @@ def cost_at_depth(depth, wall, stray):
 
 @compiled
 def evaluate_change(lines, drawing, i, count, new_items, border, limit):
-    """What `lines` cost that have the first `new_items` corners in place of the `count` + 1 of the
-    drawing from `i` on; infinite as soon as that is known to be above `limit`.
+    """Return the cost of changed `lines`, infinite once it is above `limit`.
+
+    The first `new_items` corners replace the `count` + 1 of the drawing from `i` on.
     """
     corners = compute_changed_corners(lines, drawing, i, count, new_items, border)
     if len(corners) == 0:
@@ -201,8 +213,9 @@ def evaluate_change(lines, drawing, i, count, new_items, border, limit):
 
 @compiled
 def apply_change(lines, drawing, i, count, new_items, border):
-    """The drawing of `lines` that have the first `new_items` corners in place of the `count` + 1 of
-    the drawing from `i` on.
+    """Return the drawing of changed `lines`.
+
+    The first `new_items` corners replace the `count` + 1 of the drawing from `i` on.
 
     Points away from the corners that come and go cost what they did.
     """
@@ -227,8 +240,9 @@ def apply_change(lines, drawing, i, count, new_items, border):
 
 @compiled
 def compute_changed_corners(lines, drawing, i, count, new_items, border):
-    """The corners (n, 2) of a drawing's lines changed as `apply_change` has it; none where they are
-    no polygon.
+    """Return the corners (n, 2) of changed lines, none for no polygon.
+
+    The change is as for `apply_change`.
     """
     corners, old = np.empty((len(lines), 2)), drawing.corners
     for k in range(new_items, len(lines)):
@@ -244,7 +258,10 @@ def compute_changed_corners(lines, drawing, i, count, new_items, border):
 
 @compiled
 def select_points(old, corners, i, count, new_items, border):
-    """The points (m,), ascending, near the box around the corners that come and go."""
+    """Return ascending points (m,) near the corners that come and go.
+
+    Near is within a box around them.
+    """
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
     for k in range(count + 1 + new_items):
         ring, position = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
@@ -264,7 +281,7 @@ def select_points(old, corners, i, count, new_items, border):
 
 @compiled
 def without_points(lines, drawing, corners, border):
-    """What changed lines cost, were each point to cost what it did."""
+    """Return the cost of changed lines were points to cost the same."""
     structure = structure_cost(lines, drawing.kappa, border)
     return (
         drawing.cost

@@ -1,4 +1,6 @@
-"""A polygon as the lines of its sides, counter-clockwise, or a court in one, clockwise. Compiled.
+"""A polygon as the lines of its sides. Compiled.
+
+They run counter-clockwise; those of a court in one run clockwise.
 
 `lines` (n, 2) hold a row a side: the azimuth of the normal that looks outwards (rad) and the line's
 distance from the origin along it (m). Corner i is where sides i - 1 and i meet, so side i runs from
@@ -24,8 +26,9 @@ quarter_gap = compiled(direction.quarter_gap)
 
 
 def make_lines(corners: np.ndarray) -> np.ndarray:
-    """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise, or of a court,
-    clockwise.
+    """Return the sides (n, 2) of the polygon with `corners` (n, 2).
+
+    They run counter-clockwise, those of a court clockwise.
     """
     ends = np.roll(corners, -1, axis=0)
     step, middle = ends - corners, 0.5 * (corners + ends)
@@ -37,7 +40,7 @@ def make_lines(corners: np.ndarray) -> np.ndarray:
 
 @compiled
 def find_corners(lines, corners, smallest=-1):
-    """Write the corners (n, 2) of `lines`;
+    """Write the corners (n, 2) of `lines`.
 
     False where they are no simple polygon run through in order.
 
@@ -72,7 +75,7 @@ def find_corners(lines, corners, smallest=-1):
 
 @compiled
 def crosses_another(corners, i):
-    """Whether side i crosses another that is not next to it."""
+    """Return whether side i crosses another that is not next to it."""
     n = len(corners)
     previous, count = i - 1 if i > 0 else n - 1, i + 1 if i + 1 < n else 0
     x, y = corners[i, 0], corners[i, 1]
@@ -93,7 +96,7 @@ def crosses_another(corners, i):
 
 @compiled
 def compute_area(corners):
-    """Area (m2) of the polygon, positive where it runs counter-clockwise."""
+    """Return the area (m2) of a polygon, positive if counter-clockwise."""
     doubled = 0.0
     for i in range(len(corners)):
         doubled += corners[i - 1, 0] * corners[i, 1] - corners[i, 0] * corners[i - 1, 1]
@@ -102,7 +105,7 @@ def compute_area(corners):
 
 @compiled
 def shares_direction(lines, i):
-    """Whether a line before line `i` has its direction."""
+    """Return whether a line before line `i` has its direction."""
     for j in range(i):
         if abs(quarter_gap(lines[j, 0] - lines[i, 0])) < SAME_RAD:
             return True
@@ -111,13 +114,16 @@ def shares_direction(lines, i):
 
 @compiled
 def replace_lines(lines, i, count, azimuth, distance):
-    """The lines with one in place of `count` from `i` on; it comes first."""
+    """Replace `count` lines from `i` on by one, which comes first."""
     return replaced_by(lines, i, count, np.array([[azimuth, distance]]))
 
 
 @compiled
 def replaced_by(lines, i, count, flight):
-    """The lines with those of `flight` (m, 2) in place of `count` from `i` on; these come first."""
+    """Replace `count` lines from `i` on by those of `flight` (m, 2).
+
+    These come first.
+    """
     n, m = len(lines), len(flight)
     result = np.empty((m + n - count, 2))
     result[:m] = flight
@@ -128,5 +134,5 @@ def replaced_by(lines, i, count, flight):
 
 @compiled
 def drop_line(lines, i):
-    """The lines without line `i`; the one after it comes first."""
+    """Return the lines without line `i`; the one after it comes first."""
     return replaced_by(lines, i, 1, lines[:0])

@@ -1,4 +1,4 @@
-"""An outline redrawn until no change of a few lines explains the points more cheaply. Compiled.
+"""An outline redrawn while a change of few lines pays. Compiled.
 
 Changes: a line goes; one, two or three in a row become one (three are a step); one turns into a
 direction that others have; lines move; all lines of a direction turn together.
@@ -29,8 +29,9 @@ GAIN = 1e-6  # nats; numerically none
 
 @compiled
 def redraw(drawing, border, step_m):
-    """The drawing with no change left that pays; lines that replace others are moved by `step_m` at
-    first.
+    """Redraw until no change pays.
+
+    Lines that replace others are moved by `step_m` at first.
     """
     drawing = simplify_drawing(drawing, border, step_m)
     for _ in range(ROUNDS):
@@ -48,8 +49,9 @@ def redraw(drawing, border, step_m):
 
 @compiled
 def simplify_drawing(drawing, border, step_m):
-    """The change that gains most is made, again and again; after each only the gains of lines
-    beside it are asked anew.
+    """Make the change that gains most, again and again.
+
+    After each only the gains of lines beside it are computed anew.
     """
     gains = np.full(len(drawing.lines), np.inf)
     for _ in range(MOST_CHANGES):
@@ -74,9 +76,10 @@ def simplify_drawing(drawing, border, step_m):
 
 @compiled
 def best_change(drawing, i, border):
-    """The cheapest change that begins at line `i`, or none where all are dearer: its cost and the
-    lines, with how many of the old ones the first of them is come in place of, and how many corners
-    are new.
+    """Return the cheapest change that begins at line `i`, or none.
+
+    It is its cost and the lines, with how many of the old ones the first of them replaces, and how
+    many corners are new. There is none where all are dearer.
     """
     n = len(drawing.lines)
     best, lines, missing, new_items = drawing.cost, drawing.lines, 1, 1
@@ -96,7 +99,7 @@ def best_change(drawing, i, border):
 
 @compiled
 def joint_lines(drawing, i, count):
-    """Lines (m, 2) that may stand for `count` lines from `i` on.
+    """Return lines (m, 2) that may replace `count` lines from `i` on.
 
     They run through the middle of these, or of the first and last of three, which are a step and
     may also go on as one of them; along the main direction, the chord, the first or the last; a
@@ -124,8 +127,9 @@ def joint_lines(drawing, i, count):
 
 @compiled
 def list_azimuths(drawing, i, count, chord):
-    """Azimuths (m,) that the one line for `count` from `i` on may have: nearest to the `chord` of
-    all that are common.
+    """Return azimuths (m,) for one line in place of `count` from `i` on.
+
+    They are nearest to the `chord` of all that are common.
     """
     lines, n = drawing.lines, len(drawing.lines)
     main = chord - quarter_gap(chord - drawing.kappa)
@@ -151,8 +155,9 @@ def side_length(corners, i):
 
 @compiled
 def compute_middle(corners, i, count):
-    """The middle (2,) of `count` sides from `i` on, weighted by their lengths; of a run of three
-    without the second.
+    """Return the middle (2,) of `count` sides from `i` on.
+
+    It is weighted by their lengths; of a run of three the second does not count.
     """
     n, total, x, y = len(corners), 1e-9, 0.0, 0.0
     for k in range(0, count, 2 if count == LONGEST_RUN else 1):
@@ -166,7 +171,7 @@ def compute_middle(corners, i, count):
 
 @compiled
 def shift_lines(drawing, border, step):
-    """Each line moved by multiples of `step` (m) for as long as that is cheaper."""
+    """Move each line by multiples of `step` (m) while that is cheaper."""
     for _ in range(SHIFT_ROUNDS):
         cost = drawing.cost
         for _ in range(len(drawing.lines)):
@@ -182,7 +187,7 @@ def shift_lines(drawing, border, step):
 
 @compiled
 def shift_first_line(drawing, border, step):
-    """The first line moved by multiples of `step` (m) for as long as that is cheaper."""
+    """Move the first line by multiples of `step` (m) while that is cheaper."""
     for sign in (1.0, -1.0):
         moved = False
         while True:
@@ -199,8 +204,9 @@ def shift_first_line(drawing, border, step):
 
 @compiled
 def turn_lines(drawing, border, step):
-    """All lines of each direction turned about their middles by multiples of `step` (rad) for as
-    long as that is cheaper.
+    """Turn the lines of each direction while that is cheaper.
+
+    They turn about their middles by multiples of `step` (rad).
     """
     for i in range(len(drawing.lines)):
         if shares_direction(drawing.lines, i):  # turned already

@@ -1,4 +1,6 @@
-"""Each side of an outline where the points across it put it: undoing the bias of outermost points.
+"""Sides moved to where the points across them lie. Compiled.
+
+It undoes the bias of outermost points.
 
 Across a side of length L the density of points is density L (Phi(d / blur) + walls N(d; blur)):
 even inside, with what a scanner sees of the wall below the eave piled up on the line. The side's
@@ -44,9 +46,7 @@ ROW_M, MOSTLY_ON_POINTS = 0.1, 0.6
 
 
 def settle_lines(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
-    """The `lines` (n, 2) of an outline, each moved to where the points `xy` (m, 2) across it put
-    it.
-    """
+    """Move each of the `lines` (n, 2) to where the points `xy` (m, 2) put it."""
     corners, moved = np.empty_like(lines), lines.copy()
     find_corners(lines, corners)
     normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
@@ -58,17 +58,20 @@ def settle_lines(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarra
 def side_offsets(
     xy: np.ndarray, normals: np.ndarray, distances: np.ndarray, ends: np.ndarray, density: float
 ) -> np.ndarray:
-    """How far (m,) outwards the points `xy` (n, 2) put sides that have `normals` (m, 2), lie
-    `distances` (m,) from the origin along these and run between `ends` (m, 2, 2).
+    """Return how far (m,) outwards points `xy` (n, 2) move sides.
+
+    Sides have `normals` (m, 2), lie `distances` (m,) from the origin along these and run between
+    `ends` (m, 2, 2).
     """
     return offsets_by(xy, normals, distances, ends, density, log_densities())
 
 
 @functools.cache
 def log_densities() -> np.ndarray:
-    """Logarithms of the density of points across a side, relative to that inside: (blurs x walls,
-    FINE, k), the places FINE apart in a row, so that those of one point under all offsets lie side
-    by side.
+    """Return logarithms of the density of points across a side.
+
+    They are relative to that inside: (blurs x walls, FINE, k), the places FINE apart in a row, so
+    that those of one point under all offsets lie side by side.
     """
     count = (
         round((SHALLOW_M - OFFSETS_M[0] + OUTSIDE_M + OFFSETS_M[-1] - OFFSETS_M[0]) / STEP_M) + 2
@@ -78,7 +81,7 @@ def log_densities() -> np.ndarray:
 
 @compiled
 def log_densities_at(first, count):
-    """What `log_densities` says, from the depth `first` on for `count` steps."""
+    """Return `log_densities` from the depth `first` on for `count` steps."""
     table = np.empty((len(BLURS_M) * len(WALLS_M), OFFSET_STEPS, count))
     for b, blur in enumerate(BLURS_M):
         for m, walls in enumerate(WALLS_M):
@@ -97,7 +100,7 @@ def log_densities_at(first, count):
 
 @compiled
 def offsets_by(xy, normals, distances, ends, density, table):
-    """What `side_offsets` says, by the `log_densities`."""
+    """Return `side_offsets` by the table of `log_densities`."""
     offsets = np.empty(len(normals))
     for m in range(len(normals)):
         lower, upper = compute_span(normals[m], ends[m])
@@ -111,7 +114,7 @@ def offsets_by(xy, normals, distances, ends, density, table):
 
 @compiled
 def compute_span(normal, ends):
-    """From where to where a side with `ends` (2, 2) runs, square to its `normal`."""
+    """Return the span of a side with `ends` (2, 2), square to its `normal`."""
     first, last = (
         normal[0] * ends[0, 1] - normal[1] * ends[0, 0],
         normal[0] * ends[1, 1] - normal[1] * ends[1, 0],
@@ -121,8 +124,9 @@ def compute_span(normal, ends):
 
 @compiled
 def depths_across(xy, normal, distance, lower, upper):
-    """How deep (k,) inside a side those of the points lie that tell where it is: across it from
-    `lower` to `upper`, near enough.
+    """Return the depths (k,) of the points that determine a side.
+
+    They lie across it from `lower` to `upper`, near enough.
     """
     depths, count = np.empty(len(xy)), 0
     for k in range(len(xy)):
@@ -138,8 +142,9 @@ def depths_across(xy, normal, distance, lower, upper):
 
 @compiled
 def interpolate_offset(depth, length, density, table):
-    """How far (m) outwards a side of `length` lies of where points `depth` (n,) were
-    measured from.
+    """Return how far (m) a side lies outwards of its assumed place.
+
+    The points `depth` (n,) were measured from that place; the side is `length` long.
     """
     if len(depth) < FEWEST:
         return 0.0
@@ -156,8 +161,9 @@ def interpolate_offset(depth, length, density, table):
 
 @compiled
 def log_likelihoods(depth, a_metre, table):
-    """Log likelihoods (blurs x walls, offsets) of the points `depth` (n,) across a side with
-    `a_metre` points a metre of depth.
+    """Return log likelihoods (blurs x walls, offsets) of points `depth` (n,).
+
+    They lie across a side with `a_metre` points a metre of depth.
     """
     logs = np.empty((len(BLURS_M) * len(WALLS_M), len(OFFSETS_M)))
     for m, walls in enumerate(WALLS_M):
@@ -183,8 +189,9 @@ def log_likelihoods(depth, a_metre, table):
 
 @compiled
 def half_gap(depth):
-    """Distance (m) from a line placed by chance to the next point behind it, or the next row where
-    points lie in rows.
+    """Return the distance (m) from a random line to the next point behind it.
+
+    Where points lie in rows it is that to the next row.
 
     That is half the mean gap, wide gaps being hit more often.
     """

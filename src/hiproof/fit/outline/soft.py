@@ -1,4 +1,4 @@
-"""How soft a side is: the scanner's noise in plan takes points across it. Compiled."""
+"""The softness of a side: noise in plan takes points across it. Compiled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ SURE_BLURS = 4.0
 
 @compiled
 def share_inside(depth):
-    """How likely a point of the roof is at `depth` inside the side (standard deviations of the
-    noise), from 0 to 1.
+    """Return the likelihood, 0 to 1, of a roof point at `depth` inside a side.
+
+    Depth is in standard deviations of the noise.
     """
     return 0.5 * math.erfc(-depth / math.sqrt(2.0))

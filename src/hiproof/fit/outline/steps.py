@@ -1,5 +1,6 @@
-"""Runs of sides that become flights of steps where the points across them pay for it: bays,
-notches, porches. Compiled.
+"""Sides that become flights of steps, where points pay for it. Compiled.
+
+Flights make bays, notches and porches.
 
 A run of sides is made one straight side at first. This is cut into columns, and each is given a
 level outwards or inwards, such that points and prices of lines together cost least: two lines a
@@ -30,8 +31,9 @@ INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
 
 @compiled
 def add_steps(drawing, border, longest):
-    """The drawing with sides, and runs of up to `longest` of them, as flights of steps where that
-    is cheaper.
+    """Add flights of steps where they are cheaper.
+
+    They replace sides, and runs of up to `longest` of them.
     """
     i = 0
     while i < len(drawing.lines):
@@ -49,7 +51,7 @@ def add_steps(drawing, border, longest):
 
 @compiled
 def step_side(drawing, i, border):
-    """The drawing with side `i` as a flight of steps along its own direction."""
+    """Draw side `i` as a flight of steps along its own direction."""
     flight = make_flight(drawing, i, border)
     lines = replaced_by(drawing.lines, i, 1, flight)
     return apply_change(lines, drawing, i, 1, len(flight) + 1, border)
@@ -57,8 +59,10 @@ def step_side(drawing, i, border):
 
 @compiled
 def step_run(drawing, i, count, border):
-    """The drawing with `count` sides from `i` on as one flight along the main direction nearest to
-    their chord; itself where they make no such side to begin with.
+    """Draw `count` sides from `i` on as one flight.
+
+    It runs along the main direction nearest to their chord. The drawing stays where they make no
+    such side to begin with.
     """
     start, end = drawing.corners[i], drawing.corners[(i + count) % len(drawing.lines)]
     chord = math.atan2(start[0] - end[0], end[1] - start[1])
@@ -73,8 +77,9 @@ def step_run(drawing, i, count, border):
 
 @compiled
 def make_flight(drawing, i, border):
-    """Lines (m, 2) in place of side `i`: along it at one level or another, and what joins them at
-    right angles.
+    """Return the lines (m, 2) of a flight in place of side `i`.
+
+    They run along it at one level or another, joined at right angles.
     """
     azimuth, distance = drawing.lines[i]
     lower, upper = (
@@ -101,13 +106,16 @@ def make_flight(drawing, i, border):
 
 @compiled
 def along(azimuth, place):
-    """How far (m) `place` (2,) lies along lines whose normal has the `azimuth`."""
+    """Return how far (m) `place` (2,) lies along lines of an azimuth.
+
+    `azimuth` is that of their normal.
+    """
     return place[1] * math.cos(azimuth) - place[0] * math.sin(azimuth)
 
 
 @compiled
 def column_costs(drawing, border, azimuth, distance, lower, width, columns):
-    """What each of the `columns` (columns, LEVELS) along a line costs at each level."""
+    """Return the costs (columns, LEVELS) of columns along a line at each level."""
     costs, far_out = np.empty((columns, LEVELS)), border.costs[0, 0]
     for level in range(LEVELS):
         costs[:, level] = border.density * width * (STEP_LEVEL_M * level - DEEPEST_STEP_M)
@@ -140,8 +148,9 @@ def column_costs(drawing, border, azimuth, distance, lower, width, columns):
 
 @compiled
 def find_band(y, azimuth, distance, lower, upper):
-    """The first and last of points, ascending in `y` (n,), that may lie beside a line between
-    `lower` and `upper` along it.
+    """Return the first and last of the points that may lie beside a line.
+
+    Points ascend in `y` (n,). The line runs from `lower` to `upper`.
     """
     c, s = math.cos(azimuth), math.sin(azimuth)
     minimum, limit = np.inf, -np.inf
@@ -156,8 +165,9 @@ def find_band(y, azimuth, distance, lower, upper):
 
 @compiled
 def best_levels(costs, step):
-    """The level of each column (n,) such that `costs` (n, levels) and `step` for each change along
-    them are least.
+    """Return the cheapest level of each column (n,).
+
+    `costs` are (n, levels), and `step` is the price of each change along them.
     """
     n, levels = costs.shape
     came, total = np.empty((n, levels), np.int64), costs[0].copy()
