@@ -218,8 +218,9 @@ def import_format(name: str) -> ModuleType:
 
 
 def choose_format(file: str) -> str | None:
-    """The format that files named like `file` have: by all that ends the name, else by its last
-    suffix; None where that is none.
+    """Return the format of files named like `file`, or None.
+
+    All that ends the name counts, else its last suffix.
 
     >>> [choose_format(name) for name in ("a.gml", "a.citygml3.gml", "b.json", "c.jsonl", "d.txt")]
     ['citygml2', 'citygml3', 'cityjson', 'cityjsonseq', None]
@@ -231,5 +232,5 @@ def choose_format(file: str) -> str | None:
 
 
 def file_ending(format: Format) -> str:
-    """All that follows the first word of its file's name."""
+    """Return all that follows the first word of its file's name."""
     return format.file[format.file.index(".") :]

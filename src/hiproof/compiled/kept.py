@@ -70,7 +70,10 @@ class Kept:
         return None
 
     def load_overload(self, signature: Any, context: Any) -> None:
-        """Answer numba, which asks before it compiles: nothing is kept, or it would be loaded."""
+        """Answer numba, which asks before it compiles, that nothing is kept.
+
+        Otherwise it would be loaded.
+        """
         place_to_write(self.folders)
         news.tell()
 

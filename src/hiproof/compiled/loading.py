@@ -12,8 +12,9 @@ from .linking import Callee
 
 
 class Loaded(JITCodeLibrary):
-    """numba's library of a function that was compiled before: its machine code as it is; what
-    callers would copy of it is read when one is compiled.
+    """numba's library of a function that was compiled before.
+
+    It has machine code as it is. What callers would copy of it is read when one is compiled.
     """
 
     _shared_module: Any

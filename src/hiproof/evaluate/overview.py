@@ -15,8 +15,10 @@ from ..status import MOSTLY_OFF, Attention, Status, find_attention
 
 
 class BuildingOutcome(NamedTuple):
-    """What came of a building: the codes of its status and grade, its detail, and its share of roof
-    points within 0.2 m of the roof, None where it is unknown.
+    """The outcome of a building.
+
+    It has the codes of its status and grade, its detail, and its share of roof points within 0.2 m
+    of the roof, None where it is unknown.
     """
 
     status: str
@@ -27,9 +29,10 @@ class BuildingOutcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Overview:
-    """Buildings in all, those modelled, the share of roof points within 0.2 m of the roof (that of
-    the median building, and that which a tenth of the buildings fall below), and the buildings that
-    need attention by kind.
+    """The result of a run: buildings in all, modelled, and in need of attention.
+
+    It has the share of roof points within 0.2 m of the roof (that of the median building, and that
+    which a tenth of the buildings fall below). Buildings that need attention are counted by kind.
     """
 
     buildings: int
@@ -59,7 +62,7 @@ class Overview:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """The overview for run.json and `--json`."""
+        """Return the overview for run.json and `--json`."""
         return {
             "buildings": self.buildings,
             "modelled": self.modelled,
@@ -97,12 +100,15 @@ class Overview:
 
 
 def is_modelled(outcome: BuildingOutcome) -> bool:
-    """Whether a building has a model that most of its points support."""
+    """Return whether a building has a model that most of its points support."""
     status = Status.__members__.get(outcome.status.upper())
     supports = outcome.share is None or outcome.share >= MOSTLY_OFF
     return status is not None and status.is_model and supports
 
 
 def show_command(folder: str, kind: Attention) -> str:
-    """The command that shows the buildings of a run that need this attention."""
+    """Return the command that shows buildings that need this attention.
+
+    They are those of a run.
+    """
     return f"hiproof edit {folder} --only {kind.code}"

@@ -110,7 +110,10 @@ def lead(run: EvaluatedRun, visible: int) -> str:
 
 
 def attention_list(run: EvaluatedRun) -> str:
-    """The buildings that need attention, by kind, with the command that shows them."""
+    """Return the buildings that need attention, by kind.
+
+    Each kind has the command that shows them.
+    """
     rows = "".join(
         f"<li>{count:,} {kind.code}: {escape(kind.value)}. "
         f"<code>{escape(show_command('RUN', kind))}</code></li>"
@@ -120,7 +123,10 @@ def attention_list(run: EvaluatedRun) -> str:
 
 
 def find_overview(run: EvaluatedRun) -> Overview:
-    """The overview that the run wrote; made of its models where it wrote none."""
+    """Return the overview that the run wrote.
+
+    It is made of its models where it wrote none.
+    """
     if record := run.record.get("summary"):
         return Overview.from_dict(record)
     return Overview.of(

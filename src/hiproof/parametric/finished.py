@@ -1,5 +1,6 @@
-"""Finished models, building by building: of a run's folder, of a parameters.jsonl, or of CityJSON
-and CityGML of any maker.
+"""Finished models, building by building.
+
+They are those of a run's folder, of a parameters.jsonl, or of CityJSON and CityGML of any maker.
 """
 
 from __future__ import annotations
@@ -62,8 +63,10 @@ class Run:
         return (described.building for described in self.describe())
 
     def describe(self, damaged: Damaged = refuse) -> Iterator[Described]:
-        """Yield every building with what files tell of it; those that cannot be read or built are
-        told to `damaged`, which refuses the run by default, and left out.
+        """Yield every building with all that files need of it.
+
+        Those that cannot be read or built are reported to `damaged`, which refuses the run by
+        default, and left out.
         """
         if is_parameters(self.path):
             return describe_parametric(self.path, self.head, damaged)
@@ -71,8 +74,9 @@ class Run:
 
 
 def open_run(path: str | os.PathLike, crs: Any = None) -> Run:
-    """Open the models of a run's folder, or of a file: parameters.jsonl, CityJSON, CityJSONSeq or
-    CityGML.
+    """Open the models of a run's folder, or of a file.
+
+    A file is parameters.jsonl, CityJSON, CityJSONSeq or CityGML.
 
     `crs` (anything pyproj understands) replaces the CRS that they name. Buildings are read when you
     iterate over the run, so that one is in memory at a time. Those of a parameters.jsonl, which
@@ -91,7 +95,10 @@ def open_run(path: str | os.PathLike, crs: Any = None) -> Run:
 
 
 def read_file_head(file: Path, record: dict[str, Any]) -> FileHead:
-    """What a file tells of its models, the CRS by `record` where it names none."""
+    """Read what a file says of its models.
+
+    The CRS is that of `record` where the file names none.
+    """
     if is_parameters(file):
         with opened_parameters(file) as (head, _):
             return head
@@ -103,7 +110,7 @@ def read_file_head(file: Path, record: dict[str, Any]) -> FileHead:
 
 
 def is_parameters(file: Path) -> bool:
-    """Whether a file begins as a parameters.jsonl does."""
+    """Return whether a file begins as a parameters.jsonl does."""
     try:
         with file.open(encoding="utf-8-sig") as lines:
             return HEAD_KEY in lines.readline(200)
@@ -150,8 +157,9 @@ def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[
 
 
 def make_building(model: BuildingModel) -> Building:
-    """The building of a model of unknown parameters: a part of its roof has a piece for each of its
-    faces.
+    """Make the building of a model of unknown parameters.
+
+    A part of its roof has a piece for each of its faces.
     """
     attributes = {plain_text(name): plain(value) for name, value in model.attributes.items()}
     code = model.status.upper()
@@ -167,8 +175,9 @@ def make_building(model: BuildingModel) -> Building:
 
 
 def name_faces(solid: Solid) -> Solid:
-    """The solid with faces that look up as its roof and faces that look down as its ground, where
-    the file names no roof.
+    """Name the faces of a solid as roof and ground by where they look.
+
+    Faces that look up are its roof, where the file names no roof.
     """
     if solid.select_faces(ROOF):
         return solid
@@ -188,7 +197,7 @@ def list_parts(solid: Solid) -> list[int]:
 
 
 def number_parts(solid: Solid) -> Solid:
-    """The solid with its roof's parts numbered from 0 on, without gaps."""
+    """Number the parts of a solid's roof from 0 on, without gaps."""
     number = {part: k for k, part in enumerate(list_parts(solid))}
     faces = (
         dataclasses.replace(face, part=number[face.part] if face.kind == ROOF else -1)
@@ -198,7 +207,10 @@ def number_parts(solid: Solid) -> Solid:
 
 
 def trace_roof(solid: Solid, types: list[str]) -> Roof:
-    """The roof of a solid, its parts of these `types`, from its faces."""
+    """Return the roof of a solid, traced from its faces.
+
+    Its parts have these `types`.
+    """
     frame = LocalFrame(np.floor(solid.vertices.min(axis=0)))
     local = solid.move(-frame.origin)
     faces = local.select_faces(ROOF)
@@ -211,7 +223,7 @@ def trace_roof(solid: Solid, types: list[str]) -> Roof:
 
 
 def trace_piece(solid: Solid, face: Face) -> Piece | None:
-    """The piece of a roof that a face is, None of an upright one."""
+    """Return the piece of a roof that a face is, None for an upright one."""
     ring = solid.vertices[list(face.rings[0])]
     normal = ring_normal(ring)
     if abs(normal[2]) <= PLAN_SHARE_UPRIGHT * np.linalg.norm(normal):

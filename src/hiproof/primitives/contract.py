@@ -435,8 +435,6 @@ def turn_quarter(theta: np.ndarray) -> np.ndarray:
     """Exchange the plan axes by a quarter turn.
 
     The caller exchanges the q that belong to them.
-
-    The caller exchanges the q that belong to them.
     """
     theta = theta.copy()
     theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]

@@ -196,8 +196,9 @@ def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str,
 
 
 def find_citygml_crs(path: Path) -> str | None:
-    """Find the name of the CRS of a CityGML file, that of its first envelope; None where there is
-    none before the first city object.
+    """Find the name of the CRS of a CityGML file.
+
+    It is that of its first envelope; None where there is none before the first city object.
     """
     from lxml import etree
 

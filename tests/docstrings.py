@@ -1,0 +1,63 @@
+"""List the docstrings of the package whose first lines are not as CONTRIBUTING.md asks.
+
+usage: python tests/docstrings.py
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from naming import PACKAGE, is_later_file, is_property
+
+LONGEST_LINE = 80  # characters of a first line, so that lists of functions show it whole
+NOUNS = ("The", "A", "An", "What", "Whether", "How", "Where", "Which", "Those", "All", "One", "Of")
+"""Words that begin a noun or a clause where a function needs a verb."""
+
+Documented = ast.Module | ast.ClassDef | ast.FunctionDef
+
+
+def iterate_docstrings() -> Iterator[tuple[str, Documented, str]]:
+    """Yield the place, the node and the docstring of all that has one outside `fit/union`."""
+    for file in sorted(PACKAGE.rglob("*.py")):
+        if not is_later_file(file):
+            yield from iterate_file(file)
+
+
+def iterate_file(file: Path) -> Iterator[tuple[str, Documented, str]]:
+    """Yield the place, the node and the docstring of all that has one in a file."""
+    place = file.relative_to(PACKAGE).as_posix()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, Documented) and (text := ast.get_docstring(node)):
+            yield f"{place}: {getattr(node, 'name', 'module')}", node, text
+
+
+def find_fault(node: Documented, text: str) -> str:
+    """Return what is wrong with a docstring's first line, empty where nothing is.
+
+    >>> function = ast.parse("def area(): ...").body[0]
+    >>> find_fault(function, "Return the area."), find_fault(function, "The area.")
+    ('', 'begins with no verb')
+    """
+    first, *rest = text.splitlines()
+    if len(first) > LONGEST_LINE:
+        return f"is longer than {LONGEST_LINE} characters"
+    if not first.endswith(".") or (rest and rest[0].strip()):
+        return "is no sentence of its own"
+    is_function = isinstance(node, ast.FunctionDef) and not is_property(node)
+    word = first.split()[0]
+    if is_function and (word in NOUNS or not re.fullmatch(r"[A-Z][a-z]+,?", word)):
+        return "begins with no verb"
+    return ""
+
+
+def find_faulty_docstrings() -> list[str]:
+    """Return the places of docstrings with a faulty first line, and what is wrong."""
+    faults = ((place, find_fault(node, text)) for place, node, text in iterate_docstrings())
+    return [f"{place}: first line {fault}" for place, fault in faults if fault]
+
+
+if __name__ == "__main__":
+    print(*find_faulty_docstrings(), sep="\n")
