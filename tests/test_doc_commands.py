@@ -1,8 +1,10 @@
 """Run every `hiproof` command of the documentation, page by page, on three houses of the demo."""
 
+import json
 import re
 import shlex
 import shutil
+import tomllib
 from pathlib import Path
 
 import laspy
@@ -10,8 +12,10 @@ import pytest
 import shapely
 from typer.testing import CliRunner
 
-from hiproof import read_footprints
+from hiproof import build, read_footprints
 from hiproof.cli.app import app
+from hiproof.parametric.override import read_override
+from hiproof.settings import Settings
 from hiproof.simulate import demo_files
 
 ROOT = Path(__file__).parents[1]
@@ -28,6 +32,23 @@ NOT_RUN = {
     "hiproof footprints": "needs a network; tests/test_overture.py serves a release",
     "--scheduler": "needs a Dask cluster; tests/test_city_dask.py starts one",
 }
+OTHER_PROGRAMS = {
+    "make": "installs into an environment of its own; .ci/run runs it",
+    "pip": "installs packages from a registry",
+    "python": "compiles for minutes; tests/test_packaging.py builds wheels",
+    "docker": "needs Docker",
+    "qgis_process": "needs QGIS; tests/test_qgis.py runs the plugin's commands",
+    "dask": "starts a cluster; tests/test_city_dask.py starts one",
+}
+FORMULAS = {"method.md"}  # pages whose indented lines may be formulas
+FENCED = {
+    "python": "tests/test_docs.py runs it",
+    "sql": "tests/test_postgis.py runs it",
+    "json": "read here",
+    "toml": "read here",
+    "js": "needs CesiumJS and a browser",
+}
+JSON_READERS = {"overrides.md": read_override, "parameters.md": build}
 OVERRIDES = '{"id": "house-00", "ridge_height": 12.0}\n'
 
 
@@ -36,6 +57,24 @@ def list_commands(page):
     text = page.read_text(encoding="utf-8").replace("\\\n", " ")
     lines = re.findall(r"^    (hiproof .+)$", text, re.MULTILINE)
     return [" ".join(line.split(" # ")[0].split()) for line in lines]
+
+
+def list_blocks(page):
+    """Return the fenced blocks of a page as (language, text), and its indented blocks."""
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"```(\w*)\n(.*?)```", text, re.DOTALL)
+    rest = re.sub(r"```.*?```|^:::.*\n(?:    .*\n)*", "", text, flags=re.DOTALL | re.MULTILINE)
+    return fenced, re.findall(r"(?:^    .*\n)+", rest.replace("\\\n", " "), re.MULTILINE)
+
+
+def parse_values(text):
+    """Return the JSON values of a text, one after the other."""
+    values, decoder = [], json.JSONDecoder()
+    while text := text.strip():
+        value, end = decoder.raw_decode(text)
+        values.append(value)
+        text = text[end:]
+    return values
 
 
 def is_run(command):
@@ -93,3 +132,24 @@ def test_the_commands_of_a_page_run(page, inputs, models, tmp_path, monkeypatch)
 def test_what_is_not_run_still_stands_on_a_page():
     text = "\n".join(command for page in PAGES for command in list_commands(page))
     assert [part for part in NOT_RUN if part not in text] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_block_of_a_page_is_run_or_listed(page):
+    fenced, indented = list_blocks(page)
+    assert [language for language, _ in fenced if language not in FENCED] == []
+    for language, text in fenced:
+        if language == "json":
+            assert all(map(JSON_READERS[page.name], parse_values(text)))
+        elif language == "toml":
+            Settings.from_dict(tomllib.loads(text))
+    programs = {line.split()[0] for block in indented for line in block.splitlines()}
+    assert page.name in FORMULAS or programs <= {"hiproof", *OTHER_PROGRAMS}
+
+
+def test_what_is_listed_stands_on_a_page():
+    blocks = [list_blocks(page) for page in PAGES]
+    languages = {language for fenced, _ in blocks for language, _ in fenced}
+    lines = [line for _, indented in blocks for block in indented for line in block.splitlines()]
+    assert FENCED.keys() <= languages
+    assert OTHER_PROGRAMS.keys() <= {line.split()[0] for line in lines}
