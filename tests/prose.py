@@ -12,8 +12,16 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
+FRONT_PAGES = (
+    "README",
+    "ARCHITECTURE",
+    "CONTRIBUTING",
+    "CHANGELOG",
+    "SECURITY",
+    "benchmarks/RESULTS",
+)
 PAGES = [
-    *(ROOT / f"{name}.md" for name in ("README", "ARCHITECTURE", "CONTRIBUTING", "CHANGELOG")),
+    *(ROOT / f"{name}.md" for name in FRONT_PAGES),
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
 COLUMNS = 100  # of a line, tables and links that cannot be broken apart
