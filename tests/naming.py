@@ -60,7 +60,7 @@ VERBS = frozenset(
         r"\w+",
         """accept are begin build check choose compose compute count describe end
         estimate explain find fit fits format has have import is iterate judge knows
-        lies list log make measure minimise model names open plan put raise read refuse
+        lies list log make mark measure minimise model names open plan put raise read refuse
         remark remove report round run score search select serve solve sort split step
         take turn vote warn work write""",
     )

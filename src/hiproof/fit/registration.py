@@ -65,7 +65,7 @@ SQUARE_M = 50.0
 RASTER_MARGIN = round((FARTHEST_SHIFT_M + 1.2) / RASTER_PITCH_M)
 """Pitches of raster around the points, so that no shift leads out of it."""
 
-ROWS_AT_ONCE = 100
+RASTER_ROWS_AT_ONCE = 100
 """Rows of a raster that are smoothed at once: some megabytes."""
 
 MOST_SAMPLE_POINTS = 30_000
@@ -299,8 +299,8 @@ def blur_columns(raster: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """
     reach, smooth = len(weights) // 2, np.empty_like(raster)
     mirrored = np.pad(np.arange(len(raster)), reach, mode="symmetric")
-    for first in range(0, len(raster), ROWS_AT_ONCE):
-        last = min(first + ROWS_AT_ONCE, len(raster))
+    for first in range(0, len(raster), RASTER_ROWS_AT_ONCE):
+        last = min(first + RASTER_ROWS_AT_ONCE, len(raster))
         block = raster[mirrored[first : last + 2 * reach]].astype(float)
         rows = [block[k : k + last - first] for k in range(2 * reach + 1)]
         total, pair = weights[reach] * rows[reach], np.empty(rows[0].shape)

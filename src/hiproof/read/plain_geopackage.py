@@ -29,7 +29,7 @@ PYTHON_TYPES = {
 }
 """Types of a column whose values SQLite gives as they are declared."""
 
-LAYERS = """
+FEATURE_TABLES = """
 select g.table_name, g.column_name, g.geometry_type_name, s.organization, s.organization_coordsys_id
 from gpkg_geometry_columns g join gpkg_spatial_ref_sys s using (srs_id)
 join sqlite_master m on m.name = g.table_name and m.type = 'table'
@@ -106,7 +106,7 @@ def open_database(path: str | Path) -> sqlite3.Connection:
 
 def choose_layer(database: sqlite3.Connection, layer: str | int | None) -> Layer:
     """Return the layer of that name, or the only one."""
-    layers = [Layer(*row) for row in database.execute(LAYERS)]
+    layers = [Layer(*row) for row in database.execute(FEATURE_TABLES)]
     chosen = [one for one in layers if layer is None or one.table == layer]
     if (
         len(chosen) != 1
