@@ -14,12 +14,14 @@ from typer.testing import CliRunner
 from hiproof.city.plan import make_jobs
 from hiproof.city.prepare import make_plan
 from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
 from hiproof.cli.options import declared_settings
 from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
+from run_records import by_id
 
 OPTIONED = [option for option in declared_settings() if option.field.metadata["option"]]
 PARAMETERS = {p.name: p for p in typer.main.get_command(app).commands["reconstruct"].params}
@@ -165,6 +167,17 @@ def test_without_footprints_the_box_chooses_among_what_is_found(town_files, tmp_
         InputError, match=r"meets the clouds, which lie in [\d.,]+, got -9,-9,-8,-8"
     ):
         make_plan(dataclasses.replace(request, bbox=(-9.0, -9.0, -8.0, -8.0)))
+
+
+def test_without_footprints_a_building_in_the_box_comes_as_without_a_box(town_files, tmp_path):
+    request = Request((town_files[0],), tmp_path / "whole")
+    reconstruct_area(request)
+    whole = by_id(tmp_path / "whole")
+    box = shapely.Polygon(whole[min(whole)]["outline"][0]).bounds
+    origin = whole[min(whole)]["origin"]
+    box = tuple(np.add(box, [origin[0], origin[1]] * 2).tolist())
+    reconstruct_area(dataclasses.replace(request, out=tmp_path / "part", bbox=box))
+    assert by_id(tmp_path / "part") == {min(whole): whole[min(whole)]}
 
 
 def test_a_plan_holds_the_footprints_chosen(town_files, tmp_path):

@@ -9,11 +9,14 @@ import pytest
 import shapely
 
 import hiproof.read
+from hiproof.classify import buildings
+from hiproof.classify.buildings import SquareSearch
 from hiproof.classify.cells import plan_density
 from hiproof.classify.split import connected_groups, split_buildings
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import PointCloud
 from hiproof.settings import Settings
+from leafy_scenes import GROUND, TREE, town
 
 CTVIEW = Path(__file__).parents[3] / "shared" / "data" / "ctview"
 L_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 8), (9, 8), (9, 18), (0, 18)])
@@ -85,6 +88,35 @@ def test_ids_and_areas_depend_neither_on_order_nor_on_the_other_houses():
         for b in split_buildings(PointCloud(cloud.xyz[east], cloud.classification[east]), settings)
     }
     assert len(part & set(whole)) >= 2
+
+
+@pytest.mark.parametrize("roofs", ["class", "shape"])
+def test_a_box_gives_the_buildings_of_the_whole_cloud_and_searches_no_more(roofs, monkeypatch):
+    """Squares as small as a house, so that buildings and rows go over their borders."""
+    monkeypatch.setattr(buildings, "WORK_M", 20.0)
+    monkeypatch.setattr(buildings, "SQUARE_BORDER_M", 6.0)
+    scan, _ = town()
+    classes = np.select([scan.source == GROUND, scan.source == TREE], [2, 5], 6).astype(np.uint8)
+    cloud = PointCloud(scan.points, classes if roofs == "class" else np.ones_like(classes))
+    settings, searched = Settings.from_dict({"read": {"roofs": roofs, "split_gap_m": 1.5}}), set()
+    classify_square = SquareSearch.classify_square
+    monkeypatch.setattr(
+        SquareSearch,
+        "classify_square",
+        lambda self, square: (searched.add(square), classify_square(self, square))[1],
+    )
+    whole = {building.id: building for building in split_buildings(cloud, settings)}
+    n_squares = len(searched)
+    assert len(whole) >= 6
+    for middle in [building.area.centroid for building in list(whole.values())[:2]]:
+        searched.clear()
+        box = middle.buffer(2.0).bounds
+        part = {b.id: b for b in split_buildings(cloud, settings, box)}
+        inside = {id for id, b in whole.items() if b.area.intersects(shapely.box(*box))}
+        assert inside and inside <= set(part) and len(part) < len(whole)
+        assert all(np.array_equal(part[id].index, whole[id].index) for id in inside)
+        assert all(part[id].area.equals(whole[id].area) for id in inside)
+        assert roofs == "class" or len(searched) < n_squares
 
 
 @pytest.mark.parametrize("seed", range(6))

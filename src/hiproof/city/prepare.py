@@ -19,7 +19,7 @@ from ..write.naming import FileUnits
 from ..write.reprojected import choose_file_crs
 from ..write.tables.geopackage import attributes_with_a_column
 from .classes import settle_classes
-from .from_cloud import jobs_from_cloud
+from .from_cloud import Progress, jobs_from_cloud
 from .from_overture import with_overture
 from .outlines import MOST_ROW_M
 from .plan import (
@@ -43,7 +43,7 @@ TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core 
 MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
 
 
-def make_plan(request: Request) -> WorkPlan:
+def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPlan:
     """Make the plan of a request.
 
     Raises InputError when nothing can be read.
@@ -65,7 +65,7 @@ def make_plan(request: Request) -> WorkPlan:
         jobs, neighbours, registration = jobs_from_footprints(request, headers, frame, settings)
         operations += footprint_operations(request, frame, jobs)
     else:
-        jobs, settings = jobs_from_cloud(request.clouds, settings)
+        jobs, settings = jobs_from_cloud(request, headers, frame.units, settings, progress)
         jobs = jobs_in_box(jobs, request, frame.units)
     if terrain is not None:
         check_terrain(terrain, jobs)

@@ -22,6 +22,7 @@ from ..write.files import atomic
 from . import noted
 from .bundles import remove_bundles
 from .changed import take_over
+from .from_cloud import Progress
 from .ledger import Ledger, Task
 from .marks import changed_files, compute_mark, describe_inputs, describe_selection
 from .merge import remove_tiles, tile_parts, whole_files
@@ -79,7 +80,7 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
     return ledger
 
 
-def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
+def resume_or_plan(request: Request, state: Path, ledger: Ledger, progress: Progress) -> WorkPlan:
     """Return the plan of an earlier run of the same request, or a new one.
 
     The earlier one holds where its files stand as it left them. Where the footprints changed since,
@@ -90,7 +91,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
     if plan is None or ledger.get("choice") != compute_mark(
         describe_selection(request), ledger.get("salt") or ""
     ):
-        old, plan = plan, make_plan(request)
+        old, plan = plan, make_plan(request, progress)
         new_items = old is None or not take_over(plan, old, state, ledger)
         if new_items:
             begin(plan, request, state, ledger)

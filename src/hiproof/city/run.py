@@ -31,6 +31,7 @@ from .bundles import find_bundle_folder, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
 from .executors import make_executor
+from .from_cloud import Progress
 from .from_overture import choose_footprints, read_source
 from .ledger import Failure, Ledger
 from .lock import hold_folder
@@ -44,7 +45,6 @@ from .resume import open_ledger, open_state, resume_or_plan
 from .tasks import MAIN_JOB, ONE_PRIMITIVE, RECOGNISING, WITHOUT_FOOTPRINTS, solve_tile, sort_cloud
 
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
-        plan = resume_or_plan(request, state, ledger)
+        plan = resume_or_plan(request, state, ledger, progress)
         if request.processes is None and not request.scheduler:
             executor = make_executor(count_processes(request, plan, state, ledger))
         clock.lap("plan")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
 from scipy import ndimage
 
 from ..read.assign import PointGrid
+from ..read.pointcloud import Box
 from .cells import SquareCells, plan_density
 from .ground import ground_grid
 from .surfaces import Surfaces, find_surfaces
@@ -45,25 +47,67 @@ def classify(
 ) -> np.ndarray:
     """Return the class (n,) uint8 of each point (n, 3) in world metres.
 
-    Classes are BUILDING, GROUND and UNKNOWN.
-
-    Points within 40 m decide, and so the answer for a place is much the same whatever else the
-    cloud holds. `on_error` is called with the indices of the points of a square that fails; they
-    stay UNKNOWN.
+    Classes are BUILDING, GROUND and UNKNOWN. `on_error` is called with the indices of the points of
+    a square that fails; they stay UNKNOWN.
     """
-    classes = np.full(len(xyz), UNKNOWN, np.uint8)
-    if not len(xyz):
-        return classes
-    grid, cell_m = PointGrid(xyz, 10.0), choose_cell_size(xyz)
-    for column, row in np.unique(np.floor(xyz[:, :2] / WORK_M).astype(np.int64), axis=0).tolist():
-        lower = WORK_M * np.array([column, row])
-        nearby = grid.candidates((*(lower - SQUARE_BORDER_M), *(lower + WORK_M + SQUARE_BORDER_M)))
-        mask = (np.floor(xyz[nearby, :2] / WORK_M) == (column, row)).all(axis=1)
+    search = SquareSearch(xyz, on_error)
+    search.classify(search.squares)
+    return search.classes
+
+
+Square = tuple[int, int]
+"""Column and row of a square of WORK_M on the world's grid."""
+
+
+class SquareSearch:
+    """The search for ground and buildings in a cloud, square by square.
+
+    Points within 40 m of a square decide, and so the answer for a place is much the same whatever
+    else the cloud holds. `classes` (n,) are UNKNOWN in squares that were not searched.
+    """
+
+    def __init__(
+        self, xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error
+    ):
+        self.xyz, self.on_error = xyz, on_error
+        self.classes = np.full(len(xyz), UNKNOWN, np.uint8)
+        self.squares, self.searched = find_squares(xyz), set[Square]()
+        if len(xyz):
+            self.grid, self.cell_m = PointGrid(xyz, 10.0), choose_cell_size(xyz)
+
+    def classify(
+        self, squares: set[Square], progress: Callable[[int, int], None] = lambda *_: None
+    ) -> None:
+        """Find the classes of the points in those `squares` that are not searched yet."""
+        remainder = sorted((squares & self.squares) - self.searched)
+        for number, square in enumerate(remainder):
+            progress(number, len(remainder))
+            self.classify_square(square)
+        self.searched.update(remainder)
+
+    def classify_square(self, square: Square) -> None:
+        lower = WORK_M * np.array(square)
+        border = (*(lower - SQUARE_BORDER_M), *(lower + WORK_M + SQUARE_BORDER_M))
+        nearby = self.grid.candidates(border)
+        mask = (np.floor(self.xyz[nearby, :2] / WORK_M) == square).all(axis=1)
         try:
-            classes[nearby[mask]] = classify_square(xyz[nearby], cell_m)[mask]
+            self.classes[nearby[mask]] = classify_points(self.xyz[nearby], self.cell_m)[mask]
         except Exception as error:
-            on_error(nearby[mask], error)
-    return classes
+            self.on_error(nearby[mask], error)
+
+
+def find_squares(xyz: np.ndarray, reach_m: float = 0.0) -> set[Square]:
+    """Return the squares within `reach_m`, less than WORK_M, of points (n, 2 or more)."""
+    corners = [(x, y) for x in {-reach_m, reach_m} for y in {-reach_m, reach_m}]
+    places = [np.floor((xyz[:, :2] + corner) / WORK_M) for corner in corners]
+    return set(map(tuple, np.unique(np.concatenate(places), axis=0).astype(int).tolist()))
+
+
+def list_squares(box: Box, reach_m: float) -> set[Square]:
+    """Return the squares within `reach_m` of a box."""
+    lower = np.floor((np.array(box[:2]) - reach_m) / WORK_M).astype(int)
+    upper = np.floor((np.array(box[2:]) + reach_m) / WORK_M).astype(int) + 1
+    return set(itertools.product(range(lower[0], upper[0]), range(lower[1], upper[1])))
 
 
 def choose_cell_size(xyz: np.ndarray) -> float:
@@ -75,7 +119,7 @@ def choose_cell_size(xyz: np.ndarray) -> float:
     return next((cell for cell in CELLS_M if density * cell**2 >= 1.0), CELLS_M[-1])
 
 
-def classify_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
+def classify_points(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     """Return the class (n,) of all points of a small cloud (n, 3), n > 0."""
     ground = ground_grid(xyz)
     rise = 0.5 * ground.cell_m * ground.slope_at(xyz)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,11 +19,13 @@ from ..errors import ErrorReport, InputError, InputWarning, report_error
 from ..geometry.components import label_components
 from ..log import count_things
 from ..model import PointCloud
+from ..read.pointcloud import Box
 from ..settings import ReadSettings, Settings
+from .buildings import find_squares, list_squares
 from .cells import plan_density
 from .cut_out import is_cut_out
 from .houses import separate_houses
-from .scene import roofs_by_shape, select_roof_candidates
+from .scene import RoofSearch, select_roof_candidates
 
 # steps, so that neighbouring tiles of one survey choose the same gap
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
@@ -36,6 +39,13 @@ NEVER_CLASSIFIED = (0, 1)  # of ASPRS: created, unclassified
 NOISE = (7, 18)  # of ASPRS: low and high noise
 MIN_AREA_M2 = 4.0  # m2; smaller is a shed or a car's roof, and too little to model
 SPACINGS_BEYOND = 0.35  # a roof ends about so far beyond its outermost points
+
+
+Progress = Callable[[str, int, int], None]
+
+
+def ignore(stage: str, finished: int, total: int) -> None:
+    """Take no notice of how far the work is."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,12 @@ class RoofPoints(NamedTuple):
     error: ErrorReport | None = None
 
 
-def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
+def split_buildings(
+    cloud: PointCloud,
+    settings: Settings | None = None,
+    box: Box | None = None,
+    progress: Progress = ignore,
+) -> list[FoundBuilding]:
     """Split `cloud` into its buildings.
 
     They come from the points of its building class or, where it has none, from roofs found by
@@ -80,29 +95,77 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
     name the metre that holds the group's middle, not its number, so that they do not depend on what
     else was read. Raises InputError where no point may be a building's. An unexpected error stays
     with the group, or the square of the cloud, where it happens.
+
+    With a `box` (xmin, ymin, xmax, ymax, world metres) the buildings that meet it come as without
+    one; of the others those that touch them come too. `progress` is called with a stage ("ground",
+    "split"), how much of it is done, and how much there is.
     """
     read = (settings or Settings()).read
-    roof, is_cut_out, failed = select_roof_points(cloud, read)
-    places = name_places(
-        [*divide_roof_points(roof, cloud.xyz, read, is_cut_out), *failed], cloud.xyz
-    )
+    roof, is_cut_out, failed = select_roof_points(cloud, read, box, progress)
+    houses = divide_roof_points(roof, cloud.xyz, read, is_cut_out, box, progress)
+    places = name_places([*houses, *failed], cloud.xyz)
     return [dataclasses.replace(item, is_cut_out=is_cut_out) for item in places]
 
 
 def divide_roof_points(
-    roof: np.ndarray, xyz: np.ndarray, read: ReadSettings, is_cut_out: bool
+    roof: np.ndarray,
+    xyz: np.ndarray,
+    read: ReadSettings,
+    is_cut_out: bool,
+    box: Box | None = None,
+    progress: Progress = ignore,
 ) -> list[RoofPoints]:
-    """Divide the `roof` points (indices) among buildings."""
+    """Divide the `roof` points (indices) among buildings.
+
+    With a `box`, only groups that may meet it are divided.
+    """
     if not len(roof):
         return []
     xy = xyz[roof, :2]
     if is_cut_out and is_single(xy):
         return houses_or_error(roof, xyz, adapted_gap(xy), split_houses=False)
     gap_m = read.split_gap_m or adapted_gap(xy)
-    groups = select_large_groups([roof[group] for group in connected_groups(xy, gap_m)], xyz, read)
-    return [
-        house for group in groups for house in houses_or_error(group, xyz, gap_m, read.split_houses)
-    ]
+    candidates = [roof[group] for group in connected_groups(xy, gap_m)]
+    if box is not None:
+        candidates = [group for group in candidates if meets_box(xyz[group], box, gap_m)]
+    groups, houses = select_large_groups(candidates, xyz, read), []
+    for number, group in enumerate(groups):
+        progress("split", number, len(groups))
+        houses += houses_or_error(group, xyz, gap_m, read.split_houses)
+    return houses
+
+
+def meets_box(xyz: np.ndarray, box: Box, gap_m: float) -> bool:
+    """Return whether the area of a group of points (n, 3) may meet the box.
+
+    The area consists of cells, which reach half a gap beyond the points at most.
+    """
+    lower, upper = np.array(box[:2]) - gap_m / 2, np.array(box[2:]) + gap_m / 2
+    return bool(((xyz[:, :2] >= lower) & (xyz[:, :2] <= upper)).all(axis=1).any())
+
+
+def find_roofs_around(
+    search: RoofSearch, xyz: np.ndarray, read: ReadSettings, box: Box, progress: Progress
+) -> np.ndarray:
+    """Return the roof points (indices) of squares around the box.
+
+    The squares hold every group of roof points that meets the box.
+
+    A group that reaches the border of the squares searched so far may go on beyond it: then the
+    next squares are searched too, until no such group does.
+    """
+    squares = list_squares(box, GAPS_M[-1])
+    while True:
+        roofs = search.find(squares, lambda done, total: progress("ground", done, total))
+        if not len(roofs):
+            return roofs
+        gap_m = read.split_gap_m or adapted_gap(xyz[roofs, :2])
+        groups = [xyz[roofs[group]] for group in connected_groups(xyz[roofs, :2], gap_m)]
+        around = [find_squares(group, gap_m) for group in groups if meets_box(group, box, gap_m)]
+        grown = squares.union(*around)
+        if grown == squares:
+            return roofs
+        squares = grown
 
 
 def select_large_groups(
@@ -130,7 +193,7 @@ def select_large_groups(
 
 
 def select_roof_points(
-    cloud: PointCloud, read: ReadSettings
+    cloud: PointCloud, read: ReadSettings, box: Box | None = None, progress: Progress = ignore
 ) -> tuple[np.ndarray, bool, list[RoofPoints]]:
     """Return ascending indices of the points that may be roofs.
 
@@ -153,11 +216,15 @@ def select_roof_points(
     if unclassified is not None and is_roofs_only(cloud.xyz[unclassified]):
         return unclassified, True, []
     failed: list[RoofPoints] = []
-    roofs = roofs_by_shape(
+    search = RoofSearch(
         cloud,
         read.ground_classes,
         lambda index, error: failed.append(failed_place(index, cloud.xyz, error)),
     )
+    if box is None:
+        roofs = search.find(progress=lambda done, total: progress("ground", done, total))
+    else:
+        roofs = find_roofs_around(search, cloud.xyz, read, box, progress)
     if read.roofs == "auto":
         text = (
             f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs "

@@ -73,7 +73,7 @@ class Overview:
 
     @classmethod
     def from_dict(cls, record: Mapping[str, Any]) -> Overview:
-        """Make it again of what `to_dict` gave."""
+        """Restore the overview from what `to_dict` returned."""
         counts = record.get("needs_attention") or {}
         return cls(
             record.get("buildings") or 0,
@@ -85,12 +85,12 @@ class Overview:
 
     @property
     def headline(self) -> str:
-        """How many of how many buildings were modelled."""
+        """Say how many of how many buildings were modelled."""
         return f"{self.modelled:,} of {count_things(self.buildings, 'building')} modelled"
 
     @property
     def fit(self) -> str:
-        """How well the models fit their points, empty where nothing is known."""
+        """Say how well the models fit their points; empty where nothing is known."""
         if self.median_share is None or self.worst_tenth_share is None:
             return ""
         return (
