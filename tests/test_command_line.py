@@ -11,13 +11,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from hiproof.cli import progress
+from hiproof import progress
 from hiproof.cli.app import app
 from hiproof.cli.command import choose_level
 from hiproof.cli.commands import COMMANDS, FIRST_OPTIONS
-from hiproof.cli.progress import show_progress
 from hiproof.errors import SettingsError
 from hiproof.log import Level, start
+from hiproof.progress import show_progress
 from sample_models import sample_points, write_sample_run
 
 GROUPS = ["Reconstruct", "Inspect", "Edit", "Export", "Network"]

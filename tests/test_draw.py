@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hiproof
+from hiproof.draw.html import VIEW_SIZE
 from hiproof.draw.view import choose_turn, list_colours, project_points, select_seen_faces
 from hiproof.errors import InputError
 from hiproof.status import Status
@@ -76,3 +77,14 @@ def test_a_plot_tells_near_points_from_far_ones(house):
         hiproof.plot(house, xy)
     with pytest.raises(InputError, match="with a model"):
         hiproof.plot(hiproof.Building("b", Status.NO_POINTS))
+
+
+@pytest.mark.parametrize("turn", range(0, 360, 30))
+@pytest.mark.parametrize(("width", "height"), [(60.0, 3.0), (4.0, 80.0), (10.0, 8.0)])
+def test_the_view_frames_a_building_whichever_way_it_turns(width, height, turn):
+    """A hall, a tower and a house: no corner lies beyond the picture."""
+    tall = gable_house(float(turn), width=width, length=2 * width, eave=height)
+    drawn = re.findall(r'<path d="([^"]+)"', tall._repr_html_())
+    numbers = [float(number) for path in drawn for number in re.findall(r"-?\d+\.\d", path)]
+    corners = np.abs(np.reshape(numbers, (-1, 2)))
+    assert (corners.max(axis=0) < np.array(VIEW_SIZE) / 2).all()

@@ -24,6 +24,7 @@ __version__ = "0.1.0"
 _HOME = {
     "build": "parametric",
     "plot": "draw.plot",
+    "to_geodataframe": "draw.objects",
     "open_run": "parametric.finished",
     "read_parameters": "parametric",
     "reconstruct": "method",
@@ -102,6 +103,8 @@ METHODS = {
         "without_part": "parametric.edit",
         "refit": "parametric.refit",
         "render_building": "draw.html",
+        "to_pyvista": "draw.objects",
+        "to_trimesh": "draw.objects",
     }.items()
 }
 """Functions that methods of `model.Building` call, from packages that stand above `model`."""

@@ -23,7 +23,7 @@ def setting(
     unit: str = "",
     lower: float | None = None,
     upper: float | None = None,
-    choices: tuple = (),
+    choices: tuple[Any, ...] = (),
     minimum: int = 0,
     option: str = "",
     names: str = "",
@@ -415,7 +415,7 @@ class Settings:
         return "\n".join(lines)
 
 
-def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
+def check_value(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
     """Convert `value` to the declared setting's type.
 
     Raises SettingsError with the full sentence when it does not fit.
@@ -492,7 +492,7 @@ def format_value(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def describe(declared: dataclasses.Field) -> str:
+def describe(declared: dataclasses.Field[Any]) -> str:
     """Return one line: meaning, unit, bounds or choices, default."""
     m = declared.metadata
     parts = [m["help"]]

@@ -187,7 +187,7 @@ def test_names_that_clash(tmp_path):
 
 
 def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):
-    monkeypatch.setattr(waiting, "ROWS_AT_ONCE", 4)
+    monkeypatch.setattr(waiting, "BATCH_ROWS", 4)
     columns, _, _ = table(
         tmp_path, [make_lost_building(str(n), attributes={"n": n}) for n in range(11)]
     )

@@ -24,6 +24,7 @@ from ..formats import list_model_paths
 from ..frames import METRES, Units
 from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
+from ..progress import show_in_notebook
 from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
@@ -84,17 +85,19 @@ class Summary:
         return 2 if self.broken_inputs else 0
 
 
-def reconstruct_area(
-    request: Request, progress: Progress = lambda step, done, total: None
-) -> Summary:
+def reconstruct_area(request: Request, progress: Progress | None = None) -> Summary:
     """Reconstruct every building of an area into `request.out`.
 
     The package's docstring has the steps.
 
     Raises InputError, SettingsError or OutputError (full sentences) when the run cannot start or go
     on, or when another one works in that folder; what was done so far stays, and the same call goes
-    on from there.
+    on from there. Without `progress`, which is called with a step, how much of it is done and how
+    much there is, a notebook shows bars.
     """
+    if progress is None:
+        with show_in_notebook("plan") as update:
+            return reconstruct_area(request, update)
     refuse_unusable(request)
     state = open_state(request.out)
     with hold_folder(state):

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from ..log import count_things
+from ..progress import show_progress
 from .options import with_settings
-from .progress import show_progress
 
 
 def print_shapes(targets: bool) -> None:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from ..log import count_things
-from .progress import Update, show_progress
+from ..progress import Update, show_progress
 
 
 @dataclass

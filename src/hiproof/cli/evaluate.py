@@ -15,7 +15,7 @@ import typer
 
 from ..errors import InputError, OutputError
 from ..log import count_things
-from .progress import show_progress
+from ..progress import show_progress
 
 SHOWN_FIGURES = {
     "psd_mean": "PSD",

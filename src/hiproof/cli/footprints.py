@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import SettingsError
-from .progress import show_progress
+from ..progress import show_progress
 
 
 def footprints(

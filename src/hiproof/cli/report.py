@@ -9,7 +9,7 @@ import typer
 
 from ..errors import OutputError
 from ..log import count_things
-from .progress import show_progress
+from ..progress import show_progress
 
 
 def report(

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from .progress import show_progress
+from ..progress import show_progress
 
 
 def repro(

@@ -9,8 +9,8 @@ import typer
 
 from ..evaluate.overview import Overview, show_command
 from ..log import Level, console_level
+from ..progress import show_progress
 from ..status import Grade
-from .progress import show_progress
 
 if TYPE_CHECKING:
     from ..city.request import Request

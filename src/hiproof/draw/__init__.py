@@ -3,5 +3,6 @@
 view          how a solid is seen: faces turned, projected, ordered from far to near
 html          a notebook's view, which turns
 plot          a building over its points, by matplotlib
+objects       buildings as objects of trimesh, pyvista and geopandas
 primitives    the figure of every roof type
 """

@@ -12,7 +12,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from ..model import Building
+from ..model import Building, Part
 from ..write.attribute_list import ANGLES
 from .view import (
     TILT_DEG,
@@ -103,7 +103,7 @@ def table_row(*cells: str) -> str:
     return "<tr>" + "".join(f'<td style="text-align:left">{cell}</td>' for cell in cells) + "</tr>"
 
 
-def parameters_text(part) -> str:
+def parameters_text(part: Part) -> str:
     """Format parameters for people: degrees for angles, else metres."""
     entries = []
     for name, value in part.parameters.items():

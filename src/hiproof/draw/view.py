@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.rings import ring_normal
-from ..model import ROOF, Building, Solid
+from ..model import ROOF, Building, Face, Solid
 from ..write.meshes.viewed import choose_look
 
 # degrees; from the front left and above, so that two walls and the roof show
@@ -89,7 +89,7 @@ def select_seen_faces(
     return [face for _, face in sorted(visited, key=lambda pair: pair[0])]
 
 
-def lightness(solid: Solid, face) -> float:
+def lightness(solid: Solid, face: Face) -> float:
     """Return how light a face is under a lamp high in the south-west."""
     normal = ring_normal(solid.vertices[list(face.rings[0])])
     normal /= max(float(np.linalg.norm(normal)), 1e-12)

@@ -15,7 +15,7 @@ from ..parametric.record import refuse_other_kinds
 from ..read.damage import SkippedBuildings, excerpt
 from ..settings import Settings
 from ..status import Attention, find_attention
-from ..write.parameters import FileHead
+from ..write.head import FileHead
 from .doubt import BuildingDoubt, measure_doubt
 from .edits import read_stamp
 

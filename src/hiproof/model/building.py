@@ -11,6 +11,7 @@ import shapely
 
 from .. import METHODS
 from ..errors import NoModelError
+from ..log import count_things
 from ..settings import ComposeSettings
 from ..status import Grade, Status
 from .roof import Part, Roof
@@ -209,6 +210,36 @@ class Building:
         fewer than three points inside the outline.
         """
         return METHODS["refit"](self, points, fixed)
+
+    def to_trimesh(self) -> Any:
+        """Return the solid as a trimesh.Trimesh in world coordinates.
+
+        Its faces are coloured by roof type.
+        Raises NoModelError without a model, InputError where trimesh (extra `trimesh`) is missing.
+        """
+        return METHODS["to_trimesh"](self)
+
+    def to_pyvista(self) -> Any:
+        """Return the solid as a pyvista.PolyData in world coordinates.
+
+        Its cells have a `kind` and a `part`.
+        Raises NoModelError without a model, InputError where pyvista (extra `pyvista`) is missing.
+        """
+        return METHODS["to_pyvista"](self)
+
+    def __repr__(self) -> str:
+        """Return the building in one line.
+
+        >>> from hiproof.status import Status
+        >>> Building("shed", Status.NO_POINTS)
+        <Building 'shed': no_points>
+        """
+        words = [self.status.code]
+        if self.built is not None:
+            words += [str(self.type), count_things(len(self.parts), "part")]
+        if self.grade is not None:
+            words.append(f"quality {self.grade.code}")
+        return f"<Building {self.id!r}: {', '.join(words)}>"
 
     def _repr_html_(self) -> str:
         """Return a small 3D view for notebooks, which needs no network."""

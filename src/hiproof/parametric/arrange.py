@@ -166,7 +166,7 @@ def compute_part_area(part: dict[str, Any]) -> float:
     return sum(make_polygon(outline).area for outline in part["outlines"])
 
 
-def cut_outlines(outlines: list, place: np.ndarray, direction: np.ndarray) -> list:
+def cut_outlines(outlines: list[Any], place: np.ndarray, direction: np.ndarray) -> list[Any]:
     """Keep what lies beyond a line through `place` (2,), along `direction` (2,)."""
     perpendicular = np.array([-direction[1], direction[0]])
     ring = place + FAR_M * np.array(
@@ -185,7 +185,7 @@ def cut_outlines(outlines: list, place: np.ndarray, direction: np.ndarray) -> li
     return rings
 
 
-def list_rings(geometry: shapely.Geometry) -> list:
+def list_rings(geometry: shapely.Geometry) -> list[Any]:
     """Return the polygons of a geometry as rings, the outer first."""
     return [
         [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]

@@ -100,7 +100,7 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def make_polygon(rings: list) -> shapely.Geometry:
+def make_polygon(rings: list[Any]) -> shapely.Geometry:
     """Return the area of a part's outline, rings of (x, y), the outer first.
 
     A spike without width has no area.

@@ -20,14 +20,15 @@ from ..read.crs import NAMED_UNITS, parse_crs
 from ..read.damage import Damaged, excerpt, readable, refuse
 from ..read.plausible import MOST_PLAN
 from ..settings import Settings
-from ..write.parameters import VERSION, FileHead
+from ..write.head import FileHead
+from ..write.parameters import VERSION
 
 HEAD_KEY = "hiproof_parameters"
 # This very object stands for a line that cannot be read.
 DAMAGED: dict[str, Any] = {"damaged": True}
 
 
-def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
+def read_parameters(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
     """Read the objects of all buildings in a parameters.jsonl, in its order.
 
     Raises InputError when it cannot be read or is no such file, naming line and column where its
@@ -39,7 +40,7 @@ def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
 
 @contextmanager
 def opened_parameters(
-    path: str | os.PathLike, damaged: Damaged = refuse
+    path: str | os.PathLike[str], damaged: Damaged = refuse
 ) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
     """Yield the head of the parameters.jsonl at `path`, and its buildings.
 
@@ -62,7 +63,7 @@ def opened_parameters(
 
 
 def objects(
-    file: Any, path: str | os.PathLike, damaged: Damaged = refuse
+    file: Any, path: str | os.PathLike[str], damaged: Damaged = refuse
 ) -> Iterator[tuple[int, Any]]:
     """Yield (line, JSON value) of every line that is not blank.
 
@@ -100,7 +101,7 @@ def quote_line(line: str, place: int) -> str:
     return line[max(place - 12, 0) : place + 12].strip()
 
 
-def read_head(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
+def read_head(first: tuple[int, Any] | None, path: str | os.PathLike[str]) -> FileHead:
     """Read the head from the first line."""
     where = os.fspath(path)
     record = first[1] if first else None
@@ -153,7 +154,7 @@ def is_place(value: Any) -> bool:
 
 
 def records(
-    lines: Iterator[tuple[int, Any]], path: str | os.PathLike, damaged: Damaged = refuse
+    lines: Iterator[tuple[int, Any]], path: str | os.PathLike[str], damaged: Damaged = refuse
 ) -> Iterator[dict[str, Any]]:
     """Yield the buildings after the head."""
     for number, record in lines:

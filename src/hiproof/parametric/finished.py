@@ -73,7 +73,7 @@ class Run:
         return describe_solids(self.path, self.head, damaged)
 
 
-def open_run(path: str | os.PathLike, crs: Any = None) -> Run:
+def open_run(path: str | os.PathLike[str], crs: Any = None) -> Run:
     """Open the models of a run's folder, or of a file.
 
     A file is parameters.jsonl, CityJSON, CityJSONSeq or CityGML.

@@ -88,7 +88,7 @@ class Override:
     most_parts: int | None = None
     parts: list[dict[str, Any]] | None = None
     origin: np.ndarray | None = None
-    outline: list | None = None
+    outline: list[Any] | None = None
     fixed: dict[str, float] = field(default_factory=dict)
     z_ground: float | None = None
     block_height: float | None = None

@@ -26,8 +26,8 @@ CLEAR = 0.02  # of what they share: a part that roofs no more of it leaves it to
 
 
 def with_recess(
-    parts: list, roof: Roof, index: int, position: tuple[float, float] | None = None
-) -> list:
+    parts: list[Any], roof: Roof, index: int, position: tuple[float, float] | None = None
+) -> list[Any]:
     """Return the parts with a recess, turned as part `index` is.
 
     It lies at `position` (x, y about the roof's origin), else in the middle of part `index`.
@@ -48,7 +48,7 @@ def with_recess(
     return [*(leaving_out(part, cover_rectangle(recess)) for part in parts), recess]
 
 
-def replace_part(parts: list, index: int, changed: dict[str, Any]) -> list:
+def replace_part(parts: list[Any], index: int, changed: dict[str, Any]) -> list[Any]:
     """Return the parts with `changed` in place of part `index`.
 
     Parts that left out its old place leave out its new one instead.

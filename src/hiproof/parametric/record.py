@@ -121,7 +121,7 @@ def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
         ) from error
 
 
-def read_roof(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
+def read_roof(parts: list[Any], outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
     """Return the roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
         raise InputError(
@@ -329,13 +329,13 @@ def require_mapping(value: Any, where: str) -> Mapping[str, Any]:
     return value
 
 
-def as_list(value: Any, where: str) -> list:
+def as_list(value: Any, where: str) -> list[Any]:
     if not isinstance(value, list):
         raise InputError(f"expected a list as {where}, got {excerpt(value)}; write [...]")
     return value
 
 
-def list_at(record: Mapping[str, Any], name: str) -> list:
+def list_at(record: Mapping[str, Any], name: str) -> list[Any]:
     return as_list(record.get(name) if record.get(name) is not None else [], name)
 
 

@@ -83,8 +83,8 @@ def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
 
 
 def refit_parts(
-    roof: Roof, parts: list, points: np.ndarray, fixed: Mapping[int, Collection[str]]
-) -> list:
+    roof: Roof, parts: list[Any], points: np.ndarray, fixed: Mapping[int, Collection[str]]
+) -> list[Any]:
     """Fit the objects `parts`, of which `roof` was made, to `points` (n, 3).
 
     Points are about the roof's origin.

@@ -52,9 +52,9 @@ class Built:
     """
 
     models: list[Path] = field(default_factory=list)
-    by_status: Counter = field(default_factory=Counter)
-    by_quality: Counter = field(default_factory=Counter)
-    by_type: Counter = field(default_factory=Counter)
+    by_status: Counter[str] = field(default_factory=Counter)
+    by_quality: Counter[str] = field(default_factory=Counter)
+    by_type: Counter[str] = field(default_factory=Counter)
     not_built: list[tuple[str, str]] = field(default_factory=list)
 
     @property
@@ -82,8 +82,8 @@ class Built:
 
 
 def build_file(
-    path: str | os.PathLike,
-    out: str | os.PathLike,
+    path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
     progress: Callable[[int], None] = lambda done: None,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> Built:
@@ -128,13 +128,15 @@ def refuse_run_folder(out: Path) -> None:
         )
 
 
-def chain_records(first: dict, remainder: Iterator[dict]) -> Iterator[dict]:
+def chain_records(
+    first: dict[str, Any], remainder: Iterator[dict[str, Any]]
+) -> Iterator[dict[str, Any]]:
     yield first
     yield from remainder
 
 
 def make_fragments(
-    maker: Maker, records: Iterator[dict], built: Built, progress: Callable[[int], None]
+    maker: Maker, records: Iterator[dict[str, Any]], built: Built, progress: Callable[[int], None]
 ) -> Iterator[Fragments]:
     """Yield the texts of every building, and count them."""
     for number, record in enumerate(records, 1):

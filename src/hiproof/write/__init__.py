@@ -31,7 +31,8 @@ from .citygml.version2 import CityGMLWriter, write_citygml
 from .cityjson.features import CityJSONWriter, write_cityjson
 from .files import atomic, atomic_file
 from .fragments import Fragments, load_fragments, save_fragments
-from .parameters import FileHead, ParametersWriter, write_parameters
+from .head import FileHead
+from .parameters import ParametersWriter, write_parameters
 from .roof_figures import RoofFigures, roof_figures
 from .run_files import fragments, join_fragments, write_all
 from .tables.geopackage import AttributesWriter, write_attributes

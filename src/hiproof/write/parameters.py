@@ -31,7 +31,7 @@ LENGTH_DIGITS = 6  # micrometres and millionths of a degree
 
 
 def write_parameters(
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     buildings: Iterable[Building],
     crs: Any = None,
     head: FileHead | None = None,
@@ -51,7 +51,7 @@ def write_parameters(
 class ParametersWriter(BuildingWriter):
     """Incremental form of `write_parameters`."""
 
-    def __init__(self, path: str | os.PathLike, head: FileHead | None = None) -> None:
+    def __init__(self, path: str | os.PathLike[str], head: FileHead | None = None) -> None:
         super().__init__(path)
         self.head = head or FileHead()
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from abc import abstractmethod
 from contextlib import AbstractContextManager, ExitStack
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Self
 
 from ..model import Building
 from .files import atomic_file
@@ -16,7 +16,7 @@ from .fragments import Fragment
 from .roof_figures import RoofFigures
 
 
-class BuildingWriter(AbstractContextManager):
+class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
     """Base of the incremental writers.
 
     Use it as `with Writer(path, ...) as writer: writer.add(building)`.
@@ -27,7 +27,7 @@ class BuildingWriter(AbstractContextManager):
 
     file: BinaryIO
 
-    def __init__(self, path: str | os.PathLike) -> None:
+    def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path
 
     def begin(self, stack: ExitStack) -> None:
@@ -61,7 +61,7 @@ class BuildingWriter(AbstractContextManager):
     def open(self, stack: ExitStack) -> None:
         self.file = stack.enter_context(atomic_file(self.path))
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         with ExitStack() as stack:
             self.open(stack)
             self.begin(stack)
@@ -69,5 +69,5 @@ class BuildingWriter(AbstractContextManager):
             self.stack = stack.pop_all()
         return self
 
-    def __exit__(self, kind, error, trace) -> bool | None:
-        return self.stack.__exit__(kind, error, trace)
+    def __exit__(self, *failure: Any) -> bool | None:
+        return self.stack.__exit__(*failure)

@@ -50,7 +50,7 @@ NAMESPACES = {
 
 
 def write_citygml(
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     buildings: Iterable[Building],
     crs: Any = None,
     prefix: str = PREFIX,
@@ -76,7 +76,7 @@ class CityGMLWriter(BuildingWriter):
 
     namespaces, root_id = NAMESPACES, ""
 
-    def __init__(self, path: str | os.PathLike, head: FileHead) -> None:
+    def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
         super().__init__(path)
         self.head = head
         self.srs_name = srs_name(self.head.crs_of_files)

@@ -37,7 +37,7 @@ GRID = 1000.0
 
 
 def write_cityjson(
-    path: str | os.PathLike,
+    path: str | os.PathLike[str],
     buildings: Iterable[Building],
     crs: Any = None,
     prefix: str = PREFIX,
@@ -62,7 +62,7 @@ def write_cityjson(
 class CityJSONWriter(BuildingWriter):
     """Incremental form of `write_cityjson`."""
 
-    def __init__(self, path: str | os.PathLike, head: FileHead, scale: float = SCALE) -> None:
+    def __init__(self, path: str | os.PathLike[str], head: FileHead, scale: float = SCALE) -> None:
         super().__init__(path)
         self.head = head
         self.units, self.reference_system = (

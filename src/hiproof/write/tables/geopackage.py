@@ -32,7 +32,11 @@ from .waiting import WaitingRows, column_names
 
 BUILDINGS = "buildings"
 OUTLINE_GEOMETRY, POLYGON_Z = GeometryType("MULTIPOLYGON"), GeometryType("POLYGON", has_z=True)
-LAYERS = {BUILDINGS: OUTLINE_GEOMETRY, "parts": OUTLINE_GEOMETRY, "roof_surfaces": POLYGON_Z}
+TABLE_GEOMETRIES = {
+    BUILDINGS: OUTLINE_GEOMETRY,
+    "parts": OUTLINE_GEOMETRY,
+    "roof_surfaces": POLYGON_Z,
+}
 """Tables and the geometry of their rows."""
 
 # of a table in SQLite as it comes, less the number and the geometry of a row
@@ -40,7 +44,10 @@ MOST_COLUMNS = 1998
 
 
 def write_attributes(
-    path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, prefix: str = PREFIX
+    path: str | os.PathLike[str],
+    buildings: Iterable[Building],
+    crs: Any = None,
+    prefix: str = PREFIX,
 ) -> None:
     """Write the GeoPackage `path`.
 
@@ -67,10 +74,10 @@ def attributes_with_a_column() -> int:
 class AttributesWriter(BuildingWriter):
     """Incremental form of `write_attributes`; `layers` are those written."""
 
-    layers: tuple[str, ...] = tuple(LAYERS)
+    layers: tuple[str, ...] = tuple(TABLE_GEOMETRIES)
     reserved: tuple[str, ...] = ("fid", "geom")  # names of columns that the format has itself
 
-    def __init__(self, path: str | os.PathLike, head: FileHead) -> None:
+    def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
         super().__init__(path)
         self.head, self.plan_wkt = head, plan_wkt(head.crs_of_files)
 
@@ -116,7 +123,7 @@ def write_layer(file: GeoPackage, waiting: WaitingRows, kinds: dict[str, type]) 
     """Write the rows of a table, by columns of `kinds`."""
     names = column_names(kinds, AttributesWriter.reserved)
     columns = dict(zip(names, kinds.values(), strict=True))
-    file.create_table(waiting.layer, columns, LAYERS[waiting.layer])
+    file.create_table(waiting.layer, columns, TABLE_GEOMETRIES[waiting.layer])
     first = 1
     for rows in waiting.batches():
         values = [

@@ -14,7 +14,7 @@ from ..attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, ROOFER, SURFACES_LA
 from .rows import Row
 
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
-ROWS_AT_ONCE = 1000  # rows handed on at once: the overhead is a call's, the memory a row's
+BATCH_ROWS = 1000  # rows handed on at once: the overhead is a call's, the memory a row's
 
 
 class WaitingRows:
@@ -69,8 +69,8 @@ class WaitingRows:
             for line in self.file
             for wkb, values in json.loads(line)
         )
-        yield list(islice(rows, ROWS_AT_ONCE))
-        while batch := list(islice(rows, ROWS_AT_ONCE)):
+        yield list(islice(rows, BATCH_ROWS))
+        while batch := list(islice(rows, BATCH_ROWS)):
             yield batch
 
 

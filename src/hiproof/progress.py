@@ -1,4 +1,7 @@
-"""What a command shows while it works: bars on a terminal, lines elsewhere."""
+"""What is shown of work that goes on.
+
+These are bars on a terminal and in notebooks, and lines elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
-from ..compiled import news
-from ..log import Level, console_level, count_things
+from .compiled import news
+from .log import Level, console_level, count_things
 
 Update = Callable[..., None]
 """Called with a stage, how much of it is done, and how much there is; None where nobody knows."""
@@ -55,6 +59,28 @@ def show_progress(stage: str) -> Iterator[Update]:
         return
     with StageBars(stage) if sys.stderr.isatty() else StageLines(stage) as shown:
         yield shown.update
+
+
+@contextmanager
+def show_in_notebook(stage: str) -> Iterator[Update]:
+    """Yield the function that news goes to.
+
+    Bars are drawn in a notebook that can do so, and nothing elsewhere.
+    """
+    if not is_notebook():
+        yield lambda *_: None
+        return
+    with StageBars(stage) as shown:
+        yield shown.update
+
+
+def is_notebook() -> bool:
+    """Tell whether this is a notebook with ipywidgets, which rich draws its bars with."""
+    if "IPython" not in sys.modules or find_spec("ipywidgets") is None:
+        return False
+    from rich.console import Console
+
+    return Console().is_jupyter
 
 
 class StageLines:
