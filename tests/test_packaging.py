@@ -3,16 +3,20 @@ environment, models the demo.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tarfile
+import tomllib
 import venv
 import zipfile
 from pathlib import Path
 
 import pytest
+
+import hiproof
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/hiproof"
@@ -123,3 +127,20 @@ def test_a_citation_names_the_version_that_is_there():
     assert f"version: {hiproof.__version__}\n" in (ROOT / "CITATION.cff").read_text(
         encoding="utf-8"
     )
+
+
+def test_the_conda_recipe_asks_for_what_the_project_depends_on():
+    yaml = pytest.importorskip("yaml", reason="no PyYAML here, which MkDocs brings")
+    recipe = yaml.safe_load((ROOT / "conda/recipe.yaml").read_text(encoding="utf-8"))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    run = {line.split()[0]: line for line in recipe["requirements"]["run"]}
+    bounds = dict(
+        re.fullmatch(r"([\w-]+)(?:\[.*\])?(>=.+)", d).groups() for d in project["dependencies"]
+    )
+    assert run.pop("python") == f"python {project['requires-python']}"
+    assert run.pop("lazrs-python")  # which laspy's extra brings from PyPI
+    assert run == {name: f"{name} {bound}" for name, bound in bounds.items()}
+    assert recipe["context"]["version"] == hiproof.__version__
+    assert recipe["about"]["license"] == project["license"]["text"]
+    scripts = [f"{name} = {target}" for name, target in project["scripts"].items()]
+    assert recipe["build"]["python"]["entry_points"] == scripts

@@ -12,6 +12,7 @@ import pytest
 import typer
 
 from hiproof.cli.app import app
+from hiproof.formats import FORMATS, choose_format
 from hiproof.simulate import demo_files
 
 PLUGINS = Path(__file__).parents[1] / "qgis"
@@ -74,7 +75,9 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
     assert (
         is_taken(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))["footprints"] == "f.gpkg"
     )
-    assert is_taken(commands.convert("hiproof", "out", "obj"))["format"] == "obj"
+    for name, file in commands.FORMATS.items():
+        assert is_taken(commands.convert("hiproof", "out", name, file))["format"] == name
+        assert choose_format(file) == name and FORMATS[name].file == file
     assert is_taken(commands.status("hiproof", str(tmp_path)))["folder"] == tmp_path
 
 

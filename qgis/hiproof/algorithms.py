@@ -26,7 +26,7 @@ from qgis.core import (
 
 from . import commands, process, results
 
-FORMATS = ("glb", "obj", "3dtiles")
+FORMATS = tuple(commands.FORMATS)
 
 
 class Algorithm(QgsProcessingAlgorithm):
@@ -207,7 +207,7 @@ class Evaluate(Algorithm):
 
 
 class Convert(Algorithm):
-    """Writes a run's models in a format that 3D viewers open."""
+    """Writes a run's models in another format."""
 
     def displayName(self):
         return "Convert models"
@@ -225,7 +225,7 @@ class Convert(Algorithm):
     def processAlgorithm(self, parameters, context, feedback):
         folder = self.parameterAsString(parameters, "FOLDER", context)
         format = FORMATS[self.parameterAsEnum(parameters, "FORMAT", context)]
-        out = os.path.join(folder, f"buildings.{format}")
+        out = os.path.join(folder, commands.FORMATS[format])
         self.call(
             commands.convert(
                 self.parameterAsString(parameters, "PROGRAM", context), folder, format, out

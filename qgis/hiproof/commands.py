@@ -2,6 +2,19 @@
 
 import shlex
 
+# Names of formats of `hiproof convert`, and the files that they are written to. GeoPackage, CityGML
+# and the like, which a run writes itself, are there already.
+FORMATS = {
+    "glb": "buildings.glb",
+    "obj": "buildings.obj",
+    "stl": "buildings.stl",
+    "3dtiles": "buildings.3dtiles",
+    "ifc": "buildings.ifc",
+    "cityjson": "buildings.city.json",
+    "citygml3": "buildings.citygml3.gml",
+    "fgb": "buildings.fgb",
+}
+
 
 def reconstruct(
     program,
@@ -44,13 +57,13 @@ def evaluate(program, folder, clouds, footprints=None, layer=None):
 
 
 def convert(program, folder, format, out=None):
-    """A run's models in a format of 3D viewers."""
+    """A run's models in another format."""
     return [program, "convert", folder, *([out] if out else []), "--format", format]
 
 
 def status(program, folder):
     """How far a run is."""
-    return [program, "status", folder]
+    return [program, "status", folder, "--json"]
 
 
 def pairs(options):

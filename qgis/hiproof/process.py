@@ -1,7 +1,7 @@
 """A command that runs beside QGIS: what it says is handed on, and it ends when the user cancels."""
 
+import json
 import os
-import re
 import subprocess
 import sys
 import threading
@@ -10,7 +10,6 @@ import time
 from . import commands
 
 POLL_S, STATUS_S = 0.2, 3.0
-DONE = re.compile(r"buildings done: (\d+) of (\d+)")
 
 
 class Failed(Exception):
@@ -87,5 +86,8 @@ def measure_progress(program, folder):
     process = subprocess.run(
         commands.status(program, folder), capture_output=True, text=True, **make_environment()
     )
-    match = DONE.search(process.stdout)
-    return 100.0 * int(match[1]) / int(match[2]) if match and int(match[2]) else None
+    try:
+        buildings = json.loads(process.stdout)["buildings"]
+    except (ValueError, KeyError):
+        return None
+    return 100.0 * buildings["done"] / buildings["total"] if buildings["total"] else None
