@@ -1,5 +1,6 @@
-"""Run every benchmark one after the other: `python -m benchmarks [--quick]`; --quick goes to those
-that know it.
+"""Run every benchmark: `python -m benchmarks [--quick]`.
+
+They run one after the other; --quick goes to those that know it.
 """
 
 import subprocess

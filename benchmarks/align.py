@@ -1,4 +1,6 @@
-"""Footprints that lie beside their roofs: is the shift found, and does one that lies right stay?
+"""Footprints that lie beside their roofs: is the shift found?
+
+And does a footprint that lies right stay?
 
 usage: python -m benchmarks.align [--each 14] [--density 5] [--first-seed 0]
 
@@ -26,8 +28,10 @@ WITHIN_M = 0.1
 
 
 def find_shifts(density: float, seeds: range) -> dict[float, list[tuple[float, bool]]]:
-    """By distance (m): how far the shift found is from the true one (m), and whether it is clear
-    enough to move the footprint.
+    """Return by distance (m) how well shifts are found.
+
+    That is how far the shift found is from the true one (m), and whether it is clear enough to move
+    the footprint.
     """
     outcomes: dict[float, list[tuple[float, bool]]] = {distance: [] for distance in DISTANCES_M}
     for kind in KINDS:

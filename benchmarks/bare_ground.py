@@ -1,5 +1,6 @@
-"""Is bare ground inside footprints found, and are footprints without a building, and are sound
-buildings left alone?
+"""Is bare ground inside footprints found, and are sound buildings left alone?
+
+Footprints without a building have to be found too.
 
 usage: python -m benchmarks.bare_ground [--parity even|odd] [--count 200] [--densities 2 5 15]
 
@@ -47,7 +48,7 @@ WRONG_CLASS = 0.03  # share of roof and ground points that have another class
 
 @dataclass
 class Site:
-    """A footprint, what stands on it and around it;
+    """A footprint, what stands on it, and what stands around it.
 
     `true` is the part of the footprint that is built on.
     """
@@ -64,7 +65,10 @@ class Site:
 def make_house_body(
     rect: tuple[float, float, float, float], eave: float, rise: float, ground: Plane
 ) -> Body:
-    """A house of that plan (xmin, ymin, xmax, ymax): flat, or a gable along its longer side."""
+    """Make a house of a plan (xmin, ymin, xmax, ymax).
+
+    It is flat, or a gable along its longer side.
+    """
     x0, y0, x1, y1 = rect
     centre, size = np.array([(x0 + x1) / 2, (y0 + y1) / 2]), (x1 - x0, y1 - y0)
     kappa = 0.0 if size[0] >= size[1] else math.pi / 2
@@ -79,13 +83,16 @@ def draw_slope(rng: np.random.Generator, steepest: float = 0.06) -> Plane:
 def draw_house(
     rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0)
 ) -> tuple[np.ndarray, float, float]:
-    """Size (2,), eave and rise of a house."""
+    """Draw size (2,), eave and rise of a house."""
     size = np.array([rng.uniform(10.0, 20.0), rng.uniform(9.0, 16.0)])
     return size, rng.uniform(*eave), rng.choice([0.0, rng.uniform(1.0, 3.5)])
 
 
 def make_yard_site(rng: np.random.Generator, place: str) -> Site:
-    """A house around a yard of 10 to 60 m2: `place` is court, side or corner."""
+    """Make a house around a yard of 10 to 60 m2.
+
+    `place` is court, side or corner.
+    """
     size, eave, rise = draw_house(rng, (2.8, 7.0))
     area, ratio = rng.uniform(10.0, 60.0), rng.uniform(0.6, 1.7)
     yard = np.minimum(
@@ -135,7 +142,7 @@ def make_thinned_site(rng: np.random.Generator) -> Site:
 
 
 def make_dormer_site(rng: np.random.Generator) -> Site:
-    """Boxes on a roof."""
+    """Make a site with boxes on a roof."""
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     for _ in range(rng.integers(1, 4)):
@@ -146,8 +153,9 @@ def make_dormer_site(rng: np.random.Generator) -> Site:
 
 
 def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
-    """The site where of the roof points over `area` a `share` goes through it and meets the
-    ground.
+    """Let a `share` of the roof points over `area` meet the ground.
+
+    They go through the roof.
     """
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
@@ -165,8 +173,9 @@ def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
 
 
 def make_glass_site(rng: np.random.Generator) -> Site:
-    """A glass roof over a court: most of the light goes through, and frames and some panes
-    return.
+    """Make a glass roof over a court.
+
+    Most of the light goes through, and frames and some panes return.
     """
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
@@ -176,8 +185,9 @@ def make_glass_site(rng: np.random.Generator) -> Site:
 
 
 def make_passage_site(rng: np.random.Generator) -> Site:
-    """A way through a house, whose ground is seen from aslant for some metres at either end, under
-    the roof.
+    """Make a way through a house, under the roof.
+
+    Its ground is seen from aslant for some metres at either end.
     """
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
@@ -190,8 +200,9 @@ def make_passage_site(rng: np.random.Generator) -> Site:
 
 
 def make_canopy_site(rng: np.random.Generator) -> Site:
-    """A roof that reaches over a yard without walls: ground is seen below it along the open
-    side.
+    """Make a roof that reaches over a yard without walls.
+
+    Ground is seen below it along the open side.
     """
     site = make_plain_site(rng, (2.3, 4.0))
     x0, y0, x1, _ = site.footprint.bounds
@@ -201,7 +212,10 @@ def make_canopy_site(rng: np.random.Generator) -> Site:
 
 
 def add_ground(site: Site, area: shapely.Geometry, share: float) -> Site:
-    """The site with ground points under its roof over `area`, a `share` of the roof's density."""
+    """Add ground points under a site's roof over `area`.
+
+    They have a `share` of the roof's density.
+    """
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         is_above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
@@ -236,8 +250,9 @@ def draw_crowns(
 
 
 def make_tree_site(rng: np.random.Generator) -> Site:
-    """A house whose footprint is too large by up to 1.2 m at a side, with trees over its
-    corners.
+    """Make a house with too large a footprint, and trees over its corners.
+
+    It is too large by up to 1.2 m at a side.
     """
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
@@ -246,7 +261,7 @@ def make_tree_site(rng: np.random.Generator) -> Site:
 
 
 def shift_footprint(rng: np.random.Generator) -> Site:
-    """A footprint that lies 0.3 to 0.9 m beside its house."""
+    """Make a footprint that lies 0.3 to 0.9 m beside its house."""
     site = make_plain_site(rng)
     shift = rng.choice([-1, 1], 2) * rng.uniform(0.2, 0.65, 2)
     moved = shapely.transform(site.footprint, lambda xy: xy + shift)
@@ -254,8 +269,9 @@ def shift_footprint(rng: np.random.Generator) -> Site:
 
 
 def remove_house(rng: np.random.Generator, steep: float = 0.06) -> Site:
-    """Ground where a house stood, with heaps and bushes on up to half of it, and up to two
-    trees.
+    """Make the ground where a house stood.
+
+    There are heaps and bushes on up to half of it, and up to two trees.
     """
     site = make_plain_site(rng, steep=steep)
     x0, y0, x1, y1 = site.footprint.bounds
@@ -273,7 +289,7 @@ def remove_house(rng: np.random.Generator, steep: float = 0.06) -> Site:
 def make_shed_site(
     rng: np.random.Generator, height: tuple[float, float], share_below: float = 0.0
 ) -> Site:
-    """A shed or, with ground seen below it, a carport of 10 to 40 m2."""
+    """Make a shed of 10 to 40 m2 or, with ground seen below it, a carport."""
     size, ground = rng.uniform((3.0, 3.3), (5.5, 7.0)), draw_slope(rng)
     footprint = shapely.box(0, 0, *size)
     body = make_house_body((0, 0, *size), rng.uniform(*height), rng.choice([0.0, 0.4]), ground)
@@ -282,7 +298,7 @@ def make_shed_site(
 
 
 def make_green_roof_site(rng: np.random.Generator) -> Site:
-    """A low flat roof with plants on it: heights scatter by up to 0.3 m."""
+    """Make a low flat roof with plants, heights scattered by up to 0.3 m."""
     site = make_plain_site(rng, (2.2, 4.0))
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
@@ -298,19 +314,23 @@ def make_green_roof_site(rng: np.random.Generator) -> Site:
 
 
 def make_slope_site(rng: np.random.Generator) -> Site:
-    """A house on a slope of up to 35 %, its eaves level: uphill they are 2 m lower above the
-    ground.
+    """Make a house on a slope of up to 35 %, its eaves level.
+
+    Uphill they are 2 m lower above the ground.
     """
     return make_plain_site(rng, (3.5, 6.0), 0.35)
 
 
 def make_garage_site(rng: np.random.Generator) -> Site:
-    """The roof of a garage below ground, 0 to 1.2 m above it."""
+    """Make the roof of a garage below ground, 0 to 1.2 m above it."""
     return make_plain_site(rng, (0.0, 1.2))
 
 
 def make_block_site(rng: np.random.Generator) -> Site:
-    """A closed block of houses around a yard of a third to two thirds of its plan."""
+    """Make a closed block of houses around a yard.
+
+    The yard is a third to two thirds of its plan.
+    """
     (w, h), deep, ground, eave = (
         rng.uniform(24.0, 40.0, 2),
         rng.uniform(4.0, 9.0),
@@ -364,7 +384,7 @@ def scan_site(site: Site, density: float, rng: np.random.Generator) -> Scan:
 
 
 def judge_classified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
-    """As of a cloud whose roofs, ground and trees have classes, few of them wrong."""
+    """Judge a cloud whose roofs, ground and trees have classes, few wrong."""
     right = rng.random(len(scan)) >= WRONG_CLASS
     roof, ground = (
         scan.points[(scan.source == source) & right] for source in (SOURCE_ROOF, SOURCE_GROUND)
@@ -376,7 +396,7 @@ def judge_classified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_si
 
 
 def judge_unclassified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
-    """As of a cloud without classes, whose roofs are found by shape."""
+    """Judge a cloud without classes, whose roofs are found by shape."""
     height = scan.points[:, 2] - site.slope.height_at(scan.points[:, :2])
     is_roof = found_roof(scan.points, site.footprint, height, True)
     if not is_roof.is_seen:
@@ -385,7 +405,7 @@ def judge_unclassified(site: Site, scan: Scan, rng: np.random.Generator) -> fit_
 
 
 def judge_one_class(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
-    """As of a cloud whose only class is said to be the building class."""
+    """Judge a cloud whose only class is taken for the building class."""
     return judge_roof(site, scan.points, np.zeros((0, 3)))
 
 
@@ -417,8 +437,10 @@ WAYS = {
 
 
 def make_row(make: Callable, key: int, density: float, seeds: range) -> str:
-    """Of a kind of site by each way: share without a building, share with bare ground cut, error of
-    the area left.
+    """Return a table row for a kind of site, judged in each way.
+
+    It has the share without a building, the share with bare ground cut, and the error of the area
+    left.
     """
     outcomes: dict[str, list] = {way: [] for way in WAYS}
     for seed in seeds:

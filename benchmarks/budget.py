@@ -1,4 +1,4 @@
-"""Where the CPU time of a whole run goes: milliseconds a building by stage, on Delft.
+"""CPU time of a whole run, in milliseconds a building by stage, on Delft.
 
     python -m benchmarks.budget [--data ../shared/data/delft]
 
@@ -46,7 +46,10 @@ STAGES = {
 
 
 class Clock:
-    """Seconds by stage, each without the stages that it calls; `read` tells the time (s)."""
+    """Seconds by stage, each without the stages that it calls.
+
+    `read` tells the time (s).
+    """
 
     def __init__(self, read: Callable[[], float] = time.process_time) -> None:
         self.read = read
@@ -70,7 +73,7 @@ class Clock:
 
 
 def measure(run: Callable[[], Summary]) -> tuple[Clock, float, int]:
-    """CPU seconds of a run by stage and in total, and its number of buildings."""
+    """Return CPU seconds of a run by stage and in total, and its buildings."""
     clock = Clock()
     with ExitStack() as patched:
         for stage, place in STAGES.items():

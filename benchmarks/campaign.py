@@ -209,8 +209,9 @@ def judge_real(task: tuple[str, Callable[[], Request]]) -> Findings:
 
 
 def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield runs over every cloud of the data folder, by name; their thinned files are made when
-    called.
+    """Yield runs over every cloud of the data folder, by name.
+
+    Their thinned files are made when called.
     """
     french = Settings.from_dict({"read": {"building_classes": [6, 67]}})
     unnamed = Settings.from_dict({"read": {"crs": "EPSG:5490"}})
@@ -238,7 +239,7 @@ def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
 def request_thinned_run(
     folder: Path, share: float, footprints: str | None, settings: Settings, work: Path
 ) -> Request:
-    """The run over a share of the points of all files in `folder`."""
+    """Return the run over a share of the points of all files in `folder`."""
     clouds = [
         str(thin_file(path, share, work / "thinned")) for path in sorted(folder.glob("*.laz"))
     ]
@@ -259,8 +260,9 @@ def thin_file(path: Path, share: float, folder: Path) -> Path:
 
 
 def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield runs over real roofs without ground and over scanned towns, by name; made when
-    called.
+    """Yield runs over real roofs and over scanned towns, by name.
+
+    They have no ground, and are made when called.
     """
     if (data / "roofn3d").exists() or (data / "hand_drawn").exists():
         yield "real roofs", partial(request_roofs_run, data, work / "real-roofs")
@@ -274,12 +276,15 @@ def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
 
 
 def request_roofs_run(data: Path, folder: Path) -> Request:
-    """The run over all real roofs."""
+    """Return the run over all real roofs."""
     return lay_out(read_roofs(data), folder)
 
 
 def request_town_run(path: Path, density: float, folder: Path) -> Request:
-    """The run over all buildings of a town, scanned at `density` (points/m2)."""
+    """Return the run over all buildings of a town.
+
+    It is scanned at `density` (points/m2).
+    """
     return lay_out([building.scan_points(density) for building in read_town(path)], folder)
 
 
@@ -296,7 +301,10 @@ def read_roofs(data: Path) -> list[np.ndarray]:
 
 
 def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
-    """Write clouds (n, 3) side by side, all of the building class; return the run over them."""
+    """Write clouds (n, 3) side by side, and return the run over them.
+
+    All points are of the building class.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     extent = max(float(np.ptp(cloud[:, :2], axis=0).max()) for cloud in clouds) + 30.0
     columns = int(np.ceil(np.sqrt(len(clouds))))
@@ -348,7 +356,10 @@ def main() -> int:
 
 
 def report(name: str, all_findings: Iterator[Findings], total: Findings) -> None:
-    """Print findings as they come and the counts at the end; add the counts to `total`."""
+    """Print findings as they come and the counts at the end.
+
+    The counts are added to `total`.
+    """
     own_findings = Findings()
     for findings in all_findings:
         for text in findings.texts[:MOST_TOLD]:

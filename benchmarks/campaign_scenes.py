@@ -1,4 +1,6 @@
-"""The scenes of the campaign: simulated buildings with the faults of real data, as input files.
+"""The scenes of the campaign: simulated buildings with real faults.
+
+They are input files.
 
 A scene holds up to 100 buildings on a square grid. Its seed draws their shapes, the scanner, the
 damage to points and footprints, and the settings of the run.
@@ -110,7 +112,10 @@ def write_scene(seed: int, count: int, folder: Path) -> Request:
 
 
 def place_building(seed: int, number: int, settings: SceneSettings) -> Placed:
-    """Draw, scan and damage building `number` of the scene `seed`, whatever its `count`."""
+    """Draw, scan and damage building `number` of the scene `seed`.
+
+    The scene's `count` does not matter.
+    """
     rng = np.random.default_rng([seed, number])
     row, column = divmod(number - 1, math.isqrt(BUILDINGS_A_SCENE))
     place = ORIGIN + [
@@ -205,7 +210,10 @@ def damage_footprint(
 
 
 def classify(source: np.ndarray, has_classes: bool) -> np.ndarray:
-    """Return the ASPRS classes (n,) of points by their source, or unclassified for all."""
+    """Return the ASPRS classes (n,) of points by their source.
+
+    They are unclassified where the cloud has no classes.
+    """
     if not has_classes:
         return np.full(len(source), UNCLASSIFIED, np.uint8)
     return np.array([CLASS_OF_SOURCE[name] for name in SOURCES], np.uint8)[source]

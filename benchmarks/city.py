@@ -1,5 +1,6 @@
-"""A simulated city through the whole program: speed, workers, size, memory, kills, damaged input;
-prints one table.
+"""A simulated city through the whole program; prints one table.
+
+It covers speed, workers, size, memory, kills and damaged input.
 
 usage: python -m benchmarks.city [--work FOLDER] [--buildings 300] [--large N] [--kills N]
 [--kill-buildings 40]
@@ -50,7 +51,9 @@ RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 
 @dataclass(frozen=True)
 class Cost:
-    """One run: CPU seconds of the main process and of its workers, wall seconds, peak memory of any
+    """The cost of one run.
+
+    It is CPU seconds of the main process and of its workers, wall seconds, and peak memory of any
     process in MB.
     """
 
@@ -74,7 +77,10 @@ class Cost:
 
 
 def make_city(work: Path, buildings: int) -> tuple[list[str], str]:
-    """Clouds and footprints of a simulated city, made where they are not there yet."""
+    """Return clouds and footprints of a simulated city.
+
+    They are made where they do not exist yet.
+    """
     folder = work / f"city{buildings}"
     if not (folder / "complete").exists():
         shutil.rmtree(folder, ignore_errors=True)
@@ -92,7 +98,10 @@ def make_city(work: Path, buildings: int) -> tuple[list[str], str]:
 def measure_run(
     clouds: list[str], footprints: str, out: Path, jobs: int = 1, settings: Settings = DEFAULTS
 ) -> Cost:
-    """Cost of a run in a fresh process that has done the demo's neighbourhood before."""
+    """Measure a run in a fresh process.
+
+    It has done the demo's neighbourhood before.
+    """
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(run_warm, clouds, footprints, out, jobs, settings).result()
 
@@ -121,7 +130,7 @@ def run_warm(clouds: list[str], footprints: str, out: Path, jobs: int, settings:
 
 
 def measure_cpu() -> tuple[float, float]:
-    """CPU seconds of this process and of its ended children."""
+    """Return CPU seconds of this process and of its ended children."""
     usages = (
         resource.getrusage(process) for process in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     )
@@ -129,7 +138,10 @@ def measure_cpu() -> tuple[float, float]:
 
 
 def describe_outcomes(out: Path, n_requested: int) -> str:
-    """How many solids are valid, and how many buildings have no outcome."""
+    """Describe how many solids are valid, and how many buildings are lost.
+
+    A lost building has no outcome.
+    """
     rows = read_parameters(out / "parameters.jsonl")
     solids = [solid for _, solid in read_solids(out / "buildings.city.jsonl")]
     valid = sum(not check_solid(solid, planarity_m=0.01) for solid in solids)
@@ -143,8 +155,9 @@ def describe_outcomes(out: Path, n_requested: int) -> str:
 def run_with_kills(
     clouds: list[str], footprints: str, out: Path, whole: Path, kills: int, seed: int = 1
 ) -> str:
-    """Runs with two workers, killed at random moments and started again until they end; each is
-    compared with `whole`.
+    """Run with two workers, killed at random moments and started again.
+
+    Each run ends, and is compared with `whole`.
     """
     draw, n_kills, of_main, runs, different = random.Random(seed), 0, 0, 0, 0
     command = [
@@ -183,7 +196,10 @@ def run_with_kills(
 
 
 def list_children(pid: int) -> list[int]:
-    """Processes started by `pid` that run Python code of ours, from the process table."""
+    """List processes started by `pid` that run our Python code.
+
+    They come from the process table.
+    """
     try:
         text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8")
         return [
@@ -194,8 +210,10 @@ def list_children(pid: int) -> list[int]:
 
 
 def run_on_damage(clouds: list[str], footprints: str, work: Path, whole: Path) -> str:
-    """One tile cut off, 1 % of the polygons self-crossing, 1 % more away from all points; the rest
-    is compared.
+    """Run on damaged input, and compare the rest.
+
+    One tile is cut off, 1 % of the polygons cross themselves, and 1 % more lie away from all
+    points.
     """
     folder, out = work / "damaged", work / "out-damaged"
     shutil.rmtree(folder, ignore_errors=True)
@@ -240,7 +258,7 @@ def run_on_damage(clouds: list[str], footprints: str, work: Path, whole: Path) -
 
 
 def cross_corners(polygon: shapely.Polygon) -> shapely.Polygon:
-    """The polygon with two neighbouring corners exchanged: its border crosses itself."""
+    """Exchange two neighbouring corners, so that the border crosses itself."""
     xy = shapely.get_coordinates(polygon.exterior)[:-1]
     xy[[1, 2]] = xy[[2, 1]]
     return shapely.Polygon(xy)

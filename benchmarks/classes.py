@@ -1,5 +1,6 @@
-"""Clouds without classes: ground and buildings found by shape, against the files' own classes;
-models of such a cloud.
+"""Clouds without classes: ground and buildings found by shape.
+
+They are compared with the files' own classes, and a cloud is modelled.
 
 usage: python -m benchmarks.classes [--set delft amsterdam_west ctview stbarth] [--pictures FOLDER]
 [--quick]
@@ -45,7 +46,7 @@ WITH_FOOTPRINTS, SHARES = (
 
 
 def read_clouds(name: str) -> list[PointCloud]:
-    """The set's clouds, without its noise."""
+    """Return the set's clouds, without noise."""
     files = sorted((SHARED / "data" / name).glob("*.laz"))
     clouds = [read_points(file) for file in files] if name in APART else [read_points(*files)]
     return [select_points(cloud, cloud.classification != NOISE) for cloud in clouds]
@@ -58,7 +59,10 @@ def select_points(cloud: PointCloud, keep: np.ndarray) -> PointCloud:
 
 
 def describe_agreement(is_found: np.ndarray, truth: np.ndarray) -> str:
-    """Precision, recall and F1 of points (n,) `found` against the `truth`."""
+    """Describe precision, recall and F1 of points (n,).
+
+    `is_found` is compared with the `truth`.
+    """
     hits = (is_found & truth).sum()
     precision, recall = hits / max(is_found.sum(), 1), hits / max(truth.sum(), 1)
     return (
@@ -68,8 +72,9 @@ def describe_agreement(is_found: np.ndarray, truth: np.ndarray) -> str:
 
 
 def compare_ground(cloud: PointCloud) -> np.ndarray:
-    """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold
-    points of class 6.
+    """Return height differences (k,) of the ground found to class 2.
+
+    They are at the metre cells that hold points of class 6.
     """
     cells, is_ground = SquareCells(cloud.xyz, 1.0), cloud.classification == GROUND_CLASS
     count = cells.count(is_ground)
@@ -109,8 +114,9 @@ def report(name: str, pictures: Path | None) -> None:
 
 
 def draw(path: Path, cloud: PointCloud, is_found: np.ndarray, truth: np.ndarray) -> None:
-    """Half-metre cells: grey by height, green where found and true agree, red false alarms, blue
-    misses.
+    """Draw half-metre cells: green right, red false alarms, blue misses.
+
+    Grey shows heights.
     """
     from matplotlib import image
 
@@ -131,8 +137,9 @@ def draw(path: Path, cloud: PointCloud, is_found: np.ndarray, truth: np.ndarray)
 
 
 def model_without_classes(name: str, share: float) -> str:
-    """A town reconstructed from footprints and a `share` of its points, of class 1 alone, by
-    default options.
+    """Reconstruct a town whose points are all of class 1.
+
+    It has footprints and a `share` of its points, and default options.
     """
     data = SHARED / "data" / name
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
@@ -152,7 +159,7 @@ def model_without_classes(name: str, share: float) -> str:
 
 
 def write_unclassified(file: Path, folder: Path, share: float) -> Path:
-    """A copy in `folder` of a `share` of a LAZ file's points, all of class 1."""
+    """Copy a `share` of a LAZ file's points into `folder`, all of class 1."""
     las = laspy.read(file)
     las.points = las.points[np.random.default_rng(0).random(len(las.points)) < share]
     las.classification[:] = 1

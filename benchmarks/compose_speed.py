@@ -1,5 +1,6 @@
-"""Time of composing and checking one building: `python -m benchmarks.compose_speed` (after one
-warm-up, process time).
+"""Time of composing and checking one building.
+
+`python -m benchmarks.compose_speed` measures process time after one warm-up.
 
 Prints, for each kind of generated roof and for a typical compound building (five pieces over a
 footprint of twelve vertices), the median and the largest time of `compose` (its check included) and
@@ -21,7 +22,10 @@ ROOFS_A_KIND = 200
 
 
 def make_compound(seed: int):
-    """A house with wings, a lower extension and a dormer: five pieces over twelve vertices."""
+    """Make a house with wings, a lower extension and a dormer.
+
+    It has five pieces over twelve vertices.
+    """
     rng = np.random.default_rng(seed)
     boxes = [(0, 0, 14, 8), (14, 1, 19, 7), (4, 8, 9, 13), (-3, 2, 0, 6), (6, 2, 8, 4)]
     planes = [

@@ -1,5 +1,6 @@
-"""Compound roofs with known truth: volumes and types found, the surface's error, and honest
-standard deviations.
+"""Compound roofs with known truth.
+
+It measures volumes and types found, the surface's error, and honest standard deviations.
 
 usage: python -m benchmarks.compounds [--each 20] [--densities 2 5 10] [--kinds L T ...]
 [--first-seed 0]
@@ -49,8 +50,9 @@ MEDIAN_OF_ABSOLUTE_NORMAL = 0.6745
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one compound: RMSE in m, numbers of parts, and errors over sigma by
-    parameter.
+    """The outcome of one compound.
+
+    It has RMSE in m, numbers of parts, and errors over sigma by parameter.
     """
 
     rmse: float
@@ -62,8 +64,9 @@ class Outcome:
 
 
 def measure_errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
-    """RMSE (m) over the roof's raster, and over it without the surroundings of the true roof's
-    steps.
+    """Return the RMSE (m) over the roof's raster, with and without steps.
+
+    The second leaves out the surroundings of the true roof's steps.
     """
     x0, y0, x1, y1 = truth.outline.bounds
     x, y = np.meshgrid(np.arange(x0, x1, RASTER_M), np.arange(y0, y1, RASTER_M), indexing="ij")
@@ -84,7 +87,10 @@ def measure_errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
 
 
 def draw_compound(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray]:
-    """A compound of `kind`, always the same for a seed, and its points (n, 3) in its frame."""
+    """Draw a compound of `kind`, and its points (n, 3) in its frame.
+
+    It is always the same for a seed.
+    """
     rng = np.random.default_rng([seed, COMPOUND_KINDS.index(kind)])
     building = random_compound(rng, kind)
     cloud = scan(building, rng, ScanSettings(density=density, defects=Defects.none()))
@@ -94,8 +100,9 @@ def draw_compound(kind: str, density: float, seed: int) -> tuple[SimBuilding, np
 def compare_parts(
     truth: Roof, parts: tuple[Part, ...]
 ) -> tuple[int, bool, list[tuple[str, float]]]:
-    """The true number of parts, whether `parts` are as many, each found with its type, and their
-    errors in sigmas.
+    """Return the true number of parts, whether all are right, and errors.
+
+    They are right where `parts` are as many, each with its type. Errors are in sigmas.
     """
     as_built = len(parts) == len(truth.parts)
     true_parts = list(truth.parts) if as_built else merge_alike(truth.parts)

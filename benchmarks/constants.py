@@ -1,4 +1,6 @@
-"""What a named number does: Delft's even footprints with half of it, with it, and with twice of it.
+"""The effect of a named number on Delft's even footprints.
+
+They are run with half of it, with it, and with twice of it.
 
 usage: python -m benchmarks.constants hiproof.fit.union.grow.MOST_REGROWN [--shares 1 0.25]
 [--factors 0.5 1 2]
@@ -27,7 +29,10 @@ PARITY = "even"  # of footprints' ids: on these constants are chosen, on the odd
 
 
 def find_value(text: str, name: str) -> ast.Constant:
-    """Where the number `name` stands in a module's text. Exits with a sentence where it is none."""
+    """Find where the number `name` stands in a module's text.
+
+    Exits with a sentence where it is none.
+    """
     for statement in ast.parse(text).body:
         if isinstance(statement, ast.Assign):
             target, value = statement.targets[0], statement.value
@@ -47,9 +52,11 @@ def find_value(text: str, name: str) -> ast.Constant:
 
 
 def change_value(text: str, name: str, factor: float) -> str:
-    """A module's text with the number `name` times `factor`, whole where it is whole.
+    """Multiply the number `name` in a module's text by `factor`.
 
-    >>> changed("A, MOST = 1.5, 7  # of all\\n", "MOST", 0.5)
+    It stays whole where it is whole.
+
+    >>> change_value("A, MOST = 1.5, 7  # of all\\n", "MOST", 0.5)
     'A, MOST = 1.5, 4  # of all\\n'
     """
     number = find_value(text, name)
@@ -65,8 +72,9 @@ def change_value(text: str, name: str, factor: float) -> str:
 
 
 def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
-    """What `benchmarks.delft` says of a copy of the package in which the number is `factor` times
-    as large.
+    """Return the output of `benchmarks.delft` with a changed number.
+
+    It runs on a copy of the package in which the number is `factor` times as large.
     """
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "hiproof"

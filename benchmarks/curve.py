@@ -34,8 +34,9 @@ TITLES = {"delft": "Delft", "amsterdam_west": "Amsterdam West"}
 
 @dataclass(frozen=True)
 class Stop:
-    """What comes out at one price: share within 0.2 m, parts and roof faces a building, named share
-    of the area.
+    """The result at one price.
+
+    It has the share within 0.2 m, parts and roof faces a building, and the named share of the area.
     """
 
     price: float
@@ -46,7 +47,7 @@ class Stop:
 
 
 def set_price(price: float) -> Settings:
-    """The default settings with structure at `price` times its cost."""
+    """Return default settings with structure at `price` times its cost."""
     compound = Settings().compound
     return Settings.from_dict(
         {"compound": {name: price * getattr(compound, name) for name in PRICE}}
@@ -66,8 +67,9 @@ def stop_at(price: float, data_set: Asked) -> Stop:
 
 
 def draw(curves: dict[str, list[Stop]], path: Path) -> None:
-    """A panel a set: share against parts, each point with its price; the default is the
-    filled one.
+    """Draw a panel a set: share against parts, each point with its price.
+
+    The default is the filled one.
     """
     figure, panels = plt.subplots(1, len(curves), figsize=(5.5 * len(curves), 4.2), squeeze=False)
     for axes, (name, stops) in zip(panels[0], curves.items(), strict=True):

@@ -1,5 +1,6 @@
-"""Are roofs that were cut out of a cloud told from scenes with their ground, where no class says
-so?
+"""Are roofs that were cut out of a cloud told from scenes with ground?
+
+No class says so.
 
 usage: python -m benchmarks.cut_out [--every K]
 
@@ -38,7 +39,7 @@ AROUND = {  # an area around a footprint
 
 
 def cut_clouds(building: TrueBuilding, density: float) -> dict[str, np.ndarray]:
-    """Points (n, 3) of one building by what was cut out."""
+    """Return points (n, 3) of one building by what was cut out."""
     rng = np.random.default_rng(zlib.crc32(building.id.encode()))
     settings = ScanSettings(density=density, defects=Defects.none(), margin_m=GROUND_M)
     cloud = scan_solids(list(building.solids.values()), rng, settings)
@@ -51,7 +52,10 @@ def cut_clouds(building: TrueBuilding, density: float) -> dict[str, np.ndarray]:
 
 
 def count_cut_out(clouds: list[np.ndarray]) -> str:
-    """How many of the clouds that may be one building are taken for roofs cut out."""
+    """Count the clouds that are taken for roofs cut out.
+
+    Only those count that may be one building.
+    """
     results = [
         is_cut_out(xyz) is not False
         for xyz in clouds

@@ -1,5 +1,6 @@
-"""Compound roofs on a real town: solids for every footprint at four densities, measured against all
-points.
+"""Compound roofs on a real town, at four densities.
+
+Solids for every footprint are measured against all points.
 
 usage: python -m benchmarks.delft [--set delft|amsterdam_west|two_epochs] [--shares 1 0.5 0.25
 0.125] [--parity even|odd]
@@ -57,7 +58,7 @@ WALL_M = 3.0
 
 
 def thin_points(paths: list[Path], share: float) -> np.ndarray:
-    """Building points (n, 3) of the files after the draw that `thin_cloud.py` makes."""
+    """Return building points (n, 3) of the files after `thin_cloud.py`'s draw."""
     rng = np.random.default_rng(0)
     chunks = []
     for path in paths:
@@ -70,8 +71,9 @@ def thin_points(paths: list[Path], share: float) -> np.ndarray:
 def model(
     points: np.ndarray, footprint: Footprint, settings: Settings
 ) -> tuple[Building | None, dict[str, float]]:
-    """One building and its figures: seconds of fitting and composing, faces, metres beyond its
-    points.
+    """Model one building, and return its figures.
+
+    They are seconds of fitting and composing, faces, and metres beyond its points.
     """
     frame = LocalFrame.around(points)
     local, outline = frame.to_local(points), shapely.transform(footprint.polygon, frame.to_local)
@@ -106,7 +108,10 @@ def model(
 
 
 def select_footprints(path: Path, parity: str | None) -> list[Footprint]:
-    """Footprints of the file, all or those with an even or an odd number at the end of their id."""
+    """Return footprints of the file with an even or an odd number, or all.
+
+    The number is at the end of their id.
+    """
     footprints = list(read_footprints(path))
     if parity is None:
         return footprints
@@ -115,8 +120,9 @@ def select_footprints(path: Path, parity: str | None) -> list[Footprint]:
 
 @dataclass(frozen=True)
 class Asked:
-    """The `footprints` of a set, the files of its cloud, and the points (n, 3) of those footprints
-    that have any.
+    """A set: its footprints, the files of its cloud, and its points.
+
+    Points (n, 3) are those of the `footprints` that have any.
     """
 
     footprints: list[Footprint]
@@ -127,7 +133,10 @@ class Asked:
 def read_set(
     name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None
 ) -> Asked:
-    """The set `name`, its cloud thinned to `share`; `data` is its folder where that is another."""
+    """Read the set `name`, its cloud thinned to `share`.
+
+    `data` is its folder where that is another.
+    """
     data = data or SHARED / "data" / name
     footprints = select_footprints(data / (SETS | EPOCHS)[name], parity)
     clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
@@ -143,8 +152,10 @@ def read_set(
 def model_buildings(
     data_set: Asked, settings: Settings
 ) -> tuple[list[Building], dict[str, np.ndarray]]:
-    """All buildings that could be composed, and the figures of `model` for every building asked
-    for.
+    """Model all buildings, and return their figures.
+
+    Buildings that could not be composed are left out; figures are those of `model` for every
+    building.
     """
     model(*data_set.own_points[0], settings)  # compiles or loads what is compiled
     outcomes = [model(points, footprint, settings) for points, footprint in data_set.own_points]
@@ -155,8 +166,9 @@ def model_buildings(
 
 
 def measure(buildings: list[Building], data_set: Asked, tools: Path = SHARED / "tools") -> dict:
-    """What roof_residuals.py says of the written models within the footprints, on all points of the
-    cloud.
+    """Return roof_residuals.py's figures of the written models.
+
+    They are within the footprints, on all points of the cloud.
     """
     with tempfile.TemporaryDirectory() as folder:
         models, footprints = Path(folder) / "models.city.jsonl", Path(folder) / "asked.gpkg"

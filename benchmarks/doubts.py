@@ -1,5 +1,6 @@
-"""Is it said where points lie on two surfaces, or on a part of a building alone, and of sound
-buildings not?
+"""Are doubts raised where points lie on two surfaces, or on a part alone?
+
+Sound buildings must have none.
 
 usage: python -m benchmarks.doubts [--parity even|odd] [--share 1] [--density 5]
 
@@ -35,7 +36,10 @@ Case = tuple[str, np.ndarray, shapely.Polygon]
 
 
 def make_raise(by_m: float) -> Callable[[Case], np.ndarray]:
-    """Points (n, 3) of a case, half of them drawn by chance and put higher."""
+    """Make a change that raises half of a case's points (n, 3).
+
+    They are drawn by chance.
+    """
 
     def raise_points(case: Case) -> np.ndarray:
         id, points, _ = case
@@ -46,7 +50,7 @@ def make_raise(by_m: float) -> Callable[[Case], np.ndarray]:
 
 
 def keep_western_points(case: Case) -> np.ndarray:
-    """Points (n, 3) of a case west of the middle of its outline."""
+    """Return points (n, 3) of a case west of the middle of its outline."""
     _, points, outline = case
     return points[points[:, 0] < outline.centroid.x]
 
@@ -59,7 +63,7 @@ CHANGES: dict[str, Callable[[Case], np.ndarray]] = {
 
 
 def describe_doubts(cases: Iterable[Case], change: Callable[[Case], np.ndarray]) -> str:
-    """What is said of all cases once changed."""
+    """Describe the doubts about all changed cases."""
     surfaces, distances, unseen, count = 0, [], 0, 0
     for case in cases:
         points = change(case)

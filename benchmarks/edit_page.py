@@ -1,5 +1,6 @@
-"""The page of `hiproof edit` on Delft: how long an edit takes, and the most doubtful buildings
-mended through what the page asks.
+"""The page of `hiproof edit` on Delft: the time of an edit, and repairs.
+
+The most doubtful buildings are corrected through the page's requests.
 
 usage: python -m benchmarks.edit_page RUN [--buildings 60] [--mend 12] [--rounds 3] [--browser]
 
@@ -77,13 +78,16 @@ class Window:
         return answer.code, json.loads(answer.body)
 
     def change(self, id: str, parts: list, **asked: Any) -> dict[str, Any] | None:
-        """The model after an edit, None where it makes none."""
+        """Return the model after an edit, None where it makes none."""
         code, response = self.ask("POST", "change", {"id": id, "parts": parts, "asked": asked})
         return response if code == 200 else None
 
 
 def measure_times(window: Window, ids: list[str]) -> None:
-    """Milliseconds of an edit and of a refit, both composed, checked and measured."""
+    """Measure the milliseconds of an edit and of a refit.
+
+    Both are composed, checked and measured.
+    """
     wall, cpu = {"ridge raised": [], "refit": []}, {"ridge raised": [], "refit": []}
     for id in ids:
         model = window.ask("GET", f"building?id={id}")[1]
@@ -109,7 +113,7 @@ def measure_times(window: Window, ids: list[str]) -> None:
 
 
 def measure_in_browser(window: Window, ids: list[str]) -> None:
-    """Milliseconds from the key r to the model shown, in Chromium."""
+    """Measure the milliseconds from the key r to the model, in Chromium."""
     from playwright.sync_api import sync_playwright
 
     flags = [
@@ -141,7 +145,7 @@ def measure_in_browser(window: Window, ids: list[str]) -> None:
 
 
 def list_tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """Edits that a person might try on the largest parts."""
+    """Yield edits that a person might try on the largest parts."""
     areas = [h.get("width", 0.0) * h.get("length", 0.0) for h in model["handles"]]
     for part in sorted(range(len(areas)), key=lambda k: -areas[k])[:PARTS]:
         kinds = [kind for kind in TYPES if kind != model["parts"][part]["type"]]
@@ -156,7 +160,7 @@ def list_tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def list_drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
-    """Each edge of a part moved out and in, as a hand drags its handle."""
+    """Yield moves of each edge of a part, out and in, as by its handle."""
     h, z = model["handles"][part], model["parts"][part]["position"][2]
     for side, turn in (("length", 0.0), ("width", 0.5 * np.pi)) if h else ():
         axis = np.array([np.cos(h["turn"] + turn), np.sin(h["turn"] + turn)])
@@ -171,7 +175,7 @@ def list_drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
 
 
 def try_models(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The models that the tries make, refitted where that can be."""
+    """Yield the models of all tries, refitted where that can be."""
     for action, heights in (("dormer", ABOVE_M), ("recess", BELOW_M)):
         for crowd in find_crowds(window, id, model, heights):
             yield from draw_parts(window, id, model, crowd, action)
@@ -180,8 +184,9 @@ def try_models(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[
 
 
 def refit(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dict[str, Any]]:
-    """The model with its heights fitted to the points, itself where they cannot be; nothing of
-    none.
+    """Yield the model fitted to the points again.
+
+    It is itself where it cannot be fitted; there is nothing of None.
     """
     if model is not None:
         yield window.change(id, model["parts"], action="refit") or model
@@ -190,8 +195,9 @@ def refit(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dic
 def find_crowds(
     window: Window, id: str, model: dict[str, Any], heights: tuple[float, float]
 ) -> list[np.ndarray]:
-    """The largest crowds of points (n, 3) whose heights over the roof lie within two: what a person
-    sees stand out of it.
+    """Return the largest crowds of points (n, 3) between two heights.
+
+    Heights are over the roof: a person sees such crowds stand out of it.
     """
     cloud = window.ask("GET", f"points?id={id}")[1]
     places = np.frombuffer(base64.b64decode(cloud["places"]), "<f4").reshape(-1, 3).astype(float)
@@ -214,8 +220,9 @@ def find_crowds(
 def draw_parts(
     window: Window, id: str, model: dict[str, Any], crowd: np.ndarray, action: str
 ) -> Iterator[dict[str, Any]]:
-    """The models with a dormer, a block or a recess drawn around a crowd, refitted, its edges
-    dragged while that helps.
+    """Yield models with a dormer, a block or a recess around a crowd.
+
+    They are refitted, and edges are dragged while that helps.
     """
     middle = crowd.mean(axis=0)
     for part in list_owners(model, middle)[:PARTS]:
@@ -239,7 +246,10 @@ def draw_parts(
 
 
 def fit_box(crowd: np.ndarray, turn: float, z: float) -> dict[str, Any]:
-    """Width, length and position of the rectangle around a crowd, its length turned so."""
+    """Return width, length and position of the rectangle around a crowd.
+
+    Its length is turned so.
+    """
     axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     uv = crowd[:, :2] @ axes.T
     length, width = np.maximum(np.ptp(uv, axis=0), LEAST_M).tolist()
@@ -250,7 +260,7 @@ def fit_box(crowd: np.ndarray, turn: float, z: float) -> dict[str, Any]:
 def drag_edges(
     window: Window, id: str, model: dict[str, Any], part: int
 ) -> Iterator[dict[str, Any]]:
-    """The model, and whatever dragging edges of a part makes better."""
+    """Yield the model, and whatever dragging edges of a part makes better."""
     yield model
     for change in list_drags(model, part):
         for candidate in refit(window, id, window.change(id, model["parts"], **change)):
@@ -260,7 +270,7 @@ def drag_edges(
 
 
 def list_owners(model: dict[str, Any], place: np.ndarray) -> list[int]:
-    """The parts in whose reach a place lies."""
+    """Return the parts in whose reach a place lies."""
     return [
         index
         for index, h in enumerate(model["handles"])
@@ -275,7 +285,10 @@ def read_share(model: dict[str, Any] | None) -> float:
 
 
 def choose_better(models: Iterator[dict[str, Any]], best: dict[str, Any]) -> dict[str, Any]:
-    """The first model whose share is higher by ENOUGH, else the best of all, `best` among them."""
+    """Return the first model whose share is higher by ENOUGH, else the best.
+
+    `best` is among them.
+    """
     best_model = best
     for model in models:
         best_model = max(best_model, model, key=read_share)
@@ -285,7 +298,10 @@ def choose_better(models: Iterator[dict[str, Any]], best: dict[str, Any]) -> dic
 
 
 def mend_building(window: Window, id: str, rounds: int) -> tuple[float, float, int, int]:
-    """Share before and after, parts before and after, of a building mended and accepted."""
+    """Correct and accept a building.
+
+    Returns its share before and after, and its parts before and after.
+    """
     start = window.ask("GET", f"building?id={id}")[1]
     first = best = window.change(id, start["parts"], action="show")
     refitted = window.change(id, start["parts"], action="refit")
@@ -306,7 +322,7 @@ def mend_building(window: Window, id: str, rounds: int) -> tuple[float, float, i
 
 
 def run_again(folder: Path) -> None:
-    """The run of the folder with the edits accepted in it."""
+    """Run the folder's run with the edits accepted in it."""
     record = run_record(folder)
     inputs, settings = record["inputs"], Settings.from_dict(record["settings"])
     request = Request(
@@ -321,7 +337,10 @@ def run_again(folder: Path) -> None:
 
 
 def mend_doubtful(window: Window, folder: Path, count: int, rounds: int) -> None:
-    """The most doubtful buildings, mended one after the other; then the run done again."""
+    """Correct the most doubtful buildings, then run again.
+
+    They are corrected one after the other.
+    """
     ids = [
         row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
     ][:count]

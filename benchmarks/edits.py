@@ -1,5 +1,6 @@
-"""Random edits of generated buildings, by their parameters and by what the page's buttons do: each
-becomes a valid solid or one sentence. And: how long an edit takes.
+"""Random edits of generated buildings, and the time of an edit.
+
+They change parameters and use the page's buttons. Each becomes a valid solid or one sentence.
 
 python -m benchmarks edits [EDITS] [BUILDINGS]
 """
@@ -31,7 +32,7 @@ PRESSED = 0.3  # of the edits
 
 
 def generate_buildings(count: int, seed: int = 0) -> list[Building]:
-    """Buildings of one primitive and compounds in turn, their solids composed."""
+    """Generate primitives and compounds in turn, with composed solids."""
     rng = np.random.default_rng(seed)
     roofs = [(random_building if k % 2 else random_compound)(rng).roof for k in range(count)]
     return [
@@ -41,7 +42,10 @@ def generate_buildings(count: int, seed: int = 0) -> list[Building]:
 
 
 def draw_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
-    """What one of the page's buttons asks for, at any part and any place about the roof."""
+    """Draw the request of one of the page's buttons.
+
+    It is at any part and any place about the roof.
+    """
     part, other = (int(k) for k in rng.integers(len(building.parts), size=2))
     x0, y0, x1, y1 = building.roof.outline.bounds
     place = [rng.uniform(x0 - 1.0, x1 + 1.0), rng.uniform(y0 - 1.0, y1 + 1.0), 0.0]
@@ -59,7 +63,7 @@ def draw_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
 
 
 def draw_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[], Building]]:
-    """A random edit's kind, and what does it."""
+    """Draw a random edit's kind, and what does it."""
     if rng.random() < PRESSED:
         request = draw_press(rng, house)
         return request["action"], lambda: apply_edit(
@@ -73,8 +77,9 @@ def draw_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[
 
 
 def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, Counter]:
-    """Each building is edited again and again, an edit standing on those before it that made a
-    building.
+    """Edit each building again and again.
+
+    An edit stands on those before it that made a building.
     """
     rng, houses = np.random.default_rng(seed), generate_buildings(buildings)
     outcomes = {kind: Counter() for kind in (*EDIT_KINDS, *PRESSES)}

@@ -1,5 +1,6 @@
-"""CPU time of fitting one roof, all types tried, after warm-up, and the ratio to the paper's
-objective on the same roofs.
+"""CPU time of fitting one roof, all types tried, after warm-up.
+
+The paper's objective is measured on the same roofs.
 
 python -m benchmarks.fit_speed [--quick]
 """
@@ -24,7 +25,10 @@ POINTS = 310
 
 
 def main() -> None:
-    """Print the median and mean CPU milliseconds a roof for both objectives, and their ratio."""
+    """Print median and mean CPU milliseconds a roof, and their ratio.
+
+    Both objectives are measured.
+    """
     parser = argparse.ArgumentParser(
         description="CPU time of fit_roof on simulated roofs of about 300 points"
     )
@@ -62,7 +66,7 @@ def main() -> None:
 
 
 def measure_cpu_ms(cloud: np.ndarray, objective: str) -> float:
-    """CPU time (ms) of one fit."""
+    """Measure the CPU time (ms) of one fit."""
     settings = Settings.from_dict({"fit": {"objective": objective}})
     start = time.process_time()
     fit_roof(cloud, settings=settings)

@@ -1,4 +1,6 @@
-"""Compare roofs with those that people drew by hand over the same points: edges and corners.
+"""Compare roofs with those that people drew by hand: edges and corners.
+
+Both are drawn over the same points.
 
 usage: python -m benchmarks.hand_drawn [--mode points|footprints|both] [--parity even|odd]
            [--worst N]
@@ -31,7 +33,9 @@ SHORT_M = 1.0
 def score_roofs(
     judge: ModuleType, with_footprint: bool, parity: str | None
 ) -> tuple[list[Score], list[int]]:
-    """Return the score of every roof, and the numbers of short edges and of right ones among them.
+    """Return the score of every roof, and short edges.
+
+    These are the numbers of short edges and of right ones among them.
 
     `parity` takes roofs with an even or an odd number. A short edge has less than a metre.
     """
@@ -58,8 +62,9 @@ def compare_building(
     true_corners: np.ndarray,
     true_edges: np.ndarray,
 ) -> tuple[WireframeCounts, tuple[int, int]]:
-    """Return a building's counts against the drawn roof, and the numbers of short edges and right
-    ones.
+    """Return a building's counts against the drawn roof, and short edges.
+
+    These are the numbers of short edges and right ones.
     """
     corners, edges = judge.model_wireframe(building)
     tolerance = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()

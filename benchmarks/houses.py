@@ -1,5 +1,6 @@
-"""Houses that touch, told apart without footprints: how many of the walls between them are found,
-and how many that are none.
+"""Houses that touch, separated without footprints.
+
+It counts how many of the walls between them are found, and how many that are none.
 
 usage: python -m benchmarks.houses [--each 20] [--density 5] [--first-seed 0] [--real delft
 amsterdam_west stbarth]
@@ -43,13 +44,13 @@ LEAST_M2, LEAST_SHARED_M, APART, CUT = 30.0, 2.0, 0.8, 0.1
 
 
 def scan_house(house: SimBuilding, rng: np.random.Generator, density: float) -> np.ndarray:
-    """Points (n, 3) of a building in its own frame, those of the ground left out."""
+    """Return points (n, 3) of a building in its own frame, without ground."""
     cloud = scan(house, rng, ScanSettings(density=density, defects=Defects.none()))
     return house.roof.frame.to_local(cloud.points[cloud.source != 2])
 
 
 def find_areas(points: np.ndarray) -> list[shapely.Geometry]:
-    """The areas of the houses told apart among points (n, 3)."""
+    """Return the areas of the houses separated among points (n, 3)."""
     box = shapely.box(*points[:, :2].min(axis=0) - 0.5, *points[:, :2].max(axis=0) + 0.5)
     surroundings = shapely.MultiPoint(points[:, :2]).buffer(GAP_M).buffer(0.5 - GAP_M)
     return separate_houses(points, shapely.intersection(surroundings, box), GAP_M)
@@ -58,7 +59,10 @@ def find_areas(points: np.ndarray) -> list[shapely.Geometry]:
 def differs_from_neighbour(
     first: shapely.Polygon, other: shapely.Polygon, row: SimBuilding
 ) -> bool:
-    """Whether the roofs of neighbours in a `row` differ along most of the wall between them."""
+    """Return whether the roofs of two neighbours in a `row` differ.
+
+    They do so along most of the wall between them.
+    """
     parts = [
         next(p for p in row.roof.parts if p.pieces[0].outline.equals(o)) for o in (first, other)
     ]
@@ -77,7 +81,10 @@ def is_apart(
     areas: list[shapely.Geometry],
     points: np.ndarray,
 ) -> bool:
-    """Whether most points beside the border of two outlines lie in areas of their own side."""
+    """Return whether most points lie in areas of their own side.
+
+    They are points beside the border of two outlines.
+    """
     border = shapely.intersection(shapely.buffer(first, 0.3), shapely.buffer(other, 0.3))
     xy = points[shapely.dwithin(border, shapely.points(points[:, :2]), NEAR_M), :2]
     sides = [xy[shapely.contains_xy(outline, *xy.T)] for outline in (first, other)]

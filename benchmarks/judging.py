@@ -1,5 +1,6 @@
-"""What several benchmarks share: one door to the fit of a building, the judges in ../shared/tools,
-figures of parts.
+"""What several benchmarks share.
+
+It is one call of a building's fit, the judges in ../shared/tools, and figures of parts.
 """
 
 from __future__ import annotations
@@ -28,7 +29,10 @@ NARROW_M, STANDING_M = 1.0, 2.0
 def fit_roof_parts(
     points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None
 ) -> BuildingFit:
-    """The roof of one building: the only place where benchmarks name the search they measure."""
+    """Fit the roof of one building.
+
+    Only here do benchmarks name the search that they measure.
+    """
     return fit_building(points_local, outline, settings or Settings())
 
 
@@ -43,8 +47,9 @@ def load_tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
 
 
 def make_raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
-    """Plan points (n, 2) inside `outline` on a square grid; one point within it where the grid has
-    none.
+    """Return plan points (n, 2) inside `outline` on a square grid.
+
+    It is one point within it where the grid has none.
     """
     x0, y0, x1, y1 = outline.bounds
     axes = (np.arange(lower + 0.5 * step_m, upper, step_m) for lower, upper in ((x0, x1), (y0, y1)))
@@ -54,8 +59,9 @@ def make_raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarra
 
 
 def measure_visible_areas(roof: Roof) -> np.ndarray:
-    """Plan area (m2) where each part is the highest: what is hidden under another does not
-    count.
+    """Return the plan area (m2) where each part is the highest.
+
+    What is hidden under another does not count.
     """
     xy = make_raster(roof.outline)
     top = np.argmax([part.height_at(xy) for part in roof.parts], axis=0)
@@ -63,8 +69,9 @@ def measure_visible_areas(roof: Roof) -> np.ndarray:
 
 
 def count_narrow_parts(roof: Roof) -> tuple[int, int]:
-    """Count the parts narrower than NARROW_M, and those of them that stand STANDING_M or more above
-    all they touch.
+    """Count parts narrower than NARROW_M, and those that stand out.
+
+    They stand STANDING_M or more above all that they touch.
 
     A part's width is that of the smallest rectangle around its outlines within the roof's.
     """
@@ -97,7 +104,10 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
 
 
 def sum_area_by_type(buildings: Iterable[Building]) -> Counter[str]:
-    """Roof area in plan (m2) that each type of part has in all `buildings`, the largest first."""
+    """Sum the roof area in plan (m2) by type of part, the largest first.
+
+    It is that of all `buildings`.
+    """
     areas: Counter[str] = Counter()
     for roof in (building.roof for building in buildings if building.built is not None):
         for part, area in zip(roof.parts, measure_visible_areas(roof), strict=True):
@@ -106,6 +116,9 @@ def sum_area_by_type(buildings: Iterable[Building]) -> Counter[str]:
 
 
 def measure_named_share(buildings: Iterable[Building]) -> float:
-    """Share of the roof area in plan whose part has a type with parameters, "free" being none."""
+    """Return the share of the roof area in plan with a named type.
+
+    Named types have parameters, "free" being none.
+    """
     areas = sum_area_by_type(buildings)
     return 1.0 - areas["free"] / max(areas.total(), 1e-9)

@@ -1,5 +1,6 @@
-"""Which fitted part stands for which true one, whether its type is right, and how large its errors
-are in sigmas.
+"""Matching of fitted parts to true ones.
+
+It says whether a part's type is right, and how large its errors are in sigmas.
 
 Parts are compared by what shows of them: the part on top at points of the plan, in the truth and in
 the fit. A true part is found where a fitted one, each of them taken once, has at least half of the
@@ -25,8 +26,9 @@ ALONG = ("length", "ridge_length", "t_x", "t_y")
 
 
 def merge_alike(parts: Sequence[Part]) -> list[Part]:
-    """`parts` where neighbours that nothing tells apart, such as a row's houses under one ridge,
-    are one.
+    """Merge neighbours among `parts` that nothing distinguishes.
+
+    A row's houses under one ridge are such parts.
 
     A united part keeps the parameters its members share; its place along the row is NaN.
     """
@@ -39,7 +41,10 @@ def merge_alike(parts: Sequence[Part]) -> list[Part]:
 
 
 def merge_parts(a: Part, b: Part) -> Part | None:
-    """Two parts of the same planes side by side as one; None where they differ or lie otherwise."""
+    """Merge two parts of the same planes side by side.
+
+    Returns None where they differ or lie otherwise.
+    """
     if (
         a.type != b.type
         or len(a.pieces) > 1
@@ -68,8 +73,9 @@ def merge_parts(a: Part, b: Part) -> Part | None:
 
 
 def match_parts(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
-    """For each true part the index of the fitted one that stands for it at plan points (n, 2), -1
-    where none does.
+    """Return for each true part the index of the fitted one, -1 for none.
+
+    They are matched at plan points (n, 2).
     """
     tops = [np.argmax([part.height_at(xy) for part in parts], axis=0) for parts in (truth, fit)]
     common = np.zeros((len(truth), len(fit)))
@@ -83,7 +89,10 @@ def match_parts(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> l
 
 
 def has_hidden_end(part: Part, other_parts: Sequence[Part]) -> bool:
-    """Whether one of the two ends of `part`'s length lies under or in the roofs of `others`."""
+    """Return whether an end of `part` lies under or in other roofs.
+
+    Ends are those of its length.
+    """
     if "length" not in part.parameters or len(part.pieces) > 1 or not other_parts:
         return False
     along = np.array([math.cos(part.kappa), math.sin(part.kappa)])
@@ -98,8 +107,10 @@ def has_hidden_end(part: Part, other_parts: Sequence[Part]) -> bool:
 
 
 def list_right_types(part: Part, hidden: bool) -> set[str]:
-    """The types a true part may be called by: of a hidden end nothing can be known, and an
-    asymmetric gable of equal slopes is a gable whose eaves differ.
+    """Return the types that are right for a true part.
+
+    Of a hidden end nothing can be known, and an asymmetric gable of equal slopes is a gable whose
+    eaves differ.
     """
     types = {part.type} | (
         {ONE_END_LESS[part.type]} if hidden and part.type in ONE_END_LESS else set()
@@ -111,9 +122,11 @@ def list_right_types(part: Part, hidden: bool) -> set[str]:
 
 
 def compute_sigma_errors(truth: Part, fit: Part, hidden: bool) -> dict[str, float]:
-    """Error over standard deviation of every parameter that both parts of one type have; none where
-    they are turned against each other, none along a part whose end is hidden, none of what the
-    footprint gives (a sigma of 0).
+    """Return error over standard deviation of common parameters.
+
+    They are of every parameter that both parts of one type have; none where they are turned against
+    each other, none along a part whose end is hidden, none of what the footprint gives (a sigma of
+    0).
     """
     turn = math.remainder(fit.kappa - truth.kappa, math.pi)
     if fit.type != truth.type or abs(turn) > 0.3:

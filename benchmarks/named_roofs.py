@@ -33,8 +33,9 @@ BUILDING_CLASS = 6
 
 
 def read_demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
-    """True building, points (n, 3) and footprint of each of the demo's buildings, in world
-    metres.
+    """Return true building, points (n, 3) and footprint of the demo's houses.
+
+    All are in world metres.
     """
     files = demo_files()
     cloud = read_points(files["cloud"])
@@ -49,7 +50,7 @@ def read_demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
 
 
 def move_parts(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
-    """The parts of `roof` in the frame whose origin (world) is `origin` (3,)."""
+    """Return the parts of `roof` in the frame at `origin` (3,), world."""
     shift = roof.frame.origin - origin
     return tuple(
         dataclasses.replace(
@@ -66,7 +67,10 @@ def name_parts(parts: tuple[Part, ...]) -> str:
 
 
 def judge_types(truth: SimBuilding, model: Building) -> tuple[bool, bool]:
-    """Whether the largest part has its true type, and whether all parts are there with theirs."""
+    """Return whether the largest part, and whether all, have their types.
+
+    All parts have to be there.
+    """
     largest = max(truth.roof.parts, key=lambda part: part.area)
     main = model.type in list_right_types(largest, hidden=False)
     _, all_right, _ = compare_parts(truth.roof, move_parts(model.roof, truth.roof.frame.origin))

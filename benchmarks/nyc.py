@@ -1,5 +1,6 @@
-"""392 real New York roofs, fitted on all points and judged on those of the roof: one primitive
-each, or as compounds.
+"""392 real New York roofs, as one primitive each or as compounds.
+
+They are fitted to all points and judged on those of the roof.
 
 python -m benchmarks.nyc [--compounds] [--quick] [--data FILE]: point-surface distance (PSD, to the
 bounded roof surfaces) of the points with face > 0, beside the IoU of the plan with the points'
@@ -25,7 +26,10 @@ DATA = Path("../shared/data/roofn3d/nyc_roofs.npz")
 
 
 def fit_points(points: np.ndarray, compounds: bool) -> tuple[Fit | Solid, str, int]:
-    """The roof of `points` (n, 3), the type of its largest part, and how many parts it has."""
+    """Return the roof of `points` (n, 3), its type and number of parts.
+
+    The type is that of its largest part.
+    """
     if not compounds:
         fit = fit_roof(points)
         return fit, fit.type, 1
@@ -34,8 +38,9 @@ def fit_points(points: np.ndarray, compounds: bool) -> tuple[Fit | Solid, str, i
 
 
 def main() -> None:
-    """Print the mean, median and tail of the PSD over roofs, the types chosen, and the
-    worst ten.
+    """Print mean, median and tail of the PSD over roofs.
+
+    The types chosen and the worst ten follow.
     """
     parser = argparse.ArgumentParser(
         description="PSD of one primitive a roof on real New York roofs"

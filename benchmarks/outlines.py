@@ -1,5 +1,6 @@
-"""Outlines of buildings without footprints: how much of the true plan they cover, and whether the
-corners are as many.
+"""Outlines of buildings without footprints.
+
+It measures how much of the true plan they cover, and whether the corners are as many.
 
 usage: python -m benchmarks.outlines [--each 20] [--densities 2 5 10] [--first-seed 0] [--real delft
 amsterdam_west]
@@ -44,8 +45,9 @@ APART = ("amsterdam_west",)  # sets whose files lie apart
 
 
 def simulate_house(kind: str, density: float, seed: int) -> tuple[np.ndarray, shapely.Polygon]:
-    """Points (n, 3) of a house without the ground's, and its true outline, in its frame; always the
-    same for a seed.
+    """Simulate a house's points (n, 3), without ground, and its outline.
+
+    Both are in its frame, always the same for a seed.
     """
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     house = random_building(rng) if kind == "plain" else random_compound(rng, kind)
@@ -77,7 +79,10 @@ def report_simulation(density: float, seeds: range) -> None:
 
 
 def outline_points(points: np.ndarray) -> shapely.Polygon:
-    """The outline of points (n, 3), in their own coordinates; empty where they span no area."""
+    """Return the outline of points (n, 3), in their own coordinates.
+
+    It is empty where they span no area.
+    """
     frame = LocalFrame.around(points)
     try:
         return shapely.transform(outline_of_points(frame.to_local(points)), frame.to_world)
@@ -86,7 +91,10 @@ def outline_points(points: np.ndarray) -> shapely.Polygon:
 
 
 def report_real(name: str) -> None:
-    """IoU, over unions of touching footprints, with the outlines of the buildings found there."""
+    """Report the IoU of outlines found in a real set.
+
+    It is over unions of touching footprints, with the buildings found there.
+    """
     folder = SHARED / "data" / name
     footprints = [f.polygon for f in read_footprints(folder / SETS[name])]
     files = sorted(folder.glob("*.laz"))
@@ -109,8 +117,10 @@ def report_real(name: str) -> None:
 def measure_overlaps(
     files: list[Path], footprints: list[shapely.Polygon]
 ) -> list[tuple[float, float, float, float]]:
-    """IoU of the outlines and of the points' cells, area (m2) and share of the points outside of
-    each union of `footprints` that the files' points cover.
+    """Return IoUs, area (m2) and share outside of each union of footprints.
+
+    IoUs are of the outlines and of the points' cells; the share is that of the points outside. The
+    files' points cover each union.
     """
     cloud = read_points(*files)
     box = shapely.box(*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))

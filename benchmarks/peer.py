@@ -1,5 +1,6 @@
-"""What Delft costs a whole process, in seconds and in decodings of its two LAZ files, beside what
-roofer needs.
+"""The cost of Delft for a whole process, beside that of roofer.
+
+It is in seconds and in decodings of its two LAZ files.
 
     python -m benchmarks.peer [--runs 3] [--data ../shared/data/delft]
 
@@ -59,7 +60,10 @@ STEADY = WHOLE + "start = used(); run(); tell(start)"
 
 
 def measure_process(script: str, inputs: tuple[list[str], str, str]) -> list[float]:
-    """CPU seconds, wall seconds and peak memory (MB) that a fresh process tells of itself."""
+    """Measure CPU seconds, wall seconds and peak memory (MB) of a process.
+
+    It is fresh, and reports them itself.
+    """
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT / "src"),

@@ -1,5 +1,6 @@
-"""The parameters are the model: runs built again from their own parameters, and a city done again
-with overrides.
+"""Runs built again from their own parameters, and with overrides.
+
+The parameters are the model.
 
 usage: python -m benchmarks.rebuild [--work FOLDER] [--buildings 1000] [--flat] [--lines 1000000]
                                     [--data ../shared/data] [--only NAME ...]
@@ -46,7 +47,10 @@ FLAT = Settings.from_dict(
 def list_requests(
     work: Path, data: Path, buildings: int, settings: Settings
 ) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield what is run, by name, its input made when called; real data only where they are."""
+    """Yield what is run, by name.
+
+    Its input is made when called; real data come only where they exist.
+    """
     demo = {name: str(path) for name, path in demo_files().items()}
     yield (
         "demo",
@@ -78,7 +82,7 @@ def rebuild_run(name: str, request: Request) -> str:
 
 
 def run_with_overrides(request: Request, work: Path) -> str:
-    """The city done again with overrides of every so-many-th building."""
+    """Run the city again with overrides of every so-many-th building."""
     old_rows = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
     ids = list(old_rows)[:: max(1, len(old_rows) // OVERRIDES)][:OVERRIDES]
     path = work / "known.jsonl"
@@ -104,7 +108,7 @@ def run_with_overrides(request: Request, work: Path) -> str:
 
 
 def read_many_lines(work: Path, lines: int) -> str:
-    """A file of as many overrides, read and checked."""
+    """Read and check a file of so many overrides."""
     path = work / "many.jsonl"
     with path.open("w") as file:
         file.writelines(

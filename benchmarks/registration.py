@@ -1,4 +1,6 @@
-"""Real footprints put beside their roofs: is the shift found, and do those that lie right stay?
+"""Real footprints put beside their roofs: is the shift found?
+
+And do those that lie right stay?
 
 usage: python -m benchmarks.registration [--sets delft amsterdam_west two_epochs essen ...]
                                          [--parity even|odd]
@@ -53,7 +55,7 @@ Trial = tuple[Polygons, np.ndarray]  # outlines where the shift puts them, and t
 
 
 def read_set(name: str) -> tuple[Polygons, np.ndarray]:
-    """Footprints of a set that lie within its cloud, and the cloud's roof points (n, 3)."""
+    """Return a set's footprints within its cloud, and its roof points (n, 3)."""
     if name in TOWNS:
         return scan_town(name)
     footprints, folder = SETS[name]
@@ -65,7 +67,10 @@ def read_set(name: str) -> tuple[Polygons, np.ndarray]:
 
 
 def scan_town(name: str) -> tuple[Polygons, np.ndarray]:
-    """Surveyed footprints of a simulated town and its points (n, 3), walls included."""
+    """Return surveyed footprints and points of a simulated town.
+
+    Walls are included.
+    """
     town, rng = read_town(TOWNS[name]), np.random.default_rng(7)
     polygons = [
         shift_polygons([building.footprint], rng.normal(0.0, SURVEY_M, 2))[0] for building in town
@@ -74,7 +79,7 @@ def scan_town(name: str) -> tuple[Polygons, np.ndarray]:
 
 
 def draw_vector(distance: float, number: int) -> np.ndarray:
-    """A shift (2,) of a length, its direction drawn by chance for each number."""
+    """Draw a shift (2,) of a length, its direction by number."""
     azimuth = np.random.default_rng([number, 7]).uniform(-math.pi, math.pi)
     return distance * np.array([math.cos(azimuth), math.sin(azimuth)])
 
@@ -84,7 +89,7 @@ def shift_polygons(polygons: Polygons, vector: np.ndarray) -> Polygons:
 
 
 def find_row_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarray:
-    """What a run moves a row by (2,): nothing where the evidence is not clear."""
+    """Return a run's shift (2,) of a row, zero without clear evidence."""
     outline = row_outline(row)
     origin = np.floor(outline.bounds[:2])
     nearby = distinct(points[grid.find_within(outline, AROUND_M)])
@@ -95,7 +100,10 @@ def find_row_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.nda
 def iterate_trials(
     kind: str, polygons: Polygons, distance: float, parity: str | None
 ) -> Iterator[Trial]:
-    """Rows as a run sees them, and the vector that the one asked of was shifted by."""
+    """Yield rows as a run sees them, and the vector of the shift.
+
+    It is that of the house in question.
+    """
     outlines = Outlines(polygons)
     rows = [numbers.tolist() for numbers in outlines.members]
     for number, members in enumerate(rows):
@@ -115,7 +123,7 @@ def iterate_trials(
 
 
 def make_row(kind: str, outcomes: list[tuple[np.ndarray, np.ndarray]], distance: float) -> str:
-    """The figures of some trials: what was found (2,) and the vector (2,)."""
+    """Return the figures of some trials: shifts found (2,) and vectors (2,)."""
     distances = np.array([np.hypot(*(result + shifted)) for result, shifted in outcomes])
     moved = np.array([bool(result.any()) for result, _ in outcomes])
     right, wrong = moved & (distances < FOUND_M), moved & (distances > WRONG_M)

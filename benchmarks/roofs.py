@@ -1,5 +1,6 @@
-"""Random roofs and their points for the benchmarks: uniform in plan, with the noise of the paper's
-simulation.
+"""Random roofs and their points for the benchmarks.
+
+Points are uniform in plan, with the noise of the paper's simulation.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ DENSITY = 4.72  # points a square metre, the paper's
 
 @dataclass(frozen=True)
 class TrueRoof:
-    """A roof whose parameters are known: `theta_p` by name, turned by `kappa`, at `translation` T_L
-    (3,).
+    """A roof whose parameters are known.
+
+    It has `theta_p` by name, is turned by `kappa`, and lies at `translation` T_L (3,).
     """
 
     primitive: Primitive
@@ -33,8 +35,9 @@ class TrueRoof:
 
 
 def draw_roof(name: str, rng: np.random.Generator) -> TrueRoof:
-    """An ordinary house of type `name`: 6 to 12 m wide, up to 2.2 times as long, slopes of 20 to 50
-    degrees.
+    """Draw an ordinary house of type `name`.
+
+    It is 6 to 12 m wide, up to 2.2 times as long, with slopes of 20 to 50 degrees.
     """
     width = rng.uniform(6, 12)
     length = width * (rng.uniform(1.05, 1.3) if name == "pyramid" else rng.uniform(1.3, 2.2))
@@ -49,7 +52,7 @@ def draw_roof(name: str, rng: np.random.Generator) -> TrueRoof:
 def draw_shape(
     name: str, width: float, length: float, height: float, rng: np.random.Generator
 ) -> dict[str, float]:
-    """The lengths that make a type what it is, drawn where they can be seen."""
+    """Draw the lengths that make a type what it is, where they can be seen."""
     ends = 1 if name.startswith(("side", "corner")) else 2  # sloping ends, and sides
     sides = 1 if name in ("half_mansard", "corner", "corner_mansard") else 2
     if name in ("hip", "side_hip"):
@@ -90,8 +93,9 @@ def draw_shape(
 
 
 def draw_asymmetry(width: float, height: float, rng: np.random.Generator) -> dict[str, float]:
-    """A ridge off the middle and a step between the eaves with which one slope is at least a
-    seventh steeper.
+    """Draw a ridge off the middle and a step between the eaves.
+
+    One slope is at least a seventh steeper.
     """
     while True:
         offset, step = width * rng.uniform(0.08, 0.25), height * rng.uniform(0.1, 0.5)
@@ -101,7 +105,7 @@ def draw_asymmetry(width: float, height: float, rng: np.random.Generator) -> dic
 
 
 def draw_catslide(rng: np.random.Generator) -> TrueRoof:
-    """A gable whose ridge lies off the middle."""
+    """Draw a gable whose ridge lies off the middle."""
     gable = draw_roof("gable", rng)
     theta_p = gable.theta_p | {"ridge_offset": gable.theta_p["width"] * rng.uniform(0.08, 0.25)}
     return TrueRoof(gable.primitive.variant(theta_p), theta_p, gable.kappa, gable.translation)
@@ -114,8 +118,9 @@ def scan(
     outlier_share: float = 0.0,
     noise_rmse_m: float = NOISE_RMSE_M,
 ) -> np.ndarray:
-    """Points (n, 3): `density` a square metre, uniform over the plan; outliers uniform in a box
-    around the roof.
+    """Draw points (n, 3), `density` a square metre, uniform over the plan.
+
+    Outliers are uniform in a box around the roof.
     """
     theta = roof.theta
     half = np.array([theta[HALF_LENGTH], theta[HALF_WIDTH]])
@@ -132,8 +137,9 @@ def scan(
 
 
 def draw_paper_noise(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Errors in RMSE as the paper draws them: 90 % within 1, 9 % between 1 and 2, 1 % between 2 and
-    3, either sign.
+    """Draw errors in RMSE as the paper does.
+
+    90 % lie within 1, 9 % between 1 and 2, 1 % between 2 and 3, with either sign.
     """
     band = rng.choice(3, count, p=[0.9, 0.09, 0.01])
     return (band + rng.random(count)) * rng.choice([-1.0, 1.0], count)

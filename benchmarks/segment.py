@@ -1,5 +1,6 @@
-"""The network, the fit and both together, on simulated, scanned and real roofs. python -m
-benchmarks.segment [--quick]
+"""The network, the fit and both together.
+
+Roofs are simulated, scanned and real. Run it by `python -m benchmarks.segment [--quick]`.
 
 Writes `benchmarks/segment.md` and the confusion matrices in `benchmarks/figures/`. `--calibrate`
 prints instead how the exponents of `hiproof.segment.combine` change the accuracy. Real data are
@@ -59,7 +60,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Opinion:
-    """What network and fit say of one building;
+    """The answers of network and fit on one building.
 
     `bics` are of the fit to the points the network calls roof.
     """
@@ -79,8 +80,9 @@ class Opinion:
 
 
 def collect_opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
-    """Network alone, fit alone on all points, and the evidence of the fit to the network's roof
-    points.
+    """Collect the answers of the network alone, the fit alone, and both.
+
+    The fit alone takes all points; the evidence is that of the fit to the network's roof points.
     """
     recognition = segment(points, Settings().replace({"fit": {"types": types}}))
     from_all, informed = fit_or_none(points, types), fit_or_none(points, types, recognition.weights)
@@ -98,8 +100,9 @@ def fit_or_none(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray 
 
 
 def judge_three_types(count: int) -> tuple[str, Scores, Scores]:
-    """The paper's configuration: pyramid, gable, hip on simulated clouds with all defects, with
-    labels of every point.
+    """Judge the paper's configuration: pyramid, gable, hip.
+
+    Clouds are simulated with all defects, with labels of every point.
     """
     true_points, told_points, tally = [], [], Tally()
     allowed = Settings().replace({"fit": {"types": THREE}})
@@ -131,7 +134,10 @@ def judge_three_types(count: int) -> tuple[str, Scores, Scores]:
 def judge_all_types(
     count: int, densities: tuple[float, ...] = (2.0, 5.0, 10.0)
 ) -> tuple[str, dict[float, Tally]]:
-    """Network, fit and combination on all types with all defects, `count` buildings a density."""
+    """Judge network, fit and combination on all types with all defects.
+
+    There are `count` buildings a density.
+    """
     rows, tallies = [], {}
     for density in densities:
         tally = Tally()
@@ -155,7 +161,10 @@ def judge_all_types(
 def simulate_samples(
     count: int, density: float, seed: int = TEST_SEED
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """(type, points) of `count` buildings at one density, all of the scanner's defects in them."""
+    """Yield (type, points) of `count` buildings at one density.
+
+    All of the scanner's defects are in them.
+    """
     for index in range(count):
         rng = np.random.default_rng([seed, int(10 * density), index])
         points, _, type = training_sample(
@@ -169,8 +178,9 @@ DIRECTIONS = {"flat": 0, "monopitch": 1, "gable": 2, "hip": 4, "pyramid": 4}
 
 
 def judge_the_hague(scans: int) -> tuple[str, Tally] | None:
-    """Held-out shapes of The Hague at 5 points/m2, `scans` scans a type; all of them, and those
-    true to their code.
+    """Judge held-out shapes of The Hague at 5 points/m2.
+
+    There are `scans` scans a type; all of them count, and those true to their code.
     """
     path = DATA / "denhaag" / "DenHaag_01.city.json"
     if not path.exists():
@@ -216,8 +226,9 @@ def judge_the_hague(scans: int) -> tuple[str, Tally] | None:
 
 
 def is_true_to_code(shape: Shape) -> bool:
-    """Whether the solid's roof slopes in as many directions as its roofType says: some "monopitch"
-    are level, some "hipped" have a flat top, some pyramids are halved by a wall.
+    """Return whether a roof slopes in as many directions as its code says.
+
+    Some "monopitch" are level, some "hipped" have a flat top, some pyramids are halved by a wall.
     """
     areas, normals = [], []
     for face in shape.solid.select_faces(ROOF):
@@ -236,7 +247,7 @@ def is_true_to_code(shape: Shape) -> bool:
 
 
 def judge_labelled_roofs() -> str | None:
-    """The twelve labelled real roofs, never trained on."""
+    """Judge the twelve labelled real roofs, never trained on."""
     folder = DATA / "roofn3d" / "labelled"
     if not folder.is_dir():
         return None
@@ -252,8 +263,9 @@ def judge_labelled_roofs() -> str | None:
 
 
 def judge_new_york() -> str | None:
-    """392 real roofs through the whole pipeline with and without the network: distance of their
-    roof points.
+    """Judge 392 real roofs through the whole pipeline.
+
+    It is run with and without the network, and measures the distance of their roof points.
     """
     path = DATA / "roofn3d" / "nyc_roofs.npz"
     if not path.exists():
@@ -283,8 +295,9 @@ def judge_new_york() -> str | None:
 
 
 def measure_roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) -> float:
-    """Mean distance of a roof's points to the nearest roof surface of its reconstruction, NaN
-    counted as 1 m.
+    """Return the mean distance of a roof's points to its reconstruction.
+
+    NaN counts as 1 m.
     """
     solid = reconstruct(cloud, settings=settings).solid
     if solid is None:
@@ -296,8 +309,9 @@ def measure_roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Sett
 
 
 def measure_speed() -> str:
-    """Time of recognising on one core, types alone as a compound fit needs them and with the
-    points' labels, and the size of the weights.
+    """Measure the time of recognising on one core, and the weights' size.
+
+    It is timed for types alone, as a compound fit needs them, and with the points' labels.
     """
     rows = []
     for count in (300, 700, 1500):
@@ -324,7 +338,7 @@ def measure_speed() -> str:
 def measure_processor_time(
     road: Callable[[np.ndarray], object], points: np.ndarray, repeats: int = 100
 ) -> float:
-    """Median seconds of processor time of one call, after a first one."""
+    """Return the median processor time (s) of a call, after a first one."""
     times = []
     for _ in range(repeats + 1):
         start = time.process_time()
@@ -334,8 +348,9 @@ def measure_processor_time(
 
 
 def calibrate(count: int) -> None:
-    """Print the balanced accuracy of the combination over exponents of the evidence, on buildings
-    of another seed.
+    """Print the combination's balanced accuracy over exponents.
+
+    They are those of the evidence, on buildings of another seed.
     """
     for density in (1.0, 2.0, 5.0, 10.0):
         opinions = [
@@ -354,7 +369,7 @@ def calibrate(count: int) -> None:
 
 
 def make_table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    """A Markdown table."""
+    """Return a Markdown table."""
     lines = [
         "| " + " | ".join(map(str, row)) + " |" for row in (header, ["---"] * len(header), *rows)
     ]
@@ -366,7 +381,10 @@ def format_percent(share: float) -> str:
 
 
 def draw_confusion(scores: Scores, title: str, name: str) -> None:
-    """A confusion matrix as PNG: rows are the truth, in percent of the truth."""
+    """Draw a confusion matrix as PNG.
+
+    Rows are the truth, in percent of the truth.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -463,7 +481,7 @@ def main() -> None:
 
 
 def describe_recalls(scores: Scores) -> str:
-    """Recall of every type that occurs, as one sentence."""
+    """Describe the recall of every type that occurs, as one sentence."""
     return (
         "Recall: "
         + ", ".join(f"{name} {format_percent(recall)}" for name, recall in scores.recalls.items())

@@ -1,5 +1,6 @@
-"""What a user waits for: `import hiproof`, `hiproof --help`, a town of one building and a whole
-Delft run in a fresh process, compiled before.
+"""The waiting times of a user, in fresh processes, compiled before.
+
+They are `import hiproof`, `hiproof --help`, a town of one building and a whole Delft run.
 
     python -m benchmarks.startup [--quick]
 
@@ -28,7 +29,7 @@ REFERENCE = ["-c", "import numpy"]
 
 
 def measure_cost(arguments: list[str]) -> tuple[float, float]:
-    """CPU and wall seconds of a process and of those that it starts."""
+    """Return CPU and wall seconds of a process and those that it starts."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT / "src"),
@@ -47,7 +48,10 @@ def measure_cost(arguments: list[str]) -> tuple[float, float]:
 
 
 def compare(name: str, arguments: list[str], runs: int) -> None:
-    """Print the median of `runs` fresh processes after one warm-up, in turn with the reference."""
+    """Print the median of `runs` fresh processes after one warm-up.
+
+    They run in turn with the reference.
+    """
     measure_cost(arguments)
     pairs = [(measure_cost(arguments), measure_cost(REFERENCE)) for _ in range(runs)]
     cpu, wall = (statistics.median(own_cost[k] for own_cost, _ in pairs) for k in (0, 1))

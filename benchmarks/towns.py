@@ -67,8 +67,9 @@ TOUCH_M = 0.01
 
 @dataclass(frozen=True)
 class TrueBuilding:
-    """Solids that touch each other, by the ids of their city objects, and the union of their
-    grounds (world).
+    """Solids that touch each other, and the union of their grounds (world).
+
+    They are kept by the ids of their city objects.
     """
 
     id: str
@@ -76,7 +77,10 @@ class TrueBuilding:
     footprint: shapely.Polygon
 
     def scan_points(self, density: float) -> np.ndarray:
-        """Points (n, 3) of the building by itself, ground left out, always the same for one id."""
+        """Scan points (n, 3) of the building by itself, ground left out.
+
+        They are always the same for one id.
+        """
         rng = np.random.default_rng(zlib.crc32(self.id.encode()))
         cloud = scan_solids(
             list(self.solids.values()), rng, ScanSettings(density=density, defects=Defects.none())
@@ -85,8 +89,9 @@ class TrueBuilding:
 
 
 def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding]:
-    """The buildings of a CityJSON file with a ground of `smallest_m2` or more, in the order of
-    their ids.
+    """Read the buildings of a CityJSON file with a large enough ground.
+
+    It is `smallest_m2` or more; buildings come in the order of their ids.
     """
     objects = json.loads(path.read_text(encoding="utf-8"))["CityObjects"]
     solids = defaultdict(dict)
@@ -97,7 +102,10 @@ def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding
 
 
 def group_touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
-    """The solids of one building as one or, where their grounds lie apart, as several."""
+    """Group the solids of one building that touch.
+
+    They are several buildings where their grounds lie apart.
+    """
     grounds = {name: find_ground(solid) for name, solid in solids.items()}
     joined = shapely.union_all(
         [ground.buffer(TOUCH_M, join_style="mitre") for ground in grounds.values()]
@@ -135,8 +143,9 @@ def find_ground(solid: Solid) -> shapely.Geometry:
 def choose_buildings(
     buildings: list, step: int = 1, parity: str | None = None, limit: int | None = None
 ) -> list:
-    """Every k-th of `buildings`, those at even or odd places, at most so many drawn by a fixed
-    chance; in order.
+    """Choose every k-th of `buildings`, or even or odd ones, in order.
+
+    At most so many are drawn by a fixed chance.
     """
     buildings = buildings[::step]
     buildings = buildings if parity is None else buildings[("even", "odd").index(parity) :: 2]
@@ -149,8 +158,9 @@ def choose_buildings(
 
 
 def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:
-    """The city objects of `buildings` out of the CityJSON file `source`, those with several as
-    parts of one object.
+    """Write the city objects of `buildings` from the CityJSON file `source`.
+
+    Those with several become parts of one object.
     """
     city = json.loads(source.read_text(encoding="utf-8"))
     objects, city["CityObjects"] = city["CityObjects"], {}
@@ -169,8 +179,9 @@ def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None
 
 
 def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) -> None:
-    """Models and points of a town as `hiproof reconstruct` leaves them, for `hiproof report` and
-    docs/draw_roofs.py.
+    """Write models and points of a town as `hiproof reconstruct` does.
+
+    `hiproof report` and docs/draw_roofs.py read them.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_all(folder, models)
@@ -182,8 +193,9 @@ def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) ->
 def model_building(
     building: TrueBuilding, points: np.ndarray, with_footprint: bool
 ) -> tuple[Building, float]:
-    """One building reconstructed from its scan, and the seconds it took; a bug costs one building,
-    and is shown.
+    """Reconstruct one building from its scan, and time it (s).
+
+    A bug costs one building, and is shown.
     """
     started = time.process_time()
     try:
@@ -202,7 +214,7 @@ def model_building(
 def model_all(
     buildings: list[TrueBuilding], points: list[np.ndarray], with_footprint: bool
 ) -> tuple[list[Building], list[float]]:
-    """Every building reconstructed, and the seconds that each took."""
+    """Reconstruct every building, and return the seconds of each."""
     model_building(buildings[0], points[0], with_footprint)  # loads what is compiled
     outcomes = [
         model_building(b, p, with_footprint) for b, p in zip(buildings, points, strict=True)
@@ -211,7 +223,7 @@ def model_all(
 
 
 def describe_times(seconds: list[float]) -> str:
-    """How long the buildings took, in words."""
+    """Describe how long the buildings took."""
     ms = 1e3 * np.array(seconds)
     mean, longest = ms.mean(), ms.max()
     return (
@@ -221,7 +233,10 @@ def describe_times(seconds: list[float]) -> str:
 
 
 def compose_truth(building: TrueBuilding) -> Building:
-    """The true roof faces themselves as one shell: what a perfect reconstruction would score."""
+    """Return the true roof faces as one shell.
+
+    It has the score of a perfect reconstruction.
+    """
     frame = LocalFrame(
         np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0)
     )
@@ -233,7 +248,10 @@ def compose_truth(building: TrueBuilding) -> Building:
 
 
 def make_roof_pieces(solid: Solid) -> Iterator[Piece]:
-    """A piece for each polygon of the roof's faces; those that stand upright are none."""
+    """Yield a piece for each polygon of the roof's faces.
+
+    Upright ones have none.
+    """
     for face in solid.select_faces(ROOF):
         ring = solid.vertices[list(face.rings[0])]
         centre = ring.mean(axis=0)
@@ -254,7 +272,10 @@ def judge_models(
     seconds: list[float],
     folder: Path,
 ) -> list[Score]:
-    """The score of each model of `buildings` in `folder`, where the truth is written too."""
+    """Score each model of `buildings` in `folder`.
+
+    The truth is written there too.
+    """
     truth = folder / "truth.city.json"
     write_truth(truth, TOWNS[town], buildings)
     counts = count_wireframes(folder / "buildings.city.jsonl", truth)
@@ -266,12 +287,15 @@ def judge_models(
 
 
 def read_share(model: Building) -> float:
-    """Share of the points within 0.2 m of the roof; 0 where there is no model or no measurement."""
+    """Return the share of the points within 0.2 m of the roof.
+
+    It is 0 where there is no model or no measurement.
+    """
     return float(np.nan_to_num(model.quality.share_within_20cm)) if model.solid is not None else 0.0
 
 
 def report_scores(scores: list[Score], models: list[Building], worst: int) -> str:
-    """What there is to say of the scores and the models of a town."""
+    """Describe the scores and the models of a town."""
     areas = sum_area_by_type(models)
     types = ", ".join(f"{name} {area / areas.total():.0%}" for name, area in areas.items())
     without_reserve = sum(model.status is Status.MODELLED for model in models)

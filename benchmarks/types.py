@@ -1,5 +1,6 @@
-"""Roof type by evidence alone, all types simulated alike often with 5 % outliers. python -m
-benchmarks.types [--quick] [--seed 21]
+"""Roof types by evidence alone, all types simulated with equal frequency.
+
+There are 5 % outliers. Run it by `python -m benchmarks.types [--quick] [--seed 21]`.
 
 Half of the gables have their ridge off the middle. The draws (roofs.py) keep types apart that are
 one surface at a bound: an asymmetric gable has one slope at least a seventh steeper, a half-hip
@@ -24,7 +25,10 @@ DENSITIES = (2.0, 5.0, 10.0)
 
 
 def main() -> None:
-    """Print the share of right types at each density, and what the wrong ones were taken for."""
+    """Print the share of right types at each density.
+
+    It says too what the wrong ones were taken for.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="10 roofs a type instead of 100")
     parser.add_argument("--seed", type=int, default=21, help="of the roofs drawn")
@@ -42,13 +46,13 @@ def main() -> None:
 
 
 def choose_types(density: float, roofs: int, seed: int) -> Iterator[tuple[str, str]]:
-    """(true type, chosen type) of `roofs` roofs a type."""
+    """Yield (true type, chosen type) of `roofs` roofs a type."""
     for roof, points in draw_clouds(density, roofs, seed):
         yield roof.primitive.name, fit_roof(points).type
 
 
 def draw_clouds(density: float, roofs: int, seed: int) -> Iterator[tuple[TrueRoof, np.ndarray]]:
-    """`roofs` true roofs a type with their points (n, 3)."""
+    """Yield `roofs` true roofs a type with their points (n, 3)."""
     rng = np.random.default_rng(seed)
     for name in CATALOGUE:
         for number in range(roofs):

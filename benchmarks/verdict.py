@@ -74,7 +74,9 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """A case with its model, and how wrong it is: RMSE (m) of the surface, number of wrong levels.
+    """A case with its model, and how wrong the model is.
+
+    It has the RMSE (m) of the surface, and the number of wrong levels.
 
     `evidence` is what the verdict is found by: model, points (n, 3) and unused points (m, 3).
     """
@@ -97,7 +99,7 @@ class CaseOutcome:
 
 
 def list_polygons(solids: Iterable[Solid], kinds: tuple[str, ...]) -> Polygons:
-    """Faces of `kinds` as lists of rings (m, 3)."""
+    """Return faces of `kinds` as lists of rings (m, 3)."""
     return [
         [solid.vertices[list(r)] for r in f.rings]
         for solid in solids
@@ -112,7 +114,9 @@ def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
 
 
 def compute_heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
-    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none.
+    """Return the height (n,) of the highest polygon at `xy` (n, 2).
+
+    It is NaN where there is none.
 
     Upright polygons do not count.
     """
@@ -130,7 +134,10 @@ def compute_heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 
 
 def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
-    """RMSE (m) between the true and the model's surface; how many levels are missing or wrong."""
+    """Compare the true and the model's surface.
+
+    Returns the RMSE (m), and how many levels are missing or wrong.
+    """
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.move(-origin) for solid in case.solids], [building.solid.move(-origin)]
     area, seen_area = shapely.transform(
@@ -165,7 +172,10 @@ def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
 
 
 def find_patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
-    """Patches of a raster (rows, columns) that are LEVEL_WIDTH_M wide and `least_m2` large."""
+    """Count patches of a raster that are large enough for a level.
+
+    They are LEVEL_WIDTH_M wide and `least_m2` large; the raster is (rows, columns).
+    """
     width = max(2, round(LEVEL_WIDTH_M / step))
     wide = ndimage.binary_opening(np.pad(is_off, width), np.ones((width, width)))
     labels, count = ndimage.label(wide)
@@ -209,7 +219,7 @@ def judge_block(block: Block, folder: Path | None = None) -> list[CaseOutcome]:
 
 
 def make_line(name: str, outcomes: list[CaseOutcome]) -> str:
-    """A row of a table about some outcomes."""
+    """Return a row of a table about some outcomes."""
     sound = [outcome for outcome in outcomes if outcome.is_sound]
     cells = [f"{name:24}", f"{len(outcomes):5d}", f"{len(sound) / len(outcomes):6.3f}"]
     for grade in Grade:
@@ -223,7 +233,7 @@ def make_line(name: str, outcomes: list[CaseOutcome]) -> str:
 
 
 def make_table(outcomes: list[CaseOutcome]) -> str:
-    """Rows for all outcomes, and by density, area, source and defect."""
+    """Return rows for all outcomes, and by density, area, source and defect."""
     groups: dict[str, Callable[[CaseOutcome], bool]] = {"all": lambda outcome: True}
     groups |= {
         f"{d:g} points/m2": lambda o, d=d: o.block.density == d
@@ -303,7 +313,7 @@ def main() -> None:
 
 
 def list_sources() -> list[str]:
-    """The towns whose buildings are scanned, where their truth is here."""
+    """List the towns whose buildings are scanned, where their truth exists."""
     return [name for name, path in PLACES.items() if path.is_file()]
 
 

@@ -1,5 +1,6 @@
-"""Roofs whose truth is known, scanned by simulation, with what goes wrong with clouds and
-footprints.
+"""Roofs with known truth, scanned by simulation, with usual faults.
+
+The faults are those of clouds and footprints.
 
 A case is a simulated compound or a building of a real town, its points at one density, and the
 footprint given, None for a run without footprints. A quarter of the cases is faultless, a quarter
@@ -39,8 +40,10 @@ CLUTTERED = replace(SCANNER, chimney=0.5, antenna=0.2, tree=0.3)
 
 @dataclass(frozen=True)
 class Case:
-    """A building to model: `solids` are its truth, within `truth_area` where the footprint asks for
-    a part of it alone. `seen_area` is what of that has points; with a footprint it is all of it.
+    """A building to model.
+
+    `solids` are its truth, within `truth_area` where the footprint asks for a part of it alone.
+    `seen_area` is what of that has points; with a footprint it is all of it.
     """
 
     source: str
@@ -60,7 +63,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Scene:
-    """Points (n, 3) and the footprint of a building, as a defect changes them;
+    """Points (n, 3) and the footprint of a building, changed by a defect.
 
     `asked` is the true area asked for.
     """
@@ -75,19 +78,22 @@ Defect = Callable[[Scene, np.random.Generator], Scene]
 
 
 def draw_direction(rng: np.random.Generator) -> np.ndarray:
-    """A level unit vector (2,) drawn by chance."""
+    """Draw a level unit vector (2,)."""
     angle = rng.uniform(-np.pi, np.pi)
     return np.array([np.cos(angle), np.sin(angle)])
 
 
 def cut_hole(scene: Scene, rng: np.random.Generator) -> Scene:
-    """No points on one side of a line: 15 to 60 % of them are missing."""
+    """Drop the points on one side of a line: 15 to 60 % of them."""
     along = scene.points[:, :2] @ draw_direction(rng)
     return replace(scene, points=scene.points[along < np.quantile(along, rng.uniform(0.4, 0.85))])
 
 
 def cover_with_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
-    """A crown over a tenth to a half of the roof: seven points in ten lie in its leaves."""
+    """Put a crown over a tenth to a half of the roof.
+
+    Seven points in ten lie in its leaves.
+    """
     middle = shapely.get_coordinates(scene.footprint)[rng.integers(4)]
     distance = np.hypot(*(scene.points[:, :2] - middle).T)
     caught = (distance < np.quantile(distance, rng.uniform(0.1, 0.5))) & (
@@ -99,7 +105,7 @@ def cover_with_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def draw_facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np.ndarray:
-    """So many points (count, 3) on the two sides of the outline that face the scanner."""
+    """Draw points (count, 3) on the two sides that face the scanner."""
     seen_from = draw_direction(rng)
     corners = shapely.get_coordinates(shapely.orient_polygons(scene.footprint).exterior)
     edges = np.diff(corners, axis=0)
@@ -119,7 +125,7 @@ def draw_facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np
 
 
 def add_facades(scene: Scene, rng: np.random.Generator) -> Scene:
-    """A fifth to twice as many points on walls as on the roof."""
+    """Add a fifth to twice as many points on walls as on the roof."""
     count = int(len(scene.points) * rng.uniform(0.2, 2.0)) + 1
     return replace(
         scene, points=np.concatenate([scene.points, draw_facade_points(scene, rng, count)])
@@ -127,18 +133,18 @@ def add_facades(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def keep_walls(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Points on two walls and none on the roof."""
+    """Keep points on two walls and none on the roof."""
     return replace(scene, points=draw_facade_points(scene, rng, len(scene.points)))
 
 
 def shift_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
-    """A footprint 0.4 to 1.5 m beside its building."""
+    """Shift the footprint 0.4 to 1.5 m beside its building."""
     shift = draw_direction(rng) * rng.uniform(0.4, 1.5)
     return replace(scene, footprint=shapely.transform(scene.footprint, lambda xy: xy + shift))
 
 
 def widen_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
-    """A footprint that takes in a yard beside its building."""
+    """Widen the footprint by a yard beside its building."""
     west, south, east, north = scene.footprint.bounds
     shift = draw_direction(rng) * rng.uniform(0.1, 0.5) * np.array([east - west, north - south])
     wider = shapely.union_all(
@@ -148,8 +154,9 @@ def widen_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def halve_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
-    """A footprint of one half of the building, as cadastres cut them; the other half is not asked
-    for.
+    """Halve the footprint, as cadastres cut them.
+
+    The other half is not requested.
     """
     west, south, east, north = scene.footprint.bounds
     middle = rng.uniform(0.3, 0.7) * (east - west) + west
@@ -160,7 +167,7 @@ def halve_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def add_noise(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Heights with a further noise of 0.05 to 0.3 m."""
+    """Add a further noise of 0.05 to 0.3 m to heights."""
     noise = rng.normal(0.0, rng.uniform(0.05, 0.3), len(scene.points))
     return replace(scene, points=scene.points + np.outer(noise, (0.0, 0.0, 1.0)))
 
@@ -182,14 +189,14 @@ SOUND = ("none", "scanner")
 
 
 def make_generator(*words: object) -> np.random.Generator:
-    """A generator drawn by `words`."""
+    """Make a generator drawn by `words`."""
     return np.random.default_rng(zlib.crc32(" ".join(map(str, words)).encode()))
 
 
 def simulate_compound(
     seed: int,
 ) -> tuple[TrueBuilding, Callable[[np.random.Generator, ScanSettings], np.ndarray]]:
-    """A simulated compound as a true building, and what scans it."""
+    """Simulate a compound as a true building, and what scans it."""
     rng = np.random.default_rng([seed, 7])
     building = random_compound(rng, COMPOUND_KINDS[seed // 2 % len(COMPOUND_KINDS)])
     solid = compose(building.roof, 0.0)
@@ -207,7 +214,7 @@ def simulate_compound(
 def take_from_town(
     building: TrueBuilding,
 ) -> Callable[[np.random.Generator, ScanSettings], np.ndarray]:
-    """What scans a building of a town."""
+    """Return what scans a building of a town."""
 
     def scan_house(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
         cloud = scan_solids(list(building.solids.values()), rng, settings)
@@ -217,8 +224,9 @@ def take_from_town(
 
 
 def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
-    """Number, truth and scanner of at most so many buildings of a source, evenly chosen, as many
-    even as odd ones.
+    """Yield number, truth and scanner of buildings of a source.
+
+    They are at most so many, evenly chosen, as many even as odd ones.
     """
     if source == "compounds":
         yield from ((seed, *simulate_compound(seed)) for seed in range(limit))
@@ -230,8 +238,9 @@ def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuildi
 
 
 def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
-    """The true area as far as it has points: half a distance between points around them, gaps
-    between them closed.
+    """Return the true area as far as it has points.
+
+    It reaches half a distance between points around them, gaps between them closed.
     """
     spacing, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
     spacing = max(spacing, (scene.asked.area / max(len(points), 1)) ** 0.5)
@@ -247,7 +256,7 @@ def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
 def iterate_cases(
     source: str, limit: int, density: float, with_footprints: bool, parity: str
 ) -> Iterator[Case]:
-    """The cases of even or odd buildings of a source at one density.
+    """Yield the cases of even or odd buildings of a source at one density.
 
     Of four buildings one has no defect, one those of the scanner, two have others.
     """

@@ -1,4 +1,6 @@
-"""Score drawn roofs against true ones, building by building, and by the size of the footprint.
+"""Score drawn roofs against true ones, by building and by size.
+
+The size is that of the footprint.
 
 A score holds the counts that ../shared/tools/wireframe.py makes: edges and corners that are right,
 drawn and true. Pooled figures sum these counts over buildings, so that they hang on the largest
@@ -62,7 +64,10 @@ class WireframeCounts:
 
 @dataclass(frozen=True)
 class Score:
-    """One building: counts, footprint area, CPU time, parts, share of its points within 0.2 m."""
+    """One building: counts, footprint area, CPU time, parts, and share.
+
+    The share is that of its points within 0.2 m.
+    """
 
     id: str
     counts: WireframeCounts
@@ -73,7 +78,10 @@ class Score:
 
 
 def compute_f1(right: int, n_drawn: int, true: int, n_found: int | None = None) -> float:
-    """Return F1 (%) of `right` among `drawn` and of `found` (by default `right`) among `true`."""
+    """Return F1 (%) of `right` among drawn and found ones.
+
+    Found ones, by default `right`, are among `true`.
+    """
     precision, recall = (
         right / max(n_drawn, 1),
         (right if n_found is None else n_found) / max(true, 1),
@@ -82,7 +90,10 @@ def compute_f1(right: int, n_drawn: int, true: int, n_found: int | None = None) 
 
 
 def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
-    """Compare each building of `truth` with its model; a missing one counts as all missed."""
+    """Compare each building of `truth` with its model.
+
+    A missing one counts as all missed.
+    """
     judge = load_tool("wireframe")
     solids, counts = judge.solids(models), {}
     for name, parts in judge.solids(truth).items():
@@ -101,7 +112,10 @@ def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
 
 
 def sum_counts(counts: Iterable[WireframeCounts]) -> WireframeCounts:
-    """Return the counts of all buildings together, with the mean of the known height errors."""
+    """Sum the counts of all buildings.
+
+    The result has the mean of the known height errors.
+    """
     rows = np.array([list(vars(counts_of_one).values()) for counts_of_one in counts], float)
     *numbers, offset, _ = rows.sum(axis=0)
     rmse = measure_finite(np.mean, rows[:, -1])
@@ -115,7 +129,7 @@ def measure_finite(figure, values: np.ndarray) -> float:
 
 
 def summarise(scores: list[Score]) -> list[str]:
-    """Return the sentences on all `scores` together: edges, corners, faces and heights."""
+    """Summarise all `scores`: edges, corners, faces and heights."""
     total, counts = sum_counts(score.counts for score in scores), [score.counts for score in scores]
     rmse = measure_finite(np.median, np.array([item.height_rmse_m for item in counts]))
     share_same = np.mean([item.faces == item.true_faces for item in counts])
@@ -138,7 +152,9 @@ def summarise(scores: list[Score]) -> list[str]:
 
 
 def make_size_table(scores: list[Score]) -> list[str]:
-    """Return a head, a row for all `scores` and one for each class of footprint area that has any.
+    """Return a head, a row for all `scores` and one for each class of area.
+
+    Areas are those of footprints; classes without any are left out.
 
     Pairs are the pooled figure and the mean over buildings. Corners and faces are multiples of
     the true number.

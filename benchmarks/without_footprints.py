@@ -1,5 +1,6 @@
-"""Roofs of clouds that come without footprints: how near their points they lie, of how many parts
-and which types.
+"""Roofs of clouds that come without footprints.
+
+It measures how near their points they lie, of how many parts and which types they are.
 
 usage: python -m benchmarks.without_footprints [--set stbarth ctview delft] [--each]
 
@@ -29,8 +30,9 @@ SETS = ("stbarth", "ctview")
 
 
 def model_found(name: str) -> tuple[list[tuple[Building, float]], float]:
-    """Every building found in the set's cloud, reconstructed, and the seconds it took; the seconds
-    in which they were found.
+    """Reconstruct every building found in the set's cloud, and time it.
+
+    Returns also the seconds in which they were found.
     """
     cloud = read_points(*sorted((SHARED / "data" / name).glob("*.laz")))
     outcomes, started = [], time.process_time()

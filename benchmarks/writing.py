@@ -1,4 +1,4 @@
-"""How long writing takes a building, by format, and how memory grows with the number of buildings.
+"""Time of writing a building by format, and memory by their number.
 
     python -m benchmarks.writing [COUNT]
 
@@ -40,7 +40,7 @@ WRITERS = {
 
 
 def generate_buildings(seed=0):
-    """One building of each roof type, in world coordinates."""
+    """Generate one building of each roof type, in world coordinates."""
     rng = np.random.default_rng(seed)
     for type in ROOF_TYPES:
         building = random_building(rng, type)
@@ -59,7 +59,7 @@ def generate_buildings(seed=0):
 
 
 def iterate_street(buildings, count):
-    """`count` buildings with ids of their own."""
+    """Yield `count` buildings with ids of their own."""
     return (
         replace(building, id=f"b{n}") for n, building in enumerate(islice(cycle(buildings), count))
     )

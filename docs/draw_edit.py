@@ -1,5 +1,6 @@
-"""Draw the picture of the page of `hiproof edit`: a building of the bundled neighbourhood, as
-Chromium shows it.
+"""Draw the picture of the page of `hiproof edit`, as Chromium shows it.
+
+The building is one of the bundled neighbourhood.
 
 python docs/draw_edit.py [OUT.png]
 
@@ -29,8 +30,9 @@ SIZE = {"width": 1360, "height": 820}
 
 
 def draw(service: Service, path: Path) -> None:
-    """A picture of the page with its building of most parts, a ridge raised by hand and refitted,
-    types tried on.
+    """Draw the page with its building of most parts.
+
+    A ridge is raised by hand and refitted, and types are tried.
     """
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)

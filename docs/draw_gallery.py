@@ -1,4 +1,4 @@
-"""Draw the pictures of the gallery: the points of six real data sets beside their models.
+"""Draw the gallery: the points of six real data sets beside their models.
 
 python docs/draw_gallery.py [NAME ...] [--runs FOLDER]
 
@@ -23,7 +23,10 @@ RUNS = HERE.parent / "build/gallery"
 
 @dataclass(frozen=True)
 class DataSet:
-    """Point files of a folder, footprints if there are any, and the part of the plan shown."""
+    """Point files of a folder, footprints if any, and the part shown.
+
+    The part is one of the plan.
+    """
 
     clouds: str
     footprints: str | None = None

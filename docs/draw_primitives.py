@@ -28,7 +28,7 @@ HEAD = """# Roof types and their parameters
 
 
 def make_page() -> str:
-    """docs/primitives.md."""
+    """Return docs/primitives.md."""
     sections = [
         f"## {name}\n\n{', '.join(f'`{p}`' for p in list_parameters(name))}\n\n"
         f"![{name}](primitives/{name}.svg)\n"

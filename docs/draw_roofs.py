@@ -1,5 +1,6 @@
-"""Draw reconstructed roofs in plan over their points, beside a view from the south, on sheets of
-twelve buildings.
+"""Draw reconstructed roofs in plan over their points, on sheets of twelve.
+
+A view from the south stands beside each.
 
 python docs/draw_roofs.py RUN|delft|amsterdam_west|stbarth|ctview [--worst 24] [--chance 24] [--ids
 A B] [--seed 0]
@@ -68,7 +69,10 @@ class DrawnPart:
         return type_colour(self.type)
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Height (n,) at plan points (n, 2), minus infinity beside the part."""
+        """Return the height (n,) at plan points (n, 2).
+
+        It is minus infinity beside the part.
+        """
         z = np.full(len(xy), -np.inf)
         for piece in self.pieces:
             inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
@@ -78,7 +82,7 @@ class DrawnPart:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A building to draw, all in world metres;
+    """A building to draw, all in world metres.
 
     `gap` (n,) is each point's signed height over the roof, NaN beside it.
     """
@@ -94,14 +98,15 @@ class Drawn:
 
     @property
     def share(self) -> float:
-        """Share of the points within 0.2 m of the roof, those with no roof over or under them
-        counted as off.
+        """Share of the points within 0.2 m of the roof.
+
+        Those with no roof over or under them count as off.
         """
         return float(np.mean(np.abs(self.gap) < NEAR_M)) if len(self.gap) else 0.0
 
 
 def run_set(name: str, out: Path) -> Path:
-    """Folder of a run over the set `name`, made now.
+    """Run the set `name` now, and return the folder.
 
     Raises InputError where the set is not there.
     """
@@ -119,8 +124,9 @@ def run_set(name: str, out: Path) -> Path:
 
 
 def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
-    """The buildings of a run that have a model and points, with the models of `truth` under the
-    same ids.
+    """Read the buildings of a run that have a model and points.
+
+    The models of `truth` come with them under the same ids.
     """
     run = evaluate_run(folder)
     if not run.clouds:
@@ -148,7 +154,7 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
 
 
 def make_part(part: Part, shift: np.ndarray) -> DrawnPart:
-    """A part in world coordinates, its polygons made valid."""
+    """Return a part in world coordinates, its polygons made valid."""
     pieces = (piece.move(shift) for piece in part.pieces)
     return DrawnPart(
         part.type, tuple(Piece(shapely.make_valid(piece.outline), piece.planes) for piece in pieces)
@@ -156,8 +162,9 @@ def make_part(part: Part, shift: np.ndarray) -> DrawnPart:
 
 
 def measure_gaps(solid: Solid, points: np.ndarray) -> np.ndarray:
-    """Height (n,) of points (n, 3) over the nearest roof face above or below them, NaN where there
-    is none.
+    """Return the height (n,) of points (n, 3) over the nearest roof face.
+
+    It is above or below them, NaN where there is none.
     """
     nearest = np.full(len(points), np.nan)
     for face in solid.select_faces(ROOF):
@@ -178,7 +185,7 @@ def make_outline(vertices: np.ndarray, face: Face) -> shapely.Polygon:
 
 
 def compute_normal(vertices: np.ndarray, face: Face) -> np.ndarray:
-    """Unit normal (3,) of a face, outwards."""
+    """Return the unit normal (3,) of a face, outwards."""
     ring = vertices[list(face.rings[0])]
     ring = ring - ring.mean(axis=0)
     normal = np.cross(ring, np.roll(ring, -1, axis=0)).sum(axis=0)
@@ -186,7 +193,7 @@ def compute_normal(vertices: np.ndarray, face: Face) -> np.ndarray:
 
 
 def compute_plane(vertices: np.ndarray, face: Face) -> tuple[float, float, float]:
-    """(a, b, c) of z = a x + b y + c through a roof face."""
+    """Return (a, b, c) of z = a x + b y + c through a roof face."""
     normal, centre = compute_normal(vertices, face), vertices[list(face.rings[0])].mean(axis=0)
     a, b = -normal[:2] / normal[2]
     return a, b, centre[2] - a * centre[0] - b * centre[1]
@@ -197,7 +204,10 @@ def list_edges(face: Face) -> list[tuple[int, int]]:
 
 
 def list_roof_lines(solid: Solid) -> list[tuple[str, np.ndarray]]:
-    """(kind, ends (2, 2) in plan) of every edge of a roof face; kinds are those of LINES."""
+    """Return (kind, ends (2, 2) in plan) of every edge of a roof face.
+
+    Kinds are those of LINES.
+    """
     faces = solid.select_faces(ROOF)
     owner = {edge: face for face in faces for edge in list_edges(face)}
     border = shapely.union_all([make_outline(solid.vertices, face) for face in faces]).boundary
@@ -264,8 +274,9 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
 
 
 def draw_parts(axes: plt.Axes, building: Drawn, origin: np.ndarray) -> None:
-    """Each part's outline, drawn a little inside so that common edges stay apart, and its type
-    where it is on top.
+    """Draw each part's outline, and its type where it is on top.
+
+    Outlines are a little inside so that common edges stay apart.
     """
     x0, y0, x1, y1 = shapely.total_bounds(
         [p.outline for part in building.parts for p in part.pieces]
@@ -293,14 +304,15 @@ def draw_parts(axes: plt.Axes, building: Drawn, origin: np.ndarray) -> None:
 
 
 def draw_scale(axes: plt.Axes, corner: np.ndarray) -> None:
-    """A bar of five metres below the plan."""
+    """Draw a bar of five metres below the plan."""
     axes.plot([corner[0], corner[0] + 5.0], [corner[1], corner[1]], color="black", linewidth=2)
     axes.text(corner[0] + 5.3, corner[1], "5 m", fontsize=7, va="center")
 
 
 def draw_view(axes: plt.Axes, building: Drawn) -> None:
-    """The solid from the south-south-west, hidden surfaces removed, roofs in the colours of their
-    parts' types.
+    """Draw the solid from the south-south-west, hidden surfaces removed.
+
+    Roofs are in the colours of their parts' types.
     """
     solid, (right, upward, back) = lower_walls(building.solid), compute_view_axes()
     projected = solid.vertices @ np.column_stack([right, upward])
@@ -335,7 +347,10 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
 
 
 def lower_walls(solid: Solid) -> Solid:
-    """The solid cut off a little below its lowest eave, so that the view shows roofs."""
+    """Cut the solid off a little below its lowest eave.
+
+    So the view shows roofs.
+    """
     vertices = solid.vertices.copy()
     roof = np.unique(
         [index for face in solid.select_faces(ROOF) for ring in face.rings for index in ring]
@@ -345,7 +360,10 @@ def lower_walls(solid: Solid) -> Solid:
 
 
 def compute_view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit vectors to the right and up on the picture, and towards the eye."""
+    """Return unit vectors right, up and towards the eye.
+
+    The first two are those of the picture.
+    """
     right = np.array([math.cos(VIEW_TURN), math.sin(VIEW_TURN), 0.0])
     back = np.array(
         [
@@ -358,7 +376,10 @@ def compute_view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def choose_colour(building: Drawn, face: Face, normal: np.ndarray) -> tuple[float, float, float]:
-    """The colour of the type that is on top at a roof face's middle; light for walls."""
+    """Return the colour of the type on top at a roof face's middle.
+
+    Walls are light.
+    """
     if face.kind != ROOF:
         return (0.93, 0.91, 0.87)
     inside = shapely.get_coordinates(
@@ -369,13 +390,16 @@ def choose_colour(building: Drawn, face: Face, normal: np.ndarray) -> tuple[floa
 
 
 def apply_light(colour: tuple[float, float, float], normal: np.ndarray) -> tuple[float, ...]:
-    """A colour under light from the south-west."""
+    """Return a colour under light from the south-west."""
     light = 0.6 + 0.4 * max(float(normal @ (-0.5, -0.4, 0.77)), 0.0)
     return tuple(light * channel for channel in colour)
 
 
 def find_contours(owner: np.ndarray) -> np.ndarray:
-    """Pixels (h, w) whose neighbour above or to the right shows another face."""
+    """Return pixels (h, w) whose neighbour shows another face.
+
+    The neighbour is above or to the right.
+    """
     differs = np.zeros(owner.shape, bool)
     differs[:, :-1] |= owner[:, :-1] != owner[:, 1:]
     differs[:-1] |= owner[:-1] != owner[1:]
@@ -383,7 +407,7 @@ def find_contours(owner: np.ndarray) -> np.ndarray:
 
 
 def draw_sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
-    """One page of up to twelve buildings."""
+    """Draw one page of up to twelve buildings."""
     rows = -(-len(buildings) // COLUMNS)
     figure, axes = plt.subplots(
         rows,

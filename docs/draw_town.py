@@ -1,4 +1,6 @@
-"""Draw the README's picture: the points of a real town (Delft, AHN3) beside its models.
+"""Draw the README's picture: a real town's points beside its models.
+
+The town is Delft (AHN3).
 
 python docs/draw_town.py [RUN] [OUT.png]
 
@@ -36,7 +38,10 @@ SHOWN = (0.22, 0.95, 0.22, 0.86)
 
 
 def project(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Project points (n, 3) onto the picture: their places (n, 2) and how near they are (n,)."""
+    """Project points (n, 3) onto the picture.
+
+    Returns their places (n, 2) and how near they are (n,).
+    """
     a, e = np.radians(AZIMUTH_DEG), np.radians(ELEVATION_DEG)
     right = np.array([np.cos(a), np.sin(a), 0.0])
     forward = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -46,7 +51,7 @@ def project(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shade(colour: str, brightness: np.ndarray) -> np.ndarray:
-    """Colours (n, 3) of one hue under `brightness` (n,) from 0 to 1."""
+    """Return colours (n, 3) of one hue under `brightness` (n,) from 0 to 1."""
     base = np.array(matplotlib.colors.to_rgb(colour))
     return np.clip(base * (0.55 + 0.5 * brightness)[:, None], 0.0, 1.0)
 
@@ -92,8 +97,10 @@ def draw(
     shown_part: tuple[float, float, float, float],
     dpi: int = 100,
 ) -> None:
-    """Draw the points of `clouds` beside the models of `run`, as far as they lie in a part of the
-    picture: left, right, bottom and top as shares of its size.
+    """Draw the points of `clouds` beside the models of `run`.
+
+    They are shown as far as they lie in a part of the picture: left, right, bottom and top as
+    shares of its size.
     """
     clouds = [read_points(file) for file in sorted(clouds)]
     xyz = np.concatenate([cloud.xyz for cloud in clouds])

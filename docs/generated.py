@@ -1,5 +1,6 @@
-"""Pages of the site that are made of the code: every command with its options, every setting, every
-number with its reason.
+"""Pages of the site that are made from the code.
+
+They have every command with its options, every setting, and every number with its reason.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ PACKAGE = Path(hiproof.__file__).parent
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """What mkdocs calls to learn of the pages."""
+    """Add the generated pages; mkdocs calls this."""
     from mkdocs.structure.files import File
 
     for name, make in PAGES.items():
@@ -32,7 +33,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def describe_commands() -> str:
-    """Every command: what it does, its arguments, its options."""
+    """Describe every command: its purpose, its arguments, its options."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     return "# Commands\n\nAs `hiproof COMMAND --help` tells them.\n" + "".join(
         describe_command(name, command) for name, command in sorted(commands.items())
@@ -53,8 +54,9 @@ def describe_command(name: str, command: Any) -> str:
 
 
 def describe_settings() -> str:
-    """Every setting by section: its default, unit, bounds or choices, meaning, and option where it
-    has one.
+    """Describe every setting by section.
+
+    A setting has its default, unit, bounds or choices, meaning, and option where it has one.
     """
     text = (
         "# Settings\n\n"
@@ -85,8 +87,9 @@ def make_setting_row(field: dataclasses.Field) -> str:
 
 
 class Constant(NamedTuple):
-    """A line that names numbers: of which file of the package, its `names`, the `value` as it is
-    written, and why it is so.
+    """A line that names numbers.
+
+    It has the file of the package, its `names`, the `value` as it is written, and the reason.
     """
 
     file: str
@@ -100,7 +103,7 @@ class Constant(NamedTuple):
 
 
 def list_constants() -> list[Constant]:
-    """All numbers that have a name at the top of a module, in the order of files.
+    """List all numbers with a name at the top of a module, by file.
 
     The reason is what is written behind the value, on the lines above it, or in the text below it.
     """
@@ -149,7 +152,7 @@ def list_constants_in(file: Path) -> Iterator[Constant]:
 
 
 def list_names(statement: ast.stmt) -> tuple[str, ...]:
-    """The names in capitals that a statement gives values to."""
+    """List the names in capitals to which a statement gives values."""
     if not isinstance(statement, (ast.Assign, ast.AnnAssign)) or statement.value is None:
         return ()
     target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
@@ -158,8 +161,9 @@ def list_names(statement: ast.stmt) -> tuple[str, ...]:
 
 
 def is_number(value: ast.expr | None) -> bool:
-    """Whether an expression is a number, several of them, or made of nothing else by functions and
-    operators.
+    """Return whether an expression is a number, several, or made of numbers.
+
+    Functions and operators make it of nothing else.
     """
     if isinstance(value, ast.Constant):
         return isinstance(value.value, (int, float)) and not isinstance(value.value, bool)
@@ -173,11 +177,14 @@ def is_number(value: ast.expr | None) -> bool:
 
 
 def describe_constants() -> str:
-    """A table a room: every named number, its value, its file, and what it does or why it is so."""
+    """Describe every named number, a table a package.
+
+    A row has its value, its file, and what it does.
+    """
     text = (
         "# Constants\n\nEvery number that has a name in the code, with its unit and its reason. "
         "What a user may want to change is a "
-        "[setting](settings.md) instead. `python -m benchmarks.constants NAME` tells what half and "
+        "[setting](settings.md) instead. `python -m benchmarks.constants NAME` shows what half and "
         "double of one do to Delft.\n"
     )
     for room, room_constants in groupby(list_constants(), lambda constant: constant.room):
@@ -192,7 +199,7 @@ def describe_constants() -> str:
 
 
 def make_cell(text: str) -> str:
-    """A text as a table's cell holds it."""
+    """Return a text as a table's cell holds it."""
     return text.replace("|", "\\|").replace("\n", " ")
 
 

@@ -1,4 +1,6 @@
-"""A Dask cluster of two workers on this machine; on a real one only the address changes.
+"""A Dask cluster of two workers on this machine.
+
+On a real cluster only the address changes.
 
 usage: python examples/dask_two_workers.py OUT [CLOUD... FOOTPRINTS] (extra `city`; without files
 the bundled town)

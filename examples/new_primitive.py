@@ -1,5 +1,6 @@
-"""A roof shape of your own: a curb lean-to, a single slope that breaks once into a shallower upper
-part.
+"""A roof shape of your own: a curb lean-to.
+
+It is a single slope that breaks once into a shallower upper part.
 
 A primitive is data: its planes as formulas of half width V, half length U and q0..q3, the paper's
 vertices and faces, and where its fit starts. In the package this would be one file in `primitives/`

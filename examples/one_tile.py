@@ -1,5 +1,6 @@
-"""One tile: the bundled neighbourhood through the same road as `hiproof reconstruct`, then a look
-at the worst building.
+"""One tile: the bundled neighbourhood, as `hiproof reconstruct` runs it.
+
+Then it shows the worst building.
 """
 
 import sys

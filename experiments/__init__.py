@@ -1,4 +1,6 @@
-"""The paper's experiments, run again: one file a table or figure, `python -m experiments NAME`.
+"""The paper's experiments, run again: one file a table or figure.
+
+Run one by `python -m experiments NAME`.
 
 Every module has `run(options) -> Result`; `__main__` chooses it by name, `output` writes what comes
 back. Three methods stand side by side (`methods`): the paper's objective, the likelihood, and

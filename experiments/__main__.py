@@ -1,5 +1,6 @@
-"""`python -m experiments NAME [--quick] [--data ...] [--out DIR]`; several names, or `all`, run one
-after the other.
+"""`python -m experiments NAME [--quick] [--data ...] [--out DIR]`.
+
+Several names, or `all`, run one after the other.
 """
 
 from __future__ import annotations

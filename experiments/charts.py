@@ -11,7 +11,7 @@ MORE_COLOURS = ("#2a9d5c", "#7b3fa0", "#f08a4b", "#5fc3e4")
 
 
 def make_figure(columns: int = 1, rows: int = 1, width: float = 5.0, height: float = 3.4):
-    """A figure without a window, and its axes as a flat list."""
+    """Return a figure without a window, and its axes as a flat list."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(columns * width, rows * height), layout="constrained")
@@ -29,7 +29,10 @@ def choose_colour(name: str, index: int) -> str:
 def draw_grouped_bars(
     groups: Sequence[str], series: dict[str, Sequence[float]], label: str, log: bool = False
 ):
-    """A bar a series within each group; NaN and None leave a gap."""
+    """Draw a bar a series within each group.
+
+    NaN and None leave a gap.
+    """
     figure, (axis,) = make_figure(width=max(5.0, 0.9 * len(groups)))
     width = 0.8 / len(series)
     for i, (name, values) in enumerate(series.items()):
@@ -54,7 +57,7 @@ def draw_curves(
     label: str,
     log: bool = False,
 ):
-    """A panel a name: x values and a line a series."""
+    """Draw a panel a name: x values and a line a series."""
     columns = min(3, len(panels))
     figure, axes = make_figure(columns, -(-len(panels) // columns), 4.2, 3.2)
     for axis in axes[len(panels) :]:
@@ -75,7 +78,10 @@ def draw_curves(
 
 
 def draw_distributions(values: dict[str, np.ndarray], label: str, top: float):
-    """Histograms over each other and their cumulated shares, both up to `top`."""
+    """Draw histograms over each other, and their cumulated shares.
+
+    Both go up to `top`.
+    """
     figure, (left, right) = make_figure(2)
     bins = np.linspace(0, top, 41)
     for i, (name, numbers) in enumerate(values.items()):

@@ -1,4 +1,4 @@
-"""How exactly a roof's parameters can be known at best from points of a given density and noise.
+"""The best accuracy of a roof's parameters by density and noise.
 
 Heights. Given its place (x, y), a point's height is z = f(x, y; theta) + e with e of variance
 sigma^2. For normal errors the Fisher information about theta is the sum over the points of the
@@ -38,8 +38,9 @@ THETA_NAMES = ("x", "y", "kappa", "half_width", "half_length", "q0", "q1", "q2",
 def compute_best_covariance(
     primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
 ) -> np.ndarray:
-    """Covariance (k, k) of the used entries of theta (metres, radians, slopes) that no estimator
-    can go below.
+    """Return the covariance (k, k) that no estimator can go below.
+
+    It is that of the used entries of theta (metres, radians, slopes).
 
     `density` in points/m2, `sigma_m` the standard deviation of the height errors. What neither
     heights nor edges tell (the rotation of a level roof) has an infinite variance.
@@ -60,7 +61,7 @@ def compute_best_covariance(
 def compute_height_information(
     primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
 ) -> np.ndarray:
-    """I_z (k, k), the integral taken as a midpoint sum over the plan rectangle."""
+    """Return I_z (k, k), integrated as a midpoint sum over the plan."""
     half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
     middle = (np.arange(GRID) + 0.5) / GRID * 2 - 1
     u, v = (axis.ravel() for axis in np.meshgrid(middle * half_length, middle * half_width))
@@ -72,7 +73,10 @@ def compute_height_information(
 
 
 def compute_height_gradient(primitive: Primitive, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    """Central differences (n, k) of the height at `xy` (n, 2) by the used entries of theta."""
+    """Return derivatives (n, k) of the height at `xy` (n, 2).
+
+    They are central differences by the used entries of theta.
+    """
     columns = []
     for i in range(primitive.theta_size):
         upper, lower = theta.copy(), theta.copy()
@@ -85,7 +89,10 @@ def compute_height_gradient(primitive: Primitive, theta: np.ndarray, xy: np.ndar
 
 
 def compute_edge_information(primitive: Primitive, theta: np.ndarray, density: float) -> np.ndarray:
-    """I_xy (k, k): each edge's position is the centre's, plus or minus a half extent."""
+    """Return I_xy (k, k), from the edges' positions.
+
+    Each edge's position is the centre's, plus or minus a half extent.
+    """
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     information = np.zeros((primitive.theta_size,) * 2)
     for half, other, direction in (
@@ -104,8 +111,10 @@ def compute_edge_information(primitive: Primitive, theta: np.ndarray, density: f
 def compute_bounds(
     primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
 ) -> dict[str, float]:
-    """Least standard deviations: entries of theta (`q0` is the top or eave height), place along and
-    across the ridge, and theta_p (metres) by the delta rule.
+    """Return least standard deviations by name.
+
+    They are of entries of theta (`q0` is the top or eave height), place along and across the ridge,
+    and theta_p (metres) by the delta rule.
     """
     theta = np.asarray(theta, float)
     size = primitive.theta_size
@@ -123,7 +132,10 @@ def compute_bounds(
 
 
 def compute_parameter_gradient(primitive: Primitive, theta: np.ndarray, name: str) -> np.ndarray:
-    """Derivative (k,) of one of theta_p by the used entries of theta."""
+    """Return the derivative (k,) of one of theta_p.
+
+    It is by the used entries of theta.
+    """
     gradient = np.zeros(primitive.theta_size)
     for i in range(HALF_WIDTH, primitive.theta_size):
         upper, lower = theta.copy(), theta.copy()

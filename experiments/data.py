@@ -1,5 +1,6 @@
-"""The roofs that experiments run on: New York roofs and RoofN3D where a user has them, simulated
-ones everywhere.
+"""The roofs of experiments: New York, RoofN3D and simulated ones.
+
+The first two are used where a user has them.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ MOST_ROWS = 910
 
 @dataclass(frozen=True)
 class RoofSample:
-    """One roof: `points` (n, 3) as a method sees them, `is_roof` (n,) those it is judged on;
+    """One roof: `points` (n, 3), and `is_roof` (n,) those that are judged.
+
+    `points` are as a method sees them; `type` is given where it is known.
 
     `type` where it is known.
 
@@ -42,7 +45,10 @@ class RoofSample:
 
 
 def collect_samples(options: Options) -> dict[str, list[RoofSample]]:
-    """Every data set at hand by name: New York or the csv given, and simulated roofs."""
+    """Collect every data set at hand by name.
+
+    They are New York or the csv given, and simulated roofs.
+    """
     samples = {}
     path = options.data or SHARED
     if path.is_file():
@@ -63,8 +69,9 @@ def collect_samples(options: Options) -> dict[str, list[RoofSample]]:
 
 
 def read_new_york_roofs(path: Path, limit: int | None = None) -> Iterator[RoofSample]:
-    """The roofs of `nyc_roofs.npz`; what a published network took for roof (face > 0) is what
-    counts.
+    """Yield the roofs of `nyc_roofs.npz`.
+
+    What a published network took for roof (face > 0) is what counts.
     """
     content = np.load(path)
     for start, end in islice(pairwise(content["offset"]), limit):
@@ -73,8 +80,9 @@ def read_new_york_roofs(path: Path, limit: int | None = None) -> Iterator[RoofSa
 
 
 def read_roofn3d_roofs(path: Path, limit: int) -> Iterator[RoofSample]:
-    """The first buildings of a RoofN3D csv of a class we know, in its order, with at least ten
-    points.
+    """Yield the first buildings of a RoofN3D csv of known classes.
+
+    They come in its order, with at least ten points.
     """
     records = (
         record
@@ -92,8 +100,9 @@ def read_roofn3d_roofs(path: Path, limit: int) -> Iterator[RoofSample]:
 
 
 def simulate_roofs(seed: int, roofs: int, quick: bool) -> Iterator[RoofSample]:
-    """`roofs` of every type as an airborne scanner sees them: chimneys, dormers, trees, missing
-    strips, no neighbours.
+    """Yield `roofs` of every type as an airborne scanner sees them.
+
+    They have chimneys, dormers, trees, missing strips, and no neighbours.
     """
     settings = ScanSettings(density=5.0, defects=Defects(neighbour=0.0), margin_m=0.0)
     for index, kind in enumerate(ROOFN3D_TYPES if quick else ROOF_TYPES):

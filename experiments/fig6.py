@@ -12,7 +12,7 @@ SHARES = (5, 25, 50, 75, 95)
 
 
 def run(options: Options) -> Result:
-    """Percentiles as tables, curves as pictures, a pair for each data set."""
+    """Return percentiles as tables, and curves as pictures, a pair a data set."""
     tables, pictures = [], {}
     samples, verdicts = judge_samples(options)
     for name in samples:

@@ -1,4 +1,4 @@
-"""Figure 7: asymmetric gables, which a symmetric primitive cannot follow; ours against it."""
+"""Figure 7: asymmetric gables, which no symmetric primitive can follow."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ DENSITY, NOISE_M = 4.72, 0.12
 
 
 def run(options: Options) -> Result:
-    """The same roofs with both primitives, and a section through the first."""
+    """Fit the same roofs with both primitives, and draw a section.
+
+    The section is through the first.
+    """
     roofs = 2 if options.quick else 40
     rows = []
     for method in OBJECTIVES:
@@ -62,7 +65,7 @@ def draw_roof_and_points(seed: int, roof: int):
 
 
 def measure_errors(method: str, primitive: str, seed: int, roof: int) -> tuple[float, float]:
-    """Mean PSD, and the RMSE of the fitted surface's heights."""
+    """Return the mean PSD, and the RMSE of the fitted surface's heights."""
     building, points = draw_roof_and_points(seed, roof)
     model = fit_model(method, points, (primitive,))
     xy = uniform_points(building, np.random.default_rng(roof), 5.0, 0.0)
@@ -71,14 +74,18 @@ def measure_errors(method: str, primitive: str, seed: int, roof: int) -> tuple[f
 
 
 def has_unequal_slopes(building) -> bool:
-    """Whether the eaves are level with each other, so that the slopes differ (of equal slopes the
-    gable gets the planes).
+    """Return whether the eaves are level, so that the slopes differ.
+
+    Of equal slopes the gable gets the planes.
     """
     return abs(building.parameters["eave_step"]) < 0.2
 
 
 def draw_section(seed: int):
-    """Points and both fits of a roof with unequal slopes, seen along the ridge."""
+    """Draw points and both fits of a roof with unequal slopes.
+
+    They are seen along the ridge.
+    """
     from .charts import make_figure
 
     building, points = next(

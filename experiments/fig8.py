@@ -1,5 +1,6 @@
-"""Figure 8: RANSAC plane detection against the parametric fit on hip roofs, as the points get
-worse.
+"""Figure 8: RANSAC plane detection against the parametric fit.
+
+Hip roofs have points that get worse.
 
 For every roof: how many of its four planes are found, how many found planes are wrong or doubles,
 and whether a closed model comes out. Planes make a closed model only when each true face is found
@@ -38,7 +39,7 @@ COLUMNS = (
 
 
 def run(options: Options) -> Result:
-    """One axis of trouble at a time, both methods on the same points."""
+    """Run one axis of trouble at a time, both methods on the same points."""
     if not is_available():
         remark = (
             "Not run: it needs pyransac3d, the extra `experiments` (pip install "
@@ -97,8 +98,9 @@ class Trouble:
 
 
 def remove_corner(points: np.ndarray, building: SimBuilding, share: float) -> np.ndarray:
-    """Points (n, 3) less the given share of them nearest to one corner, as a tree's crown hides
-    them.
+    """Remove the share of points (n, 3) nearest to one corner.
+
+    A tree's crown hides points so.
 
     Distances are in units of the sides, so that the same parts of both sides remain whatever the
     roof's proportions.
@@ -120,7 +122,10 @@ def turn_back(xy: np.ndarray, kappa: float) -> np.ndarray:
 def match_planes(
     method: str, kind: str, level: float, seed: int, roof: int
 ) -> tuple[int, int, bool]:
-    """(true faces found, wrong planes, whether exactly the true faces came out)."""
+    """Return the numbers of true faces found and wrong planes, and success.
+
+    Success is that exactly the true faces came out.
+    """
     rng = np.random.default_rng([seed, roof, 88])
     building = random_building(rng, "hip")
     points = Trouble.of(kind, level).points(building, rng)
@@ -132,7 +137,7 @@ def match_planes(
 
 
 def fit_planes(points: np.ndarray) -> list[DetectedPlane]:
-    """The faces of the fitted hip as planes."""
+    """Return the faces of the fitted hip as planes."""
     model = fit_model("likelihood", points, ("hip",))
     return [
         DetectedPlane(*fit_least_squares_plane(face), np.empty(0, int)) for face in model.polygons
@@ -140,7 +145,7 @@ def fit_planes(points: np.ndarray) -> list[DetectedPlane]:
 
 
 def list_true_faces(building: SimBuilding) -> list[np.ndarray]:
-    """The roof surfaces (m, 3) in world metres."""
+    """Return the roof surfaces (m, 3) in world metres."""
     part = building.roof.parts[0]
     primitive = CATALOGUE[part.type]
     vertices = place_vertices(

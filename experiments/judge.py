@@ -17,7 +17,9 @@ METHODS = ("paper", "likelihood", *(("ransac",) if is_available() else ()))
 
 @dataclass(frozen=True)
 class Verdict:
-    """Figures of one roof: PSD mean and standard deviation over its points (m), outline IoU;
+    """Figures of one roof; NaN without a model.
+
+    They are mean and standard deviation of the PSD over its points (m), and outline IoU.
 
     NaN without a model.
     """
@@ -29,7 +31,7 @@ class Verdict:
 
 
 def judge(method: str, sample: RoofSample) -> Verdict:
-    """Fit, and judge on the roof's points.
+    """Fit a roof, and judge the fit on the roof's points.
 
     The likelihood and RANSAC see all points; the likelihood chooses among the whole catalogue. The
     paper's objective has its network before it: it is given the roof's points alone, and the type
@@ -56,8 +58,9 @@ def judge(method: str, sample: RoofSample) -> Verdict:
 def judge_samples(
     options: Options,
 ) -> tuple[dict[str, list[RoofSample]], dict[str, dict[str, dict[int, Verdict]]]]:
-    """All data sets at hand, and for each the verdicts by method and sample index; kept for the
-    next to ask.
+    """Return all data sets at hand, and the verdicts by method and index.
+
+    The index is that of the sample. They are kept for the next call.
     """
     samples = collect_samples(options)
     verdicts: dict = {name: {} for name in samples}

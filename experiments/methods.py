@@ -1,5 +1,6 @@
-"""The methods under comparison behind one verb: points in, bounded roof surfaces and parameters
-out.
+"""The methods under comparison behind one verb.
+
+Points go in, and bounded roof surfaces and parameters come out.
 """
 
 from __future__ import annotations
@@ -23,15 +24,16 @@ OBJECTIVES = ("paper", "likelihood")
 
 @dataclass(frozen=True)
 class Model:
-    """Roof surfaces (rings (m, 3)) and, of a parametric method, its `fit`; both in the frame of the
-    points.
+    """Roof surfaces (rings (m, 3)) and, of a parametric method, its `fit`.
+
+    Both are in the frame of the points.
     """
 
     polygons: list[np.ndarray] = field(default_factory=list)
     fit: Fit | None = None
 
     def psd(self, points: np.ndarray) -> np.ndarray:
-        """Distances (n,) of points to the nearest surface."""
+        """Return distances (n,) of points to the nearest surface."""
         return psd(self.polygons, points)
 
     def outline_iou(self, outline: shapely.Geometry) -> float:
@@ -44,8 +46,9 @@ def fit_model(
     types: Sequence[str] | None = None,
     outline: shapely.Polygon | None = None,
 ) -> Model:
-    """Model of `points` (n, 3) by `method` ("paper", "likelihood" or "ransac"); empty where the
-    method finds none.
+    """Fit a model to `points` (n, 3) by a method.
+
+    It is "paper", "likelihood" or "ransac". The model is empty where the method finds none.
     """
     if method == "ransac":
         from .ransac import detect_planes
@@ -64,8 +67,9 @@ def fit_model(
 
 
 def run_in_parallel(function: Callable[..., Any], work: Iterable[tuple], jobs: int) -> list[Any]:
-    """`function(*item)` for every item, in order; with several processes the work is shared out in
-    small chunks.
+    """Return `function(*item)` for every item, in order.
+
+    With several processes the work is shared in small chunks.
     """
     work = list(work)
     if jobs <= 1 or len(work) < 2:

@@ -1,5 +1,6 @@
-"""What an experiment hands back, and the files that become of it: Markdown, CSV a table, PNG a
-picture.
+"""The result of an experiment, and its files.
+
+They are Markdown, CSV a table, and PNG a picture.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Options:
-    """How to run: `quick` takes seconds, `data` overrides the data's place, `jobs` processes share
-    the work.
+    """How to run an experiment.
+
+    `quick` takes seconds, `data` overrides the data's place, `jobs` processes share the work.
 
     `paper_share` of the fits are made with the paper's objective too, which takes nine tenths of
     the time.
@@ -28,8 +30,9 @@ class Options:
     paper_share: float = 1.0
 
     def covers(self, method: str, index: int) -> bool:
-        """Whether `method` takes the roof of this index: the paper's objective an even share of
-        them.
+        """Return whether `method` takes the roof of this index.
+
+        The paper's objective takes an even share of them.
         """
         if method != "paper":
             return True
@@ -38,8 +41,9 @@ class Options:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of numbers and words under `columns`; a number shows with three decimals, None as a
-    dash.
+    """Rows of numbers and words under `columns`.
+
+    A number shows with three decimals, None as a dash.
     """
 
     title: str
@@ -67,7 +71,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Result:
-    """Tables and pictures (matplotlib figures by name) of one experiment;
+    """Tables and pictures of one experiment.
+
+    Pictures are matplotlib figures by name.
 
     `data` says in words what it was run on.
     """
@@ -86,7 +92,10 @@ def format_value(value: Any) -> str:
 
 
 def write_result(name: str, result: Result, out: Path, options: Options, seconds: float) -> Path:
-    """Write everything of `result` into the folder `out`; the path of the Markdown file."""
+    """Write everything of `result` into the folder `out`.
+
+    Returns the path of the Markdown file.
+    """
     out.mkdir(parents=True, exist_ok=True)
     size = ", quick form" if options.quick else ""
     lines = [f"## {name}: {result.title}", "", f"Data: {result.data}", ""]

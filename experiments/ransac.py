@@ -1,5 +1,6 @@
-"""The plane-based baseline: RANSAC plane after plane (pyransac3d), as the paper's Figure 8 compares
-with.
+"""The plane-based baseline: RANSAC plane after plane (pyransac3d).
+
+The paper's Figure 8 compares with it.
 
 The library draws from Python's global generator, which is seeded here so that a run can be
 repeated.
@@ -28,7 +29,9 @@ STEEPEST = 0.2
 
 @dataclass(frozen=True)
 class DetectedPlane:
-    """Unit `normal` pointing up and `offset`: normal . x + offset = 0;
+    """A plane normal . x + offset = 0 with its inliers.
+
+    The unit `normal` points up.
 
     `inliers` index the points given.
     """
@@ -38,7 +41,7 @@ class DetectedPlane:
     inliers: np.ndarray
 
     def polygon(self, points: np.ndarray) -> np.ndarray:
-        """Convex hull (m, 3) of the inliers, laid into the plane."""
+        """Return the convex hull (m, 3) of the inliers, laid into the plane."""
         hull = shapely.convex_hull(shapely.multipoints(points[self.inliers, :2]))
         xy = shapely.get_coordinates(hull)
         xy = xy[:-1] if len(xy) > 3 else np.repeat(xy[:1], 3, axis=0)
@@ -55,8 +58,9 @@ def is_available() -> bool:
 def detect_planes(
     points: np.ndarray, threshold_m: float = THRESHOLD_M, seed: int = 0
 ) -> list[DetectedPlane]:
-    """Planes of `points` (n, 3), the one with the most inliers first, until too few points are
-    left.
+    """Detect planes of `points` (n, 3) until too few points are left.
+
+    The one with the most inliers comes first.
 
     Each plane is refitted to its inliers by least squares. Raises HiproofError without pyransac3d.
     """
@@ -87,7 +91,10 @@ def detect_planes(
 
 
 def fit_least_squares_plane(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Unit normal pointing up and offset of the plane nearest to `points` (n, 3)."""
+    """Return unit normal and offset of the plane nearest to `points` (n, 3).
+
+    The normal points up.
+    """
     centre = points.mean(axis=0)
     normal = np.linalg.eigh((points - centre).T @ (points - centre))[1][:, 0]
     normal = normal if normal[2] >= 0 else -normal
@@ -100,8 +107,10 @@ def match_faces(
     angle_deg: float = 10.0,
     distance_m: float = 0.3,
 ) -> tuple[int, int]:
-    """(found, wrong): true `faces` (rings (m, 3)) with a plane of their direction and height;
-    planes of no face.
+    """Return how many true faces are found, and how many planes are wrong.
+
+    True `faces` (rings (m, 3)) have a plane of their direction and height; wrong ones are planes of
+    no face.
 
     A plane that doubles a face already found is wrong too.
     """

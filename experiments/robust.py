@@ -1,5 +1,6 @@
-"""Robustness: dimension errors of gables and hips against density, noise, missing parts, outliers,
-and shifted footprints.
+"""Robustness: dimension errors of gables and hips.
+
+They are against density, noise, missing parts, outliers, and shifted footprints.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ COLUMNS = (
 
 
 def run(options: Options) -> Result:
-    """One axis at a time; all methods see the same points."""
+    """Run one axis at a time; all methods see the same points."""
     roofs, kinds = (1, KINDS[:1]) if options.quick else (20, KINDS)
     rows = []
     for name, levels in AXES.items():
@@ -76,8 +77,9 @@ NOTE = (
 
 
 def compute_figures(outcomes: list[dict]) -> tuple:
-    """RMSE and median of the absolute dimension errors of each method, and RANSAC's missed
-    share.
+    """Return RMSE and median of the absolute dimension errors.
+
+    They are by method; RANSAC's missed share comes with them.
     """
     cells: list[float | None] = []
     for method in METHODS:
@@ -95,7 +97,10 @@ def compute_figures(outcomes: list[dict]) -> tuple:
 def measure_errors(
     label: str, level: float, kind: str, seed: int, roof: int, methods: tuple[str, ...] = METHODS
 ) -> dict:
-    """Dimension errors (k,) by method (NaN without a fit), and the share of faces RANSAC misses."""
+    """Return dimension errors (k,) by method, and RANSAC's missed faces.
+
+    Errors are NaN without a fit; missed faces are a share.
+    """
     rng = np.random.default_rng([seed, roof, KINDS.index(kind), 99])
     building = random_building(rng, kind)
     points, outline = add_trouble(building, label, level, rng)
@@ -119,8 +124,9 @@ def measure_missed_share(points: np.ndarray, building: SimBuilding) -> float:
 def add_trouble(
     building: SimBuilding, kind: str, level: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, shapely.Polygon | None]:
-    """Points of the building with one kind of trouble, and the footprint the fit is given,
-    if any.
+    """Return points of the building with one kind of trouble.
+
+    The footprint that the fit gets, if any, comes with them.
     """
     density = level if kind.startswith("density") else BASE_DENSITY
     noise_m = level if kind.startswith("noise") else BASE_NOISE_M
@@ -141,8 +147,10 @@ def add_trouble(
 def remove_strip(
     points: np.ndarray, building: SimBuilding, share: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Points less those in a band across the ridge that takes the given share of the length, a
-    tenth left at each end (a band at the end would only make a shorter roof).
+    """Remove the points in a band across the ridge.
+
+    It takes the given share of the length, a tenth left at each end (a band at the end would only
+    make a shorter roof).
     """
     part = building.roof.parts[0]
     along = turn_back(
@@ -154,7 +162,10 @@ def remove_strip(
 
 
 def add_outliers(points: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
-    """Points of which the given share is replaced by draws from their box, 2 m higher and lower."""
+    """Replace a share of the points by outliers.
+
+    They are drawn from the points' box, 2 m higher and lower.
+    """
     points = points.copy()
     is_outlier = rng.random(len(points)) < share
     lower, upper = points.min(axis=0) - [0, 0, 2], points.max(axis=0) + [0, 0, 2]
@@ -163,7 +174,7 @@ def add_outliers(points: np.ndarray, share: float, rng: np.random.Generator) -> 
 
 
 def draw_picture(rows: list[tuple]):
-    """Dimension RMSE of both objectives, a panel an axis."""
+    """Draw the dimension RMSE of both objectives, a panel an axis."""
     panels = {}
     for kind in AXES:
         panel_rows = [row for row in rows if row[0] == kind]

@@ -1,5 +1,6 @@
-"""Table 1: what the network makes of the points: labels (IoU) and roof types (accuracy, balanced
-accuracy, recalls).
+"""Table 1: the network's labels and roof types.
+
+Labels have IoU, types accuracy, balanced accuracy and recalls.
 """
 
 from __future__ import annotations
@@ -30,8 +31,9 @@ REMARKS = (
 
 
 def run(options: Options) -> Result:
-    """The shipped network on simulated roofs it never saw, and on the labelled real ones where they
-    are at hand.
+    """Run the shipped network on simulated roofs that it never saw.
+
+    The labelled real ones are used where they are at hand.
     """
     count = 4 if options.quick else 1000
     rng = np.random.default_rng(options.seed + UNSEEN)
@@ -58,8 +60,9 @@ def run(options: Options) -> Result:
 
 
 def read_labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
-    """(type, points (n, 3)) of the RoofN3D csv given, else of the few labelled roofs in the shared
-    data.
+    """Yield (type, points (n, 3)) of labelled roofs.
+
+    They are those of the RoofN3D csv given, else the few in the shared data.
     """
     if options.data is not None and options.data.is_file():
         yield from (
@@ -74,7 +77,7 @@ def read_labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def list_labels(answer: Segmentation) -> np.ndarray:
-    """Labels (n,) as indices into LABELS."""
+    """Return labels (n,) as indices into LABELS."""
     return np.where(answer.labels == NOT_ROOF, len(TYPES), answer.labels)
 
 
@@ -83,7 +86,7 @@ def get_type_index(answer: Segmentation) -> int:
 
 
 def make_label_table(scores: Scores) -> Table:
-    """IoU of each label over all points, and the mean."""
+    """Return the IoU of each label over all points, and the mean."""
     truth, answers, is_both = (
         scores.confusion.sum(axis=1),
         scores.confusion.sum(axis=0),
@@ -97,7 +100,7 @@ def make_label_table(scores: Scores) -> Table:
 
 
 def make_type_tables(name: str, scores: Scores) -> list[Table]:
-    """Accuracy, balanced accuracy and recalls, and the confusion matrix."""
+    """Return accuracy, balanced accuracy and recalls, and the confusion matrix."""
     rows = [("accuracy", scores.accuracy), ("balanced accuracy", scores.balanced_accuracy)]
     rows += [(f"recall of {kind}", value) for kind, value in scores.recalls.items()]
     used_types = [

@@ -1,5 +1,6 @@
-"""Table 2: distance of the points to the models (PSD) and IoU of the outlines, per roof type and
-overall.
+"""Table 2: distance of points to models (PSD) and IoU of outlines.
+
+It is per roof type and overall.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ UNEXPLAINED_M = 0.2
 
 
 def run(options: Options) -> Result:
-    """All data sets at hand, all methods."""
+    """Run all methods on all data sets at hand."""
     tables, remarks = [], [NO_RANSAC]
     samples, verdicts = judge_samples(options)
     for name, roofs in samples.items():
@@ -54,7 +55,10 @@ def run(options: Options) -> Result:
 def make_rows(
     method: str, samples: Sequence[RoofSample], verdicts: dict[int, Verdict]
 ) -> list[tuple]:
-    """Overall, then by true type where it is known, else by the type the method chose."""
+    """Return overall figures, then those by type.
+
+    The type is the true one where it is known, else the one that the method chose.
+    """
     groups: dict[str, list[Verdict]] = {"all": list(verdicts.values())}
     for index, verdict in verdicts.items():
         groups.setdefault(samples[index].type or verdict.type, []).append(verdict)
@@ -82,7 +86,7 @@ def compute_figures(verdicts: Sequence[Verdict]) -> tuple:
 
 
 def describe_unexplained(name: str, verdicts: dict[int, Verdict]) -> str:
-    """Which roofs no single primitive fits."""
+    """Describe which roofs no single primitive fits."""
     unexplained = [i for i, verdict in verdicts.items() if not verdict.psd_mean <= UNEXPLAINED_M]
     if not unexplained:
         return f"{name}: a single primitive fits every roof within {UNEXPLAINED_M} m in the mean."

@@ -1,4 +1,4 @@
-"""Table 3: stability under simulated points, beside the best that any estimator could do.
+"""Table 3: stability under simulated points, beside the best possible.
 
 For each type twenty roofs, each sampled thirty times as the paper does: 4.72 points/m2, noise
 "RMSE" 0.12 m (90 % of the errors within 1, 9 % within 1-2, 1 % within 2-3 of it). The type is known
@@ -36,8 +36,9 @@ ROOFS, TRIALS, TRIALS_OF_SLOW = 20, 30, 5
 
 
 def run(options: Options) -> Result:
-    """Both objectives on all types; the paper's, a hundred times slower, with five trials for types
-    it did not test.
+    """Run both objectives on all types.
+
+    The paper's, a hundred times slower, has five trials for types that it did not test.
     """
     tables, errors = [], {}
     for method in OBJECTIVES:
@@ -68,7 +69,10 @@ def run(options: Options) -> Result:
 
 
 def measure_type_errors(method: str, kind: str, options: Options) -> list[dict[str, float]]:
-    """One record a fit: errors of theta, theta_p and place, and their bounds."""
+    """Return one record a fit: errors and their bounds.
+
+    Errors are those of theta, theta_p and place.
+    """
     trials = TRIALS if method == "likelihood" or kind in PUBLISHED else TRIALS_OF_SLOW
     if method == "paper":
         trials = max(1, round(trials * options.paper_share))
@@ -84,7 +88,7 @@ def measure_type_errors(method: str, kind: str, options: Options) -> list[dict[s
 def measure_roof_errors(
     method: str, kind: str, seed: int, roof: int, trials: int
 ) -> list[dict[str, float]]:
-    """Fits of one roof; both methods see the same points."""
+    """Fit one roof; both methods see the same points."""
     rng = np.random.default_rng([seed, list(CATALOGUE).index(kind), roof])
     building = random_building(rng, kind)
     part = building.roof.parts[0]
@@ -108,7 +112,10 @@ def measure_roof_errors(
 def record_errors(
     primitive: Primitive, truth: np.ndarray, fitted_theta: np.ndarray, bounds: dict[str, float]
 ) -> dict[str, float]:
-    """Errors of `found` against `truth` (theta (9,)), each name with its `bound:` beside it."""
+    """Return errors of a fit against `truth` (theta (9,)).
+
+    Each name has its `bound:` beside it.
+    """
     twin = orient_truth(primitive, truth, fitted_theta)
     if twin is not truth:
         truth, bounds = twin, bounds | {"q1": bounds["q2"], "q2": bounds["q1"]}
@@ -142,8 +149,9 @@ def record_errors(
 
 
 def orient_truth(primitive: Primitive, truth: np.ndarray, fitted_theta: np.ndarray) -> np.ndarray:
-    """`truth`, or its twin turned by half a turn: which eave of an asymmetric gable is the lower
-    one may be chance.
+    """Return `truth`, or its twin turned by half a turn.
+
+    Which eave of an asymmetric gable is the lower one may be chance.
     """
     turn = abs((fitted_theta[KAPPA] - truth[KAPPA] + math.pi) % (2 * math.pi) - math.pi)
     if primitive.name != "asymmetric_gable" or turn < math.pi / 2:
@@ -156,7 +164,7 @@ def orient_truth(primitive: Primitive, truth: np.ndarray, fitted_theta: np.ndarr
 
 
 def compute_rmse(records: Sequence[dict[str, float]], prefix: str) -> float | None:
-    """Root mean square of all errors whose name starts with `prefix`."""
+    """Return the root mean square of errors whose name starts with `prefix`."""
     values = [
         value for record in records for name, value in record.items() if name.startswith(prefix)
     ]
@@ -212,8 +220,9 @@ BOUND_NOTE = (
 
 
 def make_bound_rows(kind: str, errors: dict) -> list[tuple]:
-    """One row a parameter: the root mean square bound over the roofs, and each method's errors in
-    units of their bounds.
+    """Return one row a parameter: its bound, and errors in units of it.
+
+    The bound is the root mean square over the roofs; errors are each method's.
     """
     rows = []
     names = THETA_NAMES[2 : CATALOGUE[kind].theta_size]
@@ -229,8 +238,9 @@ def make_bound_rows(kind: str, errors: dict) -> list[tuple]:
 
 
 def compute_ratio(records: Sequence[dict[str, float]], name: str) -> float | None:
-    """Root mean square over the fits of error / bound: 1 at the bound, each roof counting
-    the same.
+    """Return the root mean square over the fits of error / bound.
+
+    It is 1 at the bound, each roof counting the same.
     """
     if not records:
         return None
@@ -241,7 +251,7 @@ def compute_ratio(records: Sequence[dict[str, float]], name: str) -> float | Non
 
 
 def draw_picture(kinds: Sequence[str], errors: dict):
-    """Bars: dimension errors of both objectives and of the paper."""
+    """Draw bars: dimension errors of both objectives and of the paper."""
     from .charts import draw_grouped_bars
 
     series = {

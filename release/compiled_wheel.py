@@ -26,8 +26,9 @@ WARM = ("-m", "hiproof", "warm", "--all")
 
 
 def compiled_wheel(wheel: Path, out: Path, command: Sequence[str] = WARM) -> Path:
-    """Write the wheel with the code that `command`, arguments of Python, compiles of its package;
-    where it lies.
+    """Write a wheel with compiled code, and return its path.
+
+    `command`, arguments of Python, compiles the code of its package.
     """
     with tempfile.TemporaryDirectory() as folder:
         find_python("-m", "wheel", "unpack", str(wheel), "--dest", folder)
@@ -56,8 +57,9 @@ def compile_in(root: Path, command: Sequence[str]) -> None:
 
 
 def describe(root: Path) -> None:
-    """Say in the wheel's own words which Pythons and systems it is for, and which versions its code
-    fits.
+    """Write into a wheel which Pythons, systems and versions it is for.
+
+    Its code fits these versions.
     """
     (info,) = root.glob("*.dist-info")
     kind = info / "WHEEL"

@@ -1,4 +1,4 @@
-"""List the docstrings of the package whose first lines are not as CONTRIBUTING.md asks.
+"""List the docstrings outside of tests whose first lines are not as CONTRIBUTING.md asks.
 
 usage: python tests/docstrings.py
 """
@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from naming import PACKAGE, is_later_file, is_property
+from naming import ROOT, is_property, list_files, list_files_around, name_file
 
 LONGEST_LINE = 80  # characters of a first line, so that lists of functions show it whole
 NOUNS = ("The", "A", "An", "What", "Whether", "How", "Where", "Which", "Those", "All", "One", "Of")
@@ -21,17 +21,16 @@ Documented = ast.Module | ast.ClassDef | ast.FunctionDef
 
 def iterate_docstrings() -> Iterator[tuple[str, Documented, str]]:
     """Yield the place, the node and the docstring of all that has one outside `fit/union`."""
-    for file in sorted(PACKAGE.rglob("*.py")):
-        if not is_later_file(file):
-            yield from iterate_file(file)
+    around = [file for file in list_files_around() if file.parts[len(ROOT.parts)] != "tests"]
+    for file in (*list_files(), *around):
+        yield from iterate_file(file)
 
 
 def iterate_file(file: Path) -> Iterator[tuple[str, Documented, str]]:
     """Yield the place, the node and the docstring of all that has one in a file."""
-    place = file.relative_to(PACKAGE).as_posix()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, Documented) and (text := ast.get_docstring(node)):
-            yield f"{place}: {getattr(node, 'name', 'module')}", node, text
+            yield f"{name_file(file)}: {getattr(node, 'name', 'module')}", node, text
 
 
 def find_fault(node: Documented, text: str) -> str:
@@ -44,7 +43,7 @@ def find_fault(node: Documented, text: str) -> str:
     first, *rest = text.splitlines()
     if len(first) > LONGEST_LINE:
         return f"is longer than {LONGEST_LINE} characters"
-    if not first.endswith(".") or (rest and rest[0].strip()):
+    if not first.endswith((".", "?")) or (rest and rest[0].strip()):
         return "is no sentence of its own"
     is_function = isinstance(node, ast.FunctionDef) and not is_property(node)
     word = first.split()[0]

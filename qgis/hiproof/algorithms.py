@@ -1,4 +1,4 @@
-"""The algorithms: what each asks for, the command that it becomes, and what it gives back."""
+"""The algorithms: their parameters, their command, and their results."""
 
 import functools
 import inspect
@@ -67,7 +67,10 @@ class Algorithm(QgsProcessingAlgorithm):
             raise QgsProcessingException(str(error)) from error
 
     def get_source(self, parameters, name, context):
-        """(path, layer, condition) of a vector layer, each None where there is none."""
+        """Return (path, layer, condition) of a vector layer.
+
+        Each is None where there is none.
+        """
         layer = self.parameterAsVectorLayer(parameters, name, context)
         if layer is None:
             return None, None, None
@@ -174,8 +177,9 @@ def tell(program, folder, feedback):
 
 
 class Evaluate(Algorithm):
-    """Measures a run's models against points, its own where none are named: distances, shares,
-    overlaps and volumes, a row a building in evaluation.csv.
+    """Measures a run's models against points, its own where none are named.
+
+    Distances, shares, overlaps and volumes go to evaluation.csv, a row a building.
     """
 
     def displayName(self):
@@ -236,7 +240,10 @@ class Convert(Algorithm):
 
 
 class Load(Algorithm):
-    """Loads the buildings and roof surfaces of a run, coloured by roof type or raised in 2.5D."""
+    """Loads the buildings and roof surfaces of a run, coloured or raised.
+
+    Colours are by roof type; buildings are raised in 2.5D.
+    """
 
     def displayName(self):
         return "Load results"

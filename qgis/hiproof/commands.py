@@ -29,7 +29,7 @@ def reconstruct(
     processes=None,
     extra="",
 ):
-    """The main job.
+    """Return the command of the main job.
 
     `bbox` is (xmin, ymin, xmax, ymax) in the clouds' coordinates, `more` further options as typed.
     """
@@ -46,7 +46,7 @@ def reconstruct(
 
 
 def evaluate(program, folder, clouds, footprints=None, layer=None):
-    """Figures of a run's models against points."""
+    """Return the command that measures a run's models against points."""
     return [
         program,
         "evaluate",
@@ -57,17 +57,18 @@ def evaluate(program, folder, clouds, footprints=None, layer=None):
 
 
 def convert(program, folder, format, out=None):
-    """A run's models in another format."""
+    """Return the command that converts a run's models for 3D viewers."""
     return [program, "convert", folder, *([out] if out else []), "--format", format]
 
 
 def status(program, folder):
-    """How far a run is."""
+    """Return the command that shows how far a run is."""
     return [program, "status", folder, "--json"]
 
 
 def pairs(options):
-    """Options with their values, those without one left out; a value that begins with a dash cannot
-    be taken for an option.
+    """Return options with their values, those without one left out.
+
+    A value that begins with a dash cannot be taken for an option.
     """
     return [f"{name}={value}" for name, value in options.items() if value]

@@ -1,4 +1,7 @@
-"""A command that runs beside QGIS: what it says is handed on, and it ends when the user cancels."""
+"""A command that runs beside QGIS.
+
+Its output is passed on, and it ends when the user cancels.
+"""
 
 import json
 import os
@@ -17,8 +20,9 @@ class Failed(Exception):
 
 
 def run(command, say, cancelled, progress=None):
-    """Run `command` to its end, handing each line that it says to `say`; what it ends with, 0 or 1
-    (some building failed).
+    """Run `command` to its end, passing each line of its output to `say`.
+
+    Returns its exit code, 0 or 1 (some building failed).
 
     `cancelled()` is asked whether to stop it; `progress()` is called every few seconds. Raises
     Failed, with what it said last, for a command that cannot be started, is used wrongly (2) or was
@@ -67,8 +71,9 @@ def pass_lines(lines, say, lines_kept):
 
 
 def make_environment():
-    """QGIS sets variables for its own Python, which are not for another's; on Windows no window is
-    to open.
+    """Return the environment of the command, without QGIS's own variables.
+
+    They are for QGIS's Python, not for another's; on Windows no window is to open.
     """
     environment = {
         name: value
@@ -82,7 +87,10 @@ def make_environment():
 
 
 def measure_progress(program, folder):
-    """The share of buildings done [%] of the run in `folder`, None while that is not known."""
+    """Return the share of buildings done [%] of the run in `folder`.
+
+    It is None while that is not known.
+    """
     process = subprocess.run(
         commands.status(program, folder), capture_output=True, text=True, **make_environment()
     )

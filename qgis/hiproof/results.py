@@ -1,5 +1,6 @@
-"""What a run has written, as layers: coloured by the style kept in the file, roofs, or buildings
-raised in 2.5D.
+"""A run's results as layers.
+
+They have the style kept in the file, roofs, or buildings raised in 2.5D.
 """
 
 import os
@@ -16,7 +17,7 @@ HEIGHT = 'coalesce("rf_h_roof_max" - "rf_h_ground", 0)'
 
 
 def load_layers(folder):
-    """(name, QgsVectorLayer) of those layers that the run's GeoPackage has."""
+    """Return (name, QgsVectorLayer) of the layers in the run's GeoPackage."""
     path = os.path.join(folder, "buildings.gpkg")
     layers = (
         (name, QgsVectorLayer(f"{path}|layername={name}", f"hiproof {name}", "ogr"))
@@ -26,8 +27,9 @@ def load_layers(folder):
 
 
 def choose_style(name, raised):
-    """A function that styles a layer: buildings raised to their height, or as the file itself keeps
-    it, by roof type.
+    """Return a function that styles a layer.
+
+    Buildings are raised to their height, or keep the file's style by roof type.
     """
     return raise_buildings if raised and name == "buildings" else QgsVectorLayer.loadDefaultStyle
 
