@@ -253,7 +253,7 @@ HASWELL = dict.fromkeys(
     ("sse4.2", "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), True
 )
 NEHALEM = {"sse4.2": True}
-OTHER_VERSIONS = "importlib.metadata.version = lambda name: '0'"
+OTHER_VERSIONS = "import numba; numba.__version__ = '0'"
 
 
 @pytest.mark.skipif(not kinds.runs_kind(), reason=f"makes code for {kinds.KIND}")
@@ -288,7 +288,7 @@ def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_pas
     )
     assert "numba==" in (packages / "town-3.dist-info" / "METADATA").read_text()
     script = f"""
-import importlib.metadata, llvmlite.binding as binding
+import llvmlite.binding as binding
 binding.get_host_cpu_name = lambda: {name!r}
 binding.get_host_cpu_features = lambda: binding.targets.FeatureMap({features})
 {extra}

@@ -13,6 +13,7 @@ import hashlib
 import re
 import sys
 from collections.abc import Iterable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 IMPORT = re.compile(
@@ -75,10 +76,7 @@ def digest_file(file: Path) -> bytes:
 
 @functools.cache
 def read_version(library: str) -> str:
-    # slow to import, and the command line's help needs no stamp
-    from importlib.metadata import version
-
-    return version(library)
+    return import_module(library).__version__  # its metadata take ten times as long to find
 
 
 def closure(file: Path) -> set[Path]:
