@@ -67,7 +67,7 @@ def test_a_window_judges_a_moved_side_as_the_whole_roof_does(monkeypatch, kind, 
         for edge, side in enumerate(state.sides[k]):
             if not side.anchored:
                 line = Side(side.at + 0.4, side.lean, False, side.sigma)
-                moved = weld.with_line_moved(problem.volumes, state.sides, k, edge, line)
+                moved = weld.with_line_moved(state.sides, k, edge, line, problem)
                 after = state._replace(sides=moved)
                 box = weld.box_of(weld.Repair(0.4, {(k, edge): line}), state, problem)
                 in_window, on_roof = (
@@ -88,7 +88,7 @@ def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):
         for edge, side in enumerate(sides[k]):
             if not side.anchored and np.isfinite(side.sigma):
                 line = Side(side.at + 0.02, side.lean, False, side.sigma)
-                apart = weld.with_line_moved(volumes, sides, k, edge, line)
+                apart = weld.with_line_moved(sides, k, edge, line, problem)
                 back, *_ = weld.weld(volumes, apart, agreement._replace(planes=planes), site, base)
                 moved = state._replace(sides=back, planes=planes)
                 assert price(moved, problem)[1] <= price(settled, problem)[1]

@@ -39,6 +39,10 @@ class Box(NamedTuple):
     def overlaps(self, other: Box) -> bool:
         return self.u0 < other.u1 and self.u1 > other.u0 and self.v0 < other.v1 and self.v1 > other.v0
 
+    def holds(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Which of the places u, v (n,) lie in the box (n,)."""
+        return (self.u0 <= u) & (u <= self.u1) & (self.v0 <= v) & (v <= self.v1)
+
     def split(self, axis: int, at: float) -> tuple[Box, Box]:
         """Cut the box in two across an axis (0 for u, 1 for v)."""
         if axis == 0:

@@ -128,15 +128,17 @@ def improve_one(whole: Whole, place: bytes) -> None:
 
 
 def leave_out(whole: Whole, rows: np.ndarray, scene: Scene, value: float, k: int) -> tuple[np.ndarray, float]:
-    """The volumes without the k-th, its neighbours drawn over its place if need be, where that lowers the objective."""
+    """The volumes without the k-th, those beside where it shows drawn over its place if need be, where
+    that lowers the objective."""
     trial = without(rows, k)
     limit = value + LEFT_OUT_UNITS * scene.evidence + LEFT_OUT_SHARE * scene.n
     found = objective(trial, scene, limit)
     if found == np.inf or found < value - LEAST_GAIN:
         return (trial, found) if found < value - LEAST_GAIN else (rows, value)
-    around = whole.extent_of(rows[k]).widen(TOUCH_M)
-    near = [q for q in range(1, len(trial)) if around.overlaps(whole.extent_of(trial[q]))]
-    near = [q for q in near if not is_fixed(trial, q)]
+    shows = roof_heights(rows, scene.U, scene.V)[1] == k
+    u, v = scene.U[0][shows], scene.V[0][shows]
+    near = [q for q in range(1, len(trial)) if not is_fixed(trial, q)]
+    near = [q for q in near if whole.extent_of(trial[q]).widen(TOUCH_M).holds(u, v).any()]
     for _ in range(LEFT_OUT_ROUNDS):
         for q in near:
             found = move_edges(trial, scene, q, found, EVERYWHERE)

@@ -264,7 +264,7 @@ def box_of(repair: Repair, state: State, problem: Problem) -> shapely.Polygon:
     places = [shapely.get_coordinates(quad) for quad in quads]
     for (k, edge), side in repair.sides.items():
         c, s = scene.turn[int(volumes[k, DIRECTION])]
-        for j, own_edge in on_one_line(volumes, state.sides, k, edge):
+        for j, own_edge in on_one_line(state.sides, k, edge, problem):
             for line in (state.sides[j][own_edge], side):
                 own = [line if e == own_edge else other for e, other in enumerate(state.sides[j])]
                 ends = corners_of(own)[list(ENDS[own_edge])]
@@ -334,7 +334,7 @@ def repaired(state: State, repair: Repair, window: Window, problem: Problem) -> 
         volumes = problem.volumes[window.numbers]
         if dearer(volumes, own, edge, sides[k][edge], side, window.scene) > most:
             return None
-        sides = with_line_moved(problem.volumes, sides, k, edge, side)
+        sides = with_line_moved(sides, k, edge, side, problem)
     if not repair.equations:
         return State(sides, planes, basis, cost)
     found = equalised(repair, state, most, problem)
@@ -375,24 +375,32 @@ def equalised(
     return planes, free, found.cost
 
 
-def with_line_moved(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int, line: Side) -> list[list[Side]]:
+def with_line_moved(
+    sides: list[list[Side]], k: int, edge: int, line: Side, problem: Problem
+) -> list[list[Side]]:
     """All sides, with those on the line of side `edge` of volume k moved onto another `line`."""
     moved = [list(own) for own in sides]
-    for j, other in on_one_line(volumes, sides, k, edge):
+    for j, other in on_one_line(sides, k, edge, problem):
         moved[j][other] = replace(line, sigma=sides[j][other].sigma)
     return moved
 
 
-def on_one_line(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> list[tuple[int, int]]:
+def on_one_line(
+    sides: list[list[Side]], k: int, edge: int, problem: Problem
+) -> list[tuple[int, int]]:
     """The sides, as (volume, edge), on the line of side `edge` of volume k and off the outline."""
-    was = sides[k][edge]
-    alike = (np.flatnonzero(volumes[1:, DIRECTION] == volumes[k, DIRECTION]) + 1).tolist()
-    return [(j, e) for j in alike for e in (edge & 2, edge | 1) if is_one_line(sides[j][e], was)]
+    at, lean, anchored = problem.site.once(lay_out_sides, sides)
+    was, directions = sides[k][edge], problem.volumes[:, DIRECTION]
+    near = (np.abs(at - was.at) < ONE_LINE_M) & (np.abs(lean - was.lean) < ONE_LINE_M) & ~anchored
+    near &= (directions == directions[k])[:, None]
+    near[0], near[:, (edge ^ 2) & 2], near[:, (edge ^ 2) | 1] = False, False, False
+    return [(j, e) for j, e in np.argwhere(near).tolist()]
 
 
-def is_one_line(one: Side, other: Side) -> bool:
-    near = abs(one.at - other.at) < ONE_LINE_M and abs(one.lean - other.lean) < ONE_LINE_M
-    return near and not one.anchored
+def lay_out_sides(sides: list[list[Side]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where all sides lie, how they lean, and whether they are anchored: three arrays (k, 4)."""
+    at, lean = (np.array([[getattr(side, name) for side in own] for own in sides]) for name in ("at", "lean"))
+    return at, lean, np.array([[side.anchored for side in own] for own in sides])
 
 
 def dearer(volumes: np.ndarray, k: int, edge: int, was: Side, side: Side, scene: Scene) -> float:
