@@ -17,7 +17,7 @@ import shapely
 from ..read.terrain import Terrain
 from ..status import Doubt
 
-CELL_M2 = 1.0  # of the cells
+CELL_M2 = 1.0  # m2; of a whole-metre cell
 HIGH_M = 2.0  # over the ground: what is lower is a hedge, a car or the ground itself
 MOSTLY = 0.5  # of the outline's cells, which say why it has no points of the class
 HALF_CLASSIFIED = 0.2  # of the outline's cells, as for places without points (evaluate/layers.py)

@@ -42,7 +42,7 @@ ROOF, GROUND, OTHER, NOISE = range(4)  # kinds of points, by what a work tile ne
 # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
 SQUARE_M = 50.0
 HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
-MASKS_KEPT = 200  # of 100 kB each
+MASKS_KEPT = 200  # tiles whose mask stays in memory; 100 kB each make 20 MB
 QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its points
 
 

@@ -21,7 +21,7 @@ from ..settings import Settings
 from ..write.files import atomic
 from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify
 
-LEFT_ALONE = (7, 9, 17, 18)  # noise, water, bridges
+LEFT_ALONE = (7, 9, 17, 18)  # classes that stay as they are: noise, water, bridges
 
 
 def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:

@@ -17,7 +17,7 @@ from ..parametric.change import measure_rise, with_sizes
 from ..write.meshes.page_mesh import pack_values, solid_mesh
 from ..write.parameters import building_record, number
 
-MOST_PAGE_POINTS = 4000  # drawn
+MOST_PAGE_POINTS = 4000  # points drawn of a building, at most
 PAGE_FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p95", "density")
 
 

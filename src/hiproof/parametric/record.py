@@ -35,7 +35,7 @@ from ..write.attribute_list import PARAMETERS, PART
 WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
 FARTHEST_WORLD_M = 1e8
-LARGEST_NUMBER = 1e15  # of any number
+LARGEST_NUMBER = 1e15  # at which float64 still holds eighths; larger is no number of a building
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 PART_KEYS = tuple(attribute.name for attribute in PART)
 FIGURES = ("density", "nodata_share", "unexplained_area_m2")

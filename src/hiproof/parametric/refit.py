@@ -28,7 +28,7 @@ from .edit import rebuild
 HELD_PARAMETERS = ("width", "length", "teeth", "skew", "facing", "distance")
 STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian
 SCALES_M = (3.0, 0.8, 0.25)  # residuals beyond are outliers, from coarse to fine
-REFIT_ROUNDS = 6  # at each scale
+REFIT_ROUNDS = 6  # steps of descent at each scale, at most
 MOST_REFIT_POINTS = 2000  # an even selection of more
 # of a point's whole cost: a start that comes so near is no further searched for from afar
 WELL = 0.3

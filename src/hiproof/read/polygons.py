@@ -16,7 +16,7 @@ SLIVER_SHARE = 0.01
 SLIVER_M2 = 0.5  # m2; what repairing a polygon leaves beside it, less than any building
 JOIN_M = 0.001  # m; faces of one body that are as far apart were one before they were rounded
 LEVEL_SHARE = 0.01  # units of height that a flat outline's heights may differ by
-DEGENERATE_M2 = 1e-6  # m2; numerically nothing
+DEGENERATE_M2 = 1e-6  # m2; a smaller area is rounding
 # beyond any building; what is kept of terrain around one grows with the square of it
 WIDEST_BUILDING_M = 4000.0
 MOST_MEETINGS = 20_000  # of edges that follow not on one another: mending takes time for each

@@ -52,7 +52,7 @@ MOST_DENSE = 40.0
 SAME_DIRECTION_RAD = math.radians(1.5)
 # m around a court's first drawing in which its corners lie; points of twice that bear on it
 BORDER_REACH_M = 2.0
-MOSTLY_INSIDE = 0.8  # of a court's area
+MOSTLY_INSIDE = 0.8  # of a court's area has to lie inside the outline to be cut out
 STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
 

@@ -30,7 +30,7 @@ SIMPLIFY_SPACINGS = (0.7, 0.4, 0.2)
 # m; closer points drop corners like those: of twice as many no drawing gets better, all take longer
 LEAST_SPACING_M = 0.35
 COARSER, RADII_TRIED = 1.3, 12  # factor between tries at few corners, and how many tries
-LEAST_COURT_M2 = 4.0  # m2; as of buildings
+LEAST_COURT_M2 = 4.0  # m2; a smaller hole is a gap between points, not a court
 MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 CELL_SPACINGS = 2.0  # of square cells: four points in the mean
-FEWEST_SPREAD_CELLS = 9  # fewer tell nothing
+FEWEST_SPREAD_CELLS = 9  # cells; the scatter of fewer is chance
 # what is believed: the most even clouds, roofs with patches that gave no return
 LEAST, MOST_SPREAD = 0.4, 1.2
 
