@@ -6,6 +6,7 @@ import errno
 import json
 import shutil
 import sqlite3
+from contextlib import closing
 from types import SimpleNamespace
 
 import numpy as np
@@ -150,14 +151,22 @@ def test_unfinished_files_of_a_killed_worker_are_not_read(
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".buildings")]
 
 
-def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(
-    town_files, tmp_path, monkeypatch
+def spoil_ledger(path):
+    path.write_bytes(b"not a database, but long enough to look like one" * 9)
+
+
+def make_older_ledger(path):
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("create table building (position integer primary key, psd real)")
+
+
+@pytest.mark.parametrize("make", [spoil_ledger, make_older_ledger])
+def test_a_ledger_that_is_none_of_this_version_is_refused_and_replaced_on_restart(
+    town_files, tmp_path, monkeypatch, make
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     (tmp_path / ".hiproof").mkdir()
-    (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(
-        b"not a database, but long enough to look like one" * 9
-    )
+    make(tmp_path / ".hiproof" / "ledger.sqlite")
     with pytest.raises(OutputError, match="--restart"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
     assert (

@@ -207,8 +207,11 @@ class Ledger:
     def reopen(self) -> None:
         """Reopen what was running when the main process ended.
 
-        It was lost with it.
+        It was lost with it. Raises sqlite3.DatabaseError for the ledger of another version.
         """
+        columns = {name for _, name, *_ in self.database.execute("pragma table_info(building)")}
+        if columns != {*Outcome._fields, "task"}:
+            raise sqlite3.DatabaseError("the columns of another version")
         self.database.execute(
             "update task set state = 'open', losses = losses + 1 where state = 'running'"
         )
