@@ -24,6 +24,7 @@ noted         where the points of each file lie, for whoever wants some of them 
 bundles       the input of buildings that hiproof failed on, kept to be sent and run again
 repro         such a building solved again
 solve         each work tile reconstructs its own buildings and writes them as text, ready to join
+solved        buildings counted as they are solved, for the progress of a run
 ground        the ground around a building, from its tile's cells
 terrain_check a terrain model against the ground points
 found         the roof of one building among points without classes

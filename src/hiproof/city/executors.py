@@ -24,6 +24,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.sharedctypes import RawValue
 from queue import Empty, SimpleQueue
 from typing import Any
 from urllib.parse import urlsplit
@@ -33,6 +34,7 @@ from ..compiled import news
 from ..compiled.stamp import count_compiled
 from ..errors import InputError, NotKeptWarning, OutputError, is_interrupt
 from ..extras import import_extra
+from . import solved
 from .cores import limit_threads
 from .tasks import make_ready
 
@@ -40,6 +42,7 @@ CONNECT_S = 20  # seconds for an answer of the scheduler
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
 # seconds without a worker until a run gives up; seconds between looks at what is done
 WORKERLESS_S, POLL_S = 300, 5
+COUNT_S = 0.5  # seconds between looks at how many buildings the workers of this machine have solved
 
 
 class WorkerLost(Exception):
@@ -80,6 +83,8 @@ class Processes:
         self.count = min(count, MOST_ON_WINDOWS) if sys.platform == "win32" else count
         self.pool: ProcessPoolExecutor | None = None
         self.word: Connection | None = None
+        self.count_solved = RawValue("q", 0)  # by all workers, shared with them
+        self.told = 0
 
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
@@ -107,7 +112,8 @@ class Processes:
                 running[self.submit(function, task)] = task
             if not running:
                 return
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            finished, _ = wait(running, timeout=COUNT_S, return_when=FIRST_COMPLETED)
+            self.tell_count()
             if any(isinstance(future.exception(), BrokenProcessPool) for future in finished):
                 yield from self.bury(running)
                 continue
@@ -115,11 +121,18 @@ class Processes:
                 error: Any = future.exception()
                 yield running.pop(future), None if error else future.result(), error
 
+    def tell_count(self) -> None:
+        """Tell the listener how many more buildings the workers have solved."""
+        number = self.count_solved.value - self.told
+        if number > 0:
+            self.told += number
+            solved.listener(number)
+
     def submit(self, function: Callable, task: tuple) -> Future:
         if self.pool is None:
             context = get_context("spawn")
             heard, self.word = context.Pipe(duplex=False)
-            arguments = (os.getpid(), heard, log.worker_arguments())
+            arguments = (os.getpid(), heard, log.worker_arguments(), self.count_solved)
             self.pool = ProcessPoolExecutor(
                 self.count, mp_context=context, initializer=begin_worker, initargs=arguments
             )
@@ -157,14 +170,15 @@ class Processes:
             self.pool = None
 
 
-def begin_worker(parent: int, heard: Connection, logging: tuple) -> None:
+def begin_worker(parent: int, heard: Connection, logging: tuple, count: Any) -> None:
     """Set up a worker process.
 
-    It logs as the main process does, and ends with it.
+    It logs as the main process does, counts buildings in memory that both share, and ends with it.
 
     That compiled code cannot be kept, the main process has said.
     """
     log.start(*logging)
+    solved.begin_worker(count)
     warnings.simplefilter("ignore", NotKeptWarning)
     leave_with_parent(parent, heard)
 

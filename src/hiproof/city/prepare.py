@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from .frame import AreaFrame
 
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
-MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
+MOST_BUILDINGS_A_TILE = 100  # buildings; a killed worker loses one tile
 
 
 def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPlan:

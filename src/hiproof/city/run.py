@@ -28,6 +28,7 @@ from ..progress import show_in_notebook
 from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
+from . import solved
 from .bundles import find_bundle_folder, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
@@ -194,17 +195,21 @@ def work_off(
 
     `arguments` are those of `function` by the name of a task.
     """
-    total = len([task for task in ledger.tasks() if task.kind == kind])
+    sizes = {
+        task.name: task.buildings if kind == "solve" else 1
+        for task in ledger.tasks()
+        if task.kind == kind
+    }
+    tally = Tally(kind, sum(sizes.values()), progress)
     while names := ledger.open_tasks(kind):
-        finished = total - len(names)
-        progress(kind, finished, total)
+        tally.reach(tally.total - sum(sizes[name] for name in names))
         suspects = [name for name in names if ledger.losses(name) >= MOST_LOSSES]
         for name in suspects:
             run_task_isolated(ledger, executor, kind, name, function, arguments(name))
         tasks = iterate_started(
             ledger, [name for name in names if name not in set(suspects)], arguments
         )
-        for task, result, error in executor.run(function, tasks):
+        for task, result, error in tally.listen(executor.run(function, tasks)):
             name = f"{kind}:{task[1]}"
             if is_loss(error):
                 ledger.lose(name)
@@ -212,9 +217,37 @@ def work_off(
                     "%s was lost (%s) and is tried again", name, error or "out of memory"
                 )
                 continue
-            finished += 1
             record(ledger, kind, name, result, error)
-            progress(kind, finished, total)
+            tally.reach(tally.ended + sizes[name])
+
+
+class Tally:
+    """How much is done of a kind of tasks.
+
+    That is what the tasks that ended hold, and the buildings counted since.
+    """
+
+    def __init__(self, kind: str, total: int, progress: Progress):
+        self.kind, self.total, self.progress = kind, total, progress
+        self.ended = self.counted = 0
+
+    def reach(self, ended: int) -> None:
+        """Say that tasks with so many buildings have ended."""
+        self.ended, self.counted = ended, max(self.counted, ended)
+        self.progress(self.kind, min(self.counted, self.total), self.total)
+
+    def count(self, number: int) -> None:
+        """Say that so many more buildings are solved, of tasks that go on."""
+        self.counted += number
+        self.progress(self.kind, min(self.counted, self.total), self.total)
+
+    def listen(self, outcomes: Iterator[tuple]) -> Iterator[tuple]:
+        """Yield the outcomes of tasks, and count the buildings that are solved meanwhile."""
+        solved.listener = self.count
+        try:
+            yield from outcomes
+        finally:
+            solved.listener = solved.ignore
 
 
 def iterate_started(

@@ -56,6 +56,7 @@ from .other_classes import (
 from .outlines import row_outline
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, load_plan, make_job, neighbourhood
+from .solved import count_building
 from .sort import load_points
 from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
 
@@ -301,6 +302,7 @@ def solve_tile(
             building, part = solve_one(plan, job, surroundings, overrides.get(index), keep)
         parts.append(part)
         rows.append(make_outcome(index, building, time.perf_counter() - start))
+        count_building()
     write_tile(plan, root.parent, tile, parts)
     with atomic_file(tile_parts(root, tile)) as file:
         save_fragments(file, parts)
