@@ -118,12 +118,8 @@ def test_citygml_is_valid_by_its_schema(outputs, name, root):
 
 @pytest.mark.parametrize("name", ["citygml2", "citygml3"])
 def test_gdal_opens_citygml(outputs, name):
-    layers = pyogrio.list_layers(outputs(name))[:, 0]
-    assert "Building" in layers
-    assert len(pyogrio.raw.read(outputs(name), layer="Building", read_geometry=False)[1] or []) in (
-        0,
-        4,
-    )
+    info = pyogrio.read_info(outputs(name), layer="Building", force_feature_count=True)
+    assert info["features"] == 4
 
 
 @pytest.mark.parametrize(("name", "count"), [("gpkg", 4), ("parquet", 4), ("fgb", 3)])
