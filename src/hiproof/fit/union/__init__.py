@@ -28,6 +28,7 @@ finish      all planes to all points, along their sides, eaves level where the p
 cants       planes over walls that cut a volume's corners off
 cut_corners one volume over such walls in place of several
 unite       volumes that only skewed walls or cut corners keep apart, made one
+repeats     copies of small volumes along their axes, such as dormers in a row
 bays        level volumes over small pieces that walls cut off the outline
 members     the volumes whose planes points tell, by the unknowns of all
 agree       planes, slopes, ridges and eaves that volumes have in common
