@@ -184,8 +184,11 @@ class StageBars:
         """Fill the bar of the stage that another one follows."""
         if self.stage:
             task = self.tasks[self.stage]
-            total = self.bars.tasks[self.bars.task_ids.index(task)].total or 1
-            self.bars.update(task, completed=total, total=total)
+            total = self.bars.tasks[self.bars.task_ids.index(task)].total
+            if total is None:  # nobody knew how much there was, and so nothing was counted
+                self.bars.update(task, completed=1, total=1, unit="")
+            else:
+                self.bars.update(task, completed=total)
             self.bars.stop_task(task)
 
 
@@ -199,8 +202,8 @@ def describe(finished: int, total: int | None, seconds: float, unit: str, first:
     >>> describe(0, None, 31.4, "")
     '31 s'
     """
-    if total is None:
-        counted = [count_things(finished, unit)] if finished else []
+    if total is None or not unit:
+        counted = [count_things(finished, unit)] if finished and unit else []
         return ", ".join([*counted, *([f"{seconds:.0f} s"] if seconds >= 1 else [])])
     text = f"{finished:,} of {count_things(total, unit)}"
     if not first < finished < total or seconds < RATE_S:
