@@ -11,8 +11,6 @@ from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, cheapest_cut
 from hiproof.fit.union.box import NOWHERE
 from hiproof.fit.union.groups import draw_in_groups
-from hiproof.fit.union.nearby import look_around, put_back
-from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import Site
 from hiproof.fit.union.scene import directions_of, scene_of
@@ -104,33 +102,6 @@ def test_a_volume_without_width_lies_nowhere():
     whole.set_volumes(np.vstack([whole.volumes, line]))
     assert whole.boxes[1].tolist() == list(NOWHERE)
     assert whole.volumes_in(whole.box) == []
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_a_change_is_worth_as_much_among_what_is_around_it_as_on_the_whole(seed):
-    """A volume that is raised and drawn out by what look_around allows for."""
-    rng = np.random.default_rng(seed)
-    scene = whole_of(hall, HALL).scene
-    low, high = scene.corners[0].min(axis=0), scene.corners[0].max(axis=0)
-    volumes = np.repeat(base_only(-9.0), 10, axis=0)
-    volumes[1:, OFFSET : OFFSET + PLANES] = np.inf
-    volumes[1, OFFSET + LEVEL] = -0.1  # over all of the outline, so that the base shows nowhere
-    volumes[2:, OFFSET + LEVEL] = rng.uniform(0.0, 4.0, 8)
-    starts = rng.uniform(low, high - 3.0, (8, 2))
-    volumes[2:, [U0, V0]], volumes[2:, [U1, V1]] = starts, starts + rng.uniform(2.0, 4.0, (8, 2))
-    smaller = 0
-    for k in range(2, len(volumes)):
-        numbers, near = look_around(volumes, scene, k)
-        smaller += len(near.z) < len(scene.z)
-        changed = volumes.copy()
-        changed[k, OFFSET + LEVEL] += rng.uniform(-1.0, 1.0)
-        changed[k, U0 + rng.integers(4)] += rng.uniform(-1.0, 1.0)
-        rows = changed[numbers]
-        assert np.array_equal(put_back(volumes, numbers, rows), changed)
-        around = objective(rows, near, np.inf) - objective(volumes[numbers], near, np.inf)
-        whole = objective(changed, scene, np.inf) - objective(volumes, scene, np.inf)
-        assert around == pytest.approx(whole, abs=1e-6)
-    assert smaller >= 4
 
 
 def test_a_roof_drawn_in_groups_is_drawn_as_all_at_once():

@@ -13,7 +13,6 @@ objective   compiled: what a roof costs: misfit, volumes, edges that show
 edges, refit  compiled: a volume's edges moved, its planes refitted
 moves, facings, joins, improve  compiled: structure that comes and goes: of one volume, the ways planes face, of several, all in turn
 add, grow   volumes added one by one from a level base, all improved after each; the first of them grown anew
-nearby      compiled: what lies around one volume, by which its moves are judged
 trim        hidden edges drawn in
 run_on      ends that stand out of a neighbour by little drawn on until they lie hidden in it
 search      these in order, and the simplification that a draughtsman would make

@@ -10,7 +10,6 @@ from ...compiled import compiled
 from .candidates import best_rectangles
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
 from .improve import improve
-from .nearby import look_around, put_back
 from .objective import costs, objective
 from .refit import refit
 from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, is_fixed, roof_heights
@@ -99,7 +98,7 @@ def best_addition(volumes, value, ground, candidates):
             least = FREELY_UNITS * scene.evidence if leans_freely(new, scene) else 0.0
             if replacing and len(volumes) > 1:
                 new[REPLACES] = 1.0
-            trial, found = inserted(volumes, value, joined.copy(), scene, min(value, lowest) - least)
+            trial, found = settle_new(joined.copy(), scene, min(value, lowest) - least)
             if found < np.inf:
                 best, lowest = trial, found
             if replacing:
@@ -137,7 +136,7 @@ def with_neighbour_cut(volumes, joined, scene, best, lowest, value, least):
             if CUT_LEAST_M < over < CUT_MOST_SHARE * (high - low) and high - low - over >= MIN_SIDE_M:
                 cut = joined.copy()
                 cut[j, U0 + edge] = stop
-                trial, found = inserted(volumes, value, cut, scene, min(value, lowest) - least)
+                trial, found = settle_new(cut, scene, min(value, lowest) - least)
                 if found < np.inf:
                     best, lowest = trial, found
     return best, lowest
@@ -148,23 +147,6 @@ def overlap(one, other):
     """Whether two rectangles have more than a strip in common."""
     u = min(one[U1], other[U1]) - max(one[U0], other[U0])
     return min(u, min(one[V1], other[V1]) - max(one[V0], other[V0])) > CUT_LEAST_M
-
-
-@compiled
-def inserted(volumes, value, joined, scene, limit):
-    """The volumes `joined`, which are `volumes` and a new one, with the new one settled by what lies around it.
-
-    Their objective is infinite where it is not below `limit`; `value` is that of `volumes`.
-    """
-    numbers, near = look_around(joined, scene, len(joined) - 1)
-    if len(near.z) == len(scene.z):
-        return settle_new(joined, scene, limit)
-    before = objective(volumes[numbers[:-1]], near, np.inf)
-    rows, found = settle_new(joined[numbers], near, before + limit - value)
-    if found == np.inf:
-        return joined, found
-    trial = put_back(joined, numbers, rows)
-    return trial, objective(trial, scene, limit - LEAST_GAIN)
 
 
 @compiled

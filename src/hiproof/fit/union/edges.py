@@ -62,11 +62,10 @@ def move_edges(volumes, scene, k, value, reach):
         distance, gains, covered = sums_outward(volumes, scene, k, edge, gain, bare)
         places[m] = between_points(distance, gains, sign, start) if reach < SMALL_REACH_M else start
         best, chosen = value - LEAST_GAIN, start
-        first, last = scene.window[direction, 2 * (edge // 2)], scene.window[direction, 2 * (edge // 2) + 1]
         least = np.full(m + 1, np.inf)  # what the roof costs at each place before its edges are charged
         for q in range(m + 1):
             t = places[q]
-            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M or not first <= t <= last:
+            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
                 continue
             p = np.searchsorted(distance, sign * t, side="right")
             least[q] = fixed + (gains[p - 1] if p > 0 else 0.0)

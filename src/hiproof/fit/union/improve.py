@@ -23,7 +23,6 @@ from .moves import (
     refitted,
     without,
 )
-from .nearby import look_around, put_back
 from .objective import objective
 from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1, is_fixed
 
@@ -52,30 +51,13 @@ def improve(volumes, scene, value, slopes, rounds):
         while k < len(volumes):
             count, start = len(volumes), value
             if is_unsettled(volumes, k):
-                volumes, value = change_nearby(volumes, scene, value, k, slopes)
+                volumes, value = change_structure(volumes, scene, value, k, slopes)
                 if value == start:
                     volumes[k, SETTLED] = surroundings(volumes, k)
             k = k + 1 if len(volumes) == count else 1
         volumes, value = without_base(volumes, scene, value)
         if value > before - 0.05 * scene.evidence:
             break
-    return volumes, value
-
-
-@compiled
-def change_nearby(volumes, scene, value, k, slopes):
-    """Change the structure of volume k by what lies around it; it counts where the whole roof is cheaper."""
-    numbers, near = look_around(volumes, scene, k)
-    if len(near.z) == len(scene.z):
-        return change_structure(volumes, scene, value, k, slopes)
-    rows = volumes[numbers]
-    before = objective(rows, near, np.inf)
-    rows, found = change_structure(rows, near, before, np.searchsorted(numbers, k), slopes)
-    if found < before - LEAST_GAIN:
-        trial = put_back(volumes, numbers, rows)
-        found = objective(trial, scene, value - LEAST_GAIN)
-        if found < np.inf:
-            return trial, found
     return volumes, value
 
 

@@ -35,12 +35,11 @@ MOST_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
 # allowed (2, 3, 3, 2): which shapes a volume may have, see `volumes.is_allowed`.
 # corners (directions, c, 2): the outline's vertices.
 # leans (directions, 2, m): of walls that are not quite along an axis, x = at + lean y; infinite where there are no more.
-# window (directions, 4): u0, u1, v0, v1 (m) within which edges may be moved.
 # edge_prices: units for an edge that shows, a metre of it, a metre of it lower than low_step (m), if in line with no corner,
 # and off for each end at a corner.
 Scene = namedtuple(
     "Scene",
-    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed window",
+    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
 )
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # by the names above: units of evidence, m
@@ -108,7 +107,6 @@ def scene_of(
         max(tolerance_m - DEAD_M, LEAST_WIDTH_M),
         EDGE_PRICES,
         allowed,
-        np.tile([-np.inf, np.inf], (len(turn), 2)),
     )
 
 
