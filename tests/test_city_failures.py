@@ -202,7 +202,7 @@ def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkey
     fail_at(
         monkeypatch,
         buildings,
-        "classify_square",
+        "classify_points",
         np.array([border + 60.0, scene.xyz[:, 1].mean()]),
     )
     summary = run([cloud], tmp_path / "disturbed", with_footprints=False)

@@ -149,7 +149,7 @@ def test_the_ledger_remembers_after_being_closed(tmp_path):
     ledger = Ledger(path)
     ledger.add_tasks([Task("solve:a", "solve", 2), Task("solve:b", "solve", 1)])
     ledger.finish(
-        "solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.05, 0.01)]
+        "solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.01)]
     )
     ledger.close()
     reopened = Ledger(path)

@@ -43,7 +43,7 @@ def test_heights_are_drawn_where_the_roof_is(kind):
 
 
 def test_the_documents_figures_are_current():
-    assert (draw.FOLDER.parent / "primitives.md").read_text() == draw.document()
+    assert (draw.FOLDER.parent / "primitives.md").read_text() == draw.make_page()
     for kind in CATALOGUE:
         assert (draw.FOLDER / f"{kind}.svg").read_text() == primitive_svg(kind)
     assert sorted(path.stem for path in draw.FOLDER.iterdir()) == sorted(CATALOGUE)

@@ -68,7 +68,7 @@ def test_every_building_is_modelled_validly(finished_run):
 def test_the_run_record_names_settings_version_inputs_and_counts(finished_run):
     record = json.loads((finished_run[0] / "run.json").read_text())
     assert Settings.from_dict(record["settings"]) == Settings()
-    assert record["buildings"] == 4
+    assert record["summary"]["buildings"] == 4
     assert record["inputs"]["footprints"].endswith("footprints.geojson")
     assert set(record["seconds"]) == {"plan", "prepare", "sort", "solve", "merge"}
 

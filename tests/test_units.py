@@ -28,13 +28,13 @@ from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run
 from hiproof.frames import METRES, Units
+from hiproof.parametric.finished import open_run
 from hiproof.read import read_footprints, read_points, read_terrain
 from hiproof.read.crs import find_units
 from hiproof.read.pointcloud import read_header
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
-from hiproof.view.loading import database_rows
-from hiproof.write.tables.postgis import roof_rows
+from hiproof.write.tables.postgis import database_rows
 from read.test_lax import write_lax
 from read.test_pointcloud import write_copc
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
@@ -172,8 +172,9 @@ def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_m
 
 def areas_to_load(out):
     """Areas in m2 of the roof surfaces as they would go into PostGIS."""
-    rows = list(database_rows(out))
-    return [area for row in rows for *_, area, _ in roof_rows(row)]
+    run = open_run(out)
+    rows = [database_rows(described, run.head.units) for described in run.describe()]
+    return [values["area_m2"] for row in rows for _, values in row.roof_surfaces]
 
 
 def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):

@@ -143,8 +143,8 @@ def test_a_file_that_is_named_like_markup_is_named_as_it_is(hiproof, town, tmp_p
     out = tmp_path / "[bold]out[" / "bold]"
     assert hiproof("reconstruct", town[0], broken, "--footprints", town[1], "--out", out) == 2
     output = capsys.readouterr().out
-    assert f"could not be read: {broken}: expected" in output
-    assert f"models: {out}" in output
+    assert f"not read: {broken}: expected" in output
+    assert f"files: {out}" in output
 
 
 def test_a_roof_type_that_looks_like_markup_is_shown_as_it_is(tmp_path, capsys):
