@@ -9,14 +9,15 @@ import functools
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from .compiled import news
 from .log import Level, console_level, count_things
 
+T = TypeVar("T")
 Update = Callable[..., None]
 """Called with a stage, how much of it is done, and how much there is; None where nobody knows."""
 
@@ -42,6 +43,8 @@ STAGES = {
     "solve": Stage("fitting roofs", "building"),
     "merge": Stage("writing files", "work tile"),
     "build": Stage("building models", "building"),
+    "convert": Stage("writing models", "building"),
+    "load": Stage("loading models"),
     "measure": Stage("measuring models"),
     "classify": Stage("classifying points"),
     "fetch": Stage("fetching footprints"),
@@ -81,6 +84,19 @@ def is_notebook() -> bool:
     from rich.console import Console
 
     return Console().is_jupyter
+
+
+def count_progress(items: Iterable[T], stage: str, update: Update) -> Iterator[T]:
+    """Yield the items, and report to `update` how many of a stage are done.
+
+    >>> list(count_progress("ab", "convert", print))
+    convert 1
+    convert 2
+    ['a', 'b']
+    """
+    for done, item in enumerate(items, start=1):
+        yield item
+        update(stage, done)
 
 
 class StageLines:

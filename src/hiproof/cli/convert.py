@@ -11,6 +11,7 @@ import typer
 from ..errors import InputError, OutputError
 from ..formats import CONVERTED, choose_format
 from ..log import count_things
+from ..progress import count_progress, show_progress
 from ..read.damage import SkippedBuildings
 from ..write.files import elsewhere
 
@@ -78,12 +79,15 @@ def convert_models(
 
     Returns what damage left out.
     """
-    from ..parametric.finished import open_run
-    from ..write.described import write_format
+    left_out = SkippedBuildings()
+    with show_progress("convert") as update:
+        from ..parametric.finished import open_run
+        from ..write.described import write_format
 
-    run, left_out = open_run(source, crs), SkippedBuildings()
-    buildings = left_out.iterate_sound(run.describe(left_out))
-    count = write_format(name, path, buildings, run.head, **given)
+        run = open_run(source, crs)
+        buildings = left_out.iterate_sound(run.describe(left_out))
+        counted = count_progress(buildings, "convert", update)
+        count = write_format(name, path, counted, run.head, **given)
     typer.echo(f"{path}: {count_things(count, 'building')}{left_out.describe()}")
     return left_out
 

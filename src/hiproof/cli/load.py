@@ -9,6 +9,7 @@ import typer
 
 from ..errors import InputError
 from ..log import count_things
+from ..progress import show_progress
 from ..read.damage import SkippedBuildings
 
 
@@ -40,13 +41,14 @@ def load(
 
     Exit code: 0 all buildings were loaded, 2 damaged ones were left out, or unusable input.
     """
-    from ..view.loading import load_postgis
-
     if replace and append:
         raise InputError("expected --replace or --append, got both; leave one out")
     left_out = SkippedBuildings()
     how = {"replace": replace, "append": append}
-    count = load_postgis(folder, database, prefix, left_out, run, **how)
+    with show_progress("load"):
+        from ..view.loading import load_postgis
+
+        count = load_postgis(folder, database, prefix, left_out, run, **how)
     tables = f"{prefix}_buildings, {prefix}_roofs and {prefix}_parts"
     typer.echo(f"{count_things(count, 'building')} loaded into {tables}{left_out.describe()}")
     if left_out.exit_code:
