@@ -54,9 +54,10 @@ def groups_of(whole: Whole) -> list[list[int]]:
     """The numbers of all volumes but the base in groups of neighbours: halved along the longer axis until small."""
     if len(whole.volumes) < 2:
         return []
-    middles = 0.5 * (whole.boxes[:, [0, 2]] + whole.boxes[:, [1, 3]])
     shows = whole.boxes[:, 0] <= whole.boxes[:, 1]
     shows[0] = False
+    boxes = np.where(shows[:, None], whole.boxes, 0.0)  # NOWHERE has no middle
+    middles = 0.5 * (boxes[:, [0, 2]] + boxes[:, [1, 3]])
     return list(halve(np.flatnonzero(shows), middles))
 
 
