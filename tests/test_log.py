@@ -3,6 +3,7 @@ either.
 """
 
 import logging
+import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -135,7 +136,11 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
 
 
 def test_the_library_itself_sets_nothing_up():
-    assert logging.getLogger("hiproof").handlers == []
+    code = "import hiproof.log, logging; print(logging.getLogger('hiproof').handlers)"
+    output = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert output.stdout == "[]\n"
 
 
 def test_lines_of_several_workers_stay_whole(tmp_path):

@@ -56,7 +56,7 @@ def cluster(count, height, centre=(6.0, 5.0), width=2.5):
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.floats(2.0, 20.0))
+@given(st.integers(0, 2**32 - 1), st.floats(4.0, 20.0))  # chance leaves wide gaps at 2 points/m2
 def test_the_true_roof_is_good(seed, density):
     roof = random_compound(np.random.default_rng(seed)).roof
     points = sample_heights(
