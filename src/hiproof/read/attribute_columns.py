@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from .sql import quote
+
 LARGEST_EXACT = 2.0**53  # whole numbers below it are themselves as decimals
 
 
@@ -64,5 +66,4 @@ def make_known_condition(name: str, where: str | None) -> str:
     >>> make_known_condition("year", "year < 1950 or listed")
     '(year < 1950 or listed) and "year" is not null'
     """
-    quoted = name.replace('"', '""')
-    return (f"({where}) and " if where else "") + f'"{quoted}" is not null'
+    return (f"({where}) and " if where else "") + f"{quote(name)} is not null"

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .sql import quote
 from .wkb import decode_geometries
 
 FILE_START, APPLICATION_ID = b"SQLite format 3\0", b"GPKG"
@@ -157,8 +158,3 @@ def convert(values: tuple, kind: type) -> np.ndarray:
     if kind is bool:
         column[:] = [None if value is None else bool(value) for value in values]
     return column
-
-
-def quote(name: str) -> str:
-    """Quote the name of a table or a column for SQL."""
-    return '"' + name.replace('"', '""') + '"'

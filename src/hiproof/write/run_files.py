@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..formats import FORMATS, Format, import_format, requested_files, requested_fragments
+from ..formats import FORMATS, Format, import_format, list_requested_files, requested_fragments
 from ..model import Building
 from ..settings import Settings
 from ..status import Status
@@ -40,7 +40,7 @@ def write_all(
     """
     broken, head = [], FileHead(crs)
     with ExitStack() as stack:
-        files = requested_files(Settings(), Path(folder))
+        files = list_requested_files(Settings(), Path(folder))
         # The table does most of its work at the end: entered last it is closed first, and its
         # failure stops the others.
         writers = [

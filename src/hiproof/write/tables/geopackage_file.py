@@ -18,6 +18,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from ...read.crs import epsg_code, parse_crs
+from ...read.sql import quote
 
 # GeoPackage notes when a table last changed; a fixed date keeps the same input giving the same
 # file.
@@ -255,12 +256,3 @@ def encode_blobs(geometries: np.ndarray, bounds: np.ndarray, srs_id: int) -> lis
             shapely.to_wkb(geometries, flavor="iso").tolist(), envelopes, strict=True
         )
     ]
-
-
-def quote(name: str) -> str:
-    """Quote the name of a table or a column for SQL.
-
-    >>> quote('so "called"')
-    '"so ""called\"""'
-    """
-    return '"' + name.replace('"', '""') + '"'

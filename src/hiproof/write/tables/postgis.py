@@ -26,6 +26,7 @@ from ...frames import Units
 from ...model import Solid
 from ...read.damage import Damaged, refuse
 from ...read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
+from ...read.sql import quote
 from ..attribute_list import PREFIX
 from ..described import Described
 from ..meshes.triangles import faces_triangles
@@ -403,11 +404,6 @@ def encode_place(wkb: bytes, srid: int) -> str:
     if kind == WKB_POLYGON:
         kind, wkb = WKB_MULTIPOLYGON, struct.pack("<BII", 1, WKB_MULTIPOLYGON, 1) + wkb
     return (struct.pack("<BII", order, kind | WKB_HAS_SRID, srid) + wkb[5:]).hex()
-
-
-def quote(name: str) -> str:
-    """Quote a column's name for SQL."""
-    return '"' + name.replace('"', '""') + '"'
 
 
 def cut_name(name: str) -> str:
