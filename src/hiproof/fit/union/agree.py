@@ -111,7 +111,9 @@ def roof_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> floa
     return float(misfits_under(volumes, planes, scene)[0].sum())
 
 
-def misfits_under(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+def misfits_under(
+    volumes: np.ndarray, planes: list[Planes], scene: Scene
+) -> tuple[np.ndarray, np.ndarray]:
     """Return what each point costs under `planes`, and which volume shows there: two arrays (n,)."""
     n = scene.n
     heights, top = np.full(n, -np.inf), np.zeros(n, int)
@@ -139,8 +141,9 @@ def hide_again(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> list[
         after, top = misfits_under(volumes, planes, scene)
         worse = np.bincount(top, after - before, len(planes))
         worse[[own is as_found for own, as_found in zip(planes, found, strict=True)]] = 0.0
-        k = int(np.argmax(worse - RISEN_SHARE * np.bincount(top, minlength=len(planes))))
-        if worse[k] <= RISEN_SHARE * np.count_nonzero(top == k):
+        excess = worse - RISEN_SHARE * np.bincount(top, minlength=len(planes))
+        k = int(np.argmax(excess))
+        if excess[k] <= 0.0:
             return planes
         planes[k] = found[k]
 

@@ -11,7 +11,7 @@ import numpy as np
 from .edges import move_edges
 from .moves import refitted
 from .objective import costs, objective
-from .scene import Scene
+from .scene import Scene, select_points
 from .volumes import (
     DIRECTION,
     LEAN,
@@ -53,7 +53,7 @@ def repeat_along(volumes: np.ndarray, k: int, axis: int, scene: Scene) -> np.nda
     """Add copies of volume k along an axis, the best first, until none saves enough."""
     y = (scene.V, scene.U)[axis][int(volumes[k, DIRECTION])]
     low, high = volumes[k, V0 - 2 * axis], volumes[k, V1 - 2 * axis]
-    strip = select(scene, np.flatnonzero((low <= y) & (y <= high)))
+    strip = select_points(scene, np.flatnonzero((low <= y) & (y <= high)))
     while len(strip.z) and (copy := find_copy(volumes, k, axis, strip, scene.evidence)) is not None:
         volumes = np.vstack([volumes, copy])
         value = objective(volumes, scene, np.inf)
@@ -79,25 +79,13 @@ def find_copy(
     first, last = np.searchsorted(x, low + steps), np.searchsorted(x, high + steps, "right")
     best, most = None, COPY_UNITS * evidence
     for n in np.flatnonzero(total[last] - total[first] > most):
-        part = select(strip, np.sort(order[first[n] : last[n]]))
+        part = select_points(strip, np.sort(order[first[n] : last[n]]))
         copy = move_volume(volumes[k], axis, steps[n])
         after = costs(roof_heights(np.vstack([volumes, copy]), part.U, part.V)[0], part).sum()
         saved = total[last[n]] - total[first[n]] - after
         if saved > most:
             best, most = copy, saved
     return best
-
-
-def select(scene: Scene, numbers: np.ndarray) -> Scene:
-    """Return the scene of some of its points and unobserved cells, by ascending `numbers` (m,)."""
-    return scene._replace(
-        U=scene.U.take(numbers, axis=1),
-        V=scene.V.take(numbers, axis=1),
-        z=scene.z[numbers],
-        weight=scene.weight[numbers],
-        shade=scene.shade[numbers],
-        n=int(np.searchsorted(numbers, scene.n)),
-    )
 
 
 def move_volume(volume: np.ndarray, axis: int, step_m: float) -> np.ndarray:

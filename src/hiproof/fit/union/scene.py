@@ -114,20 +114,22 @@ def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
     """The scene with only the points `kept` (m,), ghosts weighing as many of them; what the outline gives is shared."""
     if len(kept) == scene.n:
         return scene._replace(evidence=evidence)
-    columns = np.r_[kept, scene.n : len(scene.z)]
-    weight, shade = scene.weight[columns], scene.shade[columns]
-    weight[len(kept) :] *= len(kept) / scene.n
-    shade *= len(kept) / scene.n
-    U, V = (np.ascontiguousarray(axis[:, columns]) for axis in (scene.U, scene.V))
+    seen = select_points(scene, np.r_[kept, scene.n : len(scene.z)])
+    seen.weight[seen.n :] *= seen.n / scene.n
+    return seen._replace(
+        order=order_along(seen.U, seen.V), shade=seen.shade * (seen.n / scene.n), evidence=evidence
+    )
+
+
+def select_points(scene: Scene, numbers: np.ndarray) -> Scene:
+    """The scene of some of its points and ghosts, by ascending `numbers` (m,); `order` stays the whole's."""
     return scene._replace(
-        U=U,
-        V=V,
-        order=order_along(U, V),
-        z=scene.z[columns],
-        weight=weight,
-        shade=shade,
-        n=len(kept),
-        evidence=evidence,
+        U=scene.U.take(numbers, axis=1),
+        V=scene.V.take(numbers, axis=1),
+        z=scene.z[numbers],
+        weight=scene.weight[numbers],
+        shade=scene.shade[numbers],
+        n=int(np.count_nonzero(numbers < scene.n)),
     )
 
 

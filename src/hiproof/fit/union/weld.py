@@ -26,7 +26,7 @@ from .objective import costs, misfits
 from .plan import Plan
 from .regions import Site, polygons_of, regions_of
 from .repairs import Repair, find_repairs
-from .scene import Scene
+from .scene import Scene, select_points
 from .sides import Side, corners_of
 from .volumes import DIRECTION, PARAMETER_COST, U0, V0, V1, with_and_without
 
@@ -289,11 +289,8 @@ def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Probl
     first, last = np.searchsorted(xy[:, 0], (x0, x1), sorter=order)
     strip = np.sort(order[first:last])
     inside = strip[(xy[strip, 1] >= y0) & (xy[strip, 1] <= y1)]
-    columns = np.ascontiguousarray
     count = min(len(inside), MOST_POINTS)
-    seen = scene._replace(
-        U=columns(scene.U[:, inside]), V=columns(scene.V[:, inside]), z=scene.z[inside], n=len(inside)
-    )
+    seen = select_points(scene, inside)
     judges = inside[np.arange(count) * len(inside) // max(count, 1)]
     outline = problem.outline
     if box.covers(outline):
