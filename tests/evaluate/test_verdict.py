@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hiproof
@@ -18,8 +18,9 @@ from hiproof.city.run import reconstruct_area
 from hiproof.cli.running import graded_words
 from hiproof.cli.status import describe, read_state
 from hiproof.compose import compose
-from hiproof.evaluate.verdict import judge_model
+from hiproof.evaluate.verdict import FEWEST_ON_PART, judge_model
 from hiproof.model import Model
+from hiproof.model.heights import find_highest
 from hiproof.settings import Settings
 from hiproof.simulate import random_compound
 from points_of_roofs import sample_heights
@@ -56,13 +57,15 @@ def cluster(count, height, centre=(6.0, 5.0), width=2.5):
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.floats(4.0, 20.0))  # chance leaves wide gaps at 2 points/m2
+@given(st.integers(0, 2**32 - 1), st.floats(2.0, 20.0))
 def test_the_true_roof_is_good(seed, density):
     roof = random_compound(np.random.default_rng(seed)).roof
     points = sample_heights(
         lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, 0.03, seed
     )
     model = Model(roof, compose(roof, 0.0).move(roof.frame.origin))
+    on_parts = np.bincount(find_highest(roof.parts, points[:, :2])[1], minlength=len(roof.parts))
+    assume((on_parts >= FEWEST_ON_PART).all())  # by chance a dormer has fewer at 2 points/m2
     assert judge_model(model, points).grade is Grade.GOOD
 
 
