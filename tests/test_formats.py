@@ -15,9 +15,9 @@ from hiproof.formats import (
     FORMATS,
     Format,
     import_format,
-    requested_files,
+    list_requested_files,
+    list_requested_tile_files,
     requested_fragments,
-    requested_tile_files,
 )
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import files_text
@@ -46,14 +46,14 @@ def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run()
     readme = README.read_text()
     assert [
         file.name
-        for file in requested_files(Settings(), Path()).values()
+        for file in list_requested_files(Settings(), Path()).values()
         if f"`{file.name}`" not in readme
     ] == []
 
 
 def test_models_by_work_tile_need_the_same_parts_of_buildings():
     by_tile = Settings.from_dict({"city": {"models": "tiles"}})
-    assert set(requested_files(by_tile, Path())) == {"parameters", "gpkg"}
+    assert set(list_requested_files(by_tile, Path())) == {"parameters", "gpkg"}
     assert requested_fragments(by_tile.write) == requested_fragments(Settings().write)
 
 
@@ -79,7 +79,7 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     write_all(tmp_path / "one", buildings)
     head = FileHead(offset=np.array([85000.0, 446000.0, 0.0]))
     parts = [fragments(building, (building.id, building.id), head)[1] for building in buildings]
-    join_fragments(requested_files(Settings(), tmp_path / "two"), parts, head)
+    join_fragments(list_requested_files(Settings(), tmp_path / "two"), parts, head)
     for folder in ("one", "two"):
         assert (tmp_path / folder / "names.txt").read_text() == "a\nb\n"
     for name in (
@@ -102,9 +102,9 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
 )
 def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
     settings = Settings.from_dict({"write": {"citygml": version}, "city": {"models": "both"}})
-    request = requested_files(settings, tmp_path)
+    request = list_requested_files(settings, tmp_path)
     assert [file.name for file in request.values() if file.suffix == ".gml"] == files
-    by_tile = requested_tile_files(settings, tmp_path, "0_0_0").values()
+    by_tile = list_requested_tile_files(settings, tmp_path, "0_0_0").values()
     assert [file.name for file in by_tile if file.suffix == ".gml"] == [
         name.replace("buildings", "0_0_0") for name in files
     ]

@@ -153,12 +153,12 @@ OF_TILES = {name: format for name, format in FORMATS.items() if format.tile_endi
 TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a run writes these
 
 
-def requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
+def list_requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
     """Return the paths of a run's files for the whole area, by format.
 
     They lie in `folder`, and are those that these settings write.
 
-    >>> [path.name for path in requested_files(Settings(), Path("models")).values()]
+    >>> [path.name for path in list_requested_files(Settings(), Path("models")).values()]
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
     """
     by_tile_alone = settings.city.models == "tiles"
@@ -170,7 +170,7 @@ def requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
     return {name: folder / format.file for name, format in written.items()}
 
 
-def requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
+def list_requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
     """Return the paths of a work tile's own files, by format.
 
     They lie in `folder`; there are none where such a run writes none.
@@ -193,7 +193,9 @@ def list_model_paths(settings: Settings, folder: Path) -> list[Path]:
     ...     Path("out"))]
     ['buildings.citygml3.gml', 'buildings.city.jsonl']
     """
-    whole = [path for name, path in requested_files(settings, folder).items() if name in OF_TILES]
+    whole = [
+        path for name, path in list_requested_files(settings, folder).items() if name in OF_TILES
+    ]
     return whole if settings.city.models == "merged" else [*whole, folder / TILE_FOLDER]
 
 

@@ -95,13 +95,13 @@ def file_stamps(path: Path) -> list[tuple[str, int, int]]:
     return []
 
 
-def changed_files(new_stamps: Any, old_stamps: Any) -> str:
+def find_changed_files(new_stamps: Any, old_stamps: Any) -> str:
     """Return which files of an input differ, in brackets.
 
     Stamps are the values of `with_files` as JSON gives them; the text is empty where they name
     none.
 
-    >>> changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20,
+    >>> find_changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20,
     ...     2]]])
     ' (b.laz)'
     """

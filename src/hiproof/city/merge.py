@@ -9,7 +9,13 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..formats import FORMATS, OF_TILES, TILE_FOLDER, requested_files, requested_tile_files
+from ..formats import (
+    FORMATS,
+    OF_TILES,
+    TILE_FOLDER,
+    list_requested_files,
+    list_requested_tile_files,
+)
 from ..write.fragments import Fragments, load_fragments
 from ..write.run_files import join_fragments
 from .plan import WorkPlan
@@ -58,7 +64,7 @@ def output_files(plan: WorkPlan, out: Path) -> list[Path]:
 
 def whole_files(plan: WorkPlan, out: Path) -> dict[str, Path]:
     """Return the files of the whole area by format."""
-    return requested_files(plan.settings, out)
+    return list_requested_files(plan.settings, out)
 
 
 def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
@@ -66,7 +72,7 @@ def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
 
     There are none unless the settings ask for them.
     """
-    return requested_tile_files(plan.settings, out / TILE_FOLDER, tile)
+    return list_requested_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
 def write_tile(plan: WorkPlan, out: Path, tile: str, parts: list[Fragments]) -> None:

@@ -24,7 +24,7 @@ from .bundles import remove_bundles
 from .changed import take_over
 from .from_cloud import Progress
 from .ledger import Ledger, Task
-from .marks import changed_files, compute_mark, describe_inputs, describe_selection
+from .marks import compute_mark, describe_inputs, describe_selection, find_changed_files
 from .merge import remove_tiles, tile_parts, whole_files
 from .outputs import broken_claims
 from .overrides import REDO, settle_overrides
@@ -176,7 +176,7 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
         json.loads(json.dumps(masked_values(inputs), default=str)),
     )
     other = [
-        name + changed_files(new_inputs.get(name), old_inputs.get(name))
+        name + find_changed_files(new_inputs.get(name), old_inputs.get(name))
         for name in new_inputs | old_inputs
         if new_inputs.get(name) != old_inputs.get(name)
     ]

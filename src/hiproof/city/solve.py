@@ -442,12 +442,12 @@ def reconstruct_job(
     if override is not None:
         return overridden(override, *arguments)
     unused = np.concatenate(
-        [thinned_out(points, used_points), surroundings.select_noise(job, points)]
+        [find_thinned_out(points, used_points), surroundings.select_noise(job, points)]
     )
     return reconstruct(*arguments, unused=unused)
 
 
-def thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:
+def find_thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:
     """Return the `points` (n, 3), each once, not among `used_points` (m, 3)."""
     if len(used_points) == len(points):
         return points[:0]

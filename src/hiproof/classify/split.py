@@ -219,7 +219,7 @@ def select_roof_points(
     search = RoofSearch(
         cloud,
         read.ground_classes,
-        lambda index, error: failed.append(failed_place(index, cloud.xyz, error)),
+        lambda index, error: failed.append(make_failed_place(index, cloud.xyz, error)),
     )
     if box is None:
         roofs = search.find(progress=lambda done, total: progress("ground", done, total))
@@ -372,10 +372,10 @@ def houses_or_error(
             for index, area in find_houses(group, xyz, gap_m, split_houses)
         ]
     except Exception as error:
-        return [failed_place(group, xyz, error)]
+        return [make_failed_place(group, xyz, error)]
 
 
-def failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> RoofPoints:
+def make_failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> RoofPoints:
     """Make the box of the points `index` with the error that happened there."""
     xy = xyz[index, :2]
     return RoofPoints(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))

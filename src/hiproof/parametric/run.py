@@ -21,7 +21,7 @@ import shapely
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError, is_interrupt
 from ..evaluate.run import run_record
-from ..formats import list_model_paths, requested_files
+from ..formats import list_model_paths, list_requested_files
 from ..log import LOGGER
 from ..masking import mask, masked_values
 from ..model import Building
@@ -107,7 +107,7 @@ def build_file(
         records = iter(()) if first is None else chain_records(first, records)
         maker.settle_offset(first)
         join_fragments(
-            requested_files(settings, out),
+            list_requested_files(settings, out),
             make_fragments(maker, records, built, progress),
             maker.head,
         )
