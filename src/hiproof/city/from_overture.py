@@ -14,7 +14,6 @@ import warnings
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree
 
 import numpy as np
 import shapely
@@ -153,6 +152,8 @@ def read_source(path: str | None) -> dict[str, Any] | None:
     """
     if not path or not is_geopackage(path):
         return None
+    from xml.etree import ElementTree
+
     try:
         with closing(open_database(path)) as database:
             texts = database.execute("select metadata from gpkg_metadata").fetchall()

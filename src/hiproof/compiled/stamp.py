@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator
@@ -51,7 +52,20 @@ def count_compiled() -> int:
 
 @functools.cache
 def compiled_files() -> tuple[Path, ...]:
-    return tuple(file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in file.read_bytes())
+    return tuple(file for file in iterate_sources(PACKAGE) if b"\n@compiled" in file.read_bytes())
+
+
+def iterate_sources(folder: str | Path) -> Iterator[Path]:
+    """Yield the source files in a folder and in those below it.
+
+    Folders of compiled code hold thousands of files, and are not looked into.
+    """
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                yield Path(entry.path)
+            elif entry.name != "__pycache__" and entry.is_dir():
+                yield from iterate_sources(entry.path)
 
 
 def digest(files: Iterable[Path]) -> str:
@@ -103,18 +117,18 @@ def list_imports(file: Path) -> frozenset[Path]:
 
     These are files of the two packages.
     """
-    result: set[Path] = set()
+    result: set[str] = set()
     for statement in IMPORT.finditer(file.read_bytes().decode()):
         for path in resolve_import(file, statement):
             result.update(
                 source
-                for source in (path.with_name(path.name + ".py"), path / "__init__.py")
-                if source.is_file()
+                for source in (f"{path}.py", os.path.join(path, "__init__.py"))
+                if os.path.isfile(source)
             )
-    return frozenset(result)
+    return frozenset(map(Path, result))
 
 
-def resolve_import(file: Path, statement: re.Match) -> Iterator[Path]:
+def resolve_import(file: Path, statement: re.Match) -> Iterator[str]:
     """Yield the modules and packages that one import statement may mean.
 
     They are paths without ending.
@@ -123,7 +137,7 @@ def resolve_import(file: Path, statement: re.Match) -> Iterator[Path]:
         for name in re.findall(r"[\w.]+", statement["modules"]):
             parts = name.split(".")
             yield from (
-                start.joinpath(*parts[:n])
+                os.path.join(start, *parts[:n])
                 for start in starts(file, parts[0])
                 for n in range(1, len(parts) + 1)
             )
@@ -131,9 +145,11 @@ def resolve_import(file: Path, statement: re.Match) -> Iterator[Path]:
     parts = [part for part in statement["module"].split(".") if part]
     dots = len(statement["dots"])
     for start in (file.parents[dots - 1],) if dots else starts(file, parts[0]):
-        base = start.joinpath(*parts)
+        base = os.path.join(start, *parts)
         yield base
-        yield from (base / name for name in re.findall(r"\w+", statement["names"]))
+        # a module holds no others
+        if os.path.isdir(base):
+            yield from (os.path.join(base, name) for name in re.findall(r"\w+", statement["names"]))
 
 
 def starts(file: Path, package: str) -> Iterator[Path]:
