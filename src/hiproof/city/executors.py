@@ -13,6 +13,7 @@ else. Tasks are taken from their iterable only when a worker is near.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -34,6 +35,7 @@ from ..compiled import news
 from ..compiled.stamp import count_compiled
 from ..errors import InputError, NotKeptWarning, OutputError, is_interrupt
 from ..extras import import_extra
+from ..garbage import RARELY
 from . import solved
 from .cores import limit_threads
 from .tasks import make_ready
@@ -179,6 +181,7 @@ def begin_worker(parent: int, heard: Connection, logging: tuple, count: Any) -> 
     """
     log.start(*logging)
     solved.begin_worker(count)
+    gc.set_threshold(RARELY)
     warnings.simplefilter("ignore", NotKeptWarning)
     leave_with_parent(parent, heard)
 

@@ -22,6 +22,7 @@ from ..errors import InputError, OutputError
 from ..evaluate.overview import Overview
 from ..formats import list_model_paths
 from ..frames import METRES, Units
+from ..garbage import collect_rarely
 from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
 from ..progress import show_in_notebook
@@ -101,7 +102,7 @@ def reconstruct_area(request: Request, progress: Progress | None = None) -> Summ
             return reconstruct_area(request, update)
     refuse_unusable(request)
     state = open_state(request.out)
-    with hold_folder(state):
+    with hold_folder(state), collect_rarely():
         return reconstruct_in_folder(request, state, progress)
 
 

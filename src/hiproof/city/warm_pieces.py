@@ -20,10 +20,8 @@ import numpy as np
 import shapely
 
 from ..compiled import news
+from ..garbage import RARELY
 
-# new objects between collections of garbage: at Python's own 700 a twelfth of compiling was spent
-# on them
-RARELY = 50_000
 # m; a house small enough to be fitted while code compiles
 OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)
 # m; and one with a corner that points inwards

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from itertools import takewhile
 
 from ..early import INTERRUPTED
+from ..garbage import collect_rarely
 
 CUT_OFF = re.compile(r"//[^/@\s]*:(?!\d*(?:/|$))[^@]*$")  # an address that ends within its password
 KEPT = (
@@ -20,7 +21,13 @@ KEPT = (
 
 
 def main() -> None:
-    """Run `hiproof`, and return its exit code.
+    """Run `hiproof`, which collects garbage rarely from its first import on."""
+    with collect_rarely():
+        run_command()
+
+
+def run_command() -> None:
+    """Run the command of the arguments, and return its exit code.
 
     Errors meant for the user become one line and exit code 2, Ctrl-C exit code 130.
 
