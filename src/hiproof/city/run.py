@@ -26,6 +26,7 @@ from ..garbage import collect_rarely
 from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
 from ..progress import show_in_notebook
+from ..read.decoded import forget_points, hold_points
 from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
@@ -112,7 +113,8 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
-        plan = resume_or_plan(request, state, ledger, progress)
+        with hold_points():  # for the step that sorts them
+            plan = resume_or_plan(request, state, ledger, progress)
         if request.processes is None and not request.scheduler:
             executor = make_executor(count_processes(request, plan, state, ledger))
         clock.lap("plan")
@@ -121,6 +123,7 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
         clock.lap("prepare")
         arguments = functools.partial(task_arguments, request, state)
         work_off(ledger, executor, "sort", sort_cloud, arguments, progress)
+        forget_points()
         refuse_without_points(plan, ledger)
         clock.lap("sort")
         work_off(ledger, executor, "solve", solve_tile, arguments, progress)
@@ -146,6 +149,7 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
             "command then goes on"
         ) from error
     finally:
+        forget_points()
         executor.close()
         with suppress(sqlite3.Error):
             ledger.interrupt()

@@ -7,6 +7,7 @@ las_header    whether what such a file says of itself is possible
 geokeys       the reference system of its GeoTIFF keys
 las_crs       the one that its records define
 copc          nodes of a COPC file that meet a box
+decoded       decoded points, held until a file is read again
 runs          where the points of a file lie, run by run
 lax           LAStools' index beside a file
 ply           PLY files

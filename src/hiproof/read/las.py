@@ -13,7 +13,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import laspy
 import numpy as np
@@ -21,6 +20,7 @@ import numpy as np
 from ..errors import InputError, InputWarning
 from ..log import count_things
 from .copc import check_nodes, copc_record
+from .decoded import Decoded, decode_or_release, take_decoded
 from .las_header import LasFacts, check_all_points, check_points, read_facts
 from .plausible import Implausible
 from .remote import is_url, open_binary
@@ -112,15 +112,13 @@ def las_chunks(
         0,
     )
     with translate_errors(path):
-        for record in records(
-            path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()
-        ):
-            xyz = coordinates(record)
+        for points in decode_runs(path, chunk_points, facts.count, runs):
+            xyz = points.xyz
             lowest, highest = check_points(xyz, facts)
             lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
             if noted is not None:
                 noted.append(compute_run_boxes(xyz))
-            chunk = drop_withheld(xyz, record)
+            chunk = drop_withheld(xyz, points)
             left_out += len(xyz) - len(chunk[0])
             yield chunk
         if runs is None and facts.count:
@@ -128,10 +126,22 @@ def las_chunks(
     log_withheld(left_out, path)
 
 
-def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Any]:
-    """Yield laspy's records of the `runs` of points, [first, end).
+def decode_runs(
+    path: str | Path, chunk_points: int, count: int, runs: np.ndarray | None
+) -> Iterator[Decoded]:
+    """Yield the decoded points of the `runs` (k, 2), or of a whole file.
 
-    A record has at most `chunk_points` points, and none is empty.
+    A whole file has `count` points, and need not be decoded twice (decoded.py).
+    """
+    if runs is not None:
+        return decode(path, chunk_points, runs.tolist())
+    return decode_or_release(path, chunk_points, count, decode(path, chunk_points, [(0, count)]))
+
+
+def decode(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Decoded]:
+    """Yield the decoded `runs` of points, [first, end).
+
+    Each holds at most `chunk_points` points, and none is empty.
     """
     with (
         open_binary(path) as file,
@@ -147,7 +157,7 @@ def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) ->
                     raise ValueError(
                         f"it ends {count_things(count - len(record), 'point')} too early"
                     )
-                yield record
+                yield take_decoded(record)
 
 
 def is_copc(path: str | Path) -> bool:
@@ -165,33 +175,25 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
                 "its first record says that it is COPC, and none tells of an octree; it is damaged"
             )
         nodes, record = copc_record(file, facts, facts.octree, box, WANTED)
-        xyz = coordinates(record)
+        points = take_decoded(record)
+        xyz = points.xyz
         lower, upper = check_points(xyz, facts)
         check_nodes(xyz, nodes, facts, facts.octree)
         if 0 < len(xyz) == facts.count:
             check_all_points(lower, upper, facts)
-        chunk = drop_withheld(xyz, record)
+        chunk = drop_withheld(xyz, points)
     log_withheld(len(xyz) - len(chunk[0]), path)
     return chunk
 
 
-def coordinates(record) -> np.ndarray:
-    """Return the world coordinates (n, 3) of a laspy record."""
-    xyz = np.empty((len(record), 3))
-    for axis, name in enumerate("XYZ"):
-        np.multiply(record.array[name], record.scales[axis], out=xyz[:, axis])
-        xyz[:, axis] += record.offsets[axis]
-    return xyz
-
-
-def drop_withheld(xyz: np.ndarray, record) -> Chunk:
+def drop_withheld(xyz: np.ndarray, points: Decoded) -> Chunk:
     """Return coordinates (n, 3) and classes without withheld points.
 
     Withheld points are flagged as deleted.
     """
-    classification = np.asarray(record["classification"], np.uint8)
-    withheld = np.asarray(record["withheld"], bool)
-    return (xyz[~withheld], classification[~withheld]) if withheld.any() else (xyz, classification)
+    if not points.is_withheld.any():
+        return xyz, points.classes
+    return xyz[~points.is_withheld], points.classes[~points.is_withheld]
 
 
 def log_withheld(count: int, path: str | Path) -> None:

@@ -1,0 +1,101 @@
+"""A run decodes each point file once, and gets from it what it would decode again."""
+
+from collections import Counter
+
+import laspy
+import numpy as np
+import pytest
+
+from hiproof import Request, Settings, reconstruct_area
+from hiproof.read import decoded
+from hiproof.read.decoded import HOLDER, forget_points, hold_points
+from hiproof.read.pointcloud import iter_points
+from tiny_town import make_town, write_town
+
+FLAT = Settings.from_dict(
+    {"fit": {"parts": "one", "types": ["flat"]}, "segment": {"network": "never"}}
+)
+
+
+@pytest.fixture
+def files(tmp_path):
+    cloud, footprints = write_town(tmp_path, make_town(3))
+    yield {"cloud": cloud, "footprints": footprints}
+    forget_points()
+
+
+@pytest.fixture
+def decoded_points(monkeypatch):
+    """How many points laspy decodes, by file."""
+    counts = Counter()
+    open_file = laspy.open
+
+    def open_counted(file, **options):
+        reader = open_file(file, **options)
+        read = reader.read_points
+
+        def read_points(count):
+            counts[file.name] += count
+            return read(count)
+
+        reader.read_points = read_points
+        return reader
+
+    monkeypatch.setattr(laspy, "open", open_counted)
+    return counts
+
+
+def join(chunks):
+    chunks = list(chunks)
+    return [
+        np.concatenate([getattr(chunk, name) for chunk in chunks]) for name in ("xyz", "classes")
+    ]
+
+
+def test_what_is_held_is_what_would_be_decoded(files, decoded_points):
+    expected = join(iter_points(files["cloud"]))
+    with hold_points():
+        first = join(iter_points(files["cloud"]))
+    decoded_points.clear()
+    again = join(iter_points(files["cloud"]))
+    assert not decoded_points
+    for one, other, third in zip(expected, first, again, strict=True):
+        np.testing.assert_array_equal(one, other)
+        np.testing.assert_array_equal(one, third)
+    # it was given away, so that its memory is free
+    assert not HOLDER.held
+    assert list(iter_points(files["cloud"])) and decoded_points
+
+
+def test_a_file_that_was_written_again_is_decoded_again(files):
+    with hold_points():
+        join(iter_points(files["cloud"]))
+    cloud = laspy.read(files["cloud"])
+    cloud.points = cloud.points[:100]
+    cloud.write(files["cloud"])
+    assert len(join(iter_points(files["cloud"]))[0]) == 100
+
+
+def test_a_file_that_is_too_large_or_not_read_to_its_end_is_not_held(files, monkeypatch):
+    with hold_points():
+        next(iter_points(files["cloud"], 100))
+    assert not HOLDER.held
+    monkeypatch.setattr(decoded, "MOST_HELD_POINTS", 1000)
+    with hold_points():
+        join(iter_points(files["cloud"], 100))
+    assert not HOLDER.held
+
+
+def test_larger_chunks_than_wanted_are_not_handed_out(files):
+    with hold_points():
+        join(iter_points(files["cloud"]))
+    assert max(len(chunk) for chunk in iter_points(files["cloud"], 100)) == 100
+
+
+@pytest.mark.parametrize("has_footprints", [True, False])
+def test_a_run_decodes_each_point_once(files, decoded_points, tmp_path, has_footprints):
+    footprints = str(files["footprints"]) if has_footprints else None
+    request = Request((str(files["cloud"]),), tmp_path / "out", footprints, settings=FLAT)
+    assert reconstruct_area(request).buildings == 3
+    assert list(decoded_points.values()) == [len(make_town(3).xyz)]
+    assert not HOLDER.held
