@@ -8,6 +8,7 @@ scene       these in each of the building's directions, as the compiled search r
 planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, heights of the roof
+around      compiled: what the other volumes leave for one
 steps       compiled: what an edge of a volume costs that shows
 objective   compiled: what a roof costs: misfit, volumes, edges that show
 edges, refit  compiled: a volume's edges moved, its planes refitted

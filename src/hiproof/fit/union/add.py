@@ -7,10 +7,11 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from .around import look_around
 from .candidates import best_rectangles
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
 from .improve import improve
-from .objective import costs, objective
+from .objective import costs, objective_with
 from .refit import refit
 from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, is_fixed, roof_heights
 
@@ -84,7 +85,8 @@ def best_addition(volumes, value, ground, candidates):
     best, lowest, scene = volumes, np.inf, ground.scene
     if len(candidates) == 0:
         return best, lowest
-    z_now, _ = roof_heights(volumes, scene.U, scene.V)
+    around = look_around(volumes, scene.U, scene.V, len(volumes))
+    z_now = around.without
     cost_now = costs(z_now, scene)
     for replacing in (False, True):
         gains, cells = best_rectangles(scene, candidates, ground.cell_u, ground.cell_v, cost_now, z_now, replacing)
@@ -98,7 +100,7 @@ def best_addition(volumes, value, ground, candidates):
             least = FREELY_UNITS * scene.evidence if leans_freely(new, scene) else 0.0
             if replacing and len(volumes) > 1:
                 new[REPLACES] = 1.0
-            trial, found = settle_new(joined.copy(), scene, min(value, lowest) - least)
+            trial, found = settle_new(joined.copy(), scene, min(value, lowest) - least, around)
             if found < np.inf:
                 best, lowest = trial, found
             if replacing:
@@ -136,7 +138,8 @@ def with_neighbour_cut(volumes, joined, scene, best, lowest, value, least):
             if CUT_LEAST_M < over < CUT_MOST_SHARE * (high - low) and high - low - over >= MIN_SIDE_M:
                 cut = joined.copy()
                 cut[j, U0 + edge] = stop
-                trial, found = settle_new(cut, scene, min(value, lowest) - least)
+                around = look_around(cut, scene.U, scene.V, last)
+                trial, found = settle_new(cut, scene, min(value, lowest) - least, around)
                 if found < np.inf:
                     best, lowest = trial, found
     return best, lowest
@@ -150,16 +153,16 @@ def overlap(one, other):
 
 
 @compiled
-def settle_new(volumes, scene, value):
+def settle_new(volumes, scene, value, around):
     """Volumes whose last one is new, that one fitted and its edges moved twice; infinite where that is not below `value`.
 
     One that begins too far above `value` to come below it is given up.
     """
     k, found = len(volumes) - 1, np.inf
     for units in HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED:
-        refit(volumes, scene, k)
-        found = objective(volumes, scene, value + units * scene.evidence)
+        refit(volumes, scene, k, around)
+        found = objective_with(volumes, scene, k, around, value + units * scene.evidence)
         if found == np.inf:
             break
-        found = move_edges(volumes, scene, k, found, EVERYWHERE)
+        found = move_edges(volumes, scene, k, found, EVERYWHERE, around)
     return volumes, found if found < value - LEAST_GAIN else np.inf

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from .around import roof_everywhere
 from .objective import BASE_SHARE, costs
 from .steps import among_vertices, edge_cost, walls_of
 from .volumes import (
@@ -22,7 +23,6 @@ from .volumes import (
     V0,
     V1,
     volume_cost,
-    with_and_without,
 )
 
 MIN_SIDE_M = 0.8  # m; a narrower volume is no part of a roof but a gutter or a parapet
@@ -38,9 +38,9 @@ EVERYWHERE = 60.0  # m: no edge is further from where it may go
 
 
 @compiled
-def move_edges(volumes, scene, k, value, reach):
+def move_edges(volumes, scene, k, value, reach, around):
     """Move each edge of volume k (in place) by at most `reach` to the place of the lowest objective; returns that."""
-    everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+    everywhere, without = roof_everywhere(volumes, scene.U, scene.V, k, around), around.without
     before, gain, bare = costs(without, scene), costs(everywhere, scene), np.zeros(len(without))
     base, always_bare = volumes[0, OFFSET + LEVEL], 0.0
     for i in range(len(gain)):

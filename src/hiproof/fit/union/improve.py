@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from .around import look_around
 from .edges import EVERYWHERE, LEAST_GAIN, move_edges
 from .facings import face_walls
 from .joins import join_neighbours, merge_volumes
@@ -45,7 +46,8 @@ def improve(volumes, scene, value, slopes, rounds):
                 volumes, value = refitted(volumes, scene, value, k)
         for k in range(1, len(volumes)):
             if is_unsettled(volumes, k):
-                value = move_edges(volumes, scene, k, value, EVERYWHERE)
+                around = look_around(volumes, scene.U, scene.V, k)
+                value = move_edges(volumes, scene, k, value, EVERYWHERE, around)
         volumes, value = drop_volumes(volumes, scene, value)
         k = 1
         while k < len(volumes):
@@ -71,11 +73,12 @@ def change_structure(volumes, scene, value, k, slopes):
 @compiled
 def change_planes(volumes, scene, value, k, slopes):
     """All moves that change which planes volume k has, how they are tied and where they face."""
-    volumes, value = drop_planes(volumes, scene, value, k, np.inf)
-    volumes, value = flatten(volumes, scene, value, k)
-    volumes, value = change_ties(volumes, scene, value, k)
-    volumes, value = face_walls(volumes, scene, value, k)
-    return add_planes(volumes, scene, value, k, slopes)
+    around = look_around(volumes, scene.U, scene.V, k)
+    volumes, value = drop_planes(volumes, scene, value, k, np.inf, around)
+    volumes, value = flatten(volumes, scene, value, k, around)
+    volumes, value = change_ties(volumes, scene, value, k, around)
+    volumes, value = face_walls(volumes, scene, value, k, around)
+    return add_planes(volumes, scene, value, k, slopes, around)
 
 
 @compiled
@@ -137,7 +140,8 @@ def simplify(volumes, scene, value, steepest):
                     if found < value - LEAST_GAIN:
                         volumes, value = trial, found
                         continue
-            volumes, value = drop_planes(volumes, scene, value, k, steepest)
+            around = look_around(volumes, scene.U, scene.V, k)
+            volumes, value = drop_planes(volumes, scene, value, k, steepest, around)
             k += 1
         volumes, value = merge_volumes(volumes, scene, value, steepest)
         if value > before - LEAST_GAIN:

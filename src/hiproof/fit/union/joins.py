@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from .around import look_around
 from .moves import remove_plane, settled, without
 from .volumes import (
     DIRECTION,
@@ -78,7 +79,14 @@ def reach_over(volumes, k, j, edge):
 @compiled
 def settled_without(trial, scene, k, value, j):
     """`trial` without volume j, and with volume k, which took its place, settled; what `settled` says of it."""
-    return settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
+    return settled_anew(without(trial, j), scene, k if k < j else k - 1, value)
+
+
+@compiled
+def settled_anew(trial, scene, k, value):
+    """Settle volume k of a `trial` of which others changed, too."""
+    around = look_around(trial, scene.U, scene.V, k)
+    return settled(trial, scene, k, value, MERGE_REACH_M, around)
 
 
 @compiled
@@ -142,7 +150,7 @@ def surround(volumes, scene, value, k):
             top[0, U0 + side] = volumes[beside[side], U0 + (side ^ 1)]
     kept[0] = kept[k] = False
     trial = np.concatenate((volumes[:1], own.reshape(1, -1), top, volumes[kept]))
-    trial, found = settled(trial, scene, 1, value, MERGE_REACH_M)
+    trial, found = settled_anew(trial, scene, 1, value)
     return (trial, found) if found < np.inf else (volumes, value)
 
 
@@ -156,7 +164,7 @@ def hand_over(volumes, scene, value, k):
         trial = volumes.copy()
         remove_plane(trial[k], side)
         trial[j, U0 + side], trial[k, U0 + side] = volumes[k, U0 + side], volumes[j, U0 + (side ^ 1)]
-        trial, found = settled(trial, scene, k, value, MERGE_REACH_M)
+        trial, found = settled_anew(trial, scene, k, value)
         if found < np.inf:
             return trial, found
     return volumes, value

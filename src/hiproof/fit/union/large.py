@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from .around import look_around
 from .block import SETTLE_POINTS, SETTLE_REACH_M, find_in_block, search_block
 from .blocks import BLOCK_M2, HeightRaster, cheapest_cut
 from .box import Box, clip_to_box
@@ -65,7 +66,8 @@ def settle_one(whole: Whole, k: int) -> None:
     def settle_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
         own = row_of(rows, k)
         rows, value = refitted(rows, scene, value, own)
-        value = move_edges(rows, scene, own, value, SETTLE_REACH_M)
+        around = look_around(rows, scene.U, scene.V, own)
+        value = move_edges(rows, scene, own, value, SETTLE_REACH_M, around)
         return refitted(rows, scene, value, own)
 
     change_in_window(whole, extent.widen(AROUND_M), SETTLE_POINTS, settle_row, {k})

@@ -8,6 +8,7 @@
     add an end, a level top               a gable becomes a hip, a hip a mansard
 
 All functions take volumes (k, COLUMNS) and the objective's value, and return the better of what they got and what they found.
+Those of volume k alone take what is `around` it, which they leave as it is.
 Which ways planes face is facings.py, several volumes at once joins.py, all moves in turn improve.py.
 """
 
@@ -16,8 +17,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from .around import look_around, roof_everywhere, roof_with
 from .edges import BEYOND_M, EVERYWHERE, LEAST_GAIN, move_edges
-from .objective import objective, point_cost
+from .objective import objective, objective_with, point_cost
 from .refit import refit
 from .volumes import (
     DIRECTION,
@@ -42,9 +44,7 @@ from .volumes import (
     lowest,
     plane_count,
     rectangle,
-    roof_heights,
     slope_count,
-    with_and_without,
 )
 
 HOPELESS_UNITS, HOPELESS_SHARE = 2.0, 0.01  # a trial that starts further above the best than this is given up
@@ -55,16 +55,17 @@ ALMOST_LEVEL = 0.15  # rise over run; below it a plane may as well be level
 
 
 @compiled
-def settled(trial, scene, k, value, reach):
+def settled(trial, scene, k, value, reach, around):
     """`trial` with volume k refitted, its edges moved and refitted, and its objective, infinite where that is above `value`."""
-    refit(trial, scene, k)
-    found = objective(trial, scene, value + HOPELESS_UNITS * scene.evidence + HOPELESS_SHARE * scene.n)
+    refit(trial, scene, k, around)
+    limit = value + HOPELESS_UNITS * scene.evidence + HOPELESS_SHARE * scene.n
+    found = objective_with(trial, scene, k, around, limit)
     if found == np.inf:
         return trial, found
-    found = move_edges(trial, scene, k, found, reach)
+    found = move_edges(trial, scene, k, found, reach, around)
     again = trial.copy()
-    refit(again, scene, k)
-    better = objective(again, scene, found)
+    refit(again, scene, k, around)
+    better = objective_with(again, scene, k, around, found)
     if better < found:
         trial, found = again, better
     return (trial, found) if found < value - LEAST_GAIN else (trial, np.inf)
@@ -89,9 +90,9 @@ def refit_each(volumes, scene, value):
 @compiled
 def refitted(volumes, scene, value, k):
     """Volume k refitted, where that helps."""
-    trial = volumes.copy()
-    refit(trial, scene, k)
-    found = objective(trial, scene, value)
+    trial, around = volumes.copy(), look_around(volumes, scene.U, scene.V, k)
+    refit(trial, scene, k, around)
+    found = objective_with(trial, scene, k, around, value)
     return (trial, found) if found < value - LEAST_GAIN else (volumes, value)
 
 
@@ -99,7 +100,8 @@ def refitted(volumes, scene, value, k):
 def move_all_edges(volumes, scene, value, reach):
     """The edges of every volume moved, in place."""
     for k in range(1, len(volumes)):
-        value = move_edges(volumes, scene, k, value, reach)
+        around = look_around(volumes, scene.U, scene.V, k)
+        value = move_edges(volumes, scene, k, value, reach, around)
     return value
 
 
@@ -120,7 +122,7 @@ def drop_volumes(volumes, scene, value):
 
 
 @compiled
-def drop_planes(volumes, scene, value, k, steepest):
+def drop_planes(volumes, scene, value, k, steepest, around):
     """Planes of volume k no steeper than `steepest` that do not pay go."""
     for plane in range(PLANES):
         if volumes[k, OFFSET + plane] == np.inf or plane_count(volumes[k]) < 2:
@@ -129,7 +131,7 @@ def drop_planes(volumes, scene, value, k, steepest):
             continue
         trial = volumes.copy()
         remove_plane(trial[k], plane)
-        trial, found = settled(trial, scene, k, value, EVERYWHERE)
+        trial, found = settled(trial, scene, k, value, EVERYWHERE, around)
         if found < np.inf:
             volumes, value = trial, found
     return volumes, value
@@ -144,7 +146,7 @@ def remove_plane(row, plane):
 
 
 @compiled
-def flatten(volumes, scene, value, k):
+def flatten(volumes, scene, value, k, around):
     """The all but level planes of volume k become one level top."""
     flat = (volumes[k, OFFSET : OFFSET + SIDES] < np.inf) & (volumes[k, SLOPE : SLOPE + SIDES] < ALMOST_LEVEL)
     if not flat.any() or volumes[k, OFFSET + LEVEL] < np.inf:
@@ -157,17 +159,17 @@ def flatten(volumes, scene, value, k):
             total += volumes[k, OFFSET + plane] + volumes[k, SLOPE + plane] * distance_up(volumes[k], plane, u, v)
             remove_plane(trial[k], plane)
     trial[k, OFFSET + LEVEL] = total / flat.sum()
-    trial, found = settled(trial, scene, k, value, EVERYWHERE)
+    trial, found = settled(trial, scene, k, value, EVERYWHERE, around)
     return (trial, found) if found < np.inf else (volumes, value)
 
 
 @compiled
-def change_ties(volumes, scene, value, k):
+def change_ties(volumes, scene, value, k, around):
     """Other slopes of volume k equal; and it may join the max instead of replacing what it covers."""
     if volumes[k, REPLACES] > 0.0:
         trial = volumes.copy()
         trial[k, REPLACES] = 0.0
-        trial, found = settled(trial, scene, k, value, EVERYWHERE)
+        trial, found = settled(trial, scene, k, value, EVERYWHERE, around)
         if found < np.inf:
             volumes, value = trial, found
     for tie in range(3):
@@ -178,27 +180,27 @@ def change_ties(volumes, scene, value, k):
         if slope_count(trial[k]) == slope_count(volumes[k]):
             continue
         equalise_slopes(trial[k])
-        trial, found = settled(trial, scene, k, value, 0.6)
+        trial, found = settled(trial, scene, k, value, 0.6, around)
         if found < np.inf:
             volumes, value = trial, found
     return volumes, value
 
 
 @compiled
-def add_planes(volumes, scene, value, k, slopes):
+def add_planes(volumes, scene, value, k, slopes, around):
     """A further plane for volume k: an end, a side or a level top; its rectangle may reach beyond the outline there."""
-    z_now, _ = roof_heights(volumes, scene.U, scene.V)
-    everywhere, beneath = with_and_without(volumes, scene.U, scene.V, k)
+    z_now = roof_with(volumes, scene.U, scene.V, k, around)
+    everywhere = roof_everywhere(volumes, scene.U, scene.V, k, around)
     for plane in range(PLANES):
         if volumes[k, OFFSET + plane] < np.inf:
             continue
         tried = slopes_to_try(volumes[k], plane, slopes)
         least = 0.6 * scene.evidence * PARAMETER_COST
-        gain, slope, offset = best_plane(volumes, scene, k, plane, tried, z_now, everywhere, beneath, least)
+        gain, slope, offset = best_plane(volumes, scene, k, plane, tried, z_now, everywhere, around.without, least)
         wide = volumes.copy()
         if plane < LEVEL:
             wide[k, U0 + plane] = beyond(scene, int(volumes[k, DIRECTION]), plane)
-            more, other_slope, other_offset = best_plane(wide, scene, k, plane, tried, z_now, everywhere, beneath, gain)
+            more, other_slope, other_offset = best_plane(wide, scene, k, plane, tried, z_now, everywhere, around.without, gain)
             if more > gain + LEAST_GAIN:
                 gain, slope, offset = more, other_slope, other_offset
             else:
@@ -212,11 +214,11 @@ def add_planes(volumes, scene, value, k, slopes):
                 trial[k, SLOPE + plane] = slope
             trial[k, TIE] = tie
             equalise_slopes(trial[k])
-            trial, found = settled(trial, scene, k, value, EVERYWHERE)
+            trial, found = settled(trial, scene, k, value, EVERYWHERE, around)
             if found < np.inf:
                 volumes, value = trial, found
-                z_now, _ = roof_heights(volumes, scene.U, scene.V)
-                everywhere, beneath = with_and_without(volumes, scene.U, scene.V, k)
+                z_now = roof_with(volumes, scene.U, scene.V, k, around)
+                everywhere = roof_everywhere(volumes, scene.U, scene.V, k, around)
                 break
     return volumes, value
 

@@ -13,8 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from .around import roof_with
 from .steps import edge_cost, walls_of
-from .volumes import BASE_COST, is_allowed, roof_heights, volume_cost
+from .volumes import BASE_COST, LEVEL, OFFSET, is_allowed, roof_heights, volume_cost
 
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
 
@@ -54,12 +55,27 @@ def objective(volumes, scene, limit):
     for k in range(1, len(volumes)):
         if not is_allowed(volumes[k], scene.allowed):
             return np.inf
-    z, top = roof_heights(volumes, scene.U, scene.V)
-    total, bare = costs(z, scene).sum(), 0.0
+    z, _ = roof_heights(volumes, scene.U, scene.V)
+    return cost_of_roof(volumes, scene, z, limit)
+
+
+@compiled
+def objective_with(volumes, scene, k, around, limit):
+    """Compute what `objective` does, of a roof whose volume k alone is another than it was."""
+    if k > 0 and not is_allowed(volumes[k], scene.allowed):
+        return np.inf
+    z = roof_with(volumes, scene.U, scene.V, k, around)
+    return cost_of_roof(volumes, scene, z, limit)
+
+
+@compiled
+def cost_of_roof(volumes, scene, z, limit):
+    """Compute the cost of a roof so high (n + g,); infinite once it is known to be above `limit`."""
+    total, bare, base = costs(z, scene).sum(), 0.0, volumes[0, OFFSET + LEVEL]
     for k in range(1, len(volumes)):
         total += scene.evidence * volume_cost(volumes[k])
     for i in range(scene.n, len(z)):
-        if top[i] == 0:
+        if z[i] == base:
             bare += scene.weight[i]
     if bare > BASE_SHARE * scene.n:
         total += scene.evidence * BASE_COST

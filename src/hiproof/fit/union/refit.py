@@ -21,7 +21,6 @@ from .volumes import (
     coefficients,
     distance_up,
     is_within,
-    lowest,
     lowest_plane,
     rectangle,
 )
@@ -32,11 +31,12 @@ LEAST_WEIGHT, LEAST_SLOPE_WEIGHT, LEAST_SPREAD_M2 = 1.0, 2.0, 0.02
 
 
 @compiled
-def refit(volumes, scene, k):
+def refit(volumes, scene, k, around):
     """Two rounds of biweighted least squares for volume k (in place) on the points where it is the one that shows."""
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v, z = scene.U[direction, :n], scene.V[direction, :n], scene.z[:n]
-    above, not_below = where_it_may_show(volumes, scene.U, scene.V, n, k)
+    below, above = around.below, around.above
+    ends, replaces = rectangle(volumes, k), volumes[k, REPLACES] > 0.0
     weights, planes = np.empty(n), np.empty(n, np.int64)
     for turn in range(ROUNDS):
         scale = (scene.dead + scene.width) * (2.0 if turn == 0 else 1.5)
@@ -44,7 +44,8 @@ def refit(volumes, scene, k):
         for i in range(n):  # no branches: a processor does several points at once
             h, planes[i] = lowest_plane(c, u[i], v[i])
             w = 1.0 - ((z[i] - h) / scale) ** 2
-            weights[i] = w * w if (h > above[i]) & (h >= not_below[i]) & (abs(z[i] - h) < scale) else 0.0
+            shows = is_within(ends, u[i], v[i]) & (replaces | (h > below[i])) & (h >= above[i])
+            weights[i] = w * w if shows & (abs(z[i] - h) < scale) else 0.0
         solve_planes(volumes[k], sums_by_plane(volumes, k, u, v, z, weights, planes))
 
 
@@ -62,34 +63,6 @@ def sums_by_plane(volumes, k, u, v, z, weights, planes):
             sums[3, plane] += w * x * x
             sums[4, plane] += w * x * z[i]
     return sums
-
-
-@compiled
-def where_it_may_show(volumes, U, V, n, k):
-    """How high volume k has to be at the first n points of U, V to show there: above one height (n,) and not below another (n,), which is
-    infinite outside its rectangle and where another replaces it."""
-    above, not_below = np.full(n, -np.inf), np.empty(n)
-    u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
-    ends = rectangle(volumes, k)
-    for i in range(n):
-        not_below[i] = -np.inf if is_within(ends, u[i], v[i]) else np.inf
-    for j in range(0 if volumes[k, REPLACES] == 0.0 else k, len(volumes)):
-        if j == k:
-            continue
-        u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
-        ends = rectangle(volumes, j)
-        replaces, c = volumes[j, REPLACES] > 0.0, coefficients(volumes, j)
-        if j < k:
-            for i in range(n):
-                h = lowest(c, u[i], v[i])
-                there = is_within(ends, u[i], v[i])
-                above[i] = h if there & (replaces | (h > above[i])) else above[i]
-            continue
-        for i in range(n):
-            h = np.inf if replaces else lowest(c, u[i], v[i])
-            there = is_within(ends, u[i], v[i])
-            not_below[i] = h if there & (h > not_below[i]) else not_below[i]
-    return above, not_below
 
 
 @compiled

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .around import look_around
 from .edges import move_edges
 from .moves import refitted
 from .objective import costs, objective
@@ -57,8 +58,10 @@ def repeat_along(volumes: np.ndarray, k: int, axis: int, scene: Scene) -> np.nda
     while len(strip.z) and (copy := find_copy(volumes, k, axis, strip, scene.evidence)) is not None:
         volumes = np.vstack([volumes, copy])
         value = objective(volumes, scene, np.inf)
-        volumes, value = refitted(volumes, scene, value, len(volumes) - 1)
-        move_edges(volumes, scene, len(volumes) - 1, value, REACH_M)
+        last = len(volumes) - 1
+        volumes, value = refitted(volumes, scene, value, last)
+        around = look_around(volumes, scene.U, scene.V, last)
+        move_edges(volumes, scene, last, value, REACH_M, around)
     return volumes
 
 

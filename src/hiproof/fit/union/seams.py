@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from .around import look_around
 from .box import Box, box_around
 from .edges import EVERYWHERE, LEAST_GAIN, move_edges
 from .grow import typical_slopes
 from .improve import change_planes
-from .moves import refitted, settled, without
+from .joins import settled_anew
+from .moves import refitted, without
 from .objective import objective
 from .scene import Scene
 from .volumes import DIRECTION, NUMBER, SETTLED, U0, U1, V0, V1, is_fixed, roof_heights
@@ -22,7 +24,7 @@ SEAM_M = 0.8  # m to either side of a cut: volumes that reach into this strip ar
 AROUND_M, FAR_M = 1.0, 5.0  # m around volumes that a window shows, and around one whose neighbours reach too far
 MOST_WINDOW_M2, MOST_TIMES = 1200.0, 1.5  # of a window over a volume and all its neighbours; times its own box
 WINDOW_POINTS = 1200  # of a window of seams at most
-BESIDE_M, MERGE_REACH_M = 0.6, 2.0  # m between volumes that may be one; m that the edges of the two made one may move
+BESIDE_M = 0.6  # m between volumes that may be one
 ALIKE_M, ALIKE_SHARE = 0.6, 0.4  # m between planes that may be one, over at least such a share of a volume
 SAMPLES = 4  # a side of a volume at which its planes are compared with another's
 TOUCH_M = 0.6  # m between volumes that touch
@@ -93,7 +95,7 @@ def merge(whole: Whole, j: int, k: int) -> bool:
         trial[at_k, low] = np.minimum(rows[at_j, low], rows[at_k, low])
         trial[at_k, high] = np.maximum(rows[at_j, high], rows[at_k, high])
         trial = without(trial, at_j)
-        trial, found = settled(trial, scene, at_k - (at_j < at_k), value, MERGE_REACH_M)
+        trial, found = settled_anew(trial, scene, at_k - (at_j < at_k), value)
         return (trial, found) if found < value else (rows, value)
 
     box = box_around([Box(*whole.boxes[j]), Box(*whole.boxes[k])]).widen(AROUND_M)
@@ -119,7 +121,8 @@ def improve_one(whole: Whole, place: bytes) -> None:
     def improve_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
         own = row_of(rows, k)
         rows, value = refitted(rows, scene, value, own)
-        value = move_edges(rows, scene, own, value, EVERYWHERE)
+        around = look_around(rows, scene.U, scene.V, own)
+        value = move_edges(rows, scene, own, value, EVERYWHERE, around)
         rows, value = leave_out(whole, rows, scene, value, own)
         own = row_of(rows, k)
         return change_planes(rows, scene, value, own, slopes_of(rows)) if own else (rows, value)
@@ -141,7 +144,8 @@ def leave_out(whole: Whole, rows: np.ndarray, scene: Scene, value: float, k: int
     near = [q for q in near if whole.extent_of(trial[q]).widen(TOUCH_M).holds(u, v).any()]
     for _ in range(LEFT_OUT_ROUNDS):
         for q in near:
-            found = move_edges(trial, scene, q, found, EVERYWHERE)
+            around = look_around(trial, scene.U, scene.V, q)
+            found = move_edges(trial, scene, q, found, EVERYWHERE, around)
         for q in near:
             trial, found = refitted(trial, scene, found, q)
         if found < value - LEAST_GAIN:

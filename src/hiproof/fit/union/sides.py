@@ -14,10 +14,11 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
+from .around import look_around, roof_everywhere
 from .objective import ghost_cost, point_cost
 from .plan import Plan
 from .scene import Scene
-from .volumes import DIRECTION, U0, V0, V1, with_and_without
+from .volumes import DIRECTION, U0, V0, V1
 
 LEAN = 0.5  # of a line that a side may take
 GAP_M = 1.0  # how far off it may be in the middle of the side; a line that leans is further off at its ends
@@ -163,7 +164,9 @@ def near_places(volume, across_u, u, v):
 @compiled
 def gain_of_volume(volumes, k, near, scene):
     """How much more the places `near` (m,) cost were volume k everywhere than without it (m,)."""
-    everywhere, without = with_and_without(volumes, scene.U[:, near], scene.V[:, near], k)
+    U, V = scene.U[:, near], scene.V[:, near]
+    around = look_around(volumes, U, V, k)
+    everywhere, without = roof_everywhere(volumes, U, V, k, around), around.without
     gain = np.zeros(len(near))
     for i in range(len(near)):
         if everywhere[i] != without[i]:

@@ -127,28 +127,6 @@ def roof_heights(volumes, U, V):
 
 
 @compiled
-def with_and_without(volumes, U, V, k):
-    """Heights (n,) of the roof were volume k everywhere, and without it."""
-    n = U.shape[1]
-    everywhere, without = np.full(n, -np.inf), np.full(n, -np.inf)
-    for j in range(len(volumes)):
-        u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
-        ends = rectangle(volumes, j)
-        c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
-        if j == k:
-            for i in range(n):
-                h = lowest(c, u[i], v[i])
-                everywhere[i] = h if replaces | (h > without[i]) else without[i]
-            continue
-        for i in range(n):
-            h = lowest(c, u[i], v[i])
-            there = is_within(ends, u[i], v[i])
-            without[i] = h if there & (replaces | (h > without[i])) else without[i]
-            everywhere[i] = h if there & (replaces | (h > everywhere[i])) else everywhere[i]
-    return everywhere, without
-
-
-@compiled
 def slope_count(row):
     """How many slopes of its own a volume has under its tie."""
     along = int(row[OFFSET] < np.inf) + int(row[OFFSET + 1] < np.inf)

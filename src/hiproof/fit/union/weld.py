@@ -20,6 +20,7 @@ import shapely
 from ...model import Part
 from ...model.heights import find_highest
 from .agree import Agreement, fitted, null_space
+from .around import look_around, roof_everywhere
 from .drawn_plan import DrawnPlan, count_parameters, draw_plan, part_over
 from .finish import Planes
 from .objective import costs, misfits
@@ -28,7 +29,7 @@ from .regions import Site, polygons_of, regions_of
 from .repairs import Repair, find_repairs
 from .scene import Scene, select_points
 from .sides import Side, corners_of
-from .volumes import DIRECTION, PARAMETER_COST, U0, V0, V1, with_and_without
+from .volumes import DIRECTION, PARAMETER_COST, U0, V0, V1
 
 # units of evidence that a corner of the drawn roof costs; above, recall and the share of points
 # fall
@@ -407,6 +408,7 @@ def dearer(volumes: np.ndarray, k: int, edge: int, was: Side, side: Side, scene:
     within = (y >= volumes[k, V0 - 2 * axis]) & (y <= volumes[k, V1 - 2 * axis])
     within &= sign * (x - volumes[k, U0 + (edge ^ 1)]) >= 0.0
     before, after = (within & (sign * (x - line.at - line.lean * y) <= 0.0) for line in (was, side))
-    everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+    around = look_around(volumes, scene.U, scene.V, k)
+    everywhere, without = roof_everywhere(volumes, scene.U, scene.V, k, around), around.without
     gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
     return float(gain[after].sum() - gain[before].sum())
