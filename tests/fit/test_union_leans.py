@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 from hiproof.fit.union import fit_building
+from hiproof.fit.union.around import look_around
 from hiproof.fit.union.facings import face_walls, turn_plane
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.scene import MOST_LEAN, leans_along
@@ -63,7 +64,7 @@ def test_facing_walls_never_costs(seed):
 
     value = objective(volumes, scene, np.inf)
     for k in range(1, len(volumes)):
-        found, lower = face_walls(volumes.copy(), scene, value, k)
+        found, lower = face_walls(volumes.copy(), scene, value, k, look_around(volumes, scene.U, scene.V, k))
         assert lower <= value
         assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
         assert np.isfinite(found[:, LEAN : LEAN + SIDES]).all()
@@ -76,7 +77,9 @@ def test_facing_walls_takes_no_plane_away(seed):
     volumes, scene = random_volumes(rng), random_scene(rng)
     scene = scene._replace(leans=np.where(np.arange(scene.leans.shape[2]) == 0, 0.1, np.full_like(scene.leans, np.inf)))
     for k in range(1, len(volumes)):
-        found, _ = face_walls(volumes.copy(), scene, objective(volumes, scene, np.inf), k)
+        found, _ = face_walls(
+            volumes.copy(), scene, objective(volumes, scene, np.inf), k, look_around(volumes, scene.U, scene.V, k)
+        )
         kept, given = (np.isfinite(rows[k, OFFSET : OFFSET + SIDES]) for rows in (found, volumes))
         assert (kept == given).all()
         assert np.isfinite(found[:, LEAN : LEAN + SIDES]).all()

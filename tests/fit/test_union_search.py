@@ -4,14 +4,23 @@ import numpy as np
 import pytest
 
 from hiproof.fit.union.add import COME_BACK, ENOUGH, add_volumes, best_addition
+from hiproof.fit.union.around import look_around, roof_everywhere, roof_with, shows_at
 from hiproof.fit.union.candidates import HOUSE, best_rectangles, candidates_of, gains_at_places
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.grow import ground_of
 from hiproof.fit.union.improve import improve, simplify, surroundings
-from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
-from hiproof.fit.union.moves import best_plane, refit_each, settled
-from hiproof.fit.union.objective import BASE_SHARE, costs, edges_cost, objective
-from hiproof.fit.union.refit import refit, where_it_may_show
+from hiproof.fit.union.joins import join_neighbours, merge_volumes, settled_anew, take_in
+from hiproof.fit.union.moves import best_plane, refit_each
+from hiproof.fit.union.objective import BASE_SHARE, costs, edges_cost, objective, objective_with
+from hiproof.fit.union.prices import (
+    BASE_COST,
+    LEANING_COST,
+    PARAMETER_COST,
+    PART_COST,
+    REPLACING_COST,
+    SLACK_UNITS,
+)
+from hiproof.fit.union.refit import refit
 from hiproof.fit.union.scene import nodes
 from hiproof.fit.union.steps import (
     AT_CORNER_M,
@@ -26,25 +35,19 @@ from hiproof.fit.union.steps import (
 from hiproof.fit.union.trim import (
     NEAR_EDGE_M,
     NEAR_VERTEX_M,
-    SLACK_UNITS,
     drawn_in,
     drawn_out,
     trim,
 )
 from hiproof.fit.union.volumes import (
-    BASE_COST,
     DIRECTION,
     FREE,
     LEAN,
-    LEANING_COST,
     LEVEL,
     OFFSET,
     OPPOSITE,
-    PARAMETER_COST,
-    PART_COST,
     PLANES,
     REPLACES,
-    REPLACING_COST,
     SIDES,
     SLOPE,
     SLOPE_LOW,
@@ -61,7 +64,6 @@ from hiproof.fit.union.volumes import (
     lowest_plane,
     roof_heights,
     volume_cost,
-    with_and_without,
 )
 from union_scenes import brute_rectangle, heights, random_scene, random_volume, random_volumes
 
@@ -74,6 +76,12 @@ def drawn(seed, **options):
     rng = np.random.default_rng(seed)
     volumes = random_volumes(rng)
     return rng, volumes, random_scene(rng, random_volumes(rng), **options)
+
+
+def around_of(volumes, scene, k):
+    """The heights of the roof were volume k everywhere, and without it."""
+    around = look_around(volumes, scene.U, scene.V, k)
+    return roof_everywhere(volumes, scene.U, scene.V, k, around), around.without
 
 
 def is_true(volumes, scene, value):
@@ -98,9 +106,33 @@ def test_a_roof_with_and_without_a_volume_is_a_few_lines_of_numpy(seed):
     for k in range(1, len(volumes)):
         wide = volumes.copy()
         wide[k, U0 : V1 + 1] = -1e3, 1e3, -1e3, 1e3
-        everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+        everywhere, without = around_of(volumes, scene, k)
         np.testing.assert_allclose(everywhere, heights(wide, scene.U, scene.V)[0], atol=1e-12)
         np.testing.assert_allclose(without, heights(np.delete(volumes, k, axis=0), scene.U, scene.V)[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_is_around_a_volume_tells_the_roof_with_any_other_in_its_place(seed):
+    rng, volumes, scene = drawn(seed)
+    for k in range(len(volumes)):
+        around = look_around(volumes, scene.U, scene.V, k)
+        for replacing in (0.0, 1.0):
+            trial = volumes.copy()
+            trial[k] = random_volume(rng, replacing) if k > 0 else base_only(rng.uniform(0, 9))
+            z, top = roof_heights(trial, scene.U, scene.V)
+            assert (roof_with(trial, scene.U, scene.V, k, around) == z).all()
+            places = zip(z, scene.U[int(trial[k, 0])], scene.V[int(trial[k, 0])], strict=True)
+            own = [
+                shows_at(trial, k, around, i, lowest(coefficients(trial, k), u, v), u, v)
+                for i, (_, u, v) in enumerate(places)
+            ]
+            assert own == (top == k).tolist()
+            value = objective(trial, scene, np.inf)
+            assert objective_with(trial, scene, k, around, np.inf) == value
+    new = np.vstack([volumes, random_volume(rng, 0.0)])
+    around = look_around(volumes, scene.U, scene.V, len(volumes))
+    z, _ = roof_heights(new, scene.U, scene.V)
+    assert (roof_with(new, scene.U, scene.V, len(volumes), around) == z).all()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -282,7 +314,8 @@ def test_moving_edges_keeps_the_books_and_never_costs(seed):
     value = objective(volumes, scene, np.inf)
     for k in range(1, len(volumes)):
         before, rest = value, np.delete(volumes, k, axis=0)
-        value = move_edges(volumes, scene, k, value, rng.choice([0.5, 2.0, 60.0]))
+        reach, around = rng.choice([0.5, 2.0, 60.0]), look_around(volumes, scene.U, scene.V, k)
+        value = move_edges(volumes, scene, k, value, reach, around)
         assert value <= before + 1e-9
         assert is_true(volumes, scene, value)
         assert (np.delete(volumes, k, axis=0) == rest).all()
@@ -294,14 +327,15 @@ def test_moved_edges_leave_a_rectangle(seed):
     value = objective(volumes, scene, np.inf)
     for k in range(1, len(volumes)):
         before = volumes[k].copy()
-        move_edges(volumes, scene, k, value, 60.0)
+        around = look_around(volumes, scene.U, scene.V, k)
+        move_edges(volumes, scene, k, value, 60.0, around)
         for low in (U0, U0 + 2):
             moved = (volumes[k, low : low + 2] != before[low : low + 2]).any()
             assert not moved or volumes[k, low + 1] - volumes[k, low] >= MIN_SIDE_M - 1e-9
 
 
 MOVES = {
-    "settle": lambda volumes, scene, value: settled(volumes.copy(), scene, len(volumes) - 1, value, 60.0),
+    "settle": lambda volumes, scene, value: settled_anew(volumes.copy(), scene, len(volumes) - 1, value),
     "refit": refit_each,
     "improve": lambda volumes, scene, value: improve(volumes, scene, value, SLOPES, 2),
     "simplify": lambda volumes, scene, value: simplify(volumes, scene, value, 0.6),
@@ -476,8 +510,9 @@ def test_refitting_finds_the_planes_of_points_without_noise(seed):
     scene = scene._replace(z=heights(true, scene.U, scene.V)[0])
     near = true.copy()
     near[1, OFFSET : OFFSET + PLANES][there] += rng.uniform(-0.05, 0.05, there.sum())
+    around = look_around(near, scene.U, scene.V, 1)
     for _ in range(25):
-        refit(near, scene, 1)
+        refit(near, scene, 1, around)
     z, _ = roof_heights(near, scene.U, scene.V)
     np.testing.assert_allclose(z[: scene.n], scene.z[: scene.n], atol=1e-3)
 
@@ -489,7 +524,8 @@ def test_a_plane_without_points_stays_where_it_is():
     volumes[1, OFFSET + LEVEL] = 1.0  # far below the slopes: only this one shows
     volumes[1, OFFSET : OFFSET + SIDES][np.isfinite(volumes[1, OFFSET : OFFSET + SIDES])] = 60.0
     before = volumes.copy()
-    refit(volumes, scene._replace(z=np.full(len(scene.z), 1.1)), 1)
+    around = look_around(volumes, scene.U, scene.V, 1)
+    refit(volumes, scene._replace(z=np.full(len(scene.z), 1.1)), 1, around)
     assert volumes[1, OFFSET + LEVEL] == pytest.approx(1.1)
     assert (volumes[1, OFFSET : OFFSET + SIDES] == before[1, OFFSET : OFFSET + SIDES]).all()
     assert (volumes[1, SLOPE : SLOPE + SIDES][before[1, SLOPE : SLOPE + SIDES] > 0] >= SLOPE_LOW).all()
@@ -525,19 +561,6 @@ def gains_in(scene, candidates, m, cells, cost_now, z_now, replacing, gain):
     total = gains_at_places(scene, candidates, m, cost_now, above, by_place)
     assert total == pytest.approx(by_place[by_place > 0.0].sum())
     np.add.at(gain, tuple(cell[int(candidates[m, DIRECTION])] for cell in cells), by_place)
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_a_volume_may_show_where_it_is_the_top_of_the_roof(seed):
-    """`where_it_may_show` says of the heights of a volume what `roof_heights` makes of them."""
-    _, volumes, scene = drawn(seed)
-    n = scene.n
-    _, top = roof_heights(volumes, scene.U, scene.V)
-    for k in range(len(volumes)):
-        above, not_below = where_it_may_show(volumes, scene.U, scene.V, n, k)
-        direction, c = int(volumes[k, DIRECTION]), coefficients(volumes, k)
-        h = np.array([lowest(c, u, v) for u, v in zip(scene.U[direction, :n], scene.V[direction, :n], strict=True)])
-        assert ((h > above) & (h >= not_below)).tolist() == (top[:n] == k).tolist()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -600,7 +623,7 @@ def test_a_further_plane_gains_what_the_points_then_cost_less(seed):
     volumes[1:, REPLACES] = 0.0
     z_now, _ = roof_heights(volumes, scene.U, scene.V)
     for k in range(1, len(volumes)):
-        everywhere, beneath = with_and_without(volumes, scene.U, scene.V, k)
+        everywhere, beneath = around_of(volumes, scene, k)
         for plane in np.nonzero(volumes[k, OFFSET : OFFSET + PLANES] == np.inf)[0]:
             slopes = SLOPES if plane < LEVEL else np.zeros(1)
             gain, slope, offset = best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath, 0.0)

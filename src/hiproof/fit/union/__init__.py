@@ -10,6 +10,7 @@ candidates  volumes of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, heights of the roof
 around      compiled: what the other volumes leave for one
 steps       compiled: what an edge of a volume costs that shows
+prices      the table of prices: what a unit is, what structure costs, what a change must gain
 objective   compiled: what a roof costs: misfit, volumes, edges that show
 edges, refit  compiled: a volume's edges moved, its planes refitted
 moves, facings, joins, improve  compiled: structure that comes and goes: of one volume, the ways planes face, of several, all in turn
@@ -70,10 +71,11 @@ from .objective import base_shows
 from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
+from .prices import COMMON_HOUSE_M2, evidence_per_unit
 from .regions import Site, besides, places_of, polygons_of
 from .repeats import repeat_volumes
 from .scene import Scene
-from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
+from .search import find_volumes
 from .shown import find_highest, that_show
 from .slivers import without_slivers, without_specks
 from .unite import Ends, ends_of, ends_within, united

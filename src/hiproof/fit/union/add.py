@@ -12,6 +12,15 @@ from .candidates import best_rectangles
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
 from .improve import improve
 from .objective import costs, objective_with
+from .prices import (
+    FREELY_UNITS,
+    NEW_MOVED_UNITS,
+    NEW_UNITS,
+    REGROWN_UNITS,
+    ROOF_UNITS,
+    SAME_BEFORE_UNITS,
+    SAME_UNITS,
+)
 from .refit import refit
 from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, is_fixed, roof_heights
 
@@ -19,14 +28,9 @@ MOST_VOLUMES = 24  # of one building: a bound on time
 TRIED_EACH_WAY = 2  # candidates of the largest gain that are tried in earnest
 # of the highest misfit, from which on a point counts as unexplained; points worth a further volume
 UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
-# of the highest misfit, from which on points count in a roof that leaves none unexplained but costs so many units: the base half way up a
-# skirt lies within a quarter of a metre of it all
-POORLY, WORTH_UNITS = 0.3, 5.0
-# roofs of as many volumes that cost so nearly the same are one; one whose last volume is not yet fitted in may cost so much more
-SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0
-REGROWN_UNITS = 0.5  # that a roof grown anew must gain: less is gained by cutting finer, too
-HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED = 6.0, 1.0  # units above the best: of 334 best additions 324 are still found
-FREELY_UNITS = 8.0  # units that a new volume must gain besides, where a plane faces neither along an axis nor a wall
+# of the highest misfit, from which on points count in a roof that leaves none unexplained but costs
+# much: the base half way up a skirt lies within a quarter of a metre of it all
+POORLY = 0.3
 ALONG_WALL = 1e-6  # of a lean; numerically the same
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
@@ -74,7 +78,7 @@ def unexplained(volumes, scene):
     z, _ = roof_heights(volumes, scene.U, scene.V)
     cost = costs(z, scene)[: scene.n]
     far = np.nonzero(cost > UNEXPLAINED)[0]
-    if len(far) < FEWEST_UNEXPLAINED and cost.sum() > WORTH_UNITS * scene.evidence:
+    if len(far) < FEWEST_UNEXPLAINED and cost.sum() > ROOF_UNITS * scene.evidence:
         return np.nonzero(cost > POORLY)[0]
     return far
 
@@ -159,7 +163,7 @@ def settle_new(volumes, scene, value, around):
     One that begins too far above `value` to come below it is given up.
     """
     k, found = len(volumes) - 1, np.inf
-    for units in HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED:
+    for units in NEW_UNITS, NEW_MOVED_UNITS:
         refit(volumes, scene, k, around)
         found = objective_with(volumes, scene, k, around, value + units * scene.evidence)
         if found == np.inf:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .corners import SPARED_UNITS, creases_at_corners
+from .corners import creases_at_corners
 from .finish import (
     LEVEL_SLACK,
     ROUNDS,
@@ -30,9 +30,10 @@ from .finish import (
 )
 from .members import Member, members_of, unknowns_of
 from .objective import misfits
+from .prices import CREASE_UNITS, PARAMETER_COST
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, PARAMETER_COST, REPLACES, SIDES, U0, U1, V0, V1
+from .volumes import DIRECTION, REPLACES, SIDES, U0, U1, V0, V1
 
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
@@ -92,7 +93,7 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
         return Agreement(planes, members, np.zeros((0, 0)), np.zeros(0))
     start = unknowns_of(known)
     alone = Agreement(planes, members, np.eye(len(start)), start)
-    at_corners = (Asked(*one, np.inf, SPARED_UNITS) for one in creases_at_corners(known, start, scene.corners[0]))
+    at_corners = (Asked(*one, np.inf, CREASE_UNITS) for one in creases_at_corners(known, start, scene.corners[0]))
     asked = sorted((*likely(known, start), *at_corners), key=lambda one: one.gap)
     found = fitted_as_asked(known, start, asked, scene) if asked else None
     if found is None:

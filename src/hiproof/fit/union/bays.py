@@ -16,6 +16,7 @@ from ...geometry.rings import counterclockwise
 from .add import UNEXPLAINED
 from .objective import base_shows, misfits
 from .plan import Plan
+from .prices import BAY_UNITS
 from .regions import THICK_M
 from .scene import Scene
 from .volumes import (
@@ -40,8 +41,6 @@ LEAST_M2, MOST_M2, MOST_SHARE, LEAST_WIDTH_M = 0.25, 12.0, 0.34, 0.3
 FILLED, FULL, SLENDER = 1.25, 0.6, 10.0
 SAME_M = 0.1  # rectangles whose sides all lie nearer are one bay's
 FEWEST = 2  # points that the roof leaves unexplained and the level volume explains
-# units, of a common house's points: The Hague's even places at 2 and 5 points/m2 84.3, 86.8 %; 0.6: 84.5, 86.8; 1.5: 84.3, 86.7
-PRICE_UNITS = 1.0
 LEAST_TURN = 1e-9  # of two walls, by their directions: numerically parallel
 NEAREST = 1e-3  # of a wall's length from its end: the line begins there
 SAME_PLACE_M = 1e-6  # numerically one place
@@ -105,7 +104,7 @@ def level_over(bay: np.ndarray, volumes: np.ndarray, seen: Seen, scene: Scene, u
     row[U0 : V1 + 1] = bay[1:]
     if (now[near] > UNEXPLAINED).sum() < FEWEST or not is_allowed(row, scene.allowed):
         return -np.inf, row
-    return float(now.sum() - misfits(z, height, scene).sum()) - PRICE_UNITS * unit, row
+    return float(now.sum() - misfits(z, height, scene).sum()) - BAY_UNITS * unit, row
 
 
 def continued(volumes: np.ndarray, by_m: float) -> np.ndarray:

@@ -31,9 +31,10 @@ from .finish import (
 from .members import lies_inside
 from .objective import misfits
 from .plan import Plan
+from .prices import PARAMETER_COST
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, LEVEL, PARAMETER_COST, SIDES
+from .volumes import DIRECTION, LEVEL, SIDES
 
 SHORTEST_M = 0.6  # of a wall
 FEWEST_INCLINED = 2  # planes of a volume with cants: one slope alone is cut off by walls and runs on

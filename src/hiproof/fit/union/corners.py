@@ -17,9 +17,9 @@ from .members import Member, heights_at, rows_at
 from .sides import CORNER_SIDES, corners_of
 from .volumes import LEVEL
 
-# m by plan and by height within which a crease is asked to end in a corner, and units of evidence that this may cost: clouds lie a
-# decimetre beside their outlines, and nobody draws the short edge
-NEAR_M, SPARED_UNITS = 0.2, 2.0
+# m by plan and by height within which a crease is asked to end in a corner: clouds lie a decimetre
+# beside their outlines
+NEAR_M = 0.2
 AT_CORNER_M = 0.01  # one that ends so near does
 REACH_M = 0.4  # a volume that ends so near a corner is drawn on to it
 LEAST_BREAK = 0.1  # rise over run; planes less apart have no crease to speak of

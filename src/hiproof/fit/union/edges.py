@@ -11,9 +11,9 @@ import numpy as np
 from ...compiled import compiled
 from .around import roof_everywhere
 from .objective import BASE_SHARE, costs
+from .prices import BASE_COST
 from .steps import among_vertices, edge_cost, walls_of
 from .volumes import (
-    BASE_COST,
     DIRECTION,
     LEVEL,
     OFFSET,

@@ -13,6 +13,7 @@ from .around import shows_at
 from .edges import EVERYWHERE, LEAST_GAIN
 from .moves import settled
 from .objective import objective_with
+from .prices import FREE_UNITS
 from .refit import refit
 from .volumes import (
     DIRECTION,
@@ -27,8 +28,8 @@ from .volumes import (
     lowest_plane,
 )
 
-# of a plane towards what its points say; most of a turn as rise over run along its edge; units that a free direction costs
-TURNS, MOST_TURN, FREE_UNITS = 4, 0.45, 1.5
+# turns of a plane towards what its points say; most of a turn, as rise over run along its edge
+TURNS, MOST_TURN = 4, 0.45
 
 
 @compiled

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .objective import point_cost
+from .prices import PARAMETER_COST
 from .scene import Scene
 from .sides import Side
 from .volumes import (
@@ -24,7 +25,6 @@ from .volumes import (
     LEVEL,
     OFFSET,
     OPPOSITE,
-    PARAMETER_COST,
     SIDES,
     SLOPE,
     SLOPE_HIGH,

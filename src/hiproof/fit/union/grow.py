@@ -8,7 +8,6 @@ from .add import (
     COME_BACK,
     ENOUGH,
     FEWEST_UNEXPLAINED,
-    REGROWN_UNITS,
     Ground,
     add_volumes,
     unexplained,
@@ -18,6 +17,7 @@ from .improve import improve
 from .moves import without
 from .objective import objective
 from .plan import MIN_STRUCTURE_POINTS, cells_of
+from .prices import REGROWN_UNITS
 from .scene import Scene
 from .volumes import OFFSET, SIDES, SLOPE, base_only
 

@@ -12,8 +12,6 @@ from .edges import EVERYWHERE, LEAST_GAIN, move_edges
 from .facings import face_walls
 from .joins import join_neighbours, merge_volumes
 from .moves import (
-    HOPELESS_SHARE,
-    HOPELESS_UNITS,
     add_planes,
     change_ties,
     drop_planes,
@@ -25,6 +23,7 @@ from .moves import (
     without,
 )
 from .objective import objective
+from .prices import BEGIN_SHARE, BEGIN_UNITS
 from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1, is_fixed
 
 AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
@@ -132,7 +131,7 @@ def simplify(volumes, scene, value, steepest):
             if volumes[k, SLOPE : SLOPE + SIDES].max() <= steepest:
                 trial = without(volumes, k)
                 found = objective(
-                    trial, scene, value + HOPELESS_UNITS * scene.evidence + 2.0 * HOPELESS_SHARE * scene.n
+                    trial, scene, value + BEGIN_UNITS * scene.evidence + 2.0 * BEGIN_SHARE * scene.n
                 )
                 if found < np.inf:
                     found = move_all_edges(trial, scene, found, EVERYWHERE)

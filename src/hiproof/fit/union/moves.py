@@ -20,13 +20,13 @@ from ...compiled import compiled
 from .around import look_around, roof_everywhere, roof_with
 from .edges import BEYOND_M, EVERYWHERE, LEAST_GAIN, move_edges
 from .objective import objective, objective_with, point_cost
+from .prices import BEGIN_SHARE, BEGIN_UNITS, PARAMETER_COST
 from .refit import refit
 from .volumes import (
     DIRECTION,
     LEAN,
     LEVEL,
     OFFSET,
-    PARAMETER_COST,
     PLANES,
     REPLACES,
     SIDES,
@@ -47,7 +47,6 @@ from .volumes import (
     slope_count,
 )
 
-HOPELESS_UNITS, HOPELESS_SHARE = 2.0, 0.01  # a trial that starts further above the best than this is given up
 MOST_SLOPES, SLOPES_APART = 9, 0.02  # slopes a plane is tried at, and rise over run between two of them
 END_SEEDS = 16  # points through which a new plane is tried
 AT_ONCE = 64  # points between two looks at whether a new plane can still do
@@ -58,7 +57,7 @@ ALMOST_LEVEL = 0.15  # rise over run; below it a plane may as well be level
 def settled(trial, scene, k, value, reach, around):
     """`trial` with volume k refitted, its edges moved and refitted, and its objective, infinite where that is above `value`."""
     refit(trial, scene, k, around)
-    limit = value + HOPELESS_UNITS * scene.evidence + HOPELESS_SHARE * scene.n
+    limit = value + BEGIN_UNITS * scene.evidence + BEGIN_SHARE * scene.n
     found = objective_with(trial, scene, k, around, limit)
     if found == np.inf:
         return trial, found

@@ -14,8 +14,9 @@ import numpy as np
 
 from ...compiled import compiled
 from .around import roof_with
+from .prices import BASE_COST
 from .steps import edge_cost, walls_of
-from .volumes import BASE_COST, LEVEL, OFFSET, is_allowed, roof_heights, volume_cost
+from .volumes import LEVEL, OFFSET, is_allowed, roof_heights, volume_cost
 
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
 

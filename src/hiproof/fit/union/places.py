@@ -11,6 +11,7 @@ from .box import Box
 from .candidates import candidates_of
 from .grow import ground_of, grown
 from .improve import improve
+from .prices import PLACE_UNITS
 from .scene import Scene
 from .seams import slopes_of
 from .whole import Whole
@@ -20,7 +21,6 @@ SQUARE_M, AROUND = (
     3.0,
     2,
 )  # m of a square in which unexplained points are counted, and squares around one that count too
-WORTH_UNITS = 4.0  # units that the unexplained points of a place must be worth
 PLACES_A_BLOCK = 3.0  # tried at most, for each block's area: a bound on time, the rest stays as it is
 WINDOW_M, WINDOW_POINTS = 20.0, 1200  # m of a side of a place's window, and its points at most
 
@@ -36,7 +36,7 @@ def grow_at_places(whole: Whole) -> None:
     for _ in range(max(1, round(PLACES_A_BLOCK * whole.area / BLOCK_M2))):
         sums = sum_around(counts)
         a, b = np.unravel_index(int(np.argmax(sums)), sums.shape)
-        if sums[a, b] < WORTH_UNITS * scene.evidence:
+        if sums[a, b] < PLACE_UNITS * scene.evidence:
             break
         u, v = box.u0 + (a + 0.5) * SQUARE_M, box.v0 + (b + 0.5) * SQUARE_M
         change_in_window(whole, Box(u, u, v, v).widen(0.5 * WINDOW_M), WINDOW_POINTS, grow_more)

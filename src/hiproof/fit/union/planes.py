@@ -12,10 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-
-# Units of complexity: what a piece of structure must pay for in evidence.
-FLAT, AXIS_SLOPE, FREE_SLOPE = 1.0, 1.4, 1.9
-KIND_COST = np.array([FLAT, AXIS_SLOPE, AXIS_SLOPE, FREE_SLOPE])
+from .prices import KIND_COST
 
 MAX_SLOPE = 2.5  # rise over run, 68 degrees; steeper planes are not looked for
 MIN_AXIS_SLOPE = 0.05  # rise over run, 3 degrees; a flatter plane is level

@@ -16,6 +16,7 @@ from .apart import IN_LINE_M
 from .finish import Planes
 from .objective import misfits
 from .plan import Plan
+from .prices import SHAPE_UNITS
 from .scene import Scene
 from .sides import Side, corners_of
 from .volumes import DIRECTION, LEVEL, OFFSET, REPLACES, U0, V1
@@ -29,7 +30,6 @@ PLACE_M2, ROOFED = 1.0, 0.5
 APART_M = 1e-5  # further apart, rounding to the grid of overlays lets no polygons touch
 FAR_M = 1e4  # m beyond all of an outline
 TURN_M2 = 1e-6  # of the parallelogram that two sides of a volume span; numerically none below
-SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
 
 
 class Site(NamedTuple):

@@ -12,6 +12,7 @@ from .around import look_around
 from .edges import move_edges
 from .moves import refitted
 from .objective import costs, objective
+from .prices import COPY_UNITS
 from .scene import Scene, select_points
 from .volumes import (
     DIRECTION,
@@ -31,9 +32,6 @@ from .volumes import (
 
 LEAST_M2, MOST_M2 = 1.0, 16.0  # of a volume that may stand in a row: a dormer, a bay, a box
 STEP_M, REACH_M = 0.2, 0.4  # m between places tried; m that the edges of a copy may move
-# units of evidence that a copy must save. Vienna's even places: F1 82.0, 81.9, 81.8 % at 1, 2 and
-# 3 units, and 81.7 % without copies
-COPY_UNITS = 1.5
 
 
 def repeat_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:

@@ -12,6 +12,7 @@ import shapely
 
 from ..direction import measure_support, quarter_gap
 from .plan import Plan, grid_lines, ring_edges, signed_depth
+from .prices import EDGE_PRICES
 
 MOST_DIRECTIONS = 2  # of a building that volumes may follow along walls, the main one first
 APART_RAD, NEAR_RAD = math.radians(7.0), math.radians(3.0)  # directions differ by more; edges support one within
@@ -41,8 +42,6 @@ Scene = namedtuple(
     "Scene",
     "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
 )
-EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
-EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # by the names above: units of evidence, m
 
 
 def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:

@@ -15,6 +15,7 @@ from .improve import change_planes
 from .joins import settled_anew
 from .moves import refitted, without
 from .objective import objective
+from .prices import LEFT_OUT_SHARE, LEFT_OUT_UNITS
 from .scene import Scene
 from .volumes import DIRECTION, NUMBER, SETTLED, U0, U1, V0, V1, is_fixed, roof_heights
 from .whole import PLACE, Whole
@@ -29,8 +30,7 @@ ALIKE_M, ALIKE_SHARE = 0.6, 0.4  # m between planes that may be one, over at lea
 SAMPLES = 4  # a side of a volume at which its planes are compared with another's
 TOUCH_M = 0.6  # m between volumes that touch
 NEXT_TO_M = 0.5  # m beyond a volume within which others are its neighbours
-# Leaving a volume out may at first cost so many units and such a share of the points: its neighbours take its place.
-LEFT_OUT_UNITS, LEFT_OUT_SHARE, LEFT_OUT_ROUNDS = 4.0, 0.1, 2
+LEFT_OUT_ROUNDS = 2  # in which neighbours take the place of a volume that is left out
 
 
 def sew(whole: Whole, box: Box, axis: int, at: float) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import shapely
 
@@ -15,36 +13,15 @@ from .improve import simplify
 from .large import find_in_windows
 from .objective import objective
 from .plan import Plan
+from .prices import COMMON_HOUSE_M2, LARGE_M2, evidence_per_unit
 from .regions import Site
 from .run_on import run_on
 from .scene import Scene, directions_of, scene_of, seen_through
 from .trim import trim
 
 SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
-# Price of structure by detail: the ends of the curve of share against parts that `benchmarks.curve` draws. Below a half every
-# chimney is a part, above four even wings go.
-DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
-COMMON_HOUSE_M2 = 60.0  # up to LARGE_M2, larger roofs ask more of each volume
-LARGE_M2 = 200.0  # of outline: larger roofs are searched in windows, at a price that does not grow with their area
-# Points that a unit of a large roof's structure must explain at least, times those of a house: of many places some
-# gain a point or two by chance. At 2 points/m2 The Hague draws too much for less.
-LARGE_POINTS = 1.77
-# Points/m2 from which on a unit of a large roof's structure must explain a larger area, and how fast
-# that grows: residuals of neighbouring points are not independent, the less so the denser the cloud
-# (`benchmarks.hand_drawn`, with footprints: 83.0 to 84.1 % of edges).
-DENSE, DENSER = 8.0, 0.3
 # What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
 LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
-
-
-def evidence_per_unit(density: float, area_m2: float, settings) -> float:
-    """Points that one unit of structure must explain: those of an area that grows with the roof's, and never too few."""
-    large = area_m2 > LARGE_M2
-    dense = max(density / DENSE, 1.0) ** DENSER
-    factor = dense if large else math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
-    points = settings.evidence_points * (LARGE_POINTS if large else 1.0)
-    share = settings.evidence_area_m2 * factor
-    return float(max(points, share * density)) * DETAIL_FACTOR[settings.detail]
 
 
 def find_volumes(

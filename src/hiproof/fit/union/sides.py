@@ -17,6 +17,7 @@ from ...compiled import compiled
 from .around import look_around, roof_everywhere
 from .objective import ghost_cost, point_cost
 from .plan import Plan
+from .prices import FAR_COST_A_METRE, LOOSE_COST, UNSUPPORTED_COST
 from .scene import Scene
 from .volumes import DIRECTION, U0, V0, V1
 
@@ -25,8 +26,6 @@ GAP_M = 1.0  # how far off it may be in the middle of the side; a line that lean
 ALONG_M, BESIDE_M, SHORTEST_M = 0.12, 6.0, 0.7  # outline so near a line lies along it; edges so far beside carry on
 CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line between corners may be
 SHARED_M = 0.3  # m within which a side takes its neighbour's line
-# units of evidence: for a side along no line, for one with no wall below, and for each metre off
-LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 1.2, 0.3, 0.1
 SHOWN_M = 0.5  # m next to a side in which points need its volume, or else it lies hidden
 MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
 REACH_M = max(GAP_M, MOVED_M)  # beyond a volume's edges, where its sides do not lean
@@ -192,14 +191,14 @@ def cheapest_line(volume, edge, lines, uv, gain, evidence):
     x, y = uv[axis], uv[1 - axis]
     strip = np.nonzero((y >= low) & (y <= high) & (sign * (x - volume[U0 + (edge ^ 1)]) >= 0.0))[0]
     x, y, gain = sign * x[strip], sign * y[strip], gain[strip]
-    best, cheapest = -1, gain[x <= sign * at].sum() + evidence * LOOSE_UNITS
+    best, cheapest = -1, gain[x <= sign * at].sum() + evidence * LOOSE_COST
     for m in range(len(lines.start)):
         if not may_be_side(lines, m, at, low, high):
             continue
         start, lean = lines.start[m], lines.lean[m]
         bare = 1.0 - min(support(start, lean, lines.x_edges, lines.y_edges, low, high) / max(high - low, 1e-6), 1.0)
         off = abs(start + lean * 0.5 * (low + high) - at)
-        price = evidence * (UNSUPPORTED_UNITS * bare + FAR_UNITS_A_METRE * off)
+        price = evidence * (UNSUPPORTED_COST * bare + FAR_COST_A_METRE * off)
         for i in range(len(x)):
             if x[i] - lean * y[i] <= sign * start:
                 price += gain[i]

@@ -10,6 +10,7 @@ import numpy as np
 from ...compiled import compiled
 from .moves import refit_each, without
 from .objective import objective
+from .prices import SLIVER_UNITS
 from .run_on import stands_out
 from .scene import Scene, nodes
 from .volumes import (
@@ -28,7 +29,6 @@ from .volumes import (
 
 FEWEST_SEEN = 3  # points over which a volume of several is the highest: two on a wall at one height are chance
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
-DEAREST_UNITS = 3.0  # what leaving a plane out may cost
 ALIKE = 0.05  # rise over run; planes of a hip are equally steep
 
 
@@ -57,7 +57,7 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
             trial[k, OFFSET + plane] = np.inf
             trial[k, [SLOPE + plane, LEAN + plane]] = 0.0
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
-            if found < value + DEAREST_UNITS * scene.evidence and not opens_a_hip(volumes, trial, k, plane, scene):
+            if found < value + SLIVER_UNITS * scene.evidence and not opens_a_hip(volumes, trial, k, plane, scene):
                 volumes, value = trial, min(value, found)
                 _, top = roof_heights(volumes, U, V)
     return volumes

@@ -9,6 +9,7 @@ import numpy as np
 
 from .moves import without
 from .objective import objective
+from .prices import CUT_UNITS, SLACK_UNITS
 from .scene import Scene, nodes
 from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
 
@@ -17,9 +18,7 @@ HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much 
 NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
 # m, and of the raster's steps, which are long on large roofs, for which a volume is hidden that shows in several places
 GAP_M, GAP_NODES = 0.8, 2.5
-CUT_UNITS = 10.0  # units that a volume cut short may cost before its neighbours are drawn out
 OUTWARDS = np.array([-1.0, 1.0])  # of the low and the high edge along an axis
-SLACK_UNITS = 0.02  # units of evidence that drawing in may cost; what is hidden explains nothing
 
 
 def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:

@@ -20,6 +20,7 @@ from .finish import SQUARE, Planes
 from .moves import refit_each, without
 from .objective import base_shows, costs, edges_cost, objective
 from .plan import Plan
+from .prices import ALONG_AXES_UNITS, FITTING_UNITS
 from .scene import Scene
 from .sides import BESIDE_M as REACH_M
 from .sides import Lines, Side, list_lines, plan_chords, plan_edges, sides_of
@@ -42,9 +43,6 @@ from .volumes import (
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
-# so much dearer along the axes, no roof is made cheaper by planes that face otherwise: of ten the most was 9
-HOPELESS_UNITS = 20.0
-HOPEFUL_UNITS = 2.0  # that fitting may still gain
 MOST_CUT = 2  # volumes drawn out over walls that cut corners off: a house has one bay or two
 
 
@@ -84,7 +82,7 @@ def united(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known, own: Col
             if bares_the_base(trial, best.volumes, scene):
                 continue
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
-            if found > value + HOPELESS_UNITS * scene.evidence:
+            if found > value + ALONG_AXES_UNITS * scene.evidence:
                 continue
             roof = drawn(trial, ends, scene, known)
             if roof.cost < best.cost:
@@ -119,7 +117,7 @@ def with_cut_corners(roof: Drawn, ends: Ends, scene: Scene, known: Known) -> Dra
     for _ in range(MOST_CUT):
         before = roof
         for trial in over_cut_corners(before.volumes, ends.walls, scene):
-            if at_least(trial, scene) > roof.cost + HOPEFUL_UNITS * scene.evidence:
+            if at_least(trial, scene) > roof.cost + FITTING_UNITS * scene.evidence:
                 continue
             if bares_the_base(trial, before.volumes, scene):
                 continue

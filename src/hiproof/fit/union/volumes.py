@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from .prices import LEANING_COST, PARAMETER_COST, PART_COST, REPLACING_COST
 
 # Columns of a volume's row: its direction's number, rectangle (metres in that direction's axes), the slopes of the four
 # inclined planes, the offsets of all five (z at u = v = 0; infinite where it has no such plane), tie and whether it replaces,
@@ -34,9 +35,6 @@ SIDES, PLANES, LEVEL = 4, 5, 4  # planes that slope, all planes, the level one's
 FREE, OPPOSITE, ALL = 0.0, 1.0, 2.0  # which slopes are equal: none, those that face each other, all
 SLOPE_LOW, SLOPE_HIGH = 0.04, 2.75  # rise over run, 2 and 70 degrees: flatter is level, steeper a wall
 
-# Units of complexity: what a volume costs, each of its offsets and its own slopes, and that it replaces.
-PART_COST, PARAMETER_COST, REPLACING_COST, BASE_COST = 0.5, 0.45, 0.5, 0.95
-LEANING_COST = 0.1  # of each plane that leans: the wall says how, but which wall is a choice
 
 
 def base_only(height: float) -> np.ndarray:

@@ -25,17 +25,13 @@ from .drawn_plan import DrawnPlan, count_parameters, draw_plan, part_over
 from .finish import Planes
 from .objective import costs, misfits
 from .plan import Plan
+from .prices import CORNER_COST, PARAMETER_COST, REPAIR_UNITS
 from .regions import Site, polygons_of, regions_of
 from .repairs import Repair, find_repairs
 from .scene import Scene, select_points
 from .sides import Side, corners_of
-from .volumes import DIRECTION, PARAMETER_COST, U0, V0, V1
+from .volumes import DIRECTION, U0, V0, V1
 
-# units of evidence that a corner of the drawn roof costs; above, recall and the share of points
-# fall
-CORNER_COST = 0.5
-# units of evidence that a repair may save; one that makes its points dearer by more is not drawn
-MOST_SAVED = 2.5
 WINDOW_M2, MARGIN_M = (
     400.0,
     2.0,
@@ -325,7 +321,7 @@ def price_of(
 
 def repaired(state: State, repair: Repair, window: Window, problem: Problem) -> State | None:
     """The roof after a repair; None where its points ask too much for it."""
-    most = MOST_SAVED * problem.scene.evidence
+    most = REPAIR_UNITS * problem.scene.evidence
     sides, planes, basis, cost = state
     for (k, edge), side in repair.sides.items():
         own = int(np.flatnonzero(window.numbers == k)[0])

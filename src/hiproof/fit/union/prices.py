@@ -1,0 +1,115 @@
+"""The table of prices: what a unit is, what structure costs, and what a change must gain.
+
+A roof costs its points' misfit and units of evidence for its structure. Every decision of the
+search and after it compares such costs; only here is it written what they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+# The unit: as many points as a unit of structure must explain.
+
+COMMON_HOUSE_M2 = 60.0  # up to LARGE_M2, larger roofs ask more of each volume
+LARGE_M2 = 200.0  # of outline: larger roofs are searched in windows, at a price that does not grow
+"""Area [m2] from which on the price of structure does not depend on a roof's size."""
+
+LARGE_POINTS = 1.77
+"""Points that a unit of a large roof must explain at least, times those of a house.
+
+Of many places some gain a point or two by chance. At 2 points/m2 The Hague draws too much for less.
+"""
+
+DENSE, DENSER = 8.0, 0.3
+"""Density [points/m2] from which on a unit of a large roof explains a larger area, and its growth.
+
+Residuals of neighbouring points are not independent, the less so the denser the cloud
+(`benchmarks.hand_drawn`, with footprints: 83.0 to 84.1 % of edges).
+"""
+
+DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
+"""Price of structure by detail: the ends of the curve that `benchmarks.curve` draws.
+
+Below a half every chimney is a part, above four even wings go.
+"""
+
+
+def evidence_per_unit(density: float, area_m2: float, settings) -> float:
+    """Compute the points that one unit of structure must explain.
+
+    They are those of an area that grows with the roof's, and never too few.
+    """
+    large = area_m2 > LARGE_M2
+    dense = max(density / DENSE, 1.0) ** DENSER
+    factor = dense if large else math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
+    points = settings.evidence_points * (LARGE_POINTS if large else 1.0)
+    share = settings.evidence_area_m2 * factor
+    return float(max(points, share * density)) * DETAIL_FACTOR[settings.detail]
+
+
+# What structure costs, in units.
+
+PART_COST, PARAMETER_COST = 0.5, 0.45  # a volume, and each of its offsets and its own slopes
+REPLACING_COST, BASE_COST = 0.5, 0.95  # that a volume replaces what it covers; a base that shows
+LEANING_COST = 0.1  # each plane that leans: the wall says how, but which wall is a choice
+
+EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
+"""What an edge costs that shows: a fixed sum, more by the metre, more by the metre of low steps
+(lower than `low_step`, in metres), more in line with no corner, less where it ends in one.
+"""
+EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # in this order
+
+CORNER_COST = 0.5  # a corner of the drawn roof; above, recall and the share of points fall
+LOOSE_COST, UNSUPPORTED_COST, FAR_COST_A_METRE = 1.2, 0.3, 0.1
+"""A side along no line of the outline, one with no wall below, each metre off the line."""
+
+KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
+"""A plane among the candidates: level, sloping along u, along v, and freely."""
+
+# What a change must gain besides, in units.
+
+FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
+REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
+SHAPE_UNITS = 0.5  # the base in a gap, instead of the volume beside it
+BAY_UNITS = 1.0
+"""A level volume over a bay, of a common house's points.
+
+The Hague's even places at 2 and 5 points/m2: 84.3, 86.8 %; at 0.6 84.5, 86.8; at 1.5 84.3, 86.7.
+"""
+
+COPY_UNITS = 1.5
+"""A copy of a small volume.
+
+Vienna's even places: 82.0, 81.9, 81.8 % at 1, 2 and 3 units, 81.7 without copies.
+"""
+
+# What a change may cost that a draughtsman would make, in units.
+
+SLIVER_UNITS = 3.0  # leaving out a plane that shows as a narrow strip
+CREASE_UNITS = 2.0  # a crease that ends in a corner of the outline: nobody draws the short edge
+SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
+
+# How far above the best a change may begin and still become the best, in units.
+
+BEGIN_UNITS, BEGIN_SHARE = 2.0, 0.01  # a move of one volume; besides, a share of the points
+NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
+"""A new volume, and one whose edges were moved once.
+
+Of 334 best additions 324 are still found.
+"""
+
+LEFT_OUT_UNITS, LEFT_OUT_SHARE = 4.0, 0.1  # leaving a volume out; besides, a share of the points
+CUT_UNITS = 10.0  # cutting a volume short, before its neighbours are drawn out
+ALONG_AXES_UNITS = 20.0  # fewer volumes along the axes, before planes face walls: 9 were the most
+FITTING_UNITS = 2.0  # that fitting may still gain
+REPAIR_UNITS = 2.5  # a repair, by its points alone: it may save no more
+
+# How much the points of a place must cost for a volume to be looked for.
+
+ROOF_UNITS, PLACE_UNITS = 5.0, 4.0  # of a roof that explains all but poorly; of one place of a roof
+
+# How nearly two roofs must cost the same to be one, and before the last volume is fitted in.
+SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0
