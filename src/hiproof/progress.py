@@ -21,7 +21,7 @@ T = TypeVar("T")
 Update = Callable[..., None]
 """Called with a stage, how much of it is done, and how much there is; None where nobody knows."""
 
-FIRST_S = 0.5  # seconds until the first line: a command that ends sooner needs none
+FIRST_S = 0.3  # seconds until the first line: a command that ends sooner needs none
 LINE_S = 10.0  # seconds between two lines about one stage: enough to see that it goes on
 RATE_S = 2.0  # seconds of a stage before a rate is shown: the first ones say little
 
@@ -50,15 +50,23 @@ STAGES = {
     "fetch": Stage("fetching footprints"),
     "check": Stage("checking solids", "solid"),
     "label": Stage("labelling points"),
+    "open": Stage("opening the run"),
+    "start": Stage("starting"),
+    "arrange": Stage("making clouds to validate with", "cloud"),
+    "train": Stage("training", "cloud"),
     "repeat": Stage("running the building again"),
 }
+
+
+def ignore_progress(*_: object) -> None:
+    """Show no news, where nobody wants them."""
 
 
 @contextmanager
 def show_progress(stage: str) -> Iterator[Update]:
     """Show that `stage` has begun, and yield the function that further news goes to."""
     if console_level() is Level.error:
-        yield lambda *_: None
+        yield ignore_progress
         return
     with StageBars(stage) if sys.stderr.isatty() else StageLines(stage) as shown:
         yield shown.update
@@ -71,7 +79,7 @@ def show_in_notebook(stage: str) -> Iterator[Update]:
     Bars are drawn in a notebook that can do so, and nothing elsewhere.
     """
     if not is_notebook():
-        yield lambda *_: None
+        yield ignore_progress
         return
     with StageBars(stage) as shown:
         yield shown.update
@@ -86,17 +94,19 @@ def is_notebook() -> bool:
     return Console().is_jupyter
 
 
-def count_progress(items: Iterable[T], stage: str, update: Update) -> Iterator[T]:
+def count_progress(
+    items: Iterable[T], stage: str, update: Update, total: int | None = None
+) -> Iterator[T]:
     """Yield the items, and report to `update` how many of a stage are done.
 
-    >>> list(count_progress("ab", "convert", print))
-    convert 1
-    convert 2
+    >>> list(count_progress("ab", "convert", print, 2))
+    convert 1 2
+    convert 2 2
     ['a', 'b']
     """
     for done, item in enumerate(items, start=1):
         yield item
-        update(stage, done)
+        update(stage, done, total)
 
 
 class StageLines:
@@ -172,7 +182,13 @@ class StageBars:
                 )
 
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), Details())
-        self.bars = Progress(*columns, console=Console(stderr=True), transient=True)
+        # what goes to a terminal stands above the bars; a file that takes the output keeps it
+        self.bars = Progress(
+            *columns,
+            console=Console(stderr=True),
+            transient=True,
+            redirect_stdout=sys.stdout.isatty(),
+        )
         self.tasks: dict[str, Any] = {}
         self.stage = ""
         self.update(stage)

@@ -30,9 +30,12 @@ def read_weights(folder):
 
 
 def test_a_killed_run_goes_on_to_the_same_weights(tmp_path):
-    lines = []
-    path = train("simulated", tmp_path / "whole", TINY, report=lines.append)
+    lines, news = [], []
+    path = train("simulated", tmp_path / "whole", TINY, lines.append, lambda *new: news.append(new))
     assert len(lines) == 2 and "balanced accuracy" in lines[0]
+    assert [new for new in news if new[0] == "arrange"][-1] == ("arrange", 16, 16)
+    shown = [new[1:] for new in news if new[0] == "train"]
+    assert shown == [(done, 48) for done in (0, 8, 12, 20, 24, 24, 32, 36, 44, 48)]
 
     def kill(line):
         raise KeyboardInterrupt

@@ -11,9 +11,8 @@ import typer
 from ..errors import InputError, OutputError
 from ..formats import CONVERTED, choose_format
 from ..log import count_things
-from ..progress import count_progress, show_progress
+from ..progress import Update, count_progress, show_progress
 from ..read.damage import SkippedBuildings
-from ..write.files import elsewhere
 
 FormatName = StrEnum("FormatName", {name: name for name in CONVERTED})  # type: ignore[misc]
 FORMAT_HELP = ", ".join(CONVERTED)
@@ -24,36 +23,39 @@ def convert(
     source: Annotated[
         Path,
         typer.Argument(
-            help="output folder of a run, or a file: parameters.jsonl, CityJSON, CityJSONSeq, "
+            help="output folder of a run, or a file: parameters.jsonl, CityJSON, CityJSONSeq or "
             "CityGML 2.0"
         ),
     ],
     out: Annotated[
         Path | None,
         typer.Argument(
-            help="file to write; its suffix chooses the format [default: beside the models]"
+            help="file to write, whose suffix chooses the format (default: a file beside the "
+            "models)"
         ),
     ] = None,
     format: Annotated[
         FormatName | None,
         typer.Option(
-            help=f"format to write: {FORMAT_HELP} [default: by the suffix of OUT, else {DEFAULT}]"
+            metavar="<format>",
+            help=f"{FORMAT_HELP} (default: by the suffix of OUT, otherwise {DEFAULT})",
         ),
     ] = None,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the models [default: what they name]")
+        str | None, typer.Option(help="CRS of the models (default: that of their file)")
     ] = None,
     geoid_height: Annotated[
         float | None,
         typer.Option(
-            help="height of the geoid above the ellipsoid, m, for 3dtiles [default: by pyproj's "
-            "grid]"
+            help="height of the geoid above the ellipsoid, m, for 3dtiles (default: that of "
+            "pyproj's grid)"
         ),
     ] = None,
 ) -> None:
     """Convert models of a run or of a file to another format.
 
-    Models of a run come with their parameters.
+    The models keep their attributes. Models of a run keep their roof parameters too, in formats
+    that have a place for them.
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
@@ -64,32 +66,35 @@ def convert(
             f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out"
         )
     path = out or default_path(source, name)
-    try:
-        left_out = convert_models(source, path, name, crs, **given)
-    except OutputError as error:
-        raise elsewhere(error, f"hiproof convert {source} OUT") if out is None else error from error
+    with show_progress("convert") as update:
+        from ..write.files import elsewhere
+
+        try:
+            text, left_out = convert_models(source, path, name, crs, update, **given)
+        except OutputError as error:
+            command = f"hiproof convert {source} OUT"
+            raise elsewhere(error, command) if out is None else error from error
+    typer.echo(text)
     if left_out.exit_code:
         raise typer.Exit(left_out.exit_code)
 
 
 def convert_models(
-    source: Path, path: Path, name: str, crs: str | None = None, **given: Any
-) -> SkippedBuildings:
+    source: Path, path: Path, name: str, crs: str | None, update: Update, **given: Any
+) -> tuple[str, SkippedBuildings]:
     """Write the models of `source` to `path` in the format `name`.
 
-    Returns what damage left out.
+    Returns the result in a line, and what damage left out.
     """
-    left_out = SkippedBuildings()
-    with show_progress("convert") as update:
-        from ..parametric.finished import open_run
-        from ..write.described import write_format
+    from ..parametric.finished import open_run
+    from ..write.described import write_format
 
-        run = open_run(source, crs)
-        buildings = left_out.iterate_sound(run.describe(left_out))
-        counted = count_progress(buildings, "convert", update)
-        count = write_format(name, path, counted, run.head, **given)
-    typer.echo(f"{path}: {count_things(count, 'building')}{left_out.describe()}")
-    return left_out
+    left_out = SkippedBuildings()
+    run = open_run(source, crs)
+    buildings = left_out.iterate_sound(run.describe(left_out))
+    counted = count_progress(buildings, "convert", update)
+    count = write_format(name, path, counted, run.head, **given)
+    return f"{path}: {count_things(count, 'building')}{left_out.describe()}", left_out
 
 
 def name_format(out: Path | None) -> str:

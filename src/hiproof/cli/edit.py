@@ -9,29 +9,37 @@ from typing import Annotated
 import typer
 
 from ..log import count_things
+from ..progress import show_progress
 
 
 def edit(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     who: Annotated[
-        str | None, typer.Option(help="name under which edits are kept (default: your user name)")
+        str | None, typer.Option(help="name to keep with each edit (default: your user name)")
     ] = None,
     clouds: Annotated[
         Path | None,
         typer.Option(
             exists=True,
             file_okay=False,
-            help="folder that now holds the inputs of the run, if they were moved",
+            help="folder of the run's inputs, where they were moved since",
         ),
     ] = None,
     only: Annotated[
         str | None,
         typer.Option(
-            help="buildings to list: doubtful, no_points, changed, failed, or ids, joined by commas"
+            help="buildings to list: doubtful, no_points, changed, failed or ids, separated by "
+            "commas (default: all)"
         ),
     ] = None,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="port of the page (default: a free one)")
+        int,
+        typer.Option(
+            min=0,
+            max=65535,
+            show_default=False,
+            help="port on this machine (default: a free one)",
+        ),
     ] = 0,
 ) -> None:
     """Open a page on this machine to check doubtful buildings and correct them.
@@ -39,12 +47,13 @@ def edit(
     Accepted edits go into edits.jsonl in the folder. Pass that file to the next run with
     `--overrides`. Ctrl-C ends the page.
     """
-    from ..edit.desk import Desk
-    from ..edit.edits import EDITS_FILE
-    from ..edit.server import Server, Service
-
     names = [name.strip() for name in only.split(",")] if only else []
-    service = Service(Desk(folder, who or user_name(), clouds, names))
+    with show_progress("open"):
+        from ..edit.desk import Desk
+        from ..edit.edits import EDITS_FILE
+        from ..edit.server import Server, Service
+
+        service = Service(Desk(folder, who or user_name(), clouds, names))
     with Server(service, port) as server:
         desk = service.desk
         count = count_things(len(desk.select_rows()), "building")

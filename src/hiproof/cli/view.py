@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +13,7 @@ import typer
 from ..errors import OutputError
 from ..formats import FORMATS
 from ..log import LOGGER
+from ..progress import Update, ignore_progress, show_progress
 from .convert import convert_models
 
 
@@ -22,10 +23,16 @@ def view(
         typer.Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote"),
     ],
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="port on this machine (default: a free one)")
+        int,
+        typer.Option(
+            min=0,
+            max=65535,
+            show_default=False,
+            help="port on this machine (default: a free one)",
+        ),
     ] = 0,
     browser: Annotated[
-        bool, typer.Option(help="open the browser; otherwise only print the address")
+        bool, typer.Option(help="open the browser, or only print the address")
     ] = True,
 ) -> None:
     """Show the models of a run in your browser, without a network.
@@ -35,12 +42,13 @@ def view(
     """
     import webbrowser
 
-    from ..view.server import make_server
+    with ExitStack() as stack:
+        with show_progress("open") as update:
+            from ..view.server import make_server
 
-    with (
-        open_tiles(folder) as tiles,
-        make_server(tiles, f"hiproof: {folder.resolve().name}", port) as server,
-    ):
+            tiles = stack.enter_context(open_tiles(folder, update))
+            title = f"hiproof: {folder.resolve().name}"
+            server = stack.enter_context(make_server(tiles, title, port))
         typer.echo(f"{server.address} shows {folder}; Ctrl-C ends")
         if browser:
             webbrowser.open(server.address)
@@ -48,7 +56,7 @@ def view(
 
 
 @contextmanager
-def open_tiles(folder: Path) -> Iterator[Path]:
+def open_tiles(folder: Path, update: Update = ignore_progress) -> Iterator[Path]:
     """Yield the tiles in a folder, or those of the run in it.
 
     They are made where they are missing or older than the models.
@@ -69,9 +77,10 @@ def open_tiles(folder: Path) -> Iterator[Path]:
             or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime
         ):
             try:
-                convert_models(folder, tiles, "3dtiles")
+                text, _ = convert_models(folder, tiles, "3dtiles", None, update)
             except OutputError as error:
                 LOGGER.warning("%s. The tiles are made in a temporary folder instead", error)
                 tiles = Path(elsewhere) / tiles.name
-                convert_models(folder, tiles, "3dtiles")
+                text, _ = convert_models(folder, tiles, "3dtiles", None, update)
+            typer.echo(text)
         yield tiles

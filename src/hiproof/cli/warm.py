@@ -14,8 +14,8 @@ def warm(
         bool,
         typer.Option(
             "--all",
-            help="compile also what only runs without footprints, with --parts one or with the "
-            "network use",
+            help="also compile what only some runs use: those without footprints, with --parts "
+            "one or with the network",
         ),
     ] = False,
 ) -> None:
@@ -27,3 +27,4 @@ def warm(
 
     with show_progress("compile"):
         make_ready(ALL if everything else MAIN_JOB, own=True)
+    typer.echo("everything is compiled" if everything else "all that most runs use is compiled")

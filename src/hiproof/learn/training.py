@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -20,6 +21,7 @@ import torch
 from torch import nn
 
 from ..errors import InputError, OutputError, SettingsError
+from ..progress import Update, count_progress, ignore_progress
 from ..segment.arrange import Layout, arrange
 from ..segment.scores import Scores
 from .augment import AugmentSettings, symmetric, vary_cloud
@@ -63,16 +65,21 @@ class TrainSettings:
 
 
 def train(
-    data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print
+    data: str | list[str],
+    out: str | Path,
+    settings: TrainSettings | None = None,
+    report: Callable[[str], object] = print,
+    update: Update = ignore_progress,
 ) -> Path:
     """Train the network on `data`, and write the results to the folder `out`.
 
     They are weights, curve, model card and checkpoints.
 
     `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 70
-    %). A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX
-    file of the best epoch. Raises InputError for data that cannot be used, OutputError for a folder
-    that cannot be written, SettingsError for a device that is not there or an epoch too short.
+    %). A checkpoint in `out` is resumed. `report` takes a line after every epoch, `update` how many
+    clouds of a stage are done. Returns the ONNX file of the best epoch. Raises InputError for data
+    that cannot be used, OutputError for a folder that cannot be written, SettingsError for a device
+    that is not there or an epoch too short.
     """
     settings = settings or TrainSettings()
     if settings.epoch < 2 * settings.views or settings.batch < 2:
@@ -84,9 +91,9 @@ def train(
     source = open_source(data, settings.types, settings.seed)
     folder = writable_folder(out)
     torch.set_num_threads(settings.threads)
-    trainer = Trainer(source, settings, folder)
+    trainer = Trainer(source, settings, folder, update)
     trainer.resume()
-    while trainer.epoch * settings.epoch < settings.samples:
+    while trainer.epoch < trainer.epochs:
         trainer.run_epoch()
         trainer.validate()
         trainer.save()
@@ -101,9 +108,15 @@ class Trainer:
     It has the network, its running average, optimiser, history, and the place of its files.
     """
 
-    def __init__(self, source: Source, settings: TrainSettings, folder: Path):
+    def __init__(
+        self,
+        source: Source,
+        settings: TrainSettings,
+        folder: Path,
+        update: Update = ignore_progress,
+    ):
         torch.manual_seed(settings.seed)
-        self.source, self.settings, self.folder = source, settings, folder
+        self.source, self.settings, self.folder, self.update = source, settings, folder, update
         self.device = chosen_device(settings.device)
         network = NetworkSettings(types=source.types, layout=settings.layout)
         self.network = RoofNetwork(network).to(self.device)
@@ -117,10 +130,16 @@ class Trainer:
         self.epoch, self.seconds = 0, 0.0
         self.history: list[dict[str, Any]] = []
         self.best: dict[str, Any] = {"score": -math.inf}
+        count = settings.validation
         self.validation = [
             arrange_sample(source.sample(VALIDATION, index), settings.layout)
-            for index in range(settings.validation)
+            for index in count_progress(range(count), "arrange", update, count)
         ]
+
+    @property
+    def epochs(self) -> int:
+        """Return the number of epochs that show as many clouds as the settings ask for."""
+        return math.ceil(self.settings.samples / self.settings.epoch)
 
     def run_epoch(self):
         """Show `settings.epoch` fresh clouds."""
@@ -128,11 +147,15 @@ class Trainer:
         torch.manual_seed(settings.seed * 1_000_003 + self.epoch)
         self.network.train()
         losses = []
+        shown, total = self.epoch * settings.epoch, self.epochs * settings.epoch
+        self.update("train", shown, total)
         for number, batch in enumerate(self.batches()):
             self.set_rate(
                 (self.epoch * settings.epoch + number * settings.batch) / settings.samples
             )
             losses.append(self.step(batch))
+            shown += len(batch)
+            self.update("train", shown, total)
             self.update_average(self.epoch * settings.epoch // settings.batch + number)
         self.epoch += 1
         self.seconds += perf_counter() - start
@@ -308,9 +331,9 @@ class Trainer:
 
     def line(self) -> str:
         """Return progress in one line."""
-        last, settings = self.history[-1], self.settings
+        last = self.history[-1]
         return (
-            f"epoch {self.epoch}/{math.ceil(settings.samples / settings.epoch)}  loss "
+            f"epoch {self.epoch}/{self.epochs}  loss "
             f"{last['loss']:.3f}  "
             f"balanced accuracy {last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f} "
             " "
