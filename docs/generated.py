@@ -18,6 +18,7 @@ import typer
 
 import hiproof
 from hiproof.cli.app import app
+from hiproof.cli.commands import COMMANDS
 from hiproof.settings import Settings, toml_value
 
 PACKAGE = Path(hiproof.__file__).parent
@@ -35,7 +36,7 @@ def on_files(files: Any, config: Any) -> Any:
 def describe_commands() -> str:
     """Describe every command: its purpose, its arguments, its options."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-    return "# Commands\n\nAs `hiproof COMMAND --help` tells them.\n" + "".join(
+    return "# Commands\n\n`hiproof COMMAND --help` prints the same.\n" + "".join(
         describe_command(name, command) for name, command in sorted(commands.items())
     )
 
@@ -50,7 +51,8 @@ def describe_command(name: str, command: Any) -> str:
     ]
     table = "".join(f"| {kind} | {make_cell(help)} |\n" for kind, help in rows)
     head = "| argument or option | meaning |\n| --- | --- |\n"
-    return f"\n## hiproof {name}\n\n{command.help}\n\n{head if rows else ''}{table}"
+    example = f"Example:\n\n    {COMMANDS[name].example}\n"
+    return f"\n## hiproof {name}\n\n{command.help}\n\n{example}\n{head if rows else ''}{table}"
 
 
 def describe_settings() -> str:
@@ -60,7 +62,8 @@ def describe_settings() -> str:
     """
     text = (
         "# Settings\n\n"
-        "As `hiproof settings` prints them, for `--config` or a `hiproof.toml` beside the data.\n"
+        "`hiproof settings` prints the same as TOML, for `--config` or a `hiproof.toml` beside the "
+        "data.\n"
     )
     for section in dataclasses.fields(Settings):
         values = getattr(Settings(), section.name)

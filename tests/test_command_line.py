@@ -29,12 +29,12 @@ def invoke(*arguments, **options):
 
 
 def list_options(text):
-    return {word for word in text.replace("│", " ").split() if word.startswith("--")}
+    return {word for word in text.split() if word.startswith("--")}
 
 
 def test_commands_stand_in_groups():
     lines = [line for line in invoke("--help").output.splitlines() if line.endswith(":")]
-    assert lines == [f"{group}:" for group in GROUPS] + ["Options:"]
+    assert lines == [f"{group}:" for group in GROUPS] + ["Options:", "Example:"]
 
 
 def test_the_help_imports_no_package_that_computes():
@@ -53,8 +53,29 @@ def test_the_help_of_a_command_ends_with_an_example_that_can_be_run(name):
     program, command, *arguments = shlex.split(COMMANDS[name].example.partition(" > ")[0])
     assert (program, command) == ("hiproof", name)
     text = invoke(name, "--help", env={"COLUMNS": "200"}).output.rstrip()
-    assert text.endswith(f"Example: {COMMANDS[name].example}")
+    assert text.endswith(f"Example:\n  {COMMANDS[name].example}")
     COMMAND_LINE[name].make_context(name, arguments)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_holds_every_word_of_its_texts(name):
+    """Brackets, backticks and stars are text, and nothing is cut to fit a column."""
+    flag = "--help-all" if COMMANDS[name].first_options else "--help"
+    shown = "".join(invoke(name, flag, env={"COLUMNS": "80"}).output.split())
+    command = COMMAND_LINE[name]
+    texts = [command.help, *(param.help for param in command.params)]
+    assert [text for text in texts if "".join(text.split()) not in shown] == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_shows_that_it_works_before_it_imports_what_computes(name):
+    heavy = ("numpy", "shapely", "numba", "pyproj")
+    code = (
+        f"import sys, hiproof.cli.app as app; app.import_command({name!r}); "
+        f"print([m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
 
 
 def test_reconstruct_shows_ten_options_first_and_all_on_request():

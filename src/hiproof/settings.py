@@ -65,21 +65,21 @@ class ReadSettings:
     )
     roofs: str = setting(
         "auto",
-        "class: roofs are the points of the building classes; shape: they are looked for among all "
-        "others that may be roofs; "
-        "alone: all of these are, but leaves, of clouds that hold roofs alone, cut out beforehand; "
-        "auto: by shape where no point has "
-        "the building class, or alone where nothing looks like ground",
+        "how roof points are found: class takes the building classes; shape looks for roofs among "
+        "all points that may be roofs; alone takes all of these but leaves, for clouds cut to "
+        "their roofs; auto takes class, or shape where no point has a building class, or alone "
+        "where nothing looks like ground",
         choices=("auto", "class", "shape", "alone"),
         option="--roofs",
     )
     crs: str = setting(
-        "", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say', option="--crs"
+        "",
+        'CRS of the clouds, such as "EPSG:7415"; empty takes that of their files',
+        option="--crs",
     )
     unit: str = setting(
         "auto",
-        "unit of the clouds' coordinates; auto is that of their CRS, and metre where they name "
-        "none",
+        "unit of the clouds' coordinates; auto takes that of their CRS, or metres without a CRS",
         choices=("auto", "metre", "foot", "us-survey-foot"),
         option="--unit",
     )
@@ -102,11 +102,11 @@ class ReadSettings:
     )
     split_houses: bool = setting(
         True,
-        "without footprints: tell touching houses apart where a step or another ridge or eave runs "
+        "without footprints: split touching houses where a step or another ridge or eave runs "
         "across the block",
     )
     split_min_points: int = setting(
-        30, "without footprints: groups of fewer points are no building", "", 3, 100000
+        30, "without footprints: groups of fewer points are not buildings", "", 3, 100000
     )
 
     @property
@@ -120,13 +120,16 @@ class ReadSettings:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """[fit] one primitive fitted to points."""
+    """[fit] fitting primitives to points."""
 
     types: tuple[str, ...] = setting(
         (), "roof types to choose among; empty means the whole catalogue", option="--types"
     )
     objective: str = setting(
-        "likelihood", "objective to minimise", choices=("likelihood", "paper"), option="--objective"
+        "likelihood",
+        "objective that the fit minimises",
+        choices=("likelihood", "paper"),
+        option="--objective",
     )
     side_softness_m: tuple[float, ...] = setting(
         (0.1, 0.04, 0.015, 0.006),
@@ -138,8 +141,8 @@ class FitSettings:
     )
     parts: str = setting(
         "compound",
-        "as many primitives as the points support, or one (extra `network`, unless --network "
-        "never)",
+        "primitives of a building: compound fits as many as the points support, one fits a single "
+        "one (extra `network`, unless --network never)",
         choices=("compound", "one"),
         option="--parts",
     )
@@ -147,12 +150,12 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class CompoundSettings:
-    """[compound] several parts chosen by evidence."""
+    """[compound] roofs of several parts."""
 
     detail: str = setting(
         "full",
-        "how much structure: fine keeps small dormers and steps, main leaves dormers and small "
-        "parts out",
+        "how much structure a model has: fine keeps small dormers and steps, main leaves out "
+        "dormers and small parts, full lies between",
         choices=("fine", "full", "main"),
         option="--detail",
     )
@@ -169,13 +172,12 @@ class CompoundSettings:
 
 @dataclass(frozen=True)
 class SegmentSettings:
-    """[segment] recognising the roof before fitting it."""
+    """[segment] recognising roof types with the network."""
 
     network: str = setting(
         "auto",
-        "where the network is used (extra `network`): auto only where one primitive is fitted to a "
-        "building, always on every building, whose recognised types are then written, never not at "
-        "all",
+        "buildings whose roof type the network recognises (extra `network`): auto, those to which "
+        "one primitive is fitted; always, all buildings, and the types are written; never, none",
         choices=("auto", "always", "never"),
         option="--network",
     )
@@ -208,23 +210,21 @@ class ReconstructSettings:
 
     align: str = setting(
         "auto",
-        "auto moves footprints that clearly lie beside their roofs, off leaves them",
+        "auto moves footprints that clearly lie beside their roofs; off leaves them in place",
         choices=("auto", "off"),
         option="--align",
     )
     footprint_trust: str = setting(
         "points",
-        "points: bare ground inside a footprint (a yard that is no hole, a wing pulled down) is "
-        "cut out of it; full: it is "
-        "roofed over, and a remark says so",
+        "bare ground inside a footprint, such as a yard: points cuts it out of the footprint; full "
+        "roofs it over and adds a remark",
         choices=("points", "full"),
         option="--footprint-trust",
     )
     empty_footprints: str = setting(
         "skip",
-        "skip: a footprint whose points lie on the ground gets no model and the status "
-        "no_building; model: it gets the model "
-        "of whatever points it has",
+        "footprints whose points all lie on the ground: skip gives them the status no_building and "
+        "no model; model fits whatever points they have",
         choices=("skip", "model"),
         option="--empty-footprints",
     )
@@ -243,43 +243,42 @@ class CitySettings:
     )
     models: str = setting(
         "merged",
-        "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or "
-        "both",
+        "merged writes one CityGML and one CityJSONSeq file; tiles writes a pair for each work "
+        "tile into models/ as soon as it is solved; both writes both",
         choices=("merged", "tiles", "both"),
         option="--models",
     )
     keep_failures: bool = setting(
         True,
-        "keep points, outline and settings of up to 20 buildings that hit an internal error in the "
-        "folder failures of the "
-        "output, to be sent with a report (`hiproof repro` runs them again)",
+        "keep the points, outline and settings of up to 20 buildings with an internal error in "
+        "OUT/failures, to be sent with a report (`hiproof repro` runs them again)",
         option="--keep-failures",
     )
 
 
 @dataclass(frozen=True)
 class WriteSettings:
-    """[write] what of a building stands in the files, and which files there are."""
+    """[write] contents of the output files."""
 
     lods: tuple[str, ...] = setting(
         ("2.2",),
-        "levels of detail: 0 footprint and roof edge, 1.2 one block, 1.3 a block for each building "
-        "part, 2.2 roofs; CityJSON "
-        "always has the footprint, CityGML one LoD1, the finer",
+        "levels of detail: 0 is footprint and roof edge, 1.2 one block, 1.3 a block for each "
+        "building part, 2.2 the roof; CityJSON always has the footprint, and CityGML has only the "
+        "finer LoD1",
         choices=("0", "1.2", "1.3", "2.2"),
         minimum=1,
         option="--lods",
     )
     parts_as: str = setting(
         "one",
-        "buildingparts: roofs that meet at walls alone become building parts, each with a solid of "
-        "its own; one: a solid a building",
+        "one writes one solid for each building; buildingparts makes building parts, each with its "
+        "own solid, of roofs that meet only at walls",
         choices=("one", "buildingparts"),
         option="--parts-as",
     )
     roof_codes: str = setting(
         "sig3d",
-        "code list of CityGML's roofType: SIG3D's or AdV's",
+        "code list of roofType in CityGML: that of SIG3D or of AdV",
         choices=("sig3d", "adv"),
         option="--roof-codes",
     )
@@ -288,30 +287,28 @@ class WriteSettings:
     )
     osm_tags: bool = setting(
         False,
-        "write OpenStreetMap's Simple 3D tags as attributes too: roof:shape, roof:height, "
-        "roof:direction, roof:angle, height; they "
-        "replace the input's own of these names",
+        "also write OpenStreetMap's Simple 3D tags as attributes: roof:shape, roof:height, "
+        "roof:direction, roof:angle, height; they replace attributes of the input with these names",
         option="--osm-tags",
     )
     parquet: bool = setting(
-        False, "write the tables as GeoParquet too (extra `parquet`)", option="--parquet"
+        False, "also write the tables as GeoParquet (extra `parquet`)", option="--parquet"
     )
     out_crs: str = setting(
         "",
         'CRS of the coordinates in all files but parameters.jsonl, such as "EPSG:25832"; empty '
-        "means that of the clouds; heights stay as "
-        "they are where it names none",
+        "takes that of the clouds; heights change only if it has a vertical CRS",
         option="--out-crs",
     )
     terrain_intersection: bool = setting(
         True,
-        "write into CityGML the line along which walls meet the terrain",
+        "write the line along which walls meet the terrain into CityGML",
         option="--terrain-intersection",
     )
     gml_surfaces: bool = setting(
         True,
-        "write a solid's surfaces into CityGML by value too, last of all geometry, for GDAL and "
-        "QGIS, which follow no links",
+        "also write the surfaces of each solid into CityGML by value, as the last geometry, for "
+        "GDAL and QGIS, which follow no links",
         option="--gml-surfaces",
     )
 

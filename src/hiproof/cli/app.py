@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 from .. import __version__
 from ..masking import mask
-from .command import Command, with_log_options
+from .command import Command, with_log_options, write_example, write_parameters
 from .commands import COMMANDS
 
 
@@ -40,12 +40,13 @@ class CommandTable(Mapping[str, Any]):
 def import_command(name: str) -> Any:
     """Return the command `name`, whose module and function have its name."""
     function = getattr(import_module(f".{name}", __package__), name)
-    single = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    single = typer.Typer(
+        add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+    )
     entry = COMMANDS[name]
-    add = single.command(name, cls=Command, epilog=f"Example: {entry.example}")
-    add(with_log_options(function))
+    single.command(name, cls=Command)(with_log_options(function))
     command: Any = typer.main.get_command(single)
-    command.first_options = entry.first_options
+    command.first_options, command.example = entry.first_options, entry.example
     return command
 
 
@@ -63,19 +64,14 @@ class Commands(TyperGroup):
         return list(COMMANDS)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Write the groups of commands, then the options, as plain text.
-
-        rich takes a while.
-        """
+        """Write the groups of commands, then the options."""
         self.format_usage(ctx, formatter)
         self.format_help_text(ctx, formatter)
         for group, names in groupby(COMMANDS, lambda name: COMMANDS[name].group):
             with formatter.section(group):
                 formatter.write_dl([(name, COMMANDS[name].help) for name in names])
-        with formatter.section("Options"):
-            records = [param.get_help_record(ctx) for param in self.get_params(ctx)]
-            formatter.write_dl([record for record in records if record])
-        self.format_epilog(ctx, formatter)
+        write_parameters(formatter, "Options", self.get_params(ctx), ctx)
+        write_example(formatter, COMMANDS["reconstruct"].example)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         with mask_complaints():
@@ -105,9 +101,9 @@ app = typer.Typer(
     cls=Commands,
     name="hiproof",
     help="Turn airborne LiDAR point clouds into watertight, semantic, parametric LoD2 models.",
-    epilog=f"Example: {COMMANDS['reconstruct'].example}",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
 )
 
 

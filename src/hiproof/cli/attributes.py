@@ -8,7 +8,7 @@ import typer
 def attributes() -> None:
     """Print every attribute and table of a run as Markdown.
 
-    Each has its kind, unit and meaning.
+    The lists give kind, unit and meaning of each.
     """
     from ..write.attribute_list import attributes_text
 

@@ -33,7 +33,7 @@ def print_schema(targets: bool) -> None:
 @with_settings("write")
 def build(
     parameters: Annotated[
-        Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or as you changed it")
+        Path, typer.Argument(help="the parameters.jsonl of a run, changed or not")
     ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
     shapes: Annotated[
@@ -51,14 +51,14 @@ def build(
             "--schema",
             callback=print_schema,
             is_eager=True,
-            help="print the JSON schema of the file",
+            help="print the JSON schema of parameters.jsonl",
         ),
     ] = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
     """Make all files of a run again from its parameters.jsonl.
 
-    You may have edited the parameters.
+    Change the file with any editor or program first: the new files follow it.
 
     Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid
     solid, or unusable input.

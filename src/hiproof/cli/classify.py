@@ -25,10 +25,9 @@ def classify(
 ) -> None:
     """Find ground (class 2) and buildings (6), and write a copy with classes.
 
-    The shape of the cloud tells them.
-
-    Points of these classes that turn out to be neither become unclassified (1). Noise, water and
-    bridges keep their classes, as does everything else in the file.
+    hiproof finds both by the shape of the cloud. Points that had one of these classes and are
+    neither become unclassified (1). Noise, water and bridges keep their classes, and everything
+    else in the file stays as it is.
     """
     with show_progress("classify"):
         from ..classify.files import classify_file

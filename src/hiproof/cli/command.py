@@ -5,10 +5,9 @@ It is a help of the options that people need first, `--quiet` and `--verbose`.
 
 from __future__ import annotations
 
-import copy
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any
 
 import typer
@@ -24,26 +23,67 @@ ALL_OPTIONS = "hiproof.all_options"  # key of a context whose help shows every o
 class Command(TyperCommand):
     """A command whose help shows its `first_options`.
 
-    `--help-all` shows every option; without `first_options` help always does.
+    `--help-all` shows every option; without `first_options` help always does. Help is plain text,
+    which needs no markup and no columns for types.
     """
 
     first_options: tuple[str, ...] = ()
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        if not self.first_options or ctx.meta.get(ALL_OPTIONS):
-            super().format_help(ctx, formatter)
-            return
-        every = self.params
-        by_name = {param.name: param for param in every}
-        arguments = [param for param in every if param.param_type_name == "argument"]
-        first = [copy.copy(by_name[name]) for name in self.first_options]
-        for param in first:
-            param.rich_help_panel = None  # type: ignore[attr-defined]
-        self.params = [*arguments, *first]
-        try:
-            super().format_help(ctx, formatter)
-        finally:
-            self.params = every
+    example: str = ""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        for heading, params in self.group_parameters(ctx).items():
+            write_parameters(formatter, heading, params, ctx)
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        write_example(formatter, self.example)
+
+    def group_parameters(self, ctx: Any) -> dict[str, list[Any]]:
+        """Return the parameters that the help shows, under their headings."""
+        params = self.get_params(ctx)
+        if self.first_options and not ctx.meta.get(ALL_OPTIONS):
+            order = (*self.first_options, "help")
+            first = sorted(
+                (p for p in params if p.name in order), key=lambda p: order.index(p.name)
+            )
+            arguments = [param for param in params if param.param_type_name == "argument"]
+            return {"Arguments": arguments, "Options": first}
+        groups: dict[str, list[Any]] = {"Arguments": [], "Options": []}
+        for param in params:
+            is_argument = param.param_type_name == "argument"
+            heading = "Arguments" if is_argument else param_panel(param)
+            groups.setdefault(heading, []).append(param)
+        return {heading: group for heading, group in groups.items() if group}
+
+
+def param_panel(param: Any) -> str:
+    """Return the heading of an option."""
+    return getattr(param, "rich_help_panel", None) or "Options"
+
+
+def write_parameters(formatter: Any, heading: str, params: Iterable[Any], ctx: Any) -> None:
+    """Write what each parameter does, under a heading.
+
+    Texts of typer's own options become phrases, as those of ours are.
+    """
+    records = filter(None, [param.get_help_record(ctx) for param in params])
+    with formatter.section(heading):
+        formatter.write_dl([(name, make_phrase(text)) for name, text in records])
+
+
+def make_phrase(text: str) -> str:
+    """Turn a sentence into a phrase.
+
+    >>> make_phrase("Show this message and exit."), make_phrase("CRS of the clouds")
+    ('show this message and exit', 'CRS of the clouds')
+    """
+    return text[:1].lower() + text[1:-1] if text.endswith(".") else text
+
+
+def write_example(formatter: Any, example: str) -> None:
+    """Write a command that can be copied: it is not wrapped."""
+    with formatter.section("Example"):
+        formatter.write(f"  {example}\n")
 
 
 def print_every_option(ctx: typer.Context, is_asked_for: bool) -> None:

@@ -88,7 +88,9 @@ COMMANDS = {
         "make all files again from edited parameters",
         "hiproof build models/parameters.jsonl --out edited",
     ),
-    "convert": Entry("Export", "convert models to another format", "hiproof convert models"),
+    "convert": Entry(
+        "Export", "convert models to another format", "hiproof convert models models.glb"
+    ),
     "load": Entry(
         "Export", "load models into PostGIS", "hiproof load models postgresql://user@host/database"
     ),

@@ -13,7 +13,7 @@ def demo(
 ) -> None:
     """Model the 26 houses of a bundled, simulated neighbourhood.
 
-    It has every roof type.
+    Every roof type occurs in it.
     """
     from .running import run_request
 

@@ -63,10 +63,9 @@ def evaluate(
 ) -> None:
     """Measure the models of a run.
 
-    The figures are distances of points, shares, IoU and volume of each building, of each type and
-    of all.
-
-    The figures of each building go into evaluation.csv and evaluation.json.
+    The figures are distances of points, shares of points, IoU and volume. They are printed for each
+    roof type and for all buildings; those of each building go into evaluation.csv and
+    evaluation.json.
     """
     with show_progress("measure"):
         from ..evaluate.evaluation import summarise, to_csv, to_json

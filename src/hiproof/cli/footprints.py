@@ -17,7 +17,9 @@ def footprints(
         typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
     ],
     out: Annotated[Path, typer.Option(help="GeoPackage to write")],
-    layer: Annotated[str | None, typer.Option(help="building (default) or building_part")] = None,
+    layer: Annotated[
+        str | None, typer.Option(help="building or building_part (default: building)")
+    ] = None,
     crs: Annotated[
         str | None, typer.Option(help="CRS of the clouds (default: that of their files)")
     ] = None,
@@ -27,9 +29,8 @@ def footprints(
 ) -> None:
     """Fetch building footprints from Overture Maps (extra `parquet`).
 
-    They are those of the clouds' extent.
-
-    Pass the file to `hiproof reconstruct --footprints`, with or without a network.
+    The file holds all footprints in the extent of the clouds. Pass it to `hiproof reconstruct
+    --footprints`, which then needs no network connection.
     """
     if out.suffix.lower() != ".gpkg":
         raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")

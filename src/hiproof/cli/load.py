@@ -17,7 +17,9 @@ def load(
     folder: Annotated[
         Path, typer.Argument(help="output folder of a run, or a file that `convert` reads")
     ],
-    database: Annotated[str, typer.Argument(help="postgresql://user@host/database")],
+    database: Annotated[
+        str, typer.Argument(help="address of the database, such as postgresql://user@host/database")
+    ],
     prefix: Annotated[
         str,
         typer.Option(
@@ -26,13 +28,13 @@ def load(
     ] = "hiproof",
     run: Annotated[
         str | None,
-        typer.Option(help="name of the run in the column `run` [default: the folder's name]"),
+        typer.Option(help="name of the run in the column `run` (default: the folder's name)"),
     ] = None,
     replace: Annotated[
-        bool, typer.Option("--replace", help="replace the runs that the tables hold")
+        bool, typer.Option("--replace", help="replace all runs in the tables")
     ] = False,
     append: Annotated[
-        bool, typer.Option("--append", help="add the run beside those that the tables hold")
+        bool, typer.Option("--append", help="add the run beside others in the tables")
     ] = False,
 ) -> None:
     """Load the models of a run into PostGIS tables.

@@ -28,7 +28,7 @@ def reconstruct(
         str | None,
         typer.Option(
             help="building polygons: a file, an address, a PostGIS table, or overture for those of "
-            "Overture Maps (extra `parquet`); without them hiproof finds the buildings"
+            "Overture Maps (extra `parquet`); without this option hiproof finds the buildings"
         ),
     ] = None,
     layer: Annotated[
@@ -51,12 +51,13 @@ def reconstruct(
         ),
     ] = None,
     id_attribute: Annotated[
-        str | None, typer.Option(help="footprint attribute that names buildings")
+        str | None, typer.Option(help="footprint attribute that holds the buildings' ids")
     ] = None,
     terrain: Annotated[
         str | None,
         typer.Option(
-            help="terrain model (GeoTIFF; extra `terrain`); default: the clouds' ground points"
+            help="terrain model, a GeoTIFF (extra `terrain`); without it hiproof takes the "
+            "ground points of the clouds"
         ),
     ] = None,
     overrides: Annotated[
@@ -102,8 +103,10 @@ def reconstruct(
 ) -> None:
     """Model the buildings of point clouds as CityGML, CityJSON, parameters and tables.
 
-    Run the same command again to resume. Exit code: 0 every building has a model or a reason why
-    not, 1 an internal error, 2 unusable input.
+    Run the same command again to resume an interrupted run.
+
+    Exit code: 0 every building has a model or a reason why not, 1 an internal error, 2 unusable
+    input.
     """
     from .running import run_request
 

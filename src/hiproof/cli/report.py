@@ -28,7 +28,7 @@ def report(
 ) -> None:
     """Write a self-contained HTML page about a run.
 
-    It has a map, quality charts and the 20 worst buildings in 3D.
+    It shows a map, quality charts and the 20 worst buildings in 3D.
 
     Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable
     input.

@@ -15,13 +15,13 @@ from ..progress import show_progress
 
 def repro(
     folder: Annotated[
-        Path, typer.Argument(help="folder that a run kept of a failed building (OUT/failures/ID)")
+        Path, typer.Argument(help="folder in which a run kept a failed building (OUT/failures/ID)")
     ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
 ) -> None:
     """Run a building again on which hiproof failed.
 
-    The failure repeats, or it is fixed.
+    The result shows whether the failure repeats or is fixed.
 
     Exit code: 0 the building has an outcome, 1 the failure repeats, 2 the folder cannot be used.
     """

@@ -20,7 +20,7 @@ def segment(
     ],
     out: Annotated[
         Path,
-        typer.Option(help="LAZ file for the labelled points; the table goes next to it as CSV"),
+        typer.Option(help="LAZ file for the labelled points; the table goes beside it as CSV"),
     ],
     crs: Annotated[
         str | None, typer.Option(help="CRS of the clouds (default: that of their files)")
@@ -29,17 +29,17 @@ def segment(
         str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
     ] = None,
     weights: Annotated[
-        str, typer.Option(help="ONNX file with other weights than the shipped ones")
+        str, typer.Option(help="ONNX file with your own weights (default: those of hiproof)")
     ] = "",
     device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
     """Label every point with a roof type or not-roof (extra `network`).
 
-    Each building also gets the name of its type.
+    The table holds the roof type of each building. The LAZ has the extra dimensions roof_type
+    (number of the type's column in the table, from 1; 0 is no roof), not_roof (a probability) and
+    building (number of the file on the command line, from 1).
 
-    The LAZ has the extra dimensions roof_type (number of the type in the columns of the table, from
-    1; 0 is no roof), not_roof (a probability) and building (number of the file on the command line,
-    from 1). Exit code: 0 all buildings were labelled, 1 some were not, 2 unusable input.
+    Exit code: 0 all buildings were labelled, 1 some were not, 2 unusable input.
     """
     with show_progress("label"):
         from ..segment.files import segment_files

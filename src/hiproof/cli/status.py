@@ -27,7 +27,7 @@ def status(
 ) -> None:
     """Show the progress of a run and the state of its buildings.
 
-    The run may be going on, or finished.
+    The run may be finished or still going on.
     """
     from ..city.ledger import Ledger
 
