@@ -12,6 +12,7 @@ import tarfile
 import tomllib
 import venv
 import zipfile
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,15 @@ def run(*command, **options):
     )
     assert process.returncode == 0, process.stderr
     return process.stdout
+
+
+def test_the_types_of_every_public_name_are_checked_strictly():
+    """`py.typed` promises types, so a function without them is a fault of a public module."""
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (strict,) = (o for o in config["tool"]["mypy"]["overrides"] if "disallow_untyped_defs" in o)
+    homes = {getattr(getattr(hiproof, n), "__module__", "hiproof") for n in hiproof.__all__}
+    loose = [home for home in homes if not any(fnmatch(home, name) for name in strict["module"])]
+    assert len(homes) > 20 and not loose
 
 
 @pytest.fixture(scope="module")

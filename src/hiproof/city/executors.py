@@ -27,7 +27,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import RawValue
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Any, TypeAlias
 from urllib.parse import urlsplit
 
 from .. import log
@@ -45,6 +45,12 @@ MOST_ON_WINDOWS = 61  # processes that one can wait for there
 # seconds without a worker until a run gives up; seconds between looks at what is done
 WORKERLESS_S, POLL_S = 300, 5
 COUNT_S = 0.5  # seconds between looks at how many buildings the workers of this machine have solved
+
+
+Arguments: TypeAlias = tuple[Any, ...]
+"""Arguments of a task's function."""
+Outcome: TypeAlias = tuple[Arguments, Any, Exception | None]
+"""Arguments, result and error of a task."""
 
 
 class WorkerLost(Exception):
@@ -307,12 +313,15 @@ class Dask:
         self.client.close()
 
 
+Executor: TypeAlias = InProcess | Processes | Dask
+
+
 def import_distributed() -> Any:
     """Import distributed. Raises InputError where it is missing."""
     return import_extra("distributed", "city", "--scheduler")
 
 
-def make_executor(processes: int, scheduler: str | None = None) -> InProcess | Processes | Dask:
+def make_executor(processes: int, scheduler: str | None = None) -> Executor:
     """Make the executor of the options."""
     if scheduler:
         return Dask(scheduler)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from .. import __version__
 from ..errors import InputError, OutputError
@@ -34,7 +35,7 @@ from . import solved
 from .bundles import find_bundle_folder, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
-from .executors import make_executor
+from .executors import Arguments, Executor, Outcome, make_executor
 from .from_cloud import Progress
 from .from_overture import choose_footprints, read_source
 from .ledger import Failure, Ledger
@@ -188,10 +189,10 @@ class Clock:
 
 def work_off(
     ledger: Ledger,
-    executor,
+    executor: Executor,
     kind: str,
-    function: Callable,
-    arguments: Callable[[str], tuple],
+    function: Callable[..., Any],
+    arguments: Callable[[str], Arguments],
     progress: Progress,
 ) -> None:
     """Run all open tasks of a kind.
@@ -246,7 +247,7 @@ class Tally:
         self.counted += number
         self.progress(self.kind, min(self.counted, self.total), self.total)
 
-    def listen(self, outcomes: Iterator[tuple]) -> Iterator[tuple]:
+    def listen(self, outcomes: Iterator[Outcome]) -> Iterator[Outcome]:
         """Yield the outcomes of tasks, and count the buildings that are solved meanwhile."""
         solved.listener = self.count
         try:
@@ -256,8 +257,8 @@ class Tally:
 
 
 def iterate_started(
-    ledger: Ledger, names: list[str], arguments: Callable[[str], tuple]
-) -> Iterator[tuple]:
+    ledger: Ledger, names: list[str], arguments: Callable[[str], Arguments]
+) -> Iterator[Arguments]:
     """Yield the tasks' arguments, and record each as running.
 
     That happens when an executor takes it.
@@ -267,7 +268,7 @@ def iterate_started(
         yield arguments(name)
 
 
-def task_arguments(request: Request, state: Path, name: str) -> tuple:
+def task_arguments(request: Request, state: Path, name: str) -> Arguments:
     """Return the arguments of a task.
 
     They are the run's folder, the number or name of what it works on, and the address that it
@@ -288,7 +289,7 @@ def absolute(name: str) -> str:
     return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
 
 
-def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None) -> None:
+def record(ledger: Ledger, kind: str, name: str, result: Any, error: Exception | None) -> None:
     """Enter a finished task.
 
     Only unreadable point files may fail; any other error ends the run with what is done kept.
@@ -316,7 +317,12 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
 
 
 def run_task_isolated(
-    ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple
+    ledger: Ledger,
+    executor: Executor,
+    kind: str,
+    name: str,
+    function: Callable[..., Any],
+    task: Arguments,
 ) -> None:
     """Run a task whose process kept dying in a process of its own.
 

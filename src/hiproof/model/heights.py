@@ -33,7 +33,16 @@ def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.
 
 
 @compiled
-def raise_over(z, top, number, x, y, starts, ends, planes):
+def raise_over(
+    z: np.ndarray,
+    top: np.ndarray,
+    number: int,
+    x: np.ndarray,
+    y: np.ndarray,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    planes: np.ndarray,
+) -> None:
     """Raise heights z (n,) inside a polygon to the lowest of `planes` (k, 3).
 
     The polygon has edges from `starts` to `ends` (m, 2). Where z rises, `top` (n,) becomes
