@@ -17,6 +17,7 @@ import typer
 
 import hiproof
 from hiproof.cli.app import app
+from hiproof.enrich.run import enrich_run
 from hiproof.primitives import CATALOGUE
 from hiproof.settings import Settings
 from hiproof.simulate import demo_files
@@ -135,6 +136,7 @@ def at_hand(tmp_path_factory):
     folder, files = tmp_path_factory.mktemp("snippets"), demo_files()
     options = {"footprints": str(files["footprints"]), "where": "id < 'house-04'"}
     hiproof.reconstruct_area(hiproof.Request((str(files["cloud"]),), folder / "models", **options))
+    enrich_run(folder / "models")
     footprint = hiproof.read_footprints(files["footprints"])[0].polygon
     cloud = hiproof.read_points(files["cloud"])
     roof = (cloud.classification == 6) & shapely.intersects_xy(footprint, *cloud.xyz[:, :2].T)

@@ -43,6 +43,7 @@ STAGES = {
     "solve": Stage("fitting roofs", "building"),
     "merge": Stage("writing files", "work tile"),
     "build": Stage("building models", "building"),
+    "enrich": Stage("answering questions", "building"),
     "convert": Stage("writing models", "building"),
     "load": Stage("loading models"),
     "measure": Stage("measuring models"),

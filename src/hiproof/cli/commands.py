@@ -88,6 +88,9 @@ COMMANDS = {
         "make all files again from edited parameters",
         "hiproof build models/parameters.jsonl --out edited",
     ),
+    "enrich": Entry(
+        "Export", "add party walls and areas to the models of a run", "hiproof enrich models"
+    ),
     "convert": Entry(
         "Export", "convert models to another format", "hiproof convert models models.glb"
     ),

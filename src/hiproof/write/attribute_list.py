@@ -164,6 +164,45 @@ HIPROOF = (
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
 )
 
+ENRICHED = (
+    Attribute("ground_area_m2", "number", "m2", "area of the ground surface"),
+    Attribute("flat_roof_area_m2", "number", "m2", "area of roof faces that slope less than 3 deg"),
+    Attribute("sloped_roof_area_m2", "number", "m2", "area of all other roof faces"),
+    Attribute("outer_wall_area_m2", "number", "m2", "area of walls that touch no other building"),
+    Attribute("party_wall_area_m2", "number", "m2", "area of walls that touch another building"),
+    Attribute(
+        "party_walls",
+        "text",
+        "m2",
+        "area of the party wall with each neighbour by id, as JSON; either neighbour has the same",
+    ),
+    Attribute(
+        "neighbours_unknown",
+        "flag",
+        "",
+        "whether a neighbour may lack a model: one that touches the outline has none, or the "
+        "building stands at the border of the run",
+    ),
+)
+"""What `hiproof enrich` adds to a building."""
+
+ENRICHED_3DBAG = (
+    Attribute("b3_opp_grond", "number", "m2", "as hiproof_ground_area_m2"),
+    Attribute("b3_opp_dak_plat", "number", "m2", "as hiproof_flat_roof_area_m2"),
+    Attribute("b3_opp_dak_schuin", "number", "m2", "as hiproof_sloped_roof_area_m2"),
+    Attribute("b3_opp_buitenmuur", "number", "m2", "as hiproof_outer_wall_area_m2"),
+    Attribute("b3_opp_scheidingsmuur", "number", "m2", "as hiproof_party_wall_area_m2"),
+)
+
+ENRICHED_SURFACE = (
+    Attribute(
+        f"{OWN}party_with",
+        "text",
+        "",
+        "of a wall: id of the building that it touches; walls are cut along party walls",
+    ),
+)
+
 OSM = (
     Attribute(
         "roof:shape",
@@ -454,10 +493,20 @@ EVERY_FORMAT = (
     "`buildings.gml`, `buildings.city.jsonl`, the layer `buildings` of `buildings.gpkg`, "
     "`buildings.parquet`, `buildings.fgb`, PostGIS: PREFIX_buildings"
 )
+ENRICHED_FILES = "all files of the folder `enriched`"
 TABLES = (
     AttributeTable("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
     AttributeTable("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
     AttributeTable("Buildings, as OpenStreetMap tags them (`--osm-tags`)", EVERY_FORMAT, OSM),
+    AttributeTable("Buildings, added by `hiproof enrich`", ENRICHED_FILES, ENRICHED, OWN),
+    AttributeTable(
+        "Buildings, added by `hiproof enrich` under 3DBAG's names", ENRICHED_FILES, ENRICHED_3DBAG
+    ),
+    AttributeTable(
+        "Surfaces, added by `hiproof enrich`",
+        "`buildings.gml` and `buildings.city.jsonl` of the folder `enriched`",
+        ENRICHED_SURFACE,
+    ),
     AttributeTable(
         "Building parts (`--parts-as buildingparts`)",
         "`buildings.gml`, `buildings.city.jsonl`",

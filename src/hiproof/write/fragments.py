@@ -12,7 +12,7 @@ import functools
 import itertools
 import zipfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -33,7 +33,8 @@ class Sheet:
     """A building with all from which its texts are made.
 
     It has the `figures` of its solid (None without one), its `attributes`, its names in CityJSON
-    and in GML, and what the files of its run have in common.
+    and in GML, and what the files of its run have in common. `surfaces` are further attributes of
+    the solid's faces, by face.
     """
 
     building: Building
@@ -42,6 +43,7 @@ class Sheet:
     name: str
     gml_name: str
     head: FileHead
+    surfaces: dict[int, dict[str, Any]] = field(default_factory=dict)
 
     @functools.cached_property
     def shapes(self) -> Shapes:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -91,21 +92,27 @@ def terrain_element(lines: list[np.ndarray], level: int) -> str:
 
 
 def boundary_surfaces(
-    solid: Solid, figures: RoofFigures, polygon_ids: list[str], rings: list[str]
+    solid: Solid,
+    figures: RoofFigures,
+    polygon_ids: list[str],
+    rings: list[str],
+    attributes: dict[int, dict[str, Any]] | None = None,
 ) -> list[str]:
     """Return a RoofSurface, WallSurface or GroundSurface for every face.
 
-    Roofs have their slope and azimuth in degrees.
+    Roofs have their slope and azimuth in degrees; `attributes` has others by face.
     """
     surfaces = []
     for index, (face, polygon_id, of_face) in enumerate(
         zip(solid.faces, polygon_ids, rings, strict=True)
     ):
         tag = f"bldg:{face.kind}"
-        angles = angle_attributes(figures, index) if face.kind == ROOF else ""
+        generic = angle_attributes(figures, index) if face.kind == ROOF else ""
+        for name, value in (attributes or {}).get(index, {}).items():
+            generic += generic_attribute(name, value)
         surfaces.append(
             f"<bldg:boundedBy><{tag} "
-            f'gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
+            f'gml:id="{polygon_id}">{generic}<bldg:lod2MultiSurface><gml:MultiSurface>'
             f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{of_face}</gml:Polygon>'
             f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
         )

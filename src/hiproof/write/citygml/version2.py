@@ -184,7 +184,7 @@ def building_element(sheet: Sheet) -> str:
             list_face_rings(solid.faces, in_file(sheet, solid)),
         )
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
-        text += boundary_surfaces(solid, figures, ids, rings)
+        text += boundary_surfaces(solid, figures, ids, rings, sheet.surfaces)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, "</bldg:Building>"])
 

@@ -55,12 +55,14 @@ def building_geometry(
     vertices: Vertices,
     prefix: str,
     lods: tuple[str, ...],
+    attributes: dict[int, dict[str, Any]] | None = None,
 ) -> list[dict[str, Any]]:
     """Return the geometry of the building itself, as far as `lods` ask.
 
     The footprint comes always, then roof edge, blocks, and solid.
 
-    Vertices go to `vertices`. A building in parts has no solid of its own.
+    Vertices go to `vertices`. A building in parts has no solid of its own. `attributes` has further
+    ones of the solid's faces, by face.
     """
     if figures is None:
         footprint = level_footprint(building)
@@ -71,14 +73,11 @@ def building_geometry(
         )
     solids = []
     if "2.2" in lods and not shapes.parts:
-        solids = [
-            solid_geometry(
-                building.solid,
-                vertices,
-                LOD_SOLID,
-                roof_surfaces(building, building.solid, figures, prefix),
-            )
-        ]
+        surfaces = roof_surfaces(building, building.solid, figures, prefix)
+        for index, more in (attributes or {}).items():
+            kind = {"type": building.solid.faces[index].kind}
+            surfaces[index] = surfaces.get(index, kind) | more
+        solids = [solid_geometry(building.solid, vertices, LOD_SOLID, surfaces)]
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
     return [
         *level_surfaces(building, shapes, vertices),
@@ -133,20 +132,20 @@ def named_surfaces(surface: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 def solid_geometry(
-    solid: Solid, vertices: Vertices, lod: str, roofs: dict[int, dict[str, Any]] | None = None
+    solid: Solid, vertices: Vertices, lod: str, described: dict[int, dict[str, Any]] | None = None
 ) -> dict[str, Any]:
     """Return the Solid with its semantics.
 
-    A roof face in `roofs` is a semantic surface of its own; all others of a kind share one.
+    A face in `described` is a semantic surface of its own; all others of a kind share one.
     """
     number = vertices.add(solid.vertices)
     surfaces: list[dict[str, Any]] = []
     shared: dict[str, int] = {}
     values = []
     for index, face in enumerate(solid.faces):
-        if roofs and index in roofs:
+        if described and index in described:
             values.append(len(surfaces))
-            surfaces.append(roofs[index])
+            surfaces.append(described[index])
         else:
             if face.kind not in shared:
                 shared[face.kind] = len(surfaces)

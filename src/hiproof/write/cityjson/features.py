@@ -196,7 +196,7 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
     """
     name, prefix, lods = sheet.name, sheet.head.prefix, sheet.head.write.lods
     geometry = building_geometry(
-        sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods
+        sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods, sheet.surfaces
     )
     whole: dict[str, Any] = {"type": "Building", "attributes": sheet.attributes}
     parts = {

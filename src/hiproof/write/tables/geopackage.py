@@ -149,6 +149,10 @@ def fragment(sheet: Sheet) -> Fragment:
     """Return a building's rows in the tables of a run, as text."""
     return Fragment(
         table_rows(
-            sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table
+            sheet.building,
+            sheet.figures,
+            sheet.attributes,
+            sheet.head.units.table,
+            sheet.surfaces,
         ).to_text()
     )

@@ -63,14 +63,18 @@ def table_rows(
     figures: RoofFigures | None,
     attributes: dict[str, Any],
     units: Units = METRES,
+    surfaces: dict[int, dict[str, Any]] | None = None,
 ) -> Rows:
     """Return the rows of `building`, their geometry in `units`.
 
-    `attributes` are its own and `figures` those of its solid.
+    `attributes` are its own and `figures` those of its solid; `surfaces` has further attributes of
+    its roof faces, by face.
     """
     parts = part_rows(building, units)
     return Rows(
-        (building_row(building, attributes, units),), parts, surface_rows(building, figures, units)
+        (building_row(building, attributes, units),),
+        parts,
+        surface_rows(building, figures, units, surfaces),
     )
 
 
@@ -163,11 +167,14 @@ def list_sigmas(part: Part) -> dict[str, float]:
 
 
 def surface_rows(
-    building: Building, figures: RoofFigures | None, units: Units = METRES
+    building: Building,
+    figures: RoofFigures | None,
+    units: Units = METRES,
+    attributes: dict[int, dict[str, Any]] | None = None,
 ) -> tuple[Row, ...]:
     """Return a row a roof surface of the solid.
 
-    It has its polygon, slope, azimuth, area and part.
+    It has its polygon, slope, azimuth, area and part, and its `attributes`, given by face.
     """
     if figures is None:
         return ()
@@ -186,6 +193,7 @@ def surface_rows(
             "slope_deg": round_value(figures.face_slope_deg[index], 3),
             "azimuth_deg": round_value(azimuth, 3) if math.isfinite(azimuth) else None,
             "area_m2": metres(figures.face_area_m2[index]),
+            **(attributes or {}).get(index, {}),
         }
         rows.append((polygon, values))
     return tuple(rows)

@@ -1,0 +1,45 @@
+"""`hiproof enrich`: answers about the buildings of a finished run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..log import count_things
+from ..progress import show_progress
+
+
+def enrich(
+    run: Annotated[Path, typer.Argument(help="output folder of a run, or its parameters.jsonl")],
+    out: Annotated[
+        Path | None, typer.Option(help="folder for the results (default: enriched, in the run)")
+    ] = None,
+    touch: Annotated[
+        float,
+        typer.Option(help="distance up to which walls of neighbours touch, m", min=0.0, max=2.0),
+    ] = 0.3,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            help="number of worker processes (default: up to one per core, fewer for a small run)",
+            min=1,
+        ),
+    ] = None,
+) -> None:
+    """Add party walls and areas to the models of a finished run.
+
+    The run's own files stay as they are. A second call replaces the results of the first; run the
+    same command again to resume an interrupted one.
+
+    Exit code: 0 all buildings were written, 1 an internal error, 2 unusable input.
+    """
+    with show_progress("enrich") as update:
+        from ..enrich.run import Questions, enrich_run
+
+        result = enrich_run(
+            run, out, Questions(touch), jobs, lambda done, total: update("enrich", done, total)
+        )
+    typer.echo(f"{count_things(result.buildings, 'building')} enriched")
+    typer.echo("files: " + ", ".join(map(str, result.files)))

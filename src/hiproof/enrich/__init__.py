@@ -1,0 +1,12 @@
+"""Answers from finished models: party walls, areas, house types, storeys.
+
+records     the buildings of a parameters.jsonl, read one by one in any order
+walls       the upright faces of a solid, each a polygon in its own plane
+party       where the walls of two buildings touch
+cut         a solid whose walls are cut along their party walls
+town        the buildings of a run with their walls and where these touch
+areas       areas of outer walls, party walls, roofs and grounds
+answer      all answers about one building
+write       a building's answers as texts for the files of a run
+run         `hiproof enrich`: every building of a run, in parallel
+"""

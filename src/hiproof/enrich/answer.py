@@ -1,0 +1,84 @@
+"""All answers about one building: its attributes, and those of its surfaces."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any, NamedTuple
+
+import shapely
+
+from ..model import Building, Solid
+from ..write.attribute_list import OWN
+from ..write.values import plain_text, round_value
+from .areas import OF_3DBAG, measure_areas
+from .cut import Region, cut_walls
+from .party import Contact
+from .town import Town
+
+
+class Answers(NamedTuple):
+    """A building, its walls cut along party walls, with what is added.
+
+    `attributes` are the building's, `surfaces` those of faces by number.
+    """
+
+    building: Building
+    attributes: dict[str, Any]
+    surfaces: dict[int, dict[str, Any]]
+
+
+def answer(town: Town, number: int) -> Answers:
+    """Answers all questions about building `number`."""
+    building = town.read(number)
+    if building.built is None:
+        return Answers(building, {f"{OWN}neighbours_unknown": True}, {})
+    contacts = town.list_contacts(number)
+    regions = group_regions(town, contacts)
+    solid, party = cut_walls(building.solid, town.list_walls(number), regions)
+    areas = measure_areas(building.solid, measure_party(regions))
+    attributes = {
+        **{OWN + name: round_value(area, 4) for name, area in areas.items()},
+        **{name: round_value(areas[own], 4) for own, name in OF_3DBAG.items()},
+        f"{OWN}party_walls": describe_party(town, contacts),
+        f"{OWN}neighbours_unknown": town.lacks_neighbours(number),
+    }
+    surfaces = {face: {f"{OWN}party_with": name} for face, name in party.items()}
+    return Answers(with_solid(building, solid), attributes, surfaces)
+
+
+def group_regions(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> dict[int, list[Region]]:
+    """Return the places of party walls with their neighbour's id, by face."""
+    regions: dict[int, list[Region]] = {}
+    for other in contacts:
+        name = plain_text(town.read(other).id)
+        for contact in contacts[other]:
+            regions.setdefault(contact.walls[0].face, []).append((name, contact.regions[0]))
+    return regions
+
+
+def measure_party(regions: dict[int, list[Region]]) -> float:
+    """Return the area (m2) of all party walls.
+
+    Places that two neighbours touch count once.
+    """
+    return float(
+        sum(
+            shapely.union_all([region for _, region in of_face]).area
+            for of_face in regions.values()
+        )
+    )
+
+
+def describe_party(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> str:
+    """Return the area (m2) of the party wall with each neighbour by id, as JSON."""
+    areas = {
+        plain_text(town.read(other).id): round_value(sum(c.area_m2 for c in contacts[other]), 4)
+        for other in contacts
+    }
+    return json.dumps(areas, ensure_ascii=False)
+
+
+def with_solid(building: Building, solid: Solid) -> Building:
+    """Return a building with another solid of the same shape."""
+    return dataclasses.replace(building, built=dataclasses.replace(building.model, solid=solid))

@@ -1,0 +1,46 @@
+"""Areas of a solid's outer walls, party walls, roofs and grounds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import GROUND, ROOF, WALL, Solid
+from ..write.roof_figures import FLAT_SLOPE_DEG, cross, face_fans
+
+OF_3DBAG = {
+    "ground_area_m2": "b3_opp_grond",
+    "flat_roof_area_m2": "b3_opp_dak_plat",
+    "sloped_roof_area_m2": "b3_opp_dak_schuin",
+    "outer_wall_area_m2": "b3_opp_buitenmuur",
+    "party_wall_area_m2": "b3_opp_scheidingsmuur",
+}
+"""3DBAG's name of each area that it has too."""
+
+
+def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
+    """Return areas (m2) by name; `party_m2` of its walls are party walls.
+
+    A roof face is flat below FLAT_SLOPE_DEG, as its azimuth is null there.
+    """
+    vectors = area_vectors(solid)
+    size = np.linalg.norm(vectors, axis=1)
+    kinds = np.array([face.kind for face in solid.faces])
+    slope = np.degrees(np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
+    walls = float(size[kinds == WALL].sum())
+    return {
+        "ground_area_m2": float(size[kinds == GROUND].sum()),
+        "flat_roof_area_m2": float(size[(kinds == ROOF) & (slope < FLAT_SLOPE_DEG)].sum()),
+        "sloped_roof_area_m2": float(size[(kinds == ROOF) & (slope >= FLAT_SLOPE_DEG)].sum()),
+        "outer_wall_area_m2": max(walls - party_m2, 0.0),
+        "party_wall_area_m2": party_m2,
+    }
+
+
+def area_vectors(solid: Solid) -> np.ndarray:
+    """Return the vector areas (faces, 3) of a solid's faces."""
+    fan, face_of = face_fans(solid)
+    corners = solid.vertices[fan] - solid.vertices.mean(axis=0)
+    triangles = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.stack(
+        [np.bincount(face_of, along, len(solid.faces)) for along in triangles.T], axis=1
+    )

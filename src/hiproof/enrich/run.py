@@ -1,0 +1,191 @@
+"""`hiproof enrich`: answers about every building of a run, in parallel.
+
+Blocks of buildings that follow one another in the file are tasks. Their texts wait in a hidden
+folder until all are there, and are then joined into files in the run's order: an interrupted
+command goes on with the blocks that are missing. No answer depends on the blocks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import __version__
+from ..city.cores import as_many_as_pay
+from ..city.executors import make_executor
+from ..errors import InputError, OutputError
+from ..evaluate.run import run_record
+from ..formats import FORMATS, list_requested_files
+from ..masking import masked_values
+from ..settings import Settings
+from ..write.cityjson.features import choose_offset
+from ..write.files import atomic, atomic_file
+from ..write.fragments import Fragments, load_fragments, save_fragments
+from ..write.head import FileHead
+from ..write.run_files import join_fragments
+from .party import PARTY_GAP_M
+from .records import Index, Records, index_records
+from .town import Town
+from .write import make_fragments
+
+BLOCK_BUILDINGS = 64  # buildings of a task: a second of work
+FOLDER, WAITING = "enriched", ".enrich"
+"""The folder of a run that has its enriched files, and that of blocks until these are written."""
+
+
+class Questions(NamedTuple):
+    """What is asked of every building."""
+
+    touch_m: float = PARTY_GAP_M
+
+
+class Enriched(NamedTuple):
+    """The files that were written, and how many buildings they have."""
+
+    files: list[Path]
+    buildings: int
+
+
+def enrich_run(
+    run: Path,
+    out: Path | None = None,
+    questions: Questions | None = None,
+    processes: int | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Enriched:
+    """Write the files of a finished run again, with answers added.
+
+    `run` is its folder, or its parameters.jsonl. The files go to the folder `out`, or to `enriched`
+    in the run's folder, each whole or not at all; they replace those of an earlier call. Nothing of
+    the run itself changes. Raises InputError for what is no run, and OutputError for a folder that
+    cannot be written.
+    """
+    parameters = run / FORMATS["parameters"].file if run.is_dir() else run
+    out = out or parameters.parent / FOLDER
+    refuse_own_folder(out)
+    questions = questions or Questions()
+    waiting = make_waiting_folder(out, parameters, questions)
+    index = index_records(parameters)
+    with atomic_file(waiting / "index.npz") as file:
+        np.savez(file, **index._asdict())
+    total = len(index.offsets)
+    blocks = list_blocks(waiting, total)
+    missing = [block for block in blocks if not block[0].is_file()]
+    done = total - sum(last - first for _, first, last in missing)
+    executor = make_executor(processes or as_many_as_pay(total, len(missing)))
+    try:
+        tasks = ((str(parameters), questions, str(block[0]), *block[1:]) for block in missing)
+        for task, _, error in executor.run(enrich_block, tasks):
+            if error is not None:
+                raise error
+            done += task[4] - task[3]
+            progress(done, total)
+    finally:
+        executor.close()
+    files = join_blocks(blocks, find_head(Records(parameters, index)), out)
+    write_record(parameters.parent, out, questions, total)
+    shutil.rmtree(waiting.parent, ignore_errors=True)
+    return Enriched(list(files.values()), total)
+
+
+def refuse_own_folder(out: Path) -> None:
+    """Raise OutputError for a folder that holds a run's own files."""
+    if (out / FORMATS["parameters"].file).exists():
+        raise OutputError(
+            f"expected a folder for enriched files, got {out}, which holds a run; choose another "
+            "--out"
+        )
+
+
+def make_waiting_folder(out: Path, parameters: Path, questions: Questions) -> Path:
+    """Make the hidden folder of the blocks of a request; those of others are removed."""
+    try:
+        state = parameters.stat()
+    except OSError as error:
+        raise InputError(
+            f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
+            "path"
+        ) from error
+    request = [__version__, str(parameters), state.st_size, state.st_mtime_ns, questions]
+    key = hashlib.sha256(json.dumps(request).encode()).hexdigest()[:16]
+    waiting = out / WAITING / key
+    if waiting.parent.is_dir():
+        for other in waiting.parent.iterdir():
+            if other.name != key:
+                shutil.rmtree(other, ignore_errors=True)
+    try:
+        waiting.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"expected to write into {out}, got: {error}; choose another --out"
+        ) from error
+    return waiting
+
+
+def list_blocks(waiting: Path, total: int) -> list[tuple[Path, int, int]]:
+    """Return the file of each block with the numbers of its buildings, [first, last)."""
+    return [
+        (waiting / f"{first}.npz", first, min(first + BLOCK_BUILDINGS, total))
+        for first in range(0, total, BLOCK_BUILDINGS)
+    ]
+
+
+def enrich_block(parameters: str, questions: Questions, block: str, first: int, last: int) -> None:
+    """Write the texts of the buildings [first, last) to the file `block`."""
+    town = open_town(parameters, questions, str(Path(block).with_name("index.npz")))
+    head = find_head(town.records)
+    parts = [make_fragments(town, number, head) for number in range(first, last)]
+    with atomic_file(block) as file:
+        save_fragments(file, parts)
+
+
+@functools.lru_cache(1)
+def open_town(parameters: str, questions: Questions, index_file: str) -> Town:
+    """Open the run's buildings, once in each process."""
+    with np.load(index_file, allow_pickle=False) as arrays:
+        index = Index(**{name: arrays[name] for name in Index._fields})
+    return Town(Records(Path(parameters), index), questions.touch_m)
+
+
+def find_head(records: Records) -> FileHead:
+    """Return the head of the enriched files.
+
+    Each building is one solid, whose walls are cut. Where the run names no offset of the CityJSON
+    file, its first building sets it, as `hiproof build` has it.
+    """
+    head = dataclasses.replace(
+        records.head, write=dataclasses.replace(records.head.write, parts_as="one")
+    )
+    if head.offset is not None or not len(records):
+        return head
+    corner = np.nan_to_num(records.index.boxes[0, :2])
+    return dataclasses.replace(head, offset=choose_offset(head.units.cityjson.from_metres(corner)))
+
+
+def join_blocks(blocks: list[tuple[Path, int, int]], head: FileHead, out: Path) -> dict[str, Path]:
+    """Join the texts of all blocks into files; returns these by format."""
+    files = list_requested_files(Settings(write=head.write), out)
+    del files["parameters"]
+
+    def read_blocks() -> Iterator[Fragments]:
+        for path, _, _ in blocks:
+            yield from load_fragments(path)
+
+    join_fragments(files, read_blocks(), head)
+    return files
+
+
+def write_record(folder: Path, out: Path, questions: Questions, total: int) -> None:
+    """Write the run's record for the enriched files, with what was asked."""
+    asked: dict[str, Any] = {"hiproof": __version__, "buildings": total, **questions._asdict()}
+    record = masked_values({**run_record(folder), "enriched": asked})
+    with atomic(out / "run.json") as hidden:
+        hidden.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

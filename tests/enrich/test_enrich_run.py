@@ -1,0 +1,156 @@
+"""`hiproof enrich`: files with answers, beside a run that stays as it was."""
+
+import json
+import sqlite3
+
+import pytest
+from lxml import etree
+from typer.testing import CliRunner
+
+from hiproof.cli.app import app
+from hiproof.enrich import run as enrich_module
+from hiproof.enrich.run import Questions, enrich_run
+from hiproof.errors import InputError, OutputError
+from hiproof.parametric.finished import open_run
+from hiproof.parametric.run import build_file
+from streets import lose_house, place_house, write_street
+
+FILES = ("buildings.gml", "buildings.city.jsonl", "buildings.gpkg")
+
+
+def make_street():
+    row = [
+        place_house(f"h{k}", 6.0 * k, 0.0, eave=5.0 + k % 2, rise=3.0, year=1900 + k)
+        for k in range(5)
+    ]
+    return [*row, lose_house("lost", 40.0, 0.0)]
+
+
+def read_files(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def read_features(folder):
+    lines = (folder / "buildings.city.jsonl").read_text().splitlines()[1:]
+    return {
+        feature["id"]: feature["CityObjects"][feature["id"]] for feature in map(json.loads, lines)
+    }
+
+
+@pytest.fixture
+def run(tmp_path):
+    folder = write_street(tmp_path / "run", make_street())
+    build_file(folder / "parameters.jsonl", tmp_path / "built")
+    return folder
+
+
+def test_every_file_has_the_answers(run):
+    result = CliRunner().invoke(app, ["enrich", str(run), "--jobs", "1"])
+    assert result.exit_code == 0 and "6 buildings enriched" in result.output
+    out = run / "enriched"
+    assert sorted(read_files(out)) == sorted([*FILES, "run.json"])
+    middle = read_features(out)["h1"]
+    assert middle["attributes"]["hiproof_party_wall_area_m2"] == pytest.approx(130, abs=0.01)
+    surfaces = middle["geometry"][-1]["semantics"]["surfaces"]
+    assert {s["hiproof_party_with"] for s in surfaces if "hiproof_party_with" in s} == {"h0", "h2"}
+    gml = etree.parse(out / "buildings.gml")
+    names = gml.xpath("//*[local-name()='WallSurface']/*[@name='hiproof_party_with']/*/text()")
+    assert set(names) == {"h0", "h1", "h2", "h3", "h4"}
+    with sqlite3.connect(out / "buildings.gpkg") as file:
+        rows = dict(file.execute("SELECT id, b3_opp_scheidingsmuur FROM buildings"))
+    assert rows["h1"] == middle["attributes"]["b3_opp_scheidingsmuur"] and rows["lost"] is None
+    assert json.loads((out / "run.json").read_text())["enriched"]["touch_m"] == 0.3
+
+
+def test_the_run_s_own_files_stay(run, tmp_path):
+    before = read_files(run)
+    enrich_run(run)
+    assert read_files(run) == before
+    build_file(run / "parameters.jsonl", tmp_path / "again")
+    for name in FILES[:2]:
+        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "built" / name).read_bytes()
+
+
+def test_a_second_call_replaces_the_first(run):
+    enrich_run(run, questions=Questions(touch_m=0.0))
+    first = read_files(run / "enriched")
+    enrich_run(run, questions=Questions(touch_m=0.3))
+    enrich_run(run, questions=Questions(touch_m=0.0))
+    assert read_files(run / "enriched") == first
+
+
+def test_enriched_files_are_models(run):
+    enrich_run(run)
+    models = {building.id: building for building in open_run(run / "enriched")}
+    own = {building.id: building for building in open_run(run)}
+    assert list(models) == list(own)
+    for id in ("h0", "h1", "h4"):
+        assert models[id].volume == pytest.approx(own[id].volume, rel=1e-5)
+
+
+def test_files_depend_on_no_blocks_nor_processes(run, tmp_path, monkeypatch):
+    enrich_run(run, tmp_path / "one")
+    monkeypatch.setattr(enrich_module, "BLOCK_BUILDINGS", 2)
+    enrich_run(run, tmp_path / "three", processes=2)
+    one, three = read_files(tmp_path / "one"), read_files(tmp_path / "three")
+    assert {name: one[name] for name in FILES[:2]} == {name: three[name] for name in FILES[:2]}
+
+
+def test_an_interrupted_command_goes_on(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(enrich_module, "BLOCK_BUILDINGS", 2)
+    enrich_run(run, tmp_path / "whole")
+    made = []
+
+    def fail_at_last(parameters, questions, block, first, last):
+        if first == 4 and not made.count(4):
+            made.append(first)
+            raise KeyboardInterrupt
+        made.append(first)
+        enrich_block(parameters, questions, block, first, last)
+
+    enrich_block = enrich_module.enrich_block
+    monkeypatch.setattr(enrich_module, "enrich_block", fail_at_last)
+    with pytest.raises(KeyboardInterrupt):
+        enrich_run(run, processes=1)
+    assert not any((run / "enriched" / name).exists() for name in FILES)
+    enrich_run(run, processes=1)
+    assert made == [0, 2, 4, 4]
+    whole, resumed = read_files(tmp_path / "whole"), read_files(run / "enriched")
+    assert {name: resumed[name] for name in FILES[:2]} == {name: whole[name] for name in FILES[:2]}
+    assert not (run / "enriched" / ".enrich").exists()
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path):
+    with pytest.raises(InputError, match="expected the output folder of `hiproof reconstruct`"):
+        enrich_run(tmp_path)
+
+
+def test_a_run_is_not_overwritten(run):
+    with pytest.raises(OutputError, match="which holds a run; choose another --out"):
+        enrich_run(run, run)
+
+
+def test_two_buildings_of_one_id_are_refused(tmp_path):
+    folder = write_street(tmp_path, [place_house("a", 0, 0), place_house("a", 9, 0)])
+    with pytest.raises(InputError, match="'a' twice; give one another"):
+        enrich_run(folder)
+
+
+def test_a_building_that_cannot_be_built_does_not_end_the_run(tmp_path):
+    bad = place_house("bad", 6.0, 0.0)
+    bad["parts"][0]["position"] = [0, 0, -50]
+    enrich_run(write_street(tmp_path, [place_house("a", 0, 0), bad]))
+    attributes = read_features(tmp_path / "enriched")["bad"]["attributes"]
+    assert attributes["hiproof_status"] == "not_built"
+    assert read_features(tmp_path / "enriched")["a"]["attributes"]["hiproof_neighbours_unknown"]
+
+
+def test_parameters_without_an_offset_are_enriched(tmp_path):
+    folder = write_street(tmp_path / "run", make_street(), cityjson_offset=None)
+    enrich_run(folder)
+    build_file(folder / "parameters.jsonl", tmp_path / "built")
+    heads = [
+        json.loads((path / "buildings.city.jsonl").read_text().splitlines()[0])["transform"]
+        for path in (folder / "enriched", tmp_path / "built")
+    ]
+    assert heads[0] == heads[1]
