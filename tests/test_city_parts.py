@@ -21,7 +21,7 @@ from hiproof.city.ground import (
 from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
-from small_tasks import die_at_second_task, double
+from small_tasks import die_at_second_task, double, has_imported
 
 
 def jobs_at(xy):
@@ -178,6 +178,14 @@ def test_executors_return_every_task_with_result_or_error(executor):
     }
     executor.close()
     assert got == {i: ((None, ValueError) if i == 3 else (2 * i, type(None))) for i in range(6)}
+
+
+def test_workers_import_what_tasks_need_before_there_are_tasks():
+    executor = Processes(1)
+    executor.start()
+    ((_, result, error),) = executor.run(has_imported, [("hiproof.city.solve",)])
+    executor.close()
+    assert result and error is None
 
 
 def test_a_killed_worker_loses_its_tasks_but_not_the_others():

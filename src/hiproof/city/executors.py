@@ -4,11 +4,12 @@ It is this process, processes of this machine, or a Dask cluster.
 
 One verb: `run`.
 
-`prepare(pieces)` comes first: compiled code is made before the work starts, so that no two workers
-make the same. `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A
-worker that dies does not end the run: its tasks come back with a `WorkerLost`, and the caller
-decides whether to try them again. `isolated()` is an executor whose worker's death harms nobody
-else. Tasks are taken from their iterable only when a worker is near.
+`start()` may come early: workers import while the main process plans. `prepare(pieces)` comes
+first: compiled code is made before the work starts, so that no two workers make the same.
+`run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that
+dies does not end the run: its tasks come back with a `WorkerLost`, and the caller decides whether
+to try them again. `isolated()` is an executor whose worker's death harms nobody else. Tasks are
+taken from their iterable only when a worker is near.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from ..extras import import_extra
 from ..garbage import RARELY
 from . import solved
 from .cores import limit_threads
-from .tasks import make_ready
+from .tasks import import_work, make_ready
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
@@ -59,6 +60,9 @@ class WorkerLost(Exception):
 
 class InProcess:
     """One task after the other in this process."""
+
+    def start(self) -> None:
+        pass
 
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
@@ -93,6 +97,11 @@ class Processes:
         self.word: Connection | None = None
         self.count_solved = RawValue("q", 0)  # by all workers, shared with them
         self.told = 0
+
+    def start(self) -> None:
+        """Start the workers, which import what tasks need."""
+        for _ in range(self.count):
+            self.submit(import_work, ())
 
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
@@ -224,6 +233,9 @@ class Dask:
             raise InputError(
                 f"expected a Dask scheduler at {address}, got: {error}; check the address"
             ) from error
+
+    def start(self) -> None:
+        pass
 
     def prepare(self, pieces: Sequence[str]) -> None:
         """Compile in one worker of each host, then load in the others.

@@ -114,6 +114,8 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
+        if ledger.get("merged") != "yes":
+            executor.start()
         with hold_points():  # for the step that sorts them
             plan = resume_or_plan(request, state, ledger, progress)
         if request.processes is None and not request.scheduler:

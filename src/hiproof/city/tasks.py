@@ -41,6 +41,12 @@ def solve_tile(
     return solve.solve_tile(folder, tile, terrain, avoid)
 
 
+def import_work() -> None:
+    """Import what tasks need, in a worker that waits for its first one."""
+    from ..fit import union  # noqa: F401
+    from . import solve, sort  # noqa: F401
+
+
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     """Compile ahead of the work; see warm.py."""
     from . import warm
