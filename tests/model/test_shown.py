@@ -15,7 +15,7 @@ from hiproof.city.solve import make_outcome
 from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
-from hiproof.model import Building, Model, Part, Piece, Roof
+from hiproof.model import Building, Model, Part, Piece, Roof, shown
 from hiproof.model.shown import share_surface
 from hiproof.status import Status
 from hiproof.write import write_all
@@ -185,3 +185,16 @@ def test_a_part_around_a_yard_has_a_hole():
 
 def test_a_building_without_a_model_shows_nothing():
     assert make_lost_building().compute_visible_areas() == []
+
+
+def test_the_visible_pieces_of_a_model_are_computed_once(monkeypatch):
+    """Its verdict, its attributes and its tables ask for them."""
+    building, calls = make_building(courtyard(), kinds=("flat",)), []
+    compute = shown.compute_visible_pieces
+    monkeypatch.setattr(
+        "hiproof.model.building.compute_visible_pieces",
+        lambda *given: calls.append(given) or compute(*given),
+    )
+    (area,) = building.compute_visible_areas()
+    assert building.model.visible_m2 == (pytest.approx(area.area),)
+    assert building.compute_visible_areas() and len(calls) == 1

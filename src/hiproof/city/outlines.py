@@ -34,6 +34,7 @@ class Outlines:
 
     def __init__(self, polygons: list[shapely.Polygon]):
         self.polygons = np.array(polygons, object)
+        self.rows: dict[int, list[shapely.Polygon]] = {}  # by label, those that were asked for
 
     @functools.cached_property
     def labels(self) -> np.ndarray:
@@ -69,11 +70,13 @@ class Outlines:
 
         They have an order of their own; there are none of too long a row.
         """
-        row = self.polygons[self.members[self.labels[index]]]
-        bounds = shapely.total_bounds(row)
-        if not (bounds[2:] - bounds[:2]).max() <= MOST_ROW_M:
-            return []
-        return sorted(row, key=lambda polygon: polygon.wkb)
+        label = int(self.labels[index])
+        if label not in self.rows:
+            row = self.polygons[self.members[label]]
+            bounds = shapely.total_bounds(row)
+            is_short = (bounds[2:] - bounds[:2]).max() <= MOST_ROW_M
+            self.rows[label] = sorted(row, key=shapely.to_wkb) if is_short else []
+        return self.rows[label]
 
 
 def row_outline(row: list[shapely.Polygon]) -> shapely.Polygon:

@@ -15,7 +15,7 @@ from ..log import count_things
 from ..settings import ComposeSettings
 from ..status import Grade, Status
 from .roof import Part, Roof
-from .shown import compute_visible_areas, measure_visible_areas
+from .shown import compute_visible_pieces, measure_visible_pieces, unite_visible_pieces
 from .solid import Solid
 
 
@@ -52,9 +52,14 @@ class Model:
     compose: ComposeSettings | None = None
 
     @cached_property
+    def visible_pieces(self) -> list[list[shapely.Geometry]]:
+        """Plan pieces of each roof part as seen from above, in the roof's frame."""
+        return compute_visible_pieces(self.roof, self.solid)
+
+    @cached_property
     def visible_m2(self) -> tuple[float, ...]:
         """Plan area (m2) of each roof part as seen from above; 0 if it is hidden."""
-        return measure_visible_areas(self.roof, self.solid)
+        return measure_visible_pieces(self.visible_pieces)
 
     @property
     def main(self) -> int:
@@ -165,7 +170,9 @@ class Building:
         >>> [area.area for area in build(record).compute_visible_areas()]
         [48.0, 12.0]
         """
-        return [] if self.built is None else compute_visible_areas(self.roof, self.solid)
+        if self.built is None:
+            return []
+        return unite_visible_pieces(self.roof, self.built.visible_pieces)
 
     def with_part(self, index: int, **change: Any) -> Building:
         """Return the building with part `index` changed or added.

@@ -27,27 +27,23 @@ AREA_DIGITS = 4  # of areas in square metres, as the tables of parts round them
 SURFACE_SLIVER_M2 = 0.05
 
 
-def compute_visible_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
+def unite_visible_pieces(
+    roof: Roof, visible: Sequence[Sequence[shapely.Geometry]]
+) -> list[shapely.Geometry]:
     """Return the visible area of each part, in world coordinates.
 
     The area of a hidden part is empty.
     """
-    united = [
-        with_area(shapely.union_all(areas, grid_size=GRID_M))
-        for areas in compute_visible_pieces(roof, solid)
-    ]
+    united = [with_area(shapely.union_all(pieces, grid_size=GRID_M)) for pieces in visible]
     return shapely.transform(np.array(united, object), roof.frame.to_world).tolist()
 
 
-def measure_visible_areas(roof: Roof, solid: Solid) -> tuple[float, ...]:
+def measure_visible_pieces(visible: Sequence[Sequence[shapely.Geometry]]) -> tuple[float, ...]:
     """Return the visible plan area (m2) of each part, rounded.
 
     Rounding makes the areas of equal parts equal.
     """
-    return tuple(
-        round(float(shapely.area(pieces).sum()), AREA_DIGITS)
-        for pieces in compute_visible_pieces(roof, solid)
-    )
+    return tuple(round(float(shapely.area(pieces).sum()), AREA_DIGITS) for pieces in visible)
 
 
 def compute_visible_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
