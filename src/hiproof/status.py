@@ -71,6 +71,44 @@ class Doubt(Enum):
         return self.name.lower().replace("_", " ")
 
 
+class Change(Enum):
+    """What became of a building between two surveys."""
+
+    UNCHANGED = "the new points lie on the earlier roof"
+    CHANGED = "the new points lie on another roof"
+    NEW = "a building stands where none stood"
+    GONE = "bare ground lies where the building stood"
+    NOT_COVERED = "the new survey hardly covers the building"
+    UNCERTAIN = "the new points neither confirm nor clearly contradict the earlier roof"
+
+    @property
+    def code(self) -> str:
+        """Stable lower-case name for files."""
+        return self.name.lower()
+
+
+class ChangeKind(Enum):
+    """What changed of a building."""
+
+    ROOF_RAISED = "the whole roof is higher"
+    ROOF_LOWERED = "the whole roof is lower"
+    PART_RAISED = "a part of the roof is higher"
+    PART_LOWERED = "a part of the roof is lower"
+    PART_ADDED = "a part was added"
+    PART_REMOVED = "a part was removed"
+    TYPE_CHANGED = "the roof has another type"
+    SLOPE_CHANGED = "the roof has another slope"
+    SMALL_OBJECT = "a small object, such as a dormer or solar panels, was added or removed"
+    UNCLEAR = "points lie off the roof, on no clear surface"
+    DEMOLISHED = "the building was demolished"
+    BUILT = "the building was built"
+
+    @property
+    def code(self) -> str:
+        """Stable lower-case name for files."""
+        return self.name.lower()
+
+
 MOSTLY_OFF = 0.5
 """Share of roof points within 0.2 m of the roof, below which a building does not count as modelled:
 most of its points contradict the model."""

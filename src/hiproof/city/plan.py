@@ -231,7 +231,7 @@ def load_plan(folder: Path) -> WorkPlan:
     return loaded_plan(path, path.stat().st_mtime_ns)
 
 
-@functools.lru_cache(maxsize=1)
+@functools.lru_cache(maxsize=2)  # an update has one of each survey
 def loaded_plan(path: Path, stamp: int) -> WorkPlan:
     return WorkPlan.load(path)
 

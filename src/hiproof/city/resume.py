@@ -11,6 +11,7 @@ import shutil
 import sqlite3
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 from .. import __version__
@@ -80,7 +81,13 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
     return ledger
 
 
-def resume_or_plan(request: Request, state: Path, ledger: Ledger, progress: Progress) -> WorkPlan:
+def resume_or_plan(
+    request: Request,
+    state: Path,
+    ledger: Ledger,
+    progress: Progress,
+    plan_maker: Callable[[Request, Progress], WorkPlan] = make_plan,
+) -> WorkPlan:
     """Return the plan of an earlier run of the same request, or a new one.
 
     The earlier one holds where its files stand as it left them. Where the footprints changed since,
@@ -91,7 +98,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger, progress: Prog
     if plan is None or ledger.get("choice") != compute_mark(
         describe_selection(request), ledger.get("salt") or ""
     ):
-        old, plan = plan, make_plan(request, progress)
+        old, plan = plan, plan_maker(request, progress)
         new_items = old is None or not take_over(plan, old, state, ledger)
         if new_items:
             begin(plan, request, state, ledger)

@@ -44,6 +44,7 @@ from .merge import merge, output_files
 from .outputs import claims
 from .overrides import REDO, load_redo
 from .plan import WorkPlan
+from .prepare import make_plan
 from .quarantine import is_loss, run_isolated, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
@@ -108,8 +109,23 @@ def reconstruct_area(request: Request, progress: Progress | None = None) -> Summ
         return reconstruct_in_folder(request, state, progress)
 
 
-def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> Summary:
+@dataclass(frozen=True)
+class Steps:
+    """The steps in which a reconstruction and an update differ.
+
+    `before` is called with the plan, the executor and the progress before tiles are solved.
+    """
+
+    make_plan: Callable[[Any, Progress], WorkPlan] = make_plan
+    solve_tile: Callable[..., Any] = solve_tile
+    before: Callable[[WorkPlan, Any, Progress], None] = lambda *_: None
+
+
+def reconstruct_in_folder(
+    request: Request, state: Path, progress: Progress, steps: Steps | None = None
+) -> Summary:
     """Run the steps of a run that has its folder `state` to itself."""
+    steps = steps or Steps(solve_tile=solve_tile)
     clock = Clock()
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
@@ -117,7 +133,7 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
         if ledger.get("merged") != "yes":
             executor.start()
         with hold_points():  # for the step that sorts them
-            plan = resume_or_plan(request, state, ledger, progress)
+            plan = resume_or_plan(request, state, ledger, progress, steps.make_plan)
         if request.processes is None and not request.scheduler:
             executor = make_executor(count_processes(request, plan, state, ledger))
         clock.lap("plan")
@@ -129,7 +145,9 @@ def reconstruct_in_folder(request: Request, state: Path, progress: Progress) -> 
         forget_points()
         refuse_without_points(plan, ledger)
         clock.lap("sort")
-        work_off(ledger, executor, "solve", solve_tile, arguments, progress)
+        if ledger.open_tasks("solve"):
+            steps.before(plan, executor, progress)
+        work_off(ledger, executor, "solve", steps.solve_tile, arguments, progress)
         clock.lap("solve")
         if ledger.get("merged") != "yes":
             merge(plan, state, Path(request.out), progress)

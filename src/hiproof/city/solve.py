@@ -282,13 +282,24 @@ def solve_tile(
     """
     root = Path(folder)
     plan = load_plan(root)
-    surroundings = Surroundings(
-        load_points(root, tile),
-        terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()),
-        plan,
-    )
-    overrides, selection = load_overrides(root), kept_parts(root, tile, plan)
-    keep = functools.partial(keep_failure, root, tile, plan)
+    surroundings = Surroundings(load_points(root, tile), open_terrain(plan, terrain), plan)
+    overrides, keep = load_overrides(root), functools.partial(keep_failure, root, tile, plan)
+
+    def solve(job: Job) -> tuple[Building, Fragments]:
+        return solve_one(plan, job, surroundings, overrides.get(job.index), keep)
+
+    return solve_buildings(root, plan, tile, solve, avoid)
+
+
+def solve_buildings(
+    root: Path,
+    plan: WorkPlan,
+    tile: str,
+    solve: Callable[[Job], tuple[Building, Fragments]],
+    avoid: tuple[int, ...],
+) -> list[Outcome]:
+    """Solve the buildings of `tile` one by one, and write its part file."""
+    selection = kept_parts(root, tile, plan)
     parts, rows = [], []
     for index in plan.tiles[tile]:
         if index in selection:
@@ -297,9 +308,9 @@ def solve_tile(
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
             building, part = record_failure(plan, job, DIED)
-            keep(job, DIED, no_terrain)
+            keep_failure(root, tile, plan, job, DIED, no_terrain)
         else:
-            building, part = solve_one(plan, job, surroundings, overrides.get(index), keep)
+            building, part = solve(job)
         parts.append(part)
         rows.append(make_outcome(index, building, time.perf_counter() - start))
         count_building()
@@ -307,6 +318,11 @@ def solve_tile(
     with atomic_file(tile_parts(root, tile)) as file:
         save_fragments(file, parts)
     return rows
+
+
+def open_terrain(plan: WorkPlan, path: str | None) -> RasterTerrain | None:
+    """Return the terrain model of a run, opened once a thread."""
+    return terrain_model(path, plan.crs_wkt, plan.units, threading.get_ident())
 
 
 def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:

@@ -36,6 +36,11 @@ COMMANDS = {
         "hiproof reconstruct tile.laz --footprints footprints.gpkg --out models",
         FIRST_OPTIONS,
     ),
+    "update": Entry(
+        "Reconstruct",
+        "bring models up to date with a new survey",
+        "hiproof update models 2014/ --out models_2014",
+    ),
     "demo": Entry(
         "Reconstruct", "model a bundled neighbourhood of 26 houses", "hiproof demo --out demo"
     ),

@@ -85,6 +85,8 @@ class Building:
     (m, 3) closed lines. `recognised` are the network's probabilities by roof type, `types` those
     after the fits, where a choice was made. `footprint` (world) and `attributes` are the input's
     own; `shift` (m) is how far the footprint was moved onto its roof.
+    `change` is what the last update found of it, as in parameters.jsonl; None where it never was
+    anything but unchanged.
     """
 
     id: str
@@ -102,6 +104,7 @@ class Building:
     attributes: dict[str, Any] = field(default_factory=dict)
     shift: tuple[float, float] = (0.0, 0.0)
     grade: Grade | None = None
+    change: dict[str, Any] | None = None
 
     @property
     def model(self) -> Model:

@@ -29,14 +29,15 @@ from ..model import Building, Part, Quality, Roof
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
 from ..read.damage import excerpt
-from ..status import Grade, Status
-from ..write.attribute_list import PARAMETERS, PART
+from ..status import Change, Grade, Status
+from ..write.attribute_list import CHANGE, CHANGE_PLACE, PARAMETERS, PART
 
 WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
 FARTHEST_WORLD_M = 1e8
 LARGEST_NUMBER = 1e15  # at which float64 still holds eighths; larger is no number of a building
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
+CHANGE_KEYS = tuple(attribute.name for attribute in CHANGE)
 PART_KEYS = tuple(attribute.name for attribute in PART)
 FIGURES = ("density", "nodata_share", "unexplained_area_m2")
 RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
@@ -74,6 +75,7 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
         footprint=world,
         attributes=dict(require_mapping(record.get("attributes") or {}, "attributes")),
         shift=read_shift(record),
+        change=read_change(record),
     )
     return building, roof
 
@@ -263,6 +265,40 @@ def read_grade(record: Mapping[str, Any]) -> Grade | None:
             "it"
         )
     return by_code.get(code)
+
+
+def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Read what the last update found, None where there is nothing."""
+    if record.get("change") is None:
+        return None
+    change = dict(require_mapping(record["change"], "the change"))
+    refuse_other_keys(change, [attribute.name for attribute in CHANGE], "the change")
+    codes = [change.code for change in Change]
+    if change.get("class") not in codes:
+        raise InputError(
+            f"expected a class of change ({', '.join(codes)}), got "
+            f"{excerpt(change.get('class'))}; leave it as the update wrote it"
+        )
+    text_at(change, "survey")
+    figure(change, "chance")
+    places = [
+        read_change_place(place, f"place {k} of the change")
+        for k, place in enumerate(list_at(change, "places"))
+    ]
+    lists = {name: list_at(change, name) for name in ("lineage", "predecessors")}
+    return {name: {"places": places, **lists}.get(name, change.get(name)) for name in CHANGE_KEYS}
+
+
+def read_change_place(record: Any, where: str) -> dict[str, Any]:
+    """Read a place that changed."""
+    place = dict(require_mapping(record, where))
+    refuse_other_keys(place, [attribute.name for attribute in CHANGE_PLACE], where)
+    text_at(place, "kind")
+    for name in ("difference", "sigma", "area"):
+        figure(place, name)
+    for rings in list_at(place, "outlines"):
+        polygon(rings, f"an outline of {where}")
+    return place
 
 
 def read_quality(record: Mapping[str, Any]) -> Quality:

@@ -11,8 +11,8 @@ from typing import Any
 from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
-from ..status import Grade, Status
-from ..write.attribute_list import HEAD, PARAMETERS, PART, Attribute
+from ..status import Change, ChangeKind, Grade, Status
+from ..write.attribute_list import CHANGE, CHANGE_PLACE, HEAD, PARAMETERS, PART, Attribute
 from ..write.parameters import VERSION
 
 NUMBER_SCHEMA, TEXT_SCHEMA = {"type": "number"}, {"type": "string"}
@@ -54,6 +54,23 @@ BUILDING_KINDS = {
     "residuals": SHARES,
     "recognised": SHARES,
     "types": SHARES,
+    "change": {"$ref": "#/$defs/change"},
+}
+CHANGE_KINDS = {
+    "class": {"enum": [change.code for change in Change]},
+    "survey": TEXT_OR_NULL,
+    "chance": NUMBER_OR_NULL,
+    "places": {"type": "array", "items": {"$ref": "#/$defs/change_place"}},
+    "lineage": {"type": "array", "items": {"type": ["integer", "null"]}},
+    "predecessors": {"type": "array", "items": TEXT_SCHEMA},
+}
+PLACE_KINDS = {
+    "kind": {"enum": [kind.code for kind in ChangeKind]},
+    "difference": NUMBER_OR_NULL,
+    "sigma": NUMBER_OR_NULL,
+    "area": NUMBER_OR_NULL,
+    "parts": {"type": "array", "items": {"type": ["integer", "null"]}},
+    "outlines": {"type": "array", "items": POLYGON_SCHEMA},
 }
 PART_KINDS = {
     "parameters": {**NUMBERS, "properties": {"width": LENGTH_SCHEMA, "length": LENGTH_SCHEMA}},
@@ -79,6 +96,8 @@ def schema() -> dict[str, Any]:
             required=("type", "parameters", "position"),
         )
         | {"allOf": parameters_by_type()},
+        "change": describe_attributes(CHANGE, CHANGE_KINDS, required=("class",)),
+        "change_place": describe_attributes(CHANGE_PLACE, PLACE_KINDS, required=("kind",)),
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -162,6 +162,14 @@ HIPROOF = (
         "ISO 19107 codes of our own check of the solid; [] is valid, none without a model",
     ),
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
+    Attribute(
+        "change", "text", "", "only after an update, where not unchanged: changed, new, gone, ..."
+    ),
+    Attribute("change_kind", "text", "", "what changed most, such as part_raised"),
+    Attribute("change_m", "number", "m", "new height minus the earlier one there"),
+    Attribute("change_sigma_m", "number", "m", "standard deviation of that difference"),
+    Attribute("valid_from", "text", "", "date of the survey that first shows the roof as it is"),
+    Attribute("valid_to", "text", "", "date of the survey that no longer shows the building"),
 )
 
 ENRICHED = (
@@ -306,6 +314,39 @@ PARAMETERS = (
         "recognised", "object", "", "probability by roof type, from the network where it was asked"
     ),
     Attribute("types", "object", "", "probability by roof type, after the fits"),
+    Attribute(
+        "change",
+        "object",
+        "",
+        "what `hiproof update` found last, as below; only where the building was not unchanged",
+    ),
+)
+
+CHANGE = (
+    Attribute("class", "text", "", "changed, new, gone, not_covered or uncertain"),
+    Attribute("survey", "text", "", "date of the survey that shows it, as 2014-02-09"),
+    Attribute(
+        "chance", "number", "", "bound on the probability that an unchanged building looks like it"
+    ),
+    Attribute("places", "list", "", "every place that changed, the largest first, as below"),
+    Attribute(
+        "lineage",
+        "list",
+        "",
+        "number of the earlier part that each part continues, null for a new part",
+    ),
+    Attribute(
+        "predecessors", "list", "", "ids of the earlier buildings, where footprints were replaced"
+    ),
+)
+
+CHANGE_PLACE = (
+    Attribute("kind", "text", "", "what changed there, such as part_raised"),
+    Attribute("difference", "number", "m", "new height of the roof minus the earlier one"),
+    Attribute("sigma", "number", "m", "standard deviation of that difference"),
+    Attribute("area", "number", "m2", "area in plan"),
+    Attribute("parts", "list", "", "numbers of the earlier and the new part there, null for none"),
+    Attribute("outlines", "list", "m", "polygons in the world"),
 )
 
 PART = (
@@ -520,6 +561,12 @@ TABLES = (
     ),
     AttributeTable("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
     AttributeTable("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
+    AttributeTable("Parameters: a change", "`change` of a building in `parameters.jsonl`", CHANGE),
+    AttributeTable(
+        "Parameters: a place that changed",
+        "`places` of a change in `parameters.jsonl`",
+        CHANGE_PLACE,
+    ),
     AttributeTable(
         "Parts",
         "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; where each "

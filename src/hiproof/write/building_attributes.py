@@ -6,13 +6,14 @@ They have roofer's names, our own, and those of the input.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ..frames import METRES, Units
 from ..model import Building, Solid
-from ..status import Status
+from ..status import Change, Status
 from .attribute_list import OWN, PREFIX
 from .osm_tags import osm_tags
 from .reprojected import Reprojected
@@ -55,6 +56,10 @@ def building_attributes(
     }
     if osm:
         computed |= osm_tags(building, figures)
+    if building.change is not None:
+        computed |= {
+            OWN + name: value for name, value in change_attributes(building.change).items()
+        }
     if not units.are_metres:
         computed[OWN + "units"] = (
             f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
@@ -133,6 +138,20 @@ def hiproof_attributes(
         "iso19107_lod22": None
         if building.built is None
         else check_as_written(building.solid, units),
+    }
+
+
+def change_attributes(change: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the attributes of a building's last change, without prefix."""
+    place: Mapping[str, Any] = next(iter(change["places"]), {})
+    begins = change["class"] in (Change.CHANGED.code, Change.NEW.code)
+    return {
+        "change": change["class"],
+        "change_kind": place.get("kind"),
+        "change_m": place.get("difference"),
+        "change_sigma_m": place.get("sigma"),
+        "valid_from": change["survey"] if begins else None,
+        "valid_to": change["survey"] if change["class"] == Change.GONE.code else None,
     }
 
 

@@ -30,6 +30,13 @@ GROUND_COLOUR = "#8c8c84"
 MARK_COLOUR = "#1d1d1d"  # of what is selected
 UNKNOWN_COLOUR = "#b5b5b5"  # of values that are not known
 GRADE_COLOURS = {"good": "#05429b", "fair": "#dfba20", "poor": "#b84f0c"}
+CHANGE_COLOURS = {
+    "changed": "#b84f0c",
+    "new": "#05429b",
+    "gone": "#1d1d1d",
+    "uncertain": "#dfba20",
+    "not_covered": "#b5b5b5",
+}
 NO_MODEL = "no model"
 STATUS_COLOURS = {
     "modelled": "#05429b",

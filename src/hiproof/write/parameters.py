@@ -115,6 +115,7 @@ def parameters_line(building: Building) -> bytes:
 def building_record(building: Building) -> dict[str, Any]:
     """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
+    change = {} if building.change is None else {"change": building.change}
     return {
         "id": plain_text(building.id),
         "status": building.status.code,
@@ -142,6 +143,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "objective": number(building.objective),
         "recognised": by_name(building.recognised),
         "types": by_name(building.types),
+        **change,
     }
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
 from typing import Any
 
@@ -27,7 +27,7 @@ from ..roof_figures import RoofFigures
 from ..writer import BuildingWriter
 from .geopackage_file import GeometryType, GeoPackage
 from .rows import split_lines, table_rows
-from .styles import TABLE, style_rows
+from .styles import STYLES, TABLE, Style, style_rows
 from .waiting import WaitingRows, column_names
 
 BUILDINGS = "buildings"
@@ -134,9 +134,9 @@ def write_layer(file: GeoPackage, waiting: WaitingRows, kinds: dict[str, type]) 
         first += len(rows)
 
 
-def write_styles(file: GeoPackage) -> None:
+def write_styles(file: GeoPackage, styles: Sequence[Style] = STYLES) -> None:
     """Write the table by which QGIS draws the layers."""
-    rows = style_rows()
+    rows = style_rows(styles)
     kinds: dict[str, type] = {name: bool if name == "useAsDefault" else str for name in rows[0]}
     file.create_table(TABLE, kinds, None, key="id")
     file.insert(TABLE, [(number, *row.values()) for number, row in enumerate(rows, 1)])

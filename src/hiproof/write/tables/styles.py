@@ -5,6 +5,7 @@ They stand in the table `layer_styles`, whose defaults QGIS applies by itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ...primitives.catalogue import CATALOGUE
@@ -64,10 +65,10 @@ STYLES = (
 )
 
 
-def style_rows() -> list[dict[str, Any]]:
+def style_rows(styles: Sequence[Style] = STYLES) -> list[dict[str, Any]]:
     """Return the rows of `layer_styles`.
 
-    They are by roof type, the default of every layer, and by the quality of the models.
+    Those of a run are by roof type, the default of every layer, and by the quality of the models.
     """
     return [
         {
@@ -84,7 +85,7 @@ def style_rows() -> list[dict[str, Any]]:
             "ui": None,
             "update_time": "2000-01-01T00:00:00.000Z",
         }
-        for style in STYLES
+        for style in styles
     ]
 
 

@@ -1,0 +1,264 @@
+"""Simulated cities surveyed twice: are changes found and named?
+
+usage: python -m benchmarks.changes [--seeds 100 101] [--count 100] [--densities 8 3]
+                                    [--keep FOLDER] [--verbose]
+
+One building in five changes, by each kind in turn, and the same number of others get something that
+is no change: leaves over the roof in class 6, a crane, scaffolding, or no points on a side. Both
+surveys have their own noise; the second lies 5 cm higher and 20 cm aside. `hiproof reconstruct`
+runs on the first survey and `hiproof update` on the second. Changes count from 0.5 m over 4 m2 on.
+
+Seeds 0 to 9 are for choosing constants, 100 to 109 for reporting.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import dataclasses
+import json
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.simulate.changes import CHANGES, change_building
+from hiproof.simulate.city import City, Stock
+from hiproof.simulate.scanner import Scan, ScanSettings
+from hiproof.simulate.scene import building_bodies
+from hiproof.simulate.survey import survey, write_footprints, write_laz
+from hiproof.simulate.town import Lot
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+
+CHANGED_SHARE = 0.2
+SHIFT_M = np.array([0.16, -0.12, 0.05])
+KINDS = (*CHANGES, "demolished", "built")
+DISTURBANCES = ("leaves", "crane", "scaffolding", "occlusion")
+LEAST_M, LEAST_M2 = 0.5, 4.0
+NOTHING = "unchanged"
+
+
+def draw_truth(seed: int, lots: list[Lot]) -> tuple[dict[str, str], dict[str, Lot], dict[str, str]]:
+    """Return kinds of change by id, the lots that change, and disturbances."""
+    rng = np.random.default_rng([seed, 77])
+    order = rng.permutation(len(lots)).tolist()
+    count = max(1, round(CHANGED_SHARE * len(lots)))
+    kinds: dict[str, str] = {}
+    after: dict[str, Lot] = {}
+    number = 0
+    while order and len(kinds) < count:
+        lot = lots[order.pop()]
+        for step in range(len(KINDS)):
+            kind = KINDS[(number + step) % len(KINDS)]
+            if kind in ("demolished", "built"):
+                kinds[lot.id] = kind
+                break
+            building = change_building(rng, lot.building, kind)
+            if building is not None and is_large_change(lot, building):
+                bodies = tuple(building_bodies(building))
+                kinds[lot.id] = kind
+                after[lot.id] = dataclasses.replace(lot, building=building, bodies=bodies)
+                break
+        number += 1
+    disturbed = {
+        lots[k].id: DISTURBANCES[i % len(DISTURBANCES)] for i, k in enumerate(order[:count])
+    }
+    return kinds, after, disturbed
+
+
+def is_large_change(lot: Lot, building) -> bool:
+    """Return whether a roof changes by LEAST_M over LEAST_M2 or more."""
+    outline = lot.building.outline
+    x0, y0, x1, y1 = outline.bounds
+    x, y = np.meshgrid(np.arange(x0, x1, 0.25), np.arange(y0, y1, 0.25))
+    xy = np.column_stack([x.ravel(), y.ravel()])
+    heights = [np.nan_to_num(roof.height_at(xy)) for roof in (lot.building.roof, building.roof)]
+    return float((np.abs(heights[1] - heights[0]) > LEAST_M).sum()) / 16 >= LEAST_M2
+
+
+def disturb(rng: np.random.Generator, lot: Lot, kind: str, cloud: Scan) -> Scan:
+    """Return the cloud with something over or before a roof that is no change of it."""
+    outline = lot.building.footprint
+    x0, y0, x1, y1 = outline.bounds
+    top = lot.building.z_ground + 6.0
+    inside = shapely.intersects_xy(outline, cloud.points[:, 0], cloud.points[:, 1])
+    if not inside.any():
+        return cloud
+    top = float(cloud.points[inside, 2].max())
+    if kind == "occlusion":
+        middle = (x0 + x1) / 2
+        return cloud.select(~(inside & (cloud.points[:, 0] < middle)))
+    points = cloud.points.copy()
+    chosen = np.flatnonzero(inside)
+    if kind == "leaves":  # a crown over a half lets a third of the pulses through
+        centre = np.array([x1, (y0 + y1) / 2])
+        near = np.hypot(*(points[chosen, :2] - centre).T) < 0.35 * (x1 - x0)
+        hit = chosen[near & (rng.random(len(chosen)) < 0.67)]
+        points[hit, 2] = top + rng.uniform(-0.5, 3.0, len(hit))
+    elif kind == "crane":  # a jib of a metre across the roof
+        hit = chosen[np.abs(points[chosen, 1] - (y0 + y1) / 2) < 0.5]
+        points[hit, 2] = top + 8.0 + rng.uniform(0.0, 1.5, len(hit))
+    else:  # scaffolding: tubes over the strip along the walls
+        strip = outline.difference(outline.buffer(-0.9))
+        on = shapely.intersects_xy(strip, points[chosen, 0], points[chosen, 1])
+        hit = chosen[on & (rng.random(len(chosen)) < 0.6)]
+        points[hit, 2] = points[hit, 2] + rng.uniform(0.3, 2.0, len(hit))
+    return dataclasses.replace(cloud, points=points)
+
+
+def write_city(folder: Path, seed: int, count: int, densities: tuple[float, float]) -> dict:
+    """Write both surveys and footprints of a city; return its truth."""
+    city = City(count, seed, densities[0])
+    stock = Stock(city)
+    bounds = (*stock.low.min(axis=0), *stock.high.max(axis=0))
+    lots = stock.near(bounds)
+    kinds, after, disturbed = draw_truth(seed, lots)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_footprints(folder / "footprints.gpkg", lots)
+    first = [lot for lot in lots if kinds.get(lot.id) != "built"]
+    second = [after.get(lot.id, lot) for lot in lots if kinds.get(lot.id) != "demolished"]
+    by_id = {lot.id: lot for lot in lots}
+    rng = np.random.default_rng([seed, 78])
+    for name, some, density, own in (
+        ("first", first, densities[0], seed),
+        ("second", second, densities[1], seed + 5000),
+    ):
+        scans = []
+        for cloud in survey(
+            stock.patches(bounds),
+            some,
+            stock.terrain,
+            city.flight,
+            own,
+            ScanSettings(density=density),
+        ):
+            if name == "second":
+                for id, kind in disturbed.items():
+                    cloud = disturb(rng, by_id[id], kind, cloud)
+                cloud = cloud.move(SHIFT_M)
+            scans.append(cloud)
+        write_laz(folder / f"{name}.laz", iter(scans), np.array([*bounds[:2], 0.0]))
+    truth = {
+        "kinds": kinds,
+        "disturbed": disturbed,
+        "ids": [lot.id for lot in lots],
+        "raised": {
+            id: float(lot.building.roof.parts[0].translation[2])
+            - float(by_id[id].building.roof.parts[0].translation[2])
+            for id, lot in after.items()
+            if kinds[id] == "roof_raised"
+        },
+    }
+    (folder / "truth.json").write_text(json.dumps(truth))
+    return truth
+
+
+def run_city(folder: Path, seed: int, count: int, densities: tuple[float, float]) -> dict:
+    """Return the truth and the answer of a city, with the seconds of run and update."""
+    file = folder / "truth.json"
+    truth = (
+        json.loads(file.read_text())
+        if file.exists()
+        else write_city(folder, seed, count, densities)
+    )
+    start = time.process_time()
+    if not (folder / "models" / "run.json").exists():
+        footprints = str(folder / "footprints.gpkg")
+        reconstruct_area(
+            Request((str(folder / "first.laz"),), folder / "models", footprints, id_attribute="id"),
+            lambda *_: None,
+        )
+    middle = time.process_time()
+    request = UpdateRequest(
+        (str(folder / "second.laz"),),
+        folder / "updated",
+        run=folder / "models",
+        run_parameters=str(folder / "models" / "parameters.jsonl"),
+        restart=True,
+        date="2024-05-01",
+    )
+    summary = update_area(request)
+    end = time.process_time()
+    with (folder / "updated" / "changes.csv").open() as table:
+        rows = {row["id"]: row for row in csv.DictReader(table)}
+    shift = summary.surveys.shift
+    return {"truth": truth, "rows": rows, "seconds": (middle - start, end - middle), "shift": shift}
+
+
+def score(results: list[dict], is_verbose: bool) -> dict[str, float]:
+    """Return the figures of some cities."""
+    counts: Counter[str] = Counter()
+    errors: list[float] = []
+    for k, result in enumerate(results):
+        truth, rows = result["truth"], result["rows"]
+        for id in truth["ids"]:
+            kind, row = truth["kinds"].get(id, NOTHING), rows.get(id)
+            found = row is not None and row["class"] in ("changed", "gone", "new")
+            group = (
+                "changed"
+                if kind != NOTHING
+                else ("disturbed" if id in truth["disturbed"] else NOTHING)
+            )
+            counts[group] += 1
+            counts[group + " found"] += found
+            counts[group + " uncertain"] += row is not None and row["class"] == "uncertain"
+            right = found and row["kind"] == kind
+            counts["right"] += right
+            if kind == "roof_raised" and found:
+                errors.append(float(row["difference_m"] or "nan") - truth["raised"][id])
+            if is_verbose and (found != (kind != NOTHING) or (found and not right)):
+                told = (
+                    (row["class"], row["kind"], row["difference_m"], row["area_m2"])
+                    if row
+                    else None
+                )
+                print(f"    city {k} {id}: {kind} {truth['disturbed'].get(id, '')} -> {told}")
+    alarms = counts[NOTHING + " found"] + counts["disturbed found"]
+    hits = counts["changed found"]
+    return {
+        "changed": counts["changed"],
+        "recall": hits / max(counts["changed"], 1),
+        "precision": hits / max(hits + alarms, 1),
+        "kind right": counts["right"] / max(hits, 1),
+        "alarms unchanged": counts[NOTHING + " found"] / max(counts[NOTHING], 1),
+        "alarms disturbed": counts["disturbed found"] / max(counts["disturbed"], 1),
+        "uncertain": sum(counts[g + " uncertain"] for g in ("changed", "disturbed", NOTHING)),
+        "of them changed": counts["changed uncertain"],
+        "raised: worst error m": float(np.nanmax(np.abs(errors))) if errors else float("nan"),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, nargs="+", default=[100])
+    parser.add_argument("--count", type=int, default=100, help="buildings a city")
+    parser.add_argument("--densities", type=float, nargs=2, default=(8.0, 8.0))
+    parser.add_argument("--keep", type=Path, help="folder in which cities and models stay")
+    parser.add_argument("--verbose", action="store_true", help="list every building that is wrong")
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = given.keep or Path(scratch)
+        d = tuple(given.densities)
+        results = [
+            run_city(folder / f"{seed}_{given.count}_{d[0]:g}_{d[1]:g}", seed, given.count, d)
+            for seed in given.seeds
+        ]
+        for result in results:
+            print(
+                "shift", result["shift"].xyz, "sigma", result["shift"].sigma, result["shift"].noise
+            )
+            print(f"CPU: run {result['seconds'][0]:.1f} s, update {result['seconds'][1]:.1f} s")
+        for name, value in score(results, given.verbose).items():
+            print(f"{name:24s} {value:.4g}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""`hiproof update`: a run brought up to date with a new survey."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..log import Level, console_level
+from ..progress import show_progress
+from .options import with_settings
+
+if TYPE_CHECKING:
+    from ..update.run import UpdateSummary
+
+
+@with_settings("read")
+def update(
+    run: Annotated[Path, typer.Argument(help="output folder of the earlier run")],
+    clouds: Annotated[
+        list[str],
+        typer.Argument(help="point files of the new survey, or folders of them"),
+    ],
+    out: Annotated[Path, typer.Option(help="folder for the results")],
+    date: Annotated[
+        str,
+        typer.Option(
+            help="day of the new survey, such as 2014-02-09 (default: from the time of its points, "
+            "or its files)"
+        ),
+    ] = "",
+    significance: Annotated[
+        float,
+        typer.Option(help="probability with which an unchanged building may be called changed"),
+    ] = 0.001,
+    terrain: Annotated[
+        str | None,
+        typer.Option(
+            help="terrain model (GeoTIFF; extra `terrain`); default: the clouds' ground points"
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            help="number of worker processes (default: up to one per core, fewer for a small run)"
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")
+    ] = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="discard an earlier update in this folder")
+    ] = False,
+    changes: dict[str, dict[str, Any]] | None = None,
+) -> None:
+    """Bring the models of a run up to date with a new survey, and list what changed.
+
+    The earlier run stays as it is. Run the same command again to resume. Exit code: 0 every
+    building has a model or a reason why not, 1 an internal error, 2 unusable input.
+    """
+    with show_progress("plan") as progress:
+        from ..read.pointcloud import expand_paths
+        from ..update.earlier import find_parameters
+        from ..update.request import UpdateRequest
+        from ..update.run import update_area
+
+        request = UpdateRequest(
+            clouds=tuple(map(str, expand_paths(tuple(clouds)))),
+            out=out,
+            terrain=terrain,
+            processes=jobs,
+            scheduler=scheduler,
+            restart=restart,
+            run=run,
+            run_parameters=str(find_parameters(run)),
+            significance=significance,
+            date=date,
+        )
+        summary = update_area(request, changes, progress)
+    if console_level() is not Level.error:
+        print_update(summary)
+    raise typer.Exit(summary.run.exit_code)
+
+
+def print_update(summary: UpdateSummary) -> None:
+    """Print what changed, how the surveys lie to each other, and the files."""
+    counts = ", ".join(f"{n:,} {name}" for name, n in summary.by_change.items())
+    typer.echo(typer.style(f"{summary.run.buildings:,} buildings: {counts}", bold=True))
+    if summary.by_kind:
+        typer.echo(
+            "largest change of each: "
+            + ", ".join(f"{name} {n:,}" for name, n in summary.by_kind.items())
+        )
+    surveys, shift = summary.surveys, summary.surveys.shift
+    lies = ", ".join(
+        f"{value:+.2f} ± {sigma:.2f}" for value, sigma in zip(shift.xyz, shift.sigma, strict=True)
+    )
+    typer.echo(f"survey of {surveys.date}, beside the earlier one by ({lies}) m")
+    typer.echo(
+        f"chance of a false alarm: {surveys.significance:g} for each building; compared with the "
+        + ("earlier points" if surveys.has_earlier else "earlier models alone")
+    )
+    for name, reason in summary.run.broken_inputs:
+        typer.echo(f"{typer.style('not read:', fg='red')} {name}: {reason}")
+    for id, reason in summary.run.failures:
+        typer.echo(f"{typer.style('internal error:', fg='red')} building {id}: {reason}")
+    files = [*summary.run.models, *summary.files]
+    typer.echo("files: " + ", ".join(map(str, files)))
+    steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.run.seconds.items())
+    typer.echo(f"time: {sum(summary.run.seconds.values()):.1f} s ({steps})")

@@ -1,0 +1,25 @@
+"""A finished run brought up to date with a new survey.
+
+Each building is tested against the new points; what did not change stays.
+
+request    what the user asked for
+earlier    the earlier run: its parameters, settings and clouds
+dates      when the new points were surveyed
+plan       the plan of the update, from the earlier buildings
+register   the common shift between the two surveys
+residuals  heights of points over the earlier roof
+cells      both surveys compared in cells of a metre
+clusters   connected cells that contradict the earlier roof, and how likely chance makes them
+judge      the class of a building: unchanged, changed, gone, ...
+kinds      what changed: a part raised, a dormer built, ...
+before     the earlier points sorted and the surveys registered, before there are work tiles
+lineage    parts of the new roof that continue parts of the earlier one
+solve      a work tile brought up to date
+tile       that, by name, for processes that have imported nothing yet
+tables     changes.csv and changes.gpkg
+run        the steps above, one after the other
+
+Earlier and new points are compared with each other wherever the earlier clouds still exist: what
+the earlier model left out, such as a chimney, then is no change. Otherwise the new points are
+compared with the model alone.
+"""

@@ -1,0 +1,103 @@
+"""What an update does before its work tiles.
+
+Earlier points are sorted, and the surveys registered.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..city.plan import WorkPlan
+from ..city.registration import ENOUGH_FOOTPRINTS, SAMPLE_CELL_M, hash_cell
+from ..city.run import absolute
+from ..city.tasks import sort_cloud
+from ..errors import HiproofError, InputError
+from ..log import LOGGER
+from ..parametric.building import build
+from .earlier import EarlierRun
+from .plan import EARLIER_FOLDER, load_earlier, save_earlier
+from .register import SampledRoof, register_surveys
+from .request import UpdateRequest
+from .solve import SURVEYS_FILE, Epochs, Surveys
+
+SORTED_MARK = "sorted"  # file in the earlier folder: its points are complete
+
+
+def prepare_surveys(
+    request: UpdateRequest,
+    earlier: EarlierRun,
+    date: str,
+    state: Path,
+    plan: WorkPlan,
+    executor: Any,
+) -> None:
+    """Sort the earlier points and register the surveys.
+
+    What an interrupted update did is kept.
+    """
+    if (state / SURVEYS_FILE).exists() and (state / EARLIER_FOLDER / SORTED_MARK).exists():
+        return
+    shutil.rmtree(state / EARLIER_FOLDER, ignore_errors=True)
+    save_earlier(state, plan, earlier)
+    sort_earlier(earlier.clouds, state / EARLIER_FOLDER, executor)
+    shift = register_surveys(draw_samples(state, plan, request.terrain))
+    LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
+    Surveys(shift, date, request.significance, bool(earlier.clouds)).save(state / SURVEYS_FILE)
+    (state / EARLIER_FOLDER / SORTED_MARK).touch()
+
+
+def sort_earlier(clouds: tuple[str, ...], folder: Path, executor: Any) -> None:
+    """Sort the clouds of the earlier survey.
+
+    Raises InputError for one that cannot be read.
+    """
+    tasks = ((str(folder.absolute()), i, absolute(cloud)) for i, cloud in enumerate(clouds))
+    for task, _, error in executor.run(sort_cloud, tasks):
+        if error is not None:
+            raise InputError(
+                f"expected to read {task[2]}, of which the earlier run was made, got: {error}; "
+                "restore it, or move all of the run's clouds away to compare with its models alone"
+            ) from error
+
+
+def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[SampledRoof]:
+    """Yield the points and roofs of sampled buildings, tile by tile.
+
+    They are those of squares that a hash of their place draws, until there are enough.
+    """
+    records, chosen = load_earlier(state), draw_buildings(plan)
+    for tile, members in plan.tiles.items():
+        inside = [index for index in members if index in chosen]
+        if not inside:
+            continue
+        epochs = Epochs(state, tile, terrain, np.zeros(3))
+        for index in inside:
+            try:
+                roof = build(records[index], plan.settings.compose).roof
+            except HiproofError:
+                continue
+            old, new = epochs.select(plan.jobs[index])
+            to_local = roof.frame.to_local
+            yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))
+
+
+def draw_buildings(plan: WorkPlan) -> set[int]:
+    """Return the numbers of the sampled buildings."""
+    areas = [job for job in plan.jobs if not job.area.is_empty]
+    lower = shapely.bounds([job.area for job in areas]).reshape(-1, 4)[:, :2]
+    squares = np.floor(lower / SAMPLE_CELL_M).astype(np.int64)
+    members: dict[tuple[int, int], set[int]] = {}
+    for job, (i, j) in zip(areas, squares.tolist(), strict=True):
+        members.setdefault((i, j), set()).add(job.index)
+    chosen: set[int] = set()
+    for cell in sorted(members, key=hash_cell):
+        chosen |= members[cell]
+        if len(chosen) >= ENOUGH_FOOTPRINTS:
+            break
+    return chosen

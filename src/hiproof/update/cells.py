@@ -1,0 +1,236 @@
+"""Two surveys of one building compared in cells of a metre or less.
+
+Each cell has the median height over the earlier roof of either survey. Their difference has
+a standard deviation that follows from the scatter of the points in the cell, from their number, and
+from how much unchanged roofs differ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..geometry.grid import number_cells
+from ..model import Roof
+from .residuals import measure_residuals
+
+WIDE_CELL_M, FINE_CELL_M = 1.0, 0.5
+"""Side (m) of a cell: a quarter of the smallest change that is looked for (4 m2), and half of that
+where both surveys have FINE_DENSITY."""
+
+FINE_DENSITY = 6.0
+"""Points a square metre from which on a fine cell holds points in four cases of five."""
+
+INSIDE_M = 0.4
+"""Points nearer to the outline (m) may be returns of walls and gutters, or lie beside the roof
+because the surveys are not in line."""
+
+MEDIAN_VARIANCE = np.pi / 2
+"""Variance of a median over that of a mean, for normal errors."""
+
+SAME_SIGMAS = 3.0
+"""Points within so many standard deviations of a surface lie on it."""
+
+
+@dataclass(frozen=True)
+class SurveyNoise:
+    """How much unchanged roofs differ between surveys.
+
+    Standard deviations are in metres.
+
+    `point` is that of a single point about its cell's median, `cell` that of two cells' medians
+    beyond what the points explain, and `roof` that of a whole roof. `stray` is the share of cells
+    that contradict unchanged roofs, by things on them or steps beside them.
+    """
+
+    point: float = 0.05
+    cell: float = 0.04
+    roof: float = 0.03
+    stray: float = 0.003
+
+
+@dataclass(frozen=True)
+class CellComparison:
+    """The cells (k, 2) of a building in which at least one survey has points.
+
+    `old` and `new` (k,) are median heights over the earlier roof, NaN without points; `n_old` and
+    `n_new` the numbers of points. `sigma` (k,) is the standard deviation of `new - old`. `kept`
+    (k,) is the share of the new points on the old surface, `known` that of the old points on the
+    new one. `number` (n,) is the cell of each of the new `points` (n, 3), which are about the
+    roof's origin and lie `over` (n,) the earlier roof. `number_old` and `over_old` (m,) are the
+    same of the old points.
+    """
+
+    cell_m: float
+    cells: np.ndarray
+    old: np.ndarray
+    new: np.ndarray
+    n_old: np.ndarray
+    n_new: np.ndarray
+    sigma: np.ndarray
+    kept: np.ndarray
+    known: np.ndarray
+    points: np.ndarray
+    number: np.ndarray
+    over: np.ndarray
+    number_old: np.ndarray
+    over_old: np.ndarray
+
+    @property
+    def difference(self) -> np.ndarray:
+        """The new height minus the old one (k,), NaN where one is missing."""
+        return self.new - self.old
+
+    @property
+    def is_compared(self) -> np.ndarray:
+        """Whether (k,) both surveys have points in a cell."""
+        return (self.n_old > 0) & (self.n_new > 0)
+
+    @property
+    def centres(self) -> np.ndarray:
+        """The middles (k, 2) of the cells, about the roof's origin."""
+        return (self.cells + 0.5) * self.cell_m
+
+
+def shrink_outline(outline: shapely.Polygon) -> shapely.Geometry:
+    """Return the outline without the strip along its walls.
+
+    A narrow building keeps more of it.
+    """
+    for margin in (INSIDE_M, INSIDE_M / 2):
+        inner = shapely.buffer(outline, -margin)
+        if inner.area > 0.4 * outline.area:
+            return inner
+    return outline
+
+
+def compare_points(
+    roof: Roof, old: np.ndarray | None, new: np.ndarray, noise: SurveyNoise
+) -> CellComparison:
+    """Compare the `old` and `new` points (n, 3) of a building.
+
+    Both are in its roof's frame.
+
+    Without old points the earlier roof itself stands for them.
+    """
+    inner = shrink_outline(roof.outline)
+    new, r_new = select_inner(roof, inner, new)
+    if old is None:
+        return compare_with_roof(new, r_new, noise, choose_cell(len(new), inner.area))
+    old, r_old = select_inner(roof, inner, old)
+    cell_m = choose_cell(min(len(old), len(new)), inner.area)
+    both = np.floor(np.concatenate([old[:, :2], new[:, :2]]) / cell_m)
+    cells, number = number_cells(both)
+    in_old, in_new = number[: len(old)], number[len(old) :]
+    m_old, s_old, n_old = summarise_cells(in_old, r_old, len(cells), noise.point)
+    m_new, s_new, n_new = summarise_cells(in_new, r_new, len(cells), noise.point)
+    s_new = np.fmin(s_new, np.fmax(s_old, 2 * noise.point))  # as an unchanged roof would scatter
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sampling = MEDIAN_VARIANCE * (s_old**2 / n_old + s_new**2 / n_new)
+    sigma = np.sqrt(np.where(np.isfinite(sampling), sampling, np.inf) + noise.cell**2)
+    near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
+    return CellComparison(
+        cell_m,
+        cells,
+        m_old,
+        m_new,
+        n_old,
+        n_new,
+        sigma,
+        compute_share_near(in_new, r_new, m_old, near),
+        compute_share_near(in_old, r_old, m_new, near),
+        new,
+        in_new,
+        r_new,
+        in_old,
+        r_old,
+    )
+
+
+def choose_cell(points: int, area_m2: float) -> float:
+    """Return the side (m) of the cells for so many points over an area."""
+    return FINE_CELL_M if points >= FINE_DENSITY * area_m2 else WIDE_CELL_M
+
+
+def compare_with_roof(
+    new: np.ndarray, residuals: np.ndarray, noise: SurveyNoise, cell_m: float
+) -> CellComparison:
+    """Compare new points (n, 3) with the roof over which they have `residuals` (n,)."""
+    cells, number = number_cells(np.floor(new[:, :2] / cell_m))
+    median, scatter, count = summarise_cells(number, residuals, len(cells), noise.point)
+    zero = np.zeros(len(cells))
+    sigma = np.sqrt(MEDIAN_VARIANCE * scatter**2 / np.maximum(count, 1) + noise.cell**2)
+    near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
+    kept = compute_share_near(number, residuals, zero, near)
+    none = np.zeros(0, np.int64), np.zeros(0)
+    one = np.ones_like(count)
+    return CellComparison(
+        cell_m,
+        cells,
+        zero,
+        median,
+        one,
+        count,
+        sigma,
+        kept,
+        zero,
+        new,
+        number,
+        residuals,
+        *none,
+    )
+
+
+def select_inner(
+    roof: Roof, inner: shapely.Geometry, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points (m, 3) inside `inner`, and their heights (m,) over the roof."""
+    points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    residuals = measure_residuals(roof, points)
+    known = np.isfinite(residuals)
+    return points[known], residuals[known]
+
+
+def summarise_cells(
+    number: np.ndarray, values: np.ndarray, count: int, least: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the median, the scatter and the number of the `values` (n,) in each cell.
+
+    The scatter is 1.48 times the median deviation, and at least `least`. Empty cells have NaN.
+    """
+    order = np.lexsort([values, number])
+    number, values = number[order], values[order]
+    n = np.bincount(number, minlength=count)
+    start = np.concatenate([[0], np.cumsum(n)])[:-1]
+    median = take_middle(values, start, n)
+    deviation = np.abs(values - median[number])
+    deviation = deviation[np.lexsort([deviation, number])]
+    scatter = np.maximum(1.4826 * take_middle(deviation, start, n), least)
+    return median, scatter, n
+
+
+def take_middle(values: np.ndarray, start: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Return the median (k,) of runs of sorted values.
+
+    A run begins at `start` (k,) and has `n` (k,) values; without any the median is NaN.
+    """
+    result = np.full(len(n), np.nan)
+    has = n > 0
+    lower, upper = start[has] + (n[has] - 1) // 2, start[has] + n[has] // 2
+    result[has] = (values[lower] + values[upper]) / 2
+    return result
+
+
+def compute_share_near(
+    number: np.ndarray, values: np.ndarray, surface: np.ndarray, near: float
+) -> np.ndarray:
+    """Return the share (k,) of each cell's values (n,) near its surface.
+
+    Near is within `near` (m) of its `surface` (k,).
+    """
+    n = np.bincount(number, minlength=len(surface))
+    with np.errstate(invalid="ignore"):
+        close = np.abs(values - surface[number]) <= near
+    return np.bincount(number, weights=close, minlength=len(surface)) / np.maximum(n, 1)

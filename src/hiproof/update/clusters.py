@@ -1,0 +1,212 @@
+"""Connected cells in which the new points contradict the earlier roof.
+
+A cell contradicts it where the difference between the surveys is beyond chance, and where neither
+survey has points on the other's surface: leaves, a crane or scaffolding let some points through.
+Chance makes single such cells, but hardly ever several side by side.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.components import label_components
+from .cells import MEDIAN_VARIANCE, CellComparison
+
+CELL_SIGMAS = 3.3
+"""Standard deviations from which on a cell's difference counts: by chance one in a thousand."""
+
+CELL_CHANCE, TAIL_POWER, FARTHEST_SIGMAS = 0.003, 1.5, 10.0
+"""Least chance of such a cell, the power of its score by which it falls, and the score from which
+on it falls no more. Roofs are not as smooth as their models, so the tail is long: a normal error
+would give a thousandth and fall much faster."""
+
+SHAPES_A_CELL = 6.75
+"""Growth of the number of shapes of connected cells (polyominoes: at most 27/4 a cell)."""
+
+KEPT_SHARE = 0.25
+"""Share of points on the other survey's surface from which on a cell contradicts
+nothing: a third of the pulses passes through a crown."""
+
+HEIGHT_STEP_M = 1.0
+"""Range (m) of the earlier heights around a cell from which on there is a step or a wall."""
+
+LOG_LEAST = -600.0  # of a chance; float64 holds no smaller one
+
+PLANE_NEIGHBOURS, FEWEST_SURFACE_POINTS = 5, 9
+"""Points that a local plane is laid through, and points below which chance makes a surface."""
+
+ROUGH_M = 0.12
+"""Scatter (m) of points about local planes, beyond which they lie on no surface: leaves scatter by
+decimetres, roofs by the noise of a scanner and a step here and there."""
+
+USUAL_SLOPE, USUAL_NOISE_M = 1.5, 0.05
+"""Slope that planes hardly exceed, against the noise (m) of their points: points in a narrow strip
+lie on a steep plane otherwise, however much they scatter."""
+
+
+STRIP_WIDTH_M, STRIP_SHARE = 1.3, 3.0
+"""Width (m) below which, and times its length over its width from which on, a cluster is a strip:
+the jib of a crane or scaffolding along a wall, hardly a part of a roof."""
+
+
+@dataclass(frozen=True)
+class ChangedCells:
+    """Cells that contradict the earlier roof side by side.
+
+    `members` (m,) are numbers of the comparison's cells, `chance` the probability that a building
+    without any change shows such a cluster, `difference_m` the median difference with its
+    `sigma_m`, and `is_surface` whether the new points lie on a surface.
+    """
+
+    members: np.ndarray
+    area_m2: float
+    chance: float
+    difference_m: float
+    sigma_m: float
+    is_surface: bool
+
+
+def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> list[ChangedCells]:
+    """Return the clusters of a building, the largest first.
+
+    `stray` is the share of cells that contradict an unchanged roof.
+    """
+    c = comparison
+    is_other = flag_cells(c)
+    cells = int(c.is_compared.sum())
+    result = []
+    for sign in (1.0, -1.0):
+        chosen = np.flatnonzero(is_other & (sign * c.difference > 0))
+        labels = label_components(len(chosen), link_neighbours(c.cells[chosen]))
+        for label in range(labels.max(initial=-1) + 1):
+            result.append(describe_cluster(c, chosen[labels == label], cells, stray))
+    return sorted(result, key=lambda cluster: (-len(cluster.members), cluster.members[0]))
+
+
+def flag_cells(comparison: CellComparison) -> np.ndarray:
+    """Return whether (k,) each cell contradicts the earlier roof."""
+    c = comparison
+    with np.errstate(invalid="ignore"):
+        score = np.where(c.is_compared, np.abs(c.difference) / c.sigma, 0.0)
+    result = (score > CELL_SIGMAS) & (np.maximum(c.kept, c.known) <= KEPT_SHARE)
+    result[result] = ~is_known_around(c, np.flatnonzero(result))
+    return result
+
+
+def is_known_around(comparison: CellComparison, members: np.ndarray) -> np.ndarray:
+    """Return whether (m,) the earlier survey shows the new height nearby.
+
+    Nearby is in or around each cell of `members` (m,).
+
+    At a step either survey sees now one side and now the other, or the wall between them. So a
+    height does not count that lies among those of the earlier points in the cells around.
+    """
+    c = comparison
+    place = {cell: k for k, cell in enumerate(map(tuple, c.cells.tolist()))}
+    order = np.argsort(c.number_old, kind="stable")
+    over, ends = c.over_old[order], np.searchsorted(c.number_old[order], range(len(c.cells) + 1))
+    result = np.zeros(len(members), bool)
+    for n, k in enumerate(members):
+        i, j = c.cells[k].tolist()
+        around = [place.get((i + u, j + v)) for u in (-1, 0, 1) for v in (-1, 0, 1)]
+        heights = np.concatenate([over[ends[q] : ends[q + 1]] for q in around if q is not None])
+        near = CELL_SIGMAS * c.sigma[k]
+        result[n] = heights.min(initial=np.inf) - near <= c.new[k] <= heights.max(
+            initial=-np.inf
+        ) + near and (np.ptp(heights) > HEIGHT_STEP_M or np.abs(heights - c.new[k]).min() <= near)
+    return result
+
+
+def link_neighbours(cells: np.ndarray) -> np.ndarray:
+    """Return the pairs (2, p) of `cells` (k, 2) that share a side."""
+    place = {(i, j): k for k, (i, j) in enumerate(cells.tolist())}
+    pairs = [
+        (k, place[other])
+        for (i, j), k in place.items()
+        for other in ((i + 1, j), (i, j + 1))
+        if other in place
+    ]
+    return np.array(pairs, np.int64).reshape(-1, 2).T
+
+
+def describe_cluster(
+    comparison: CellComparison, members: np.ndarray, cells: int, stray: float
+) -> ChangedCells:
+    """Return the cluster of cells `members` (m,) among so many `cells` of a building."""
+    d, s = comparison.difference[members], comparison.sigma[members]
+    points = select_points(comparison, members, float(np.median(d)))
+    return ChangedCells(
+        members,
+        len(points) / max(len(comparison.points), 1) * measure_area(comparison),
+        compute_chance(len(members), float((np.abs(d) / s).min()), cells, stray),
+        float(np.median(d)),
+        float(np.sqrt(MEDIAN_VARIANCE * np.mean(s**2) / len(members))),
+        measure_roughness(points) < ROUGH_M and not is_strip(points),
+    )
+
+
+def select_points(comparison: CellComparison, members: np.ndarray, difference: float) -> np.ndarray:
+    """Return the new points (m, 3) of a cluster.
+
+    Those of the cells around it are among them where they lie nearer to its height over the earlier
+    roof, by `difference`, than to that roof: a cell at its edge holds points of both.
+    """
+    c = comparison
+    low, high = c.cells[members].min(axis=0) - 1, c.cells[members].max(axis=0) + 1
+    box = np.flatnonzero(((c.cells >= low) & (c.cells <= high)).all(axis=1))
+    apart = np.abs(c.cells[box, None] - c.cells[members][None]).max(axis=2).min(axis=1)
+    around = np.isin(c.number, box[apart <= 1]) & (np.abs(c.over / difference - 1) < 0.5)
+    return c.points[np.isin(c.number, members) | around]
+
+
+def measure_area(comparison: CellComparison) -> float:
+    """Return the area (m2) of the cells that hold new points."""
+    return float((comparison.n_new > 0).sum()) * comparison.cell_m**2
+
+
+def is_strip(points: np.ndarray) -> bool:
+    """Return whether points (n, 3) lie in a long and narrow strip of the plan."""
+    spread = np.linalg.eigvalsh(np.cov(points[:, :2].T))
+    width, length = np.sqrt(12 * np.maximum(spread, 0.0))  # of a strip with even points
+    return bool(width < STRIP_WIDTH_M and length > STRIP_SHARE * width)
+
+
+def compute_chance(size: int, score: float, cells: int, stray: float = CELL_CHANCE) -> float:
+    """Return a bound on the chance of `size` connected cells among `cells`.
+
+    Each of them has at least that `score`.
+
+    Every shape may lie anywhere, and each of its cells reaches the score by chance: `stray` is that
+    of CELL_SIGMAS.
+
+    >>> round(compute_chance(1, 3.3, 100), 3), round(compute_chance(4, 3.3, 100), 7)
+    (0.3, 2.5e-06)
+    """
+    tail = TAIL_POWER * math.log(CELL_SIGMAS / min(score, FARTHEST_SIGMAS))
+    cell = math.log(max(stray, CELL_CHANCE)) + tail
+    log = math.log(cells) + (size - 1) * math.log(SHAPES_A_CELL) + size * cell
+    return math.exp(min(0.0, max(log, LOG_LEAST)))
+
+
+def measure_roughness(points: np.ndarray) -> float:
+    """Return the median scatter (m) of points (n, 3) about local planes.
+
+    A plane goes through the neighbours of a point.
+
+    It is that of no surface where there are too few points.
+    """
+    if len(points) < FEWEST_SURFACE_POINTS:
+        return math.inf
+    from scipy.spatial import KDTree  # only where a building may have changed
+
+    near = points[KDTree(points).query(points, PLANE_NEIGHBOURS)[1]]
+    near = near - near.mean(axis=1, keepdims=True)
+    xy, z = near[:, :, :2], near[:, :, 2:]
+    across = xy.transpose(0, 2, 1)
+    ridge = (USUAL_NOISE_M / USUAL_SLOPE) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(across @ xy + ridge, across @ z)
+    scatter = np.sqrt(((z - xy @ slopes) ** 2).sum(axis=(1, 2)) / (PLANE_NEIGHBOURS - 3))
+    return float(np.median(scatter))

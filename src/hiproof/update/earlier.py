@@ -1,0 +1,98 @@
+"""The earlier run: its buildings, settings and clouds.
+
+All are read and checked before work is spent.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import HiproofError, InputError, InputWarning
+from ..evaluate.inputs import found_inputs
+from ..evaluate.run import run_record
+from ..formats import FORMATS
+from ..parametric.file import opened_parameters
+from ..parametric.record import read_building, refuse_other_kinds
+from ..settings import ReadSettings, Settings
+from ..write.head import FileHead
+
+RUN_PARAMETERS = FORMATS["parameters"].file
+
+
+@dataclass(frozen=True)
+class EarlierRun:
+    """The buildings of a run (objects of parameters.jsonl).
+
+    Its head and settings come with them.
+
+    `clouds` are those that the run was made of, empty where not all of them exist.
+    """
+
+    head: FileHead
+    records: tuple[dict[str, Any], ...]
+    settings: Settings
+    clouds: tuple[str, ...]
+
+
+def find_parameters(folder: Path) -> Path:
+    """Return the parameters of the run in `folder`.
+
+    Raises InputError where there are none.
+    """
+    path = Path(folder) / RUN_PARAMETERS
+    if not path.is_file():
+        raise InputError(
+            f"expected the folder of a finished run with {RUN_PARAMETERS}, got {folder}; name the "
+            "--out of `hiproof reconstruct`"
+        )
+    return path
+
+
+def read_earlier(folder: Path) -> EarlierRun:
+    """Read the run in `folder`.
+
+    Raises InputError for one that is damaged, naming the building.
+    """
+    path, record = find_parameters(folder), run_record(folder)
+    with opened_parameters(path) as (head, rows):
+        records = tuple(rows)
+    if not records:
+        raise InputError(f"expected buildings in {path}, got none; name another run")
+    for row in records:
+        refuse_damaged(row, path)
+    settings = dataclasses.replace(
+        Settings.from_dict(record.get("settings") or {}), compose=head.compose, write=head.write
+    )
+    inputs = found_inputs(record)
+    clouds = () if inputs.gone else inputs.clouds
+    if not clouds:
+        warnings.warn(
+            f"{folder}: the clouds of this run are not there, so the new points are compared with "
+            "its models alone; changes that the models leave out are not told from their errors",
+            InputWarning,
+        )
+    return EarlierRun(head, records, settings, clouds)
+
+
+def refuse_damaged(record: dict[str, Any], path: Path) -> None:
+    """Raise InputError for a building that cannot be read."""
+    try:
+        refuse_other_kinds(record)
+        read_building(record)
+    except HiproofError as error:
+        raise InputError(f"building {record['id']:.80} in {path}: {error}") from error
+
+
+def choose_read_settings(settings: Settings) -> Settings:
+    """Return settings to read new clouds.
+
+    Their classes need not be those of the earlier ones.
+    """
+    usual = ReadSettings()
+    names = ("building_classes", "ground_classes", "roofs")
+    read = dataclasses.replace(settings.read, **{name: getattr(usual, name) for name in names})
+    return dataclasses.replace(settings, read=read)

@@ -1,0 +1,143 @@
+"""The class of a building by a test of "the same roof" against "another roof".
+
+The chance that an unchanged building shows what is seen has to be below the significance. That
+holds for the largest of its clusters and for the roof as a whole. What lies above the roof without
+taking its place, such as leaves or a crane, makes a building uncertain at most.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Roof
+from ..status import Change
+from .cells import CellComparison, SurveyNoise, compare_points
+from .clusters import ChangedCells, find_clusters
+
+COVERED = 0.5
+"""Share of the earlier cells that the new survey has to cover, for a building to be judged."""
+
+FEWEST_COMPARED = 4
+"""Cells that have to be compared, below which chance decides."""
+
+GONE_SHARE = 0.7
+"""Share of the compared cells that have to lie on bare ground, for a building to be gone."""
+
+OVER_GROUND_M = 1.0
+"""Points less high above the ground (m) lie on it, and roofs higher."""
+
+WHOLE_SHARE = 0.7
+"""Share of the cells that have to move with the roof as a whole."""
+
+SMALLEST_M2 = 2.0
+"""Area (m2) below which a cluster is a chimney, an aerial or the edge of something."""
+
+DOUBTFUL_M2 = 4.0
+"""Area (m2) from which on points that lie on no surface make a building uncertain."""
+
+
+@dataclass(frozen=True)
+class ChangeVerdict:
+    """The class of a building, and what it rests on.
+
+    `chance` bounds the probability that an unchanged building looks like this. `clusters` are those
+    that count; `whole_m` is how much higher the roof as a whole lies (0 where it does not), with
+    `whole_sigma_m`. `comparison` is None where nothing was compared.
+    """
+
+    change: Change
+    chance: float = 1.0
+    clusters: tuple[ChangedCells, ...] = ()
+    whole_m: float = 0.0
+    whole_sigma_m: float = math.nan
+    comparison: CellComparison | None = None
+
+
+def judge_building(
+    roof: Roof,
+    old: np.ndarray | None,
+    new: np.ndarray,
+    z_ground: float,
+    noise: SurveyNoise,
+    sigma_m: float,
+    significance: float,
+    unexplained_m2: float = 0.0,
+) -> ChangeVerdict:
+    """Judge a building by its `old` and `new` points (n, 3), in its roof's frame.
+
+    Ground points inside the outline are among them. `z_ground` is the ground's height there,
+    `sigma_m` the standard deviation of the common vertical shift. Without old points clusters count
+    as far as they are larger than the area that the earlier model left unexplained.
+    """
+    comparison = compare_points(roof, old, new, noise)
+    if is_not_covered(comparison, roof):
+        return ChangeVerdict(Change.NOT_COVERED, comparison=comparison)
+    if is_gone(comparison, roof, z_ground):
+        return ChangeVerdict(Change.GONE, 0.0, comparison=comparison)
+    whole, sigma, chance_whole = measure_whole(comparison, noise, sigma_m)
+    found = [c for c in find_clusters(comparison, noise.stray) if c.area_m2 >= SMALLEST_M2]
+    likely = [c for c in found if c.chance < significance]
+    beyond = unexplained_m2 if old is None else 0.0
+    clear = tuple(c for c in likely if c.is_surface and c.area_m2 > beyond)
+    chance = min([1.0, *(c.chance for c in clear)])
+    if chance_whole < significance:
+        return ChangeVerdict(
+            Change.CHANGED, min(chance, chance_whole), clear, whole, sigma, comparison
+        )
+    if clear:
+        return ChangeVerdict(Change.CHANGED, chance, clear, comparison=comparison)
+    doubtful = tuple(c for c in likely if c.area_m2 >= DOUBTFUL_M2)
+    if doubtful:
+        return ChangeVerdict(Change.UNCERTAIN, doubtful[0].chance, doubtful, comparison=comparison)
+    return ChangeVerdict(Change.UNCHANGED, comparison=comparison)
+
+
+def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
+    """Return whether too little of the earlier roof has new points."""
+    earlier = comparison.n_old > 0
+    compared = int(comparison.is_compared.sum())
+    area = compared * comparison.cell_m**2
+    without_old = (comparison.old == 0).all() and (comparison.known == 0).all()
+    share = area / roof.outline.area if without_old else compared / max(int(earlier.sum()), 1)
+    return (
+        compared < FEWEST_COMPARED or share < COVERED / 2 or (share < COVERED and not without_old)
+    )
+
+
+def is_gone(comparison: CellComparison, roof: Roof, z_ground: float) -> bool:
+    """Return whether bare ground lies where the roof was."""
+    c = comparison
+    chosen = c.is_compared
+    heights = find_heights(roof, c)
+    was_roof = chosen & (heights + c.old > z_ground + 2 * OVER_GROUND_M)
+    on_ground = was_roof & (heights + c.new < z_ground + OVER_GROUND_M)
+    return int(on_ground.sum()) >= max(FEWEST_COMPARED, GONE_SHARE * int(was_roof.sum()))
+
+
+def find_heights(roof: Roof, comparison: CellComparison) -> np.ndarray:
+    """Return the roof's height (k,) at the middles of the cells.
+
+    Beside the roof it is that of its lowest known place.
+    """
+    heights = roof.height_at(comparison.centres)
+    lowest = np.nanmin(heights) if np.isfinite(heights).any() else 0.0
+    return np.where(np.isfinite(heights), heights, lowest)
+
+
+def measure_whole(
+    comparison: CellComparison, noise: SurveyNoise, sigma_m: float
+) -> tuple[float, float, float]:
+    """Return how much higher the whole roof lies, its sigma, and the chance of that.
+
+    The difference counts where most cells take part in it.
+    """
+    d, s = (v[comparison.is_compared] for v in (comparison.difference, comparison.sigma))
+    middle = float(np.median(d))
+    sigma = math.sqrt(noise.roof**2 + sigma_m**2 + 1.57 * float(np.mean(s**2)) / len(d))
+    together = np.mean(np.abs(d - middle) < np.abs(d))
+    if together < WHOLE_SHARE:
+        return middle, sigma, 1.0
+    return middle, sigma, math.erfc(abs(middle) / sigma / math.sqrt(2))

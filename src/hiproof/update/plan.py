@@ -1,0 +1,160 @@
+"""The plan of an update: the buildings of the earlier run.
+
+The folder of an update holds, beside what every run has, `earlier.jsonl` with the objects of the
+earlier run by the numbers of their buildings, and `earlier/` with the plan and the points of the
+earlier survey.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..city.classes import settle_classes
+from ..city.frame import plan_bounds, settle_frame
+from ..city.plan import (
+    Job,
+    WorkPlan,
+    cut_into_tiles,
+    make_job,
+    unusual_names,
+)
+from ..city.prepare import TILE_M, limit_buildings_per_tile, read_headers
+from ..errors import InputError, InputWarning
+from ..masking import mask
+from ..model import Footprint
+from ..parametric.record import polygon, read_outline, read_shift
+from ..read.crs import describe_crs, find_units, same_horizontal
+from ..read.overlap import format_box
+from ..settings import Settings
+from ..write.files import atomic
+from ..write.json_text import dump
+from ..write.parameters import crs_text
+from .earlier import EarlierRun
+from .request import UpdateRequest
+
+EARLIER_FILE, EARLIER_FOLDER = "earlier.jsonl", "earlier"
+
+
+def make_update_plan(request: UpdateRequest, earlier: EarlierRun) -> WorkPlan:
+    """Make the plan of an update.
+
+    Raises InputError where the clouds do not fit the run.
+    """
+    headers = read_headers(request.clouds)
+    settings = adopt_crs(request.settings, headers, earlier, request)
+    frame = settle_frame(dataclasses.replace(request, settings=settings), headers)
+    refuse_other_crs(frame, earlier, request)
+    jobs = tuple(make_earlier_job(i, record) for i, record in enumerate(earlier.records))
+    refuse_elsewhere(jobs, frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)), request)
+    settings = settle_classes(request.clouds, settings).replace({"reconstruct": {"align": "off"}})
+    offset = earlier.head.offset
+    return WorkPlan(
+        jobs=jobs,
+        tiles=cut_into_tiles(jobs, TILE_M, limit_buildings_per_tile(settings)),
+        crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
+        settings=settings,
+        names=unusual_names(jobs),
+        translate=np.zeros(3) if offset is None else offset,
+    )
+
+
+def adopt_crs(
+    settings: Settings, headers: list, earlier: EarlierRun, request: UpdateRequest
+) -> Settings:
+    """Return settings with the run's CRS where the new clouds name none."""
+    if (
+        settings.read.crs
+        or earlier.head.crs is None
+        or any(header.crs is not None for header in headers)
+    ):
+        return settings
+    warnings.warn(
+        f"{mask(request.clouds[0])}: names no CRS; taken to be in that of {request.run}, "
+        f"{describe_crs(earlier.head.crs)}; say otherwise with --crs",
+        InputWarning,
+    )
+    return settings.replace({"read": {"crs": crs_text(earlier.head.crs)}})
+
+
+def refuse_other_crs(frame: Any, earlier: EarlierRun, request: UpdateRequest) -> None:
+    """Raise InputError where run and clouds are in different CRSs or units."""
+    crs, unit = earlier.head.crs, earlier.head.unit
+    same = (crs is None and frame.crs is None) or (
+        crs is not None and frame.crs is not None and same_horizontal(crs, frame.crs)
+    )
+    if not same or find_units(crs, unit_name=unit) != frame.units:
+        raise InputError(
+            f"expected clouds in the CRS of {request.run}, {describe_crs(crs)}, got "
+            f"{describe_crs(frame.crs)}; reproject them (`pdal translate`)"
+        )
+
+
+def make_earlier_job(index: int, record: dict[str, Any]) -> Job:
+    """Make the job of a building of the earlier run.
+
+    Its outline lies on its roof already.
+    """
+    outline = read_outline(record)
+    if outline is None:
+        rings = record.get("outline")
+        outline = shapely.Polygon() if rings is None else polygon(rings, "outline")
+    shift = read_shift(record) if record.get("parts") else (0.0, 0.0)
+    polygon_before = shapely.transform(outline, lambda xy: xy - shift)
+    footprint = Footprint(record["id"], polygon_before, record.get("attributes") or {})
+    return make_job(index, footprint, shift)
+
+
+def refuse_elsewhere(jobs: tuple[Job, ...], corners: np.ndarray, request: UpdateRequest) -> None:
+    """Raise InputError where the new clouds meet none of the buildings.
+
+    `corners` (2 n, 2) are those of the clouds in metres, two a cloud.
+    """
+    areas = [job.area for job in jobs if not job.area.is_empty]
+    if not areas:
+        raise InputError(
+            f"expected buildings with outlines in {request.run}, got none; name another run"
+        )
+    boxes = shapely.box(*corners.reshape(-1, 4).T)
+    if not len(boxes) or len(shapely.STRtree(boxes).query(areas, predicate="intersects")[0]):
+        return
+    extent = shapely.total_bounds(areas).tolist()
+    lies = [*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()]
+    raise InputError(
+        f"expected new clouds that meet the buildings of {request.run}, which lie in "
+        f"{format_box(extent)}, got clouds in {format_box(lies)}; check their place and CRS"
+    )
+
+
+def save_earlier(state: Path, plan: WorkPlan, earlier: EarlierRun) -> None:
+    """Keep the earlier buildings for the workers.
+
+    The plan by which their survey is read is kept too.
+    """
+    folder = state / EARLIER_FOLDER
+    (folder / "points").mkdir(parents=True, exist_ok=True)
+    with atomic(state / EARLIER_FILE) as temporary:
+        Path(temporary).write_bytes(b"".join(dump(record) + b"\n" for record in earlier.records))
+    settings = earlier.settings.replace({"reconstruct": {"align": "off"}})
+    with atomic(folder / "plan.jsonl") as temporary:
+        dataclasses.replace(plan, settings=settings).save(Path(temporary))
+
+
+def load_earlier(state: Path) -> list[dict[str, Any]]:
+    """Load the earlier buildings by number, once a process."""
+    path = state / EARLIER_FILE
+    return load_records(path, path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=1)
+def load_records(path: Path, stamp: int) -> list[dict[str, Any]]:
+    """Load the objects at `path`, whose file has the time `stamp`."""
+    with path.open(encoding="utf-8") as lines:
+        return [json.loads(line) for line in lines]

@@ -1,0 +1,25 @@
+"""What the user asked for: a run, new clouds, and options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..city.request import FILES_FIELD, NO_MATTER, Request
+
+SIGNIFICANCE = 0.001
+"""Probability with which an unchanged building may be called changed."""
+
+
+@dataclass(frozen=True)
+class UpdateRequest(Request):
+    """An update of the models in the folder `run` with new `clouds`, written to `out`.
+
+    `run_parameters` is the run's parameters.jsonl, whose state decides whether an interrupted
+    update may resume. `date` is that of the survey, "" to read it from the clouds.
+    """
+
+    run: Path = field(default=Path(), metadata=NO_MATTER)
+    run_parameters: str = field(default="", metadata=FILES_FIELD)
+    significance: float = SIGNIFICANCE
+    date: str = ""

@@ -1,0 +1,128 @@
+"""An update of a run: plan, sort, register, judge, refit and merge."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..city.checks import refuse_unusable
+from ..city.from_cloud import Progress
+from ..city.lock import hold_folder
+from ..city.plan import WorkPlan
+from ..city.resume import open_state
+from ..city.run import Steps, Summary, reconstruct_in_folder
+from ..errors import OutputError, SettingsError
+from ..status import Change
+from ..write.files import atomic
+from .before import prepare_surveys
+from .dates import find_survey_date
+from .earlier import choose_read_settings, read_earlier
+from .plan import make_update_plan
+from .request import UpdateRequest
+from .solve import SURVEYS_FILE, Surveys
+from .tables import collect_changes, write_changes
+from .tile import update_tile
+
+
+@dataclass(frozen=True)
+class UpdateSummary:
+    """The result of an update, with buildings by class and kind of change.
+
+    `files` are changes.csv and changes.gpkg.
+    """
+
+    run: Summary
+    surveys: Surveys
+    by_change: dict[str, int]
+    by_kind: dict[str, int]
+    files: tuple[Path, ...]
+
+
+def update_area(
+    request: UpdateRequest,
+    changes: dict[str, dict[str, Any]] | None = None,
+    progress: Progress = lambda *_: None,
+) -> UpdateSummary:
+    """Bring the models of `request.run` up to date in `request.out`.
+
+    `changes` are settings that differ from the run's, by section. Raises InputError, SettingsError
+    or OutputError (full sentences) when the update cannot start or go on; the same call goes on.
+    """
+    refuse_same_folder(request)
+    if not 0 < request.significance < 1:
+        raise SettingsError(
+            f"expected --significance between 0 and 1, got {request.significance}; 0.001 is usual"
+        )
+    earlier = read_earlier(request.run)
+    settings = choose_read_settings(earlier.settings).replace(changes or {})
+    date = find_survey_date(request.clouds, request.date)
+    request = dataclasses.replace(request, settings=settings, date=date)
+    refuse_unusable(request)
+    state = open_state(request.out)
+
+    def make_plan(_: Any, __: Progress) -> WorkPlan:
+        (state / SURVEYS_FILE).unlink(missing_ok=True)
+        return make_update_plan(request, earlier)
+
+    def prepare(plan: WorkPlan, executor: Any, _: Progress) -> None:
+        prepare_surveys(request, earlier, date, state, plan, executor)
+
+    with hold_folder(state):
+        summary = reconstruct_in_folder(
+            request, state, progress, Steps(make_plan, update_tile, prepare)
+        )
+        return report_changes(request, state, summary)
+
+
+def refuse_same_folder(request: UpdateRequest) -> None:
+    """Raise OutputError where the update would be written into the run that it reads."""
+    if Path(request.out).resolve() == Path(request.run).resolve():
+        raise OutputError(
+            f"expected another folder than the run itself with --out, got {request.out}; an update "
+            "never changes its run"
+        )
+
+
+def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> UpdateSummary:
+    """Write the tables of changes and complete run.json."""
+    surveys, out = Surveys.load(state / SURVEYS_FILE), Path(request.out)
+    found = collect_changes(out, surveys.date)
+    files = write_changes(out, found)
+    by_change = Counter(change.record["change"]["class"] for change in found)
+    by_change[Change.UNCHANGED.code] = summary.buildings - len(found)
+    by_kind = Counter(
+        change.record["change"]["places"][0]["kind"]
+        for change in found
+        if change.record["change"]["places"]
+    )
+    result = UpdateSummary(
+        summary,
+        surveys,
+        {c.code: by_change[c.code] for c in Change if by_change[c.code]},
+        dict(sorted(by_kind.items())),
+        files,
+    )
+    add_to_record(request, result)
+    return result
+
+
+def add_to_record(request: UpdateRequest, result: UpdateSummary) -> None:
+    """Add what is peculiar to an update to run.json."""
+    path = Path(request.out) / "run.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    surveys = result.surveys
+    record["update"] = {
+        "run": str(request.run),
+        "survey_date": surveys.date,
+        "significance": surveys.significance,
+        "compared_with": "points" if surveys.has_earlier else "models",
+        "shift": surveys.shift.to_dict(),
+        "by_change": result.by_change,
+        "by_kind": result.by_kind,
+    }
+    with atomic(path) as temporary:
+        Path(temporary).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,166 @@
+"""changes.csv and changes.gpkg: every building that is not unchanged.
+
+Both follow from parameters.jsonl.
+"""
+
+from __future__ import annotations
+
+import csv
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..parametric.file import opened_parameters
+from ..parametric.record import polygon, read_outline
+from ..write.colours import CHANGE_COLOURS
+from ..write.files import atomic
+from ..write.head import FileHead
+from ..write.naming import plan_wkt
+from ..write.tables.geopackage import OUTLINE_GEOMETRY, write_styles
+from ..write.tables.geopackage_file import GeoPackage
+from ..write.tables.styles import Style
+from .earlier import RUN_PARAMETERS
+
+CSV_FILE, GPKG_FILE = "changes.csv", "changes.gpkg"
+COLUMNS: dict[str, type] = {
+    "id": str,
+    "class": str,
+    "kind": str,
+    "difference_m": float,
+    "sigma_m": float,
+    "area_m2": float,
+    "chance": float,
+    "survey": str,
+    "places": int,
+    "predecessors": str,
+}
+PLACE_COLUMNS: dict[str, type] = {
+    "id": str,
+    "class": str,
+    "kind": str,
+    "difference_m": float,
+    "sigma_m": float,
+    "area_m2": float,
+    "old_part": int,
+    "new_part": int,
+}
+BUILDINGS_LAYER, PLACES_LAYER = "changed_buildings", "changed_places"
+CHANGE_STYLES = tuple(
+    Style(layer, "changes", '"class"', CHANGE_COLOURS, alpha)
+    for layer, alpha in ((BUILDINGS_LAYER, 0.3), (PLACES_LAYER, 0.8))
+)
+
+
+@dataclass(frozen=True)
+class FoundChange:
+    """A building that is not unchanged.
+
+    `record` has the id and the change of its object of parameters.jsonl.
+    """
+
+    record: dict[str, Any]
+    outline: shapely.Geometry | None
+
+
+def collect_changes(folder: Path, survey: str) -> list[FoundChange]:
+    """Return the changes that the survey of that date shows in the run in `folder`."""
+    with opened_parameters(folder / RUN_PARAMETERS) as (_, records):
+        return [
+            FoundChange({key: record[key] for key in ("id", "change")}, find_outline(record))
+            for record in records
+            if record.get("change") and record["change"]["survey"] == survey
+        ]
+
+
+def find_outline(record: dict[str, Any]) -> shapely.Geometry | None:
+    """Return the outline of a building in the world, None where it is unknown."""
+    outline = read_outline(record)
+    if outline is None and record.get("outline") is not None:
+        return polygon(record["outline"], "outline")
+    return outline
+
+
+def write_changes(folder: Path, changes: list[FoundChange]) -> tuple[Path, ...]:
+    """Write changes.csv and changes.gpkg into `folder`."""
+    with opened_parameters(folder / RUN_PARAMETERS) as (head, _):
+        files = folder / CSV_FILE, folder / GPKG_FILE
+        with atomic(files[0]) as temporary:
+            write_csv(Path(temporary), changes)
+        with atomic(files[1]) as temporary:
+            write_geopackage(Path(temporary), changes, head)
+    return files
+
+
+def write_csv(path: Path, changes: list[FoundChange]) -> None:
+    """Write a row a building."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        table.writerows(make_row(change) for change in changes)
+
+
+def make_row(change: FoundChange) -> tuple[Any, ...]:
+    """Return the values of a building: those of its largest place come first."""
+    found = change.record["change"]
+    place: dict[str, Any] = next(iter(found["places"]), {})
+    return (
+        change.record["id"],
+        found["class"],
+        place.get("kind"),
+        *(place.get(name) for name in ("difference", "sigma", "area")),
+        found["chance"],
+        found["survey"],
+        len(found["places"]),
+        " ".join(found["predecessors"]) or None,
+    )
+
+
+def make_place_rows(change: FoundChange) -> list[tuple[Any, ...]]:
+    """Return the values of the places of a building."""
+    found = change.record["change"]
+    return [
+        (
+            change.record["id"],
+            found["class"],
+            place["kind"],
+            *(place.get(name) for name in ("difference", "sigma", "area")),
+            *place["parts"],
+        )
+        for place in found["places"]
+    ]
+
+
+def write_geopackage(path: Path, changes: list[FoundChange], head: FileHead) -> None:
+    """Write the layers of buildings and of places, with their QGIS style."""
+    with closing(GeoPackage(path, plan_wkt(head.crs_of_files))) as file:
+        outlines = [change.outline for change in changes]
+        add_layer(file, BUILDINGS_LAYER, COLUMNS, outlines, [make_row(c) for c in changes], head)
+        places = [
+            shapely.union_all([polygon(rings, "an outline") for rings in place["outlines"]])
+            for change in changes
+            for place in change.record["change"]["places"]
+        ]
+        rows = [row for change in changes for row in make_place_rows(change)]
+        add_layer(file, PLACES_LAYER, PLACE_COLUMNS, places, rows, head)
+        write_styles(file, CHANGE_STYLES)
+        file.finish()
+
+
+def add_layer(
+    file: GeoPackage,
+    layer: str,
+    columns: dict[str, type],
+    geometries: list[Any],
+    rows: list[tuple[Any, ...]],
+    head: FileHead,
+) -> None:
+    """Add a layer of polygons, whose `geometries` are in world metres."""
+    file.create_table(layer, columns, OUTLINE_GEOMETRY)
+    if not rows:
+        return
+    there = shapely.transform(np.array(geometries, object), head.units.table.from_metres)
+    file.insert_features(layer, 1, [None if g is None else g.wkb for g in there], rows)

@@ -1,0 +1,200 @@
+"""Buildings judged by the points of two surveys: what changed is found and named, and what only
+hides a roof is no change.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.simulate import random_building
+from hiproof.simulate.changes import CHANGES, change_building
+from hiproof.simulate.roofs import assemble, make_part
+from hiproof.status import Change, ChangeKind
+from hiproof.update.cells import SurveyNoise
+from hiproof.update.clusters import compute_chance
+from hiproof.update.judge import judge_building
+from hiproof.update.kinds import name_differences
+from hiproof.update.register import SampledRoof, register_surveys
+
+NOISE, Z_GROUND = SurveyNoise(), 0.0
+FLAT = {"length": 16.0, "width": 10.0}
+GABLE = {"length": 14.0, "width": 9.0, "height": 3.5}
+
+
+def scan(rng, roof, density=8.0):
+    """Points over a roof, with the noise of a scanner."""
+    x0, y0, x1, y1 = roof.outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
+    z = roof.height_at(xy)
+    known = np.isfinite(z)
+    return np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))])[known]
+
+
+def make_roof(kind="gable", parameters=None, eave=6.0):
+    parameters = parameters or (FLAT if kind == "flat" else GABLE)
+    return assemble(
+        (make_part(kind, parameters, 0.3, np.array([0.0, 0.0, eave])),), "single", (0.0, 0.0, 0.0)
+    )
+
+
+def judge(old, new, significance=0.001, **options):
+    roof, points = old
+    return judge_building(roof, points, new, Z_GROUND, NOISE, 0.01, significance, **options)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("density", [3.0, 8.0, 20.0])
+def test_of_120_unchanged_roofs_none_is_called_changed(rng, density):
+    classes = []
+    for _ in range(40):
+        roof = random_building(rng).roof
+        classes.append(judge((roof, scan(rng, roof, density)), scan(rng, roof, 8.0)).change)
+    assert set(classes) == {Change.UNCHANGED}
+
+
+def list_changes(kind, count=6):
+    """Buildings that allow a change of some kind, before and after it."""
+    rng, pairs = np.random.default_rng(11), []
+    while len(pairs) < count:
+        names = ("two_level", "extension") if kind.startswith("part_") else None
+        building = make_building(rng, names, kind)
+        after = change_building(rng, building, kind)
+        if after is not None:
+            pairs.append((building, after))
+    return pairs
+
+
+def make_building(rng, names, kind):
+    from hiproof.simulate import random_compound
+
+    if kind == "part_added":
+        return make_roof("flat")
+    if kind == "small_object":
+        return make_roof()
+    return random_building(rng) if names is None else random_compound(rng, str(rng.choice(names)))
+
+
+@pytest.mark.parametrize("kind", sorted(CHANGES))
+def test_every_kind_of_change_is_found_and_most_are_named(kind):
+    rng, named = np.random.default_rng(2), []
+    pairs = list_changes(kind)
+    for before, after in pairs:
+        new = scan(rng, after.roof)
+        if kind == "part_removed":  # bare ground lies where the part stood
+            ground = dataclasses.replace(before.roof, parts=(level_part(before.roof.outline),))
+            yard = scan(rng, ground)
+            bare = ~shapely.intersects_xy(after.roof.outline, *yard[:, :2].T)
+            new = np.concatenate([new, yard[bare]])
+        verdict = judge((before.roof, scan(rng, before.roof)), new)
+        assert verdict.change is Change.CHANGED
+        found = name_differences(verdict, before.roof, after.roof, Z_GROUND, 0.01)
+        named.append(found[0].kind.code)
+    assert named.count(kind) >= 5, named
+
+
+def level_part(outline):
+    """A level surface on the ground."""
+    x0, y0, x1, y1 = outline.bounds
+    middle = np.array([(x0 + x1) / 2, (y0 + y1) / 2, 0.0])
+    return make_part("flat", {"length": x1 - x0 + 9, "width": y1 - y0 + 9}, 0.0, middle)
+
+
+def test_an_added_storey_is_measured_within_two_centimetres(rng):
+    roof = make_roof()
+    new = scan(rng, roof.roof) + (0.0, 0.0, 2.8)
+    verdict = judge((roof.roof, scan(rng, roof.roof)), new)
+    (place,) = name_differences(verdict, roof.roof, None, Z_GROUND, 0.01)
+    assert place.kind is ChangeKind.ROOF_RAISED
+    assert place.difference_m == pytest.approx(2.8, abs=0.02)
+    assert place.sigma_m < 0.03
+
+
+def test_bare_ground_inside_the_outline_makes_a_building_gone(rng):
+    roof = make_roof().roof
+    old = scan(rng, roof)
+    ground = old * (1, 1, 0)
+    assert judge((roof, old), ground).change is Change.GONE
+    assert judge((roof, old), ground[:0]).change is Change.NOT_COVERED
+
+
+def cover_with_leaves(rng, points):
+    """A crown over a third of the roof, which lets a third of the pulses through."""
+    hit = (points[:, 0] > 2.0) & (rng.random(len(points)) < 0.67)
+    return points + np.column_stack([np.zeros((len(points), 2)), hit * rng.uniform(1, 5, len(hit))])
+
+
+def cover_densely(rng, points):
+    """A crown through which no pulse passes."""
+    hit = points[:, 0] > 2.0
+    return points + np.column_stack([np.zeros((len(points), 2)), hit * rng.uniform(1, 5, len(hit))])
+
+
+def hang_a_jib(rng, points):
+    hit = np.abs(points[:, 1]) < 0.4
+    return points + np.column_stack(
+        [np.zeros((len(points), 2)), hit * rng.uniform(9, 10, len(hit))]
+    )
+
+
+def hide_half(rng, points):
+    return points[points[:, 0] < 0.5]
+
+
+@pytest.mark.parametrize("disturb", [cover_with_leaves, cover_densely, hang_a_jib, hide_half])
+@pytest.mark.parametrize("seed", range(5))
+def test_what_only_hides_a_roof_is_no_change(disturb, seed):
+    rng = np.random.default_rng(seed)
+    roof = make_roof().roof
+    verdict = judge((roof, scan(rng, roof)), disturb(rng, scan(rng, roof)))
+    assert verdict.change in (Change.UNCHANGED, Change.UNCERTAIN)
+
+
+def test_a_crown_that_hides_a_third_of_the_roof_makes_it_uncertain(rng):
+    roof = make_roof().roof
+    verdict = judge((roof, scan(rng, roof)), cover_densely(rng, scan(rng, roof)))
+    assert verdict.change is Change.UNCERTAIN
+
+
+def test_what_the_earlier_model_left_out_is_no_change(rng):
+    roof = make_roof("flat").roof
+    penthouse = change_building(rng, make_roof("flat"), "part_added").roof
+    old, new = scan(rng, penthouse), scan(rng, penthouse)
+    assert judge((roof, old), new).change is Change.UNCHANGED
+    assert judge((roof, None), new).change is Change.CHANGED
+    assert judge((roof, None), new, unexplained_m2=60.0).change is not Change.CHANGED
+
+
+def test_a_stricter_significance_finds_fewer_changes(rng):
+    roof = make_roof().roof
+    dormer = change_building(rng, make_roof(), "small_object").roof
+    points = scan(rng, roof), scan(rng, dormer)
+    assert judge((roof, points[0]), points[1]).change is Change.CHANGED
+    assert judge((roof, points[0]), points[1], significance=1e-250).change is Change.UNCHANGED
+
+
+def test_chance_falls_with_size_and_score():
+    assert compute_chance(4, 5.0, 100) < compute_chance(3, 5.0, 100) < compute_chance(2, 5.0, 100)
+    assert compute_chance(3, 6.0, 100) < compute_chance(3, 5.0, 100)
+    assert compute_chance(1, 3.3, 10**6) == 1.0
+
+
+def test_the_common_shift_is_found_though_one_roof_in_five_changed(rng):
+    shift, samples = np.array([0.16, -0.12, 0.05]), []
+    for k in range(30):
+        roof = random_building(rng).roof
+        raised = (0.0, 0.0, 2.0) if k % 5 == 0 else (0.0, 0.0, 0.0)
+        samples.append(SampledRoof(roof, scan(rng, roof), scan(rng, roof) + shift + raised))
+    found = register_surveys(samples)
+    assert np.abs(np.array(found.xyz) - shift).max() < 0.03
+    assert np.abs(found.applied - shift).max() < 0.03
+    assert found.noise.roof < 0.05
+
+
+def test_without_roofs_no_shift_is_applied():
+    assert register_surveys([]).applied.tolist() == [0.0, 0.0, 0.0]

@@ -1,0 +1,220 @@
+"""`hiproof update` on the tiny town: one house raised, one pulled down, two as they were."""
+
+import dataclasses
+import datetime
+import json
+import shutil
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from typer.testing import CliRunner
+
+from hiproof import InputError, OutputError, SettingsError
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.cli.app import app
+from hiproof.parametric.run import build_file
+from hiproof.update.dates import find_survey_date
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+from run_records import RECORDS, by_id, records
+from tiny_town import ORIGIN, make_town, write_cloud
+
+DATE = "2024-05-01"
+RAISED_M = 2.0
+
+
+def make_later_survey(raised="house-1", gone="house-2"):
+    """The town three years later, by another flight."""
+    town = make_town(seed=7)
+    xyz, classes = town.xyz.copy(), town.classification.copy()
+    x, y = xyz[:, :2].T
+    up = shapely.intersects_xy(town.footprints[raised], x, y) & (classes == 6)
+    down = shapely.intersects_xy(town.footprints[gone], x, y)
+    xyz[up, 2] += RAISED_M
+    xyz[down, 2], classes[down] = ORIGIN[2] + 0.01 * (x[down] - ORIGIN[0]), 2
+    return xyz, classes
+
+
+@pytest.fixture(scope="module")
+def cloud(tmp_path_factory):
+    return str(write_cloud(tmp_path_factory.mktemp("later") / "later.laz", *make_later_survey()))
+
+
+@pytest.fixture(scope="module")
+def run(town_files, tmp_path_factory):
+    """The folder of a run over the tiny town."""
+    out = tmp_path_factory.mktemp("models")
+    reconstruct_area(Request((town_files[0],), out, town_files[1]))
+    return out
+
+
+def make_request(models, cloud, folder, **changes):
+    parameters = str(models / "parameters.jsonl")
+    request = UpdateRequest((cloud,), folder, run=models, run_parameters=parameters, date=DATE)
+    return dataclasses.replace(request, **changes)
+
+
+@pytest.fixture(scope="module")
+def update(run, cloud, tmp_path_factory):
+    """The summary of an update, its folder, and the run as it was before."""
+    out, before = tmp_path_factory.mktemp("updated"), read_all(run)
+    return update_area(make_request(run, cloud, out)), out, before
+
+
+def read_all(folder):
+    return {p: p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_every_house_gets_its_class(update):
+    summary, out, _ = update
+    assert summary.by_change == {"unchanged": 2, "changed": 1, "gone": 1}
+    changes = {id: row.get("change") for id, row in by_id(out).items()}
+    assert changes["house-1"]["class"] == "changed"
+    assert changes["house-1"]["places"][0]["kind"] == "roof_raised"
+    assert changes["house-1"]["places"][0]["difference"] == pytest.approx(RAISED_M, abs=0.05)
+    assert changes["house-2"]["class"] == "gone"
+    assert changes["house-0"] is changes["house-3"] is None
+
+
+def test_unchanged_houses_keep_their_bytes_and_the_run_stays(update, run):
+    _, out, before = update
+    old, new = ((f / "parameters.jsonl").read_bytes().splitlines() for f in (run, out))
+    assert [a == b for a, b in zip(old, new, strict=True)] == [True, True, False, False, True]
+    solids = [(f / "buildings.city.jsonl").read_bytes().splitlines() for f in (run, out)]
+    assert [a == b for a, b in zip(*solids, strict=True)][1:] == [True, False, False, True]
+    assert read_all(run) == before
+
+
+def test_the_raised_house_keeps_its_parts_and_is_as_high_as_its_points(update, run):
+    _, out, _ = update
+    old, new = by_id(run)["house-1"], by_id(out)["house-1"]
+    assert new["change"]["lineage"] == [0]
+    assert [part["type"] for part in new["parts"]] == [part["type"] for part in old["parts"]]
+    tops = [r["parts"][0]["position"][2] + r["origin"][2] for r in (old, new)]
+    assert tops[1] - tops[0] == pytest.approx(RAISED_M, abs=0.05)
+    assert by_id(out)["house-2"]["status"] == "no_building"
+
+
+def test_tables_and_attributes_say_what_changed(update):
+    _, out, _ = update
+    rows = (out / "changes.csv").read_text().splitlines()
+    assert [row.split(",")[:3] for row in rows[1:]] == [
+        ["house-1", "changed", "roof_raised"],
+        ["house-2", "gone", "demolished"],
+    ]
+    layers = dict(pyogrio.list_layers(out / "changes.gpkg"))
+    assert {"changed_buildings", "changed_places", "layer_styles"} <= set(layers)
+    info = pyogrio.read_info(out / "changes.gpkg", layer="changed_places")
+    assert info["features"] == 2
+    feature = json.loads((out / "buildings.city.jsonl").read_text().splitlines()[2])
+    attributes = feature["CityObjects"]["house-1"]["attributes"]
+    assert attributes["hiproof_change"] == "changed"
+    assert attributes["hiproof_change_kind"] == "roof_raised"
+    assert attributes["hiproof_valid_from"] == DATE
+    record = json.loads((out / "run.json").read_text())["update"]
+    assert record["by_change"] == {"unchanged": 2, "changed": 1, "gone": 1}
+    assert record["compared_with"] == "points"
+
+
+def test_build_makes_the_same_files_from_the_parameters(update, tmp_path):
+    _, out, _ = update
+    build_file(out / "parameters.jsonl", tmp_path / "built")
+    assert records(tmp_path / "built") == records(out)
+
+
+def test_a_second_update_gives_the_same_bytes(update, run, cloud, tmp_path):
+    _, out, _ = update
+    update_area(make_request(run, cloud, tmp_path))
+    for name in (*RECORDS, "changes.csv", "changes.gpkg", "buildings.gpkg"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_the_same_call_again_keeps_what_is_done(update, run, cloud):
+    summary, out, _ = update
+    before = (out / "changes.csv").read_bytes()
+    assert update_area(make_request(run, cloud, out)).by_change == summary.by_change
+    assert (out / "changes.csv").read_bytes() == before
+    with pytest.raises(OutputError, match="date"):
+        update_area(make_request(run, cloud, out, date="2024-05-02"))
+
+
+def test_an_update_of_an_update_starts_from_its_models(update, cloud, tmp_path):
+    _, out, _ = update
+    summary = update_area(make_request(out, cloud, tmp_path, date="2025-05-01"))
+    assert summary.by_change == {"unchanged": 4}
+    assert records(tmp_path)["parameters.jsonl"] == records(out)["parameters.jsonl"]
+
+
+def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path):
+    run = shutil.copytree(run, tmp_path / "run")
+    record = json.loads((run / "run.json").read_text())
+    record["inputs"]["clouds"] = ["gone.laz"]
+    (run / "run.json").write_text(json.dumps(record))
+    with pytest.warns(UserWarning, match="compared with its models alone"):
+        summary = update_area(make_request(run, cloud, tmp_path / "out"))
+    assert summary.by_change == {"unchanged": 2, "changed": 1, "gone": 1}
+    assert not summary.surveys.has_earlier
+
+
+def test_the_command_prints_the_result(update, run, cloud):
+    _, out, _ = update
+    words = ["update", str(run), cloud, "--out", str(out), "--date", DATE, "--jobs", "1"]
+    result = CliRunner().invoke(app, words)
+    if result.exit_code:  # the call above was made with one process, too
+        raise AssertionError(result.output)
+    assert "4 buildings: 2 unchanged, 1 changed, 1 gone" in result.output
+
+
+def test_bad_input_is_refused_in_a_sentence(run, cloud, tmp_path):
+    run = shutil.copytree(run, tmp_path / "run")
+    xyz, classes = make_later_survey()
+    cases = [
+        (dict(out=run), OutputError, "never changes its run"),
+        (dict(significance=0.0), SettingsError, "between 0 and 1"),
+        (dict(date="May 2024"), InputError, "--date 2014-02-09"),
+        (dict(run=tmp_path), InputError, "finished run"),
+        (dict(clouds=(far_cloud(tmp_path, xyz, classes),)), InputError, "which lie in"),
+        (dict(clouds=(other_crs(tmp_path, xyz, classes),)), InputError, "in the CRS of"),
+    ]
+    for change, error, text in cases:
+        with pytest.raises(error, match=text):
+            update_area(make_request(run, cloud, tmp_path / "out", **change))
+    lines = (run / "parameters.jsonl").read_text().splitlines()
+    lines[2] = lines[2].replace('"type":"gable"', '"type":"dome"')
+    (run / "parameters.jsonl").write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match=r"building house-1 in .*parameters\.jsonl"):
+        update_area(make_request(run, cloud, tmp_path / "out"))
+    assert not (tmp_path / "out" / "parameters.jsonl").exists()
+
+
+def far_cloud(folder, xyz, classes):
+    far = xyz + (5000.0, 0.0, 0.0)
+    return str(write_cloud(folder / "far.laz", far, classes, origin=ORIGIN + (5000.0, 0.0, 0.0)))
+
+
+def other_crs(folder, xyz, classes):
+    return str(write_cloud(folder / "utm.laz", xyz, classes, crs="EPSG:25832"))
+
+
+def test_a_survey_is_dated_by_its_points_its_files_or_the_user(tmp_path):
+    import laspy
+
+    xyz, classes = make_later_survey()
+    path = write_cloud(tmp_path / "a.laz", xyz[:50], classes[:50])
+    las = laspy.read(path)
+    las.header.creation_date = datetime.date(2019, 3, 4)
+    las.write(path)
+    with pytest.warns(UserWarning, match="dated 2019-03-04"):
+        assert find_survey_date((str(path),)) == "2019-03-04"
+    las.header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
+    las.gps_time = np.full(50, 7.5e7)
+    las.write(path)
+    assert find_survey_date((str(path),)) == "2014-01-29"
+    assert find_survey_date((str(path),), "2020-02-03") == "2020-02-03"
+    text = tmp_path / "a.xyz"
+    text.write_text("1 2 3\n")
+    with pytest.raises(InputError, match="--date"):
+        find_survey_date((str(text),))
