@@ -20,6 +20,13 @@ def enrich(
         float,
         typer.Option(help="distance up to which walls of neighbours touch, m", min=0.0, max=2.0),
     ] = 0.3,
+    use_attribute: Annotated[
+        str,
+        typer.Option(
+            help="attribute of the footprints that names the use of a building, such as "
+            "residential or office (default: all are residential)"
+        ),
+    ] = "",
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -28,7 +35,7 @@ def enrich(
         ),
     ] = None,
 ) -> None:
-    """Add party walls and areas to the models of a finished run.
+    """Add party walls, areas, house types and storeys to the models of a run.
 
     The run's own files stay as they are. A second call replaces the results of the first; run the
     same command again to resume an interrupted one.
@@ -39,7 +46,11 @@ def enrich(
         from ..enrich.run import Questions, enrich_run
 
         result = enrich_run(
-            run, out, Questions(touch), jobs, lambda done, total: update("enrich", done, total)
+            run,
+            out,
+            Questions(touch, use_attribute),
+            jobs,
+            lambda done, total: update("enrich", done, total),
         )
     typer.echo(f"{count_things(result.buildings, 'building')} enriched")
     typer.echo("files: " + ", ".join(map(str, result.files)))

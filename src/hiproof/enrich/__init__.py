@@ -6,6 +6,9 @@ party       where the walls of two buildings touch
 cut         a solid whose walls are cut along their party walls
 town        the buildings of a run with their walls and where these touch
 areas       areas of outer walls, party walls, roofs and grounds
+house_type  the type of a house by the houses that it touches, its size, and its use
+storeys     storeys and floor areas, as intervals
+ridge       the direction of a roof's ridge
 answer      all answers about one building
 write       a building's answers as texts for the files of a run
 run         `hiproof enrich`: every building of a run, in parallel

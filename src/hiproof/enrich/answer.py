@@ -10,10 +10,14 @@ import shapely
 
 from ..model import Building, Solid
 from ..write.attribute_list import OWN
+from ..write.roof_figures import find_ground_height, roof_figures
 from ..write.values import plain_text, round_value
 from .areas import OF_3DBAG, measure_areas
 from .cut import Region, cut_walls
+from .house_type import is_residential, name_house_type, name_tabula_class
 from .party import Contact
+from .ridge import find_ridge_direction
+from .storeys import count_storeys, measure_floors, storey_heights
 from .town import Town
 
 
@@ -28,8 +32,11 @@ class Answers(NamedTuple):
     surfaces: dict[int, dict[str, Any]]
 
 
-def answer(town: Town, number: int) -> Answers:
-    """Answers all questions about building `number`."""
+def answer(town: Town, number: int, use_attribute: str = "") -> Answers:
+    """Answer all questions about building `number`.
+
+    `use_attribute` names the attribute of the input that has its use, empty where none has.
+    """
     building = town.read(number)
     if building.built is None:
         return Answers(building, {f"{OWN}neighbours_unknown": True}, {})
@@ -40,11 +47,41 @@ def answer(town: Town, number: int) -> Answers:
     attributes = {
         **{OWN + name: round_value(area, 4) for name, area in areas.items()},
         **{name: round_value(areas[own], 4) for own, name in OF_3DBAG.items()},
+        **describe_house(town, number, areas, building.attributes.get(use_attribute)),
         f"{OWN}party_walls": describe_party(town, contacts),
         f"{OWN}neighbours_unknown": town.lacks_neighbours(number),
     }
     surfaces = {face: {f"{OWN}party_with": name} for face, name in party.items()}
     return Answers(with_solid(building, solid), attributes, surfaces)
+
+
+def describe_house(town: Town, number: int, areas: dict[str, float], use: Any) -> dict[str, Any]:
+    """Return type, storeys, volume and floor areas of building `number`.
+
+    `areas` are those of its surfaces.
+    """
+    building = town.read(number)
+    figures = roof_figures(building.solid)
+    z_ground = find_ground_height(building, figures)
+    heights = storey_heights(is_residential(use))
+    storeys = count_storeys(figures.h_eave - z_ground, heights)
+    floors = measure_floors(building.solid, z_ground, heights)
+    house_type = name_house_type(town, number, sum(floors) / 2, use)
+    envelope = sum(areas.values()) - areas["party_wall_area_m2"]
+    ridge = find_ridge_direction(building.solid)
+    values = {
+        "house_type": house_type,
+        "tabula_class": name_tabula_class(house_type, sum(floors) / 2),
+        "storeys_min": storeys[0],
+        "storeys_max": storeys[1],
+        "gross_floor_area_min_m2": round_value(floors[0], 2),
+        "gross_floor_area_max_m2": round_value(floors[1], 2),
+        "heated_volume_m3": round_value(figures.volume_m3, 2),
+        "envelope_area_m2": round_value(envelope, 4),
+        "compactness": round_value(envelope / figures.volume_m3, 4),
+        "ridge_direction_deg": None if ridge is None else round_value(ridge, 3),
+    }
+    return {OWN + name: value for name, value in values.items()}
 
 
 def group_regions(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> dict[int, list[Region]]:

@@ -45,6 +45,7 @@ class Questions(NamedTuple):
     """What is asked of every building."""
 
     touch_m: float = PARTY_GAP_M
+    use_attribute: str = ""
 
 
 class Enriched(NamedTuple):
@@ -142,7 +143,9 @@ def enrich_block(parameters: str, questions: Questions, block: str, first: int, 
     """Write the texts of the buildings [first, last) to the file `block`."""
     town = open_town(parameters, questions, str(Path(block).with_name("index.npz")))
     head = find_head(town.records)
-    parts = [make_fragments(town, number, head) for number in range(first, last)]
+    parts = [
+        make_fragments(town, number, head, questions.use_attribute) for number in range(first, last)
+    ]
     with atomic_file(block) as file:
         save_fragments(file, parts)
 

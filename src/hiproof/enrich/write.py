@@ -23,14 +23,14 @@ def list_kinds(write: WriteSettings) -> list[str]:
     return [kind for kind in requested_fragments(write) if kind not in NOT_MADE]
 
 
-def make_fragments(town: Town, number: int, head: FileHead) -> Fragments:
+def make_fragments(town: Town, number: int, head: FileHead, use_attribute: str = "") -> Fragments:
     """Return the texts of building `number`, with all answers about it.
 
     A building whose geometry defeats a library stays as it was, and the log says so.
     """
     building = town.read(number)
     try:
-        result = answer(town, number)
+        result = answer(town, number, use_attribute)
     except (ValueError, shapely.GEOSException) as error:
         LOGGER.warning("building %s was not enriched: %s", building.id, error)
         result = Answers(building, {}, {})

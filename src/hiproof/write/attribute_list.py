@@ -185,6 +185,31 @@ ENRICHED = (
         "area of the party wall with each neighbour by id, as JSON; either neighbour has the same",
     ),
     Attribute(
+        "house_type",
+        "text",
+        "",
+        "detached, semi_detached, end_terrace, mid_terrace or apartment_block; null where it is no "
+        "house",
+    ),
+    Attribute("tabula_class", "text", "", "TABULA's class: SFH, TH, MFH or AB"),
+    Attribute("storeys_min", "count", "", "least number of full storeys below the eaves"),
+    Attribute("storeys_max", "count", "", "greatest number of them"),
+    Attribute(
+        "gross_floor_area_min_m2", "number", "m2", "least area of all floors, attics included"
+    ),
+    Attribute("gross_floor_area_max_m2", "number", "m2", "greatest area of them"),
+    Attribute("heated_volume_m3", "number", "m3", "volume of the solid, the attic included"),
+    Attribute(
+        "envelope_area_m2", "number", "m2", "area of outer walls, roof and ground, which lose heat"
+    ),
+    Attribute("compactness", "number", "1/m", "A/V: area of the envelope by the volume"),
+    Attribute(
+        "ridge_direction_deg",
+        "number",
+        "deg",
+        "compass direction of the longest level ridge, 0 to 180; null without one",
+    ),
+    Attribute(
         "neighbours_unknown",
         "flag",
         "",
