@@ -4,7 +4,7 @@
 
 One process runs Delft twice. The second run is measured, so that imports and loaded code do not
 count. Every stage is timed without the stages inside it; "other" is the rest of the run. The table
-ends with the total, measured around the run.
+ends with the total, measured around the run. The stages have to sum to it within MOST_OTHER.
 """
 
 from __future__ import annotations
@@ -43,6 +43,9 @@ STAGES = {
     "keep the texts of a tile": "hiproof.city.solve.save_fragments",
     "join the files": "hiproof.city.run.merge",
 }
+
+MOST_OTHER = 0.05
+"""Largest share of the total that no stage counts; a new step of a run belongs to a stage."""
 
 
 class Clock:
@@ -92,6 +95,16 @@ def print_table(clock: Clock, total: float, buildings: int) -> None:
         print(f"| {stage} | {1000 * seconds / buildings:.2f} | {100 * seconds / total:.1f} % |")
 
 
+def refuse_incomplete(clock: Clock, total: float) -> None:
+    """End with an error where the stages do not sum to the total (s)."""
+    counted = sum(clock.seconds.values())
+    if not (1 - MOST_OTHER) * total <= counted <= (1 + MOST_OTHER) * total:
+        raise SystemExit(
+            f"Expected stages that sum to {total:.2f} s within {MOST_OTHER:.0%}, got "
+            f"{counted:.2f} s. Add what is missing to STAGES."
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="accepted; the run is short anyway")
@@ -108,7 +121,9 @@ def main() -> None:
             clouds, Path(out), str(data / "footprints.gpkg"), restart=True, processes=1
         )
         reconstruct_area(request)
-        print_table(*measure(lambda: reconstruct_area(request)))
+        clock, total, buildings = measure(lambda: reconstruct_area(request))
+        print_table(clock, total, buildings)
+        refuse_incomplete(clock, total)
 
 
 if __name__ == "__main__":
