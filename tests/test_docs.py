@@ -194,8 +194,9 @@ def test_every_named_number_has_a_reason():
             "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.sparse', 'scipy.spatial', "
             "'onnxruntime', 'rasterio', 'xml.etree'",
         ),
+        ("hiproof.classify.split", "'scipy.ndimage', 'scipy.spatial'"),
     ],
-    ids=["the package", "a run"],
+    ids=["the package", "a run", "buildings by their class"],
 )
 def test_nothing_is_imported_that_few_need(modules, absent):
     code = f"import sys, {modules}; print([m for m in ({absent}) if m in sys.modules])"

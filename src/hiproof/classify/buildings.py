@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..read.assign import PointGrid
 from ..read.pointcloud import Box
@@ -188,7 +188,7 @@ def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.nd
         cells.count(odds > 0), cells.count(mask), cells.count(is_large & (odds > 0)) > 0, cell_m
     )
     inside, nearby = (
-        where.ravel()[cells.index] for where in (plan, ndimage.binary_dilation(plan, SQUARE))
+        where.ravel()[cells.index] for where in (plan, scipy.ndimage.binary_dilation(plan, SQUARE))
     )
     below_roof = (height < cells.highest(height, odds > 0).ravel()[cells.index]) & (odds > UNLIKELY)
     return (inside & ~mask & (height > WALL_FOOT_M)) | (nearby & mask & ((odds > 0) | below_roof))
@@ -205,22 +205,24 @@ def building_cells(
     likely = close_gaps((solid > 0) & (2 * solid >= upper))
     core = close_gaps(core & likely)
     narrowest = max(1, round(NARROWEST_M / cell_m))
-    core = ndimage.binary_opening(core, np.ones((narrowest, narrowest)))
-    label, count = ndimage.label(core, SQUARE)
-    area = ndimage.sum_labels(core, label, np.arange(count + 1)) * cell_m**2
+    core = scipy.ndimage.binary_opening(core, np.ones((narrowest, narrowest)))
+    label, count = scipy.ndimage.label(core, SQUARE)
+    area = scipy.ndimage.sum_labels(core, label, np.arange(count + 1)) * cell_m**2
     core = core & (area >= FEWEST_M2)[label]
     reach = round(REACH_M / cell_m)
     plan = core | (
-        likely & ndimage.binary_dilation(core, SQUARE, iterations=reach) if reach else likely & core
+        likely & scipy.ndimage.binary_dilation(core, SQUARE, iterations=reach)
+        if reach
+        else likely & core
     )
     gaps = (
-        ndimage.binary_fill_holes(plan)
+        scipy.ndimage.binary_fill_holes(plan)
         & (upper > 0)
-        & (ndimage.uniform_filter(plan.astype(float), 7) > 0.6)
+        & (scipy.ndimage.uniform_filter(plan.astype(float), 7) > 0.6)
     )
     return plan | gaps
 
 
 def close_gaps(cells: np.ndarray) -> np.ndarray:
     """Return `cells` (c, r) with the narrow gaps that they surround."""
-    return cells | ndimage.binary_closing(np.pad(cells, 2), SQUARE)[2:-2, 2:-2]
+    return cells | scipy.ndimage.binary_closing(np.pad(cells, 2), SQUARE)[2:-2, 2:-2]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..read.thin import cell_range
 
@@ -47,7 +47,7 @@ class SquareCells:
 
         `values` (n,) are those of the points `selection` (n,).
         """
-        return ndimage.maximum_filter(self.top(np.where(selection, values, -np.inf)), 3)
+        return scipy.ndimage.maximum_filter(self.top(np.where(selection, values, -np.inf)), 3)
 
     def compute_local_share(self, selection: np.ndarray, width_m: float) -> np.ndarray:
         """Return the share of `selection` (n,) among the points near each cell.
@@ -56,7 +56,7 @@ class SquareCells:
         """
         size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
         mean = [
-            ndimage.uniform_filter(self.count(c).astype(float), size)
+            scipy.ndimage.uniform_filter(self.count(c).astype(float), size)
             for c in (selection, np.ones(len(selection), bool))
         ]
         return (mean[0] / np.maximum(mean[1], 1e-9)).ravel()

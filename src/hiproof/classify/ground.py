@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from ..read.thin import cell_range
 
@@ -46,7 +46,7 @@ class GroundGrid:
         Beyond the border it is that of the border.
         """
         place = (np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m - 0.5
-        return ndimage.map_coordinates(self.z, place.T, order=1, mode="nearest")
+        return scipy.ndimage.map_coordinates(self.z, place.T, order=1, mode="nearest")
 
     def slope_at(self, xy: np.ndarray) -> np.ndarray:
         """Return the steepness (n,), a ratio, of the cell that holds each of `xy`."""
@@ -129,10 +129,10 @@ def open_heights(z: np.ndarray, half: int) -> np.ndarray:
     The middles of the squares are known cells. Unknown ones (NaN) take no part.
     """
     mask, size = np.isfinite(z), 2 * half + 1
-    eroded = ndimage.grey_erosion(
+    eroded = scipy.ndimage.grey_erosion(
         np.where(mask, z, np.inf), size=size, mode="constant", cval=np.inf
     )
-    return ndimage.grey_dilation(
+    return scipy.ndimage.grey_dilation(
         np.where(mask, eroded, -np.inf), size=size, mode="constant", cval=-np.inf
     )
 
@@ -145,8 +145,10 @@ def fill_gaps(z: np.ndarray) -> np.ndarray:
     mask = np.isfinite(z)
     if not mask.any():
         return np.zeros(z.shape)
-    nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    nearest = scipy.ndimage.distance_transform_edt(
+        ~mask, return_distances=False, return_indices=True
+    )
     heights = z[tuple(nearest)]
     for _ in range(SMOOTHINGS):
-        heights = np.where(mask, z, ndimage.uniform_filter(heights, 3, mode="nearest"))
+        heights = np.where(mask, z, scipy.ndimage.uniform_filter(heights, 3, mode="nearest"))
     return heights
