@@ -35,6 +35,8 @@ NAMED = re.compile(
 
 # A scheme, or what a slip has left of it.
 SCHEME = re.compile(r"^(?:/vsi\w+[/?])?[\w+.-]*:?//?|^[\w+.-]+:(?=[^@]*:)")
+# A scheme that is none where a user's name stands.
+USER_LIKE_A_SCHEME = re.compile(r"^(?:/vsi\w+[/?])?[\w+.-]*:?//?")
 # The value of a parameter with a secret, and all that follows.
 VALUE = re.compile(rf"{SECRET_NAME}(.*)", re.IGNORECASE | re.DOTALL)
 END = re.compile(r"[&\s;]+[\w-]+\s*=")  # of a value: the next parameter
@@ -98,6 +100,11 @@ def names_a_file(address: str) -> bool:
         return False
 
 
+def names_a_secret(text: str) -> bool:
+    """Return whether a parameter with a secret begins in `text`, such as `password=`."""
+    return re.search(SECRET_NAME, text, re.IGNORECASE) is not None
+
+
 def find_secrets(address: str) -> set[str]:
     """Return the secrets in an address, however malformed, and their pieces.
 
@@ -125,7 +132,19 @@ def candidates(address: str) -> Iterator[str]:
 
     It is what follows a user's name up to an @, and values of named parameters.
     """
-    remainder = SCHEME.sub("", address, count=1)
+    for remainder in {SCHEME.sub("", address, count=1), USER_LIKE_A_SCHEME.sub("", address)}:
+        yield from before_an_at(remainder, address)
+    for result in VALUE.finditer(address):
+        yield from values_at(result[1])
+    # VALUE takes all that follows, so parameters within it are looked for by their names.
+    for result in re.finditer(SECRET_NAME, address, re.IGNORECASE):
+        yield from values_at(address[result.end() :])
+        if "?" in address:  # blanks part no parameters there
+            yield re.split(r"[&;]", address[result.end() :], maxsplit=1)[0]
+
+
+def before_an_at(remainder: str, address: str) -> Iterator[str]:
+    """Yield what may be a password in the `remainder` of an address behind its scheme."""
     for end in {
         remainder.find("@"),
         remainder.rfind("@"),
@@ -134,13 +153,8 @@ def candidates(address: str) -> Iterator[str]:
         user, colon, password = remainder[: max(end, 0)].partition(":")
         if colon:
             yield password
-        elif re.match(r"(?:/vsi\w+/)?https?:", address, re.IGNORECASE):
-            yield user
-    for result in VALUE.finditer(address):
-        yield from values_at(result[1])
-    # VALUE takes all that follows, so parameters within it are looked for by their names.
-    for result in re.finditer(SECRET_NAME, address, re.IGNORECASE):
-        yield from values_at(address[result.end() :])
+        if re.match(r"(?:/vsi\w+/)?https?:", address, re.IGNORECASE):
+            yield user  # a token may stand alone, and hold a colon
 
 
 def values_at(text: str) -> Iterator[str]:
@@ -153,7 +167,9 @@ def values_at(text: str) -> Iterator[str]:
     if text[0] in "'\"":
         inner = re.match(r"((?:\\.|[^\\])*?)(?:(?<!\\)" + text[0] + r"|$)", text[1:], re.DOTALL)
         value = inner[1] if inner else text[1:]
-        yield from (value, re.sub(r"\\(.)", r"\1", value))
+        # a quote within the value ends it too early
+        all_of_it = END.split(text[1:], maxsplit=1)[0].rstrip("'\"")
+        yield from (value, re.sub(r"\\(.)", r"\1", value), all_of_it)
         return
     value = END.split(text, maxsplit=1)[0]
     yield from (value, unquote_plus(value), re.split(r"[&\s]", value, maxsplit=1)[0])

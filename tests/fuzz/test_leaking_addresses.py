@@ -2,10 +2,13 @@
 
 import random
 import re
+from unittest.mock import patch
 
 import pytest
 
 from fuzz.leaking_addresses import PARTS, draw_address, find_leak, find_leaks
+from hiproof import masking
+from hiproof.cli import addresses_in
 from hiproof.masking import mask, remember
 
 COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_addresses` tries more
@@ -14,6 +17,29 @@ COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_add
 @pytest.mark.filterwarnings("ignore")
 def test_no_command_repeats_a_password(tmp_path):
     assert list(find_leaks(tmp_path, COUNT, selection=1)) == []
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "https://S3cr3t pAss@127.0.0.1:1/a.laz",
+        "adm:S3cr3t pAss@127.0.0.1:1/t",
+        "http:/adm:S3cr3t pAss@127.0.0.1:1/a.laz@",
+        "postgresql://127.0.0.1:1/t?user=adm&password=S3cr3t pAss&table=fp",
+        "host=127.0.0.1 password='S3cr3t'pAss' user=adm",
+        "https://S3cr3t:pAss@127.0.0.1:1/a.laz@",
+        "adm:S3cr3t:pAss@127.0.0.1:1/t",
+        "host=127.0.0.1 password = S3cr3t pAss",
+    ],
+)
+def test_a_password_that_the_shell_cuts_into_pieces_is_hidden(address):
+    secrets = masking.Secrets()
+    with patch.object(masking, "SECRETS", secrets):
+        remember(*addresses_in(["load", "run", *address.split(" ")]))
+        for piece in address.split(" "):
+            shown = mask(f"Got unexpected extra argument(s) ({piece})")
+            assert "S3cr3t" not in shown
+            assert "pAss" not in shown
 
 
 def test_pieces_that_a_library_may_quote_are_hidden():

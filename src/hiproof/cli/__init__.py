@@ -5,7 +5,6 @@ It is imported only when that command runs.
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator
 from itertools import takewhile
@@ -13,7 +12,6 @@ from itertools import takewhile
 from ..early import INTERRUPTED
 from ..garbage import collect_rarely
 
-CUT_OFF = re.compile(r"//[^/@\s]*:(?!\d*(?:/|$))[^@]*$")  # an address that ends within its password
 KEPT = (
     "interrupted; no file is left half written. What a run had finished is kept: the same command "
     "goes on from there"
@@ -63,18 +61,19 @@ def run_command() -> None:
 def addresses_in(arguments: list[str]) -> Iterator[str]:
     """Yield arguments that may be addresses.
 
-    They are arguments, values of options, and passwords that a blank has cut into several
-    arguments.
+    They are arguments, values of options, and addresses that blanks in a password have cut into
+    several arguments.
 
-    >>> list(addresses_in(["load", "--prefix=a", "password=S3", "cr3t", "-x"]))
-    ['load', '--prefix=a', 'a', 'password=S3', 'password=S3 cr3t', 'cr3t', '-x']
+    >>> list(addresses_in(["--prefix=a", "run", "password=S3", "cr3t"]))[3:]
+    ['run password=S3 cr3t', 'password=S3', 'password=S3 cr3t', 'cr3t']
     """
+    from ..masking import names_a_secret
+
     for index, argument in enumerate(arguments):
         yield argument
         if argument.startswith("--") and "=" in argument:
             yield argument.partition("=")[2]
         additions = list(takewhile(lambda other: not other.startswith("-"), arguments[index + 1 :]))
-        if argument.lower().startswith(("password=", "pwd=")):
-            yield " ".join([argument, *takewhile(lambda other: "=" not in other, additions)])
-        elif CUT_OFF.search(argument) and any("@" in other for other in additions):
+        is_cut = ":" in argument and any("@" in other for other in additions)
+        if is_cut or names_a_secret(" ".join([argument, *additions[:1]])):
             yield " ".join([argument, *additions])
