@@ -1,5 +1,6 @@
 """A run decodes each point file once, and gets from it what it would decode again."""
 
+import json
 from collections import Counter
 
 import laspy
@@ -10,7 +11,7 @@ from hiproof import Request, Settings, reconstruct_area
 from hiproof.read import decoded
 from hiproof.read.decoded import HOLDER, forget_points, hold_points
 from hiproof.read.pointcloud import iter_points
-from tiny_town import make_town, write_town
+from tiny_town import make_town, write_cloud, write_town
 
 FLAT = Settings.from_dict(
     {"fit": {"parts": "one", "types": ["flat"]}, "segment": {"network": "never"}}
@@ -99,3 +100,40 @@ def test_a_run_decodes_each_point_once(files, decoded_points, tmp_path, has_foot
     assert reconstruct_area(request).buildings == 3
     assert list(decoded_points.values()) == [len(make_town(3).xyz)]
     assert not HOLDER.held
+
+
+def test_a_file_that_is_named_from_its_folder_is_decoded_once(
+    files, decoded_points, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(files["cloud"].parent)
+    request = Request((files["cloud"].name,), tmp_path / "out", settings=FLAT)
+    assert reconstruct_area(request).buildings == 3
+    assert decoded_points.total() == len(make_town(3).xyz)
+
+
+def test_of_a_large_file_a_box_is_decoded_again(decoded_points, tmp_path, monkeypatch):
+    """Points stand in the order of a flight, from house to house."""
+    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
+    monkeypatch.setattr(decoded, "MOST_HELD_POINTS", 1000)
+    town = make_town(6)
+    flown = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
+    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz[flown], town.classification[flown])
+    # so that no point is read to learn which classes there are
+    by_class = FLAT.replace({"read": {"roofs": "class"}})
+    box = tuple(town.footprints["house-0"].bounds)
+    near, whole = (
+        Request((str(cloud),), tmp_path / name, bbox=bbox, settings=by_class)
+        for name, bbox in (("near", box), ("whole", None))
+    )
+    assert reconstruct_area(near).buildings == 1
+    assert len(town.xyz) < decoded_points.total() < 1.4 * len(town.xyz)
+    assert not HOLDER.places
+    reconstruct_area(whole)
+    (building,), buildings = (
+        [
+            json.loads(line)
+            for line in (request.out / "parameters.jsonl").read_text().splitlines()[1:]
+        ]
+        for request in (near, whole)
+    )
+    assert building in buildings

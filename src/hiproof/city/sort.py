@@ -26,6 +26,7 @@ from ..frames import Units
 from ..model import PointCloud
 from ..read.assign import PointGrid
 from ..read.cell_kernel import mask_at
+from ..read.decoded import is_held, take_places
 from ..read.las import is_copc
 from ..read.lax import read_lax
 from ..read.pointcloud import as_input_error, file_kind, iter_points, read_header
@@ -232,6 +233,8 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     gatherer = Gatherer(reaches, plan.settings.read, root / "points", number)
     noted = noted_file(root, number)
     result: list[np.ndarray] = []
+    if places := take_places(address):
+        save_run_boxes(noted, places, read_header(address).count)
     try:
         for cloud in wanted_points(address, reaches, plan.units, noted, result):
             gatherer.add(cloud)
@@ -258,9 +261,9 @@ def wanted_points(
 ) -> Iterator[PointCloud]:
     """Yield the chunks of a file in `units` that may be needed.
 
-    They are all of its chunks; of a file with a spatial index, or where a part of the area is
-    wanted and `noted` is the file with the places of its points, only what holds buildings'
-    surroundings. Where it is read from end to end, `result` gets these places (noted.py).
+    They are all of its chunks; of a file with a spatial index, or with the places of its points in
+    the file `noted`, only what holds buildings' surroundings. Where it is read from end to end,
+    `result` gets these places (noted.py).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)
@@ -271,8 +274,8 @@ def wanted_points(
         return iter(())
     if is_copc(path):
         return points_by_squares(path, reaches, units)
-    index = read_lax(path) or (load_run_boxes(noted, header.count) if reaches.is_partial else None)
-    if index is None:
+    index = read_lax(path) or load_run_boxes(noted, header.count)
+    if index is None or is_held(path):
         return iter_points(path, units=units, noted=result)
     boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
     return iter_points(path, runs=index.find_runs(boxes), units=units)

@@ -1,15 +1,17 @@
 """Points of LAS, LAZ and COPC files as they are decoded, in few bytes.
 
 A run reads its files twice, to plan and to sort their points, and decoding takes most of the time
-of reading. So what is read from end to end inside `hold_points` is held for the next reading.
+of reading. So what is read from end to end inside `hold_points` is held for the next reading. Of a
+file with too many points, the places of its runs are held: a box needs few of them (runs.py).
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -53,17 +55,22 @@ def take_decoded(record: Any) -> Decoded:
     )
 
 
+FileKey: TypeAlias = tuple[str, tuple[int, int] | None]
+"""A file's name and state: one that was written again in between is another one."""
+
+
 class Holder:
-    """The chunks of whole files that are held, by a file's name and state."""
+    """The chunks of whole files that are held, and boxes (k, 4) of their runs."""
 
     def __init__(self) -> None:
         self.is_open = False
-        self.held: dict[tuple, list[Decoded]] = {}
+        self.held: dict[FileKey, list[Decoded]] = {}
+        self.places: dict[FileKey, list[np.ndarray]] = {}
 
     def count_points(self) -> int:
         return sum(len(chunk.classes) for chunks in list(self.held.values()) for chunk in chunks)
 
-    def hold(self, key: tuple, chunks: Iterator[Decoded], count: int) -> Iterator[Decoded]:
+    def hold(self, key: FileKey, chunks: Iterator[Decoded], count: int) -> Iterator[Decoded]:
         """Yield the chunks of a file of `count` points, and hold them once all are read.
 
         Nothing is held of a file that breaks off, or for which there is no room.
@@ -79,7 +86,7 @@ class Holder:
                 self.held[key] = passed
             yield chunk
 
-    def release(self, key: tuple, chunk_points: int) -> Iterator[Decoded] | None:
+    def release(self, key: FileKey, chunk_points: int) -> Iterator[Decoded] | None:
         """Return the chunks of a file that is held.
 
         None of them is held any longer once it is yielded. None is for a file that is not held, or
@@ -107,6 +114,7 @@ def hold_points() -> Iterator[None]:
 def forget_points() -> None:
     """Hold no file any longer."""
     HOLDER.held.clear()
+    HOLDER.places.clear()
 
 
 def decode_or_release(
@@ -114,8 +122,39 @@ def decode_or_release(
 ) -> Iterator[Decoded]:
     """Yield the `chunks` of a whole file, or what is held of it.
 
-    It has `count` points. A file that was written again in between is another one.
+    It has `count` points.
     """
-    facts = None if is_url(path) else Path(path).stat()
-    key = (str(path), facts and (facts.st_mtime_ns, facts.st_size))
+    key = identify_file(path)
     yield from HOLDER.hold(key, HOLDER.release(key, chunk_points) or chunks, count)
+
+
+def is_held(path: str | Path) -> bool:
+    """Return whether the points of a file need not be decoded again."""
+    return identify_file(path) in HOLDER.held
+
+
+def note_places(path: str | Path) -> list[np.ndarray] | None:
+    """Return a list for the boxes of a file's runs while it is read from end to end.
+
+    It is None outside of `hold_points`.
+    """
+    if not HOLDER.is_open:
+        return None
+    places: list[np.ndarray] = []
+    HOLDER.places[identify_file(path)] = places
+    return places
+
+
+def take_places(path: str | Path) -> list[np.ndarray]:
+    """Return the boxes of a file's runs, and hold them no longer.
+
+    There are none where the file was not read.
+    """
+    return HOLDER.places.pop(identify_file(path), [])
+
+
+def identify_file(path: str | Path) -> FileKey:
+    if is_url(path):
+        return str(path), None
+    facts = Path(path).stat()
+    return os.path.abspath(path), (facts.st_mtime_ns, facts.st_size)

@@ -20,7 +20,7 @@ import numpy as np
 from ..errors import InputError, InputWarning
 from ..log import count_things
 from .copc import check_nodes, copc_record
-from .decoded import Decoded, decode_or_release, take_decoded
+from .decoded import Decoded, decode_or_release, note_places, take_decoded
 from .las_header import LasFacts, check_all_points, check_points, read_facts
 from .plausible import Implausible
 from .remote import is_url, open_binary
@@ -111,6 +111,8 @@ def las_chunks(
         np.full(3, -np.inf),
         0,
     )
+    if noted is None and runs is None:
+        noted = note_places(path)
     with translate_errors(path):
         for points in decode_runs(path, chunk_points, facts.count, runs):
             xyz = points.xyz
