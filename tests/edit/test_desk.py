@@ -130,6 +130,7 @@ def test_the_most_doubtful_come_first(desk):
             "points of other classes",
         ),
         ({"types": {"hip": 0.5, "gable": 0.45}}, "hip or gable"),
+        ({"change": {"class": "uncertain"}}, "uncertain change"),
         (
             {"parts": [{"sigma": {"t_z": 0.5}}, {"sigma": {"rotation": 5.0}}]},
             "1 of 2 parts on few points",
@@ -431,3 +432,9 @@ def test_the_list_holds_only_the_kinds_and_ids_that_are_named(folder, caplog):
     assert list_ids("changed") == [] and "no building of the run" in caplog.text
     with pytest.raises(InputError, match="doubtful, no_points, changed or ids"):
         list_ids("house-99")
+
+
+def test_an_uncertain_change_comes_before_the_worst_model():
+    worst = {"status": "flat_fallback", "quality": "poor", "residuals": {"share_within_20cm": 0.0}}
+    uncertain = {"status": "modelled", "change": {"class": "uncertain"}}
+    assert measure_doubt(uncertain).amount > measure_doubt(worst).amount

@@ -20,7 +20,7 @@ from hiproof.update.dates import find_survey_date
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import RECORDS, by_id, records
-from tiny_town import ORIGIN, make_town, write_cloud
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
 DATE = "2024-05-01"
 RAISED_M = 2.0
@@ -218,3 +218,58 @@ def test_a_survey_is_dated_by_its_points_its_files_or_the_user(tmp_path):
     text.write_text("1 2 3\n")
     with pytest.raises(InputError, match="--date"):
         find_survey_date((str(text),))
+
+
+def draw_footprints(folder, outlines):
+    return str(write_footprints(folder / "new.geojson", outlines))
+
+
+def test_new_footprints_keep_ids_and_name_predecessors(run, cloud, tmp_path):
+    """One is drawn again under another name, one extended, one split, one missing, one added."""
+    outlines = make_town().footprints
+    x0, y0, x1, y1 = outlines["house-2"].bounds
+    names = {
+        "A0": outlines["house-0"],
+        "A1": outlines["house-1"].union(shapely.box(*outlines["house-1"].bounds).buffer(1.0)),
+        "A2-west": shapely.box(x0, y0, (x0 + x1) / 2, y1),
+        "A2-east": shapely.box((x0 + x1) / 2, y0, x1, y1),
+        "yard": shapely.box(x1 + 4, y0, x1 + 9, y1),
+    }
+    later = make_town(seed=7)
+    same = str(write_cloud(tmp_path / "same.laz", later.xyz, later.classification))
+    request = make_request(run, same, tmp_path / "out", footprints=draw_footprints(tmp_path, names))
+    update_area(dataclasses.replace(request, id_attribute="id"))
+    rows = by_id(tmp_path / "out")
+    assert list(rows) == ["house-0", "house-1", "A2-west", "A2-east", "yard", "house-3"]
+    kinds = {
+        id: [p["kind"] for p in (row.get("change") or {"places": []})["places"]]
+        for id, row in rows.items()
+    }
+    assert kinds["house-0"] == kinds["house-3"] == []
+    assert kinds["house-1"] == ["outline_changed"]
+    assert kinds["A2-west"] == kinds["A2-east"] == ["split"]
+    assert rows["A2-west"]["change"]["predecessors"] == ["house-2"]
+    assert rows["yard"]["status"] in ("no_points", "no_building")
+    text = (tmp_path / "out" / "changes.csv").read_text()
+    assert "A2-east,changed,split" in text and ",house-2" in text
+
+
+def test_a_building_whose_footprint_was_moved_keeps_its_place_and_shift(town_files, tmp_path):
+    town = make_town()
+    beside = {id: shapely.affinity.translate(p, 1.2, -0.8) for id, p in town.footprints.items()}
+    footprints = draw_footprints(tmp_path, beside)
+    reconstruct_area(Request((town_files[0],), tmp_path / "run", footprints, id_attribute="id"))
+    rows = by_id(tmp_path / "run")
+    assert any(rows["house-1"]["shift"])
+    cloud = str(write_cloud(tmp_path / "later.laz", *make_later_survey()))
+    update_area(make_request(tmp_path / "run", cloud, tmp_path / "out"))
+    after = by_id(tmp_path / "out")
+    assert after["house-0"] == rows["house-0"]
+    assert after["house-1"]["change"]["places"][0]["kind"] == "roof_raised"
+    assert after["house-1"]["shift"] == rows["house-1"]["shift"]
+    middle = [
+        shapely.Polygon(r["outline"][0]).centroid for r in (rows["house-1"], after["house-1"])
+    ]
+    origins = [r["origin"] for r in (rows["house-1"], after["house-1"])]
+    places = [(c.x + o[0], c.y + o[1]) for c, o in zip(middle, origins, strict=True)]
+    assert np.abs(np.subtract(*places)).max() < 0.01

@@ -34,6 +34,19 @@ def update(
         float,
         typer.Option(help="probability with which an unchanged building may be called changed"),
     ] = 0.001,
+    footprints: Annotated[
+        str | None,
+        typer.Option(
+            help="new building polygons (default: the outlines of the run); buildings keep their "
+            "ids, and say what they succeed where they were split or merged"
+        ),
+    ] = None,
+    layer: Annotated[
+        str | None, typer.Option(help="layer of the footprints, where a file has several")
+    ] = None,
+    id_attribute: Annotated[
+        str | None, typer.Option(help="footprint attribute that names new buildings")
+    ] = None,
     terrain: Annotated[
         str | None,
         typer.Option(
@@ -68,6 +81,9 @@ def update(
         request = UpdateRequest(
             clouds=tuple(map(str, expand_paths(tuple(clouds)))),
             out=out,
+            footprints=footprints,
+            layer=layer,
+            id_attribute=id_attribute,
             terrain=terrain,
             processes=jobs,
             scheduler=scheduler,

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..log import count_things
+from ..status import Change, Grade, Status
 from ..status import Doubt as Remark
-from ..status import Grade, Status
 from ..write.attribute_list import ANGLES
 
 UNSURE_GRADES = {Grade.FAIR.code: 0.5, Grade.POOR.code: 1.0}  # and how much each adds
@@ -21,6 +21,7 @@ LOOSE_M = 0.3  # standard deviation of a part that few points support
 UNSURE = (Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT, Status.NO_BUILDING)
 # for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
 REMARKED = 0.3
+UNCERTAIN_CHANGE = 10.0  # more than all other scores together: a person has to decide
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ def measure_doubt(record: Mapping[str, Any]) -> BuildingDoubt:
     BuildingDoubt(amount=1.4, reasons=('poor',))
     """
     result = [
+        score_change(record),
         score_residuals(record),
         unsure_grade(record),
         unsure_status(record),
@@ -54,6 +56,12 @@ def measure_doubt(record: Mapping[str, Any]) -> BuildingDoubt:
         round(sum(amount for amount, _ in scores), 4),
         tuple(reason for _, reason in scores if reason),
     )
+
+
+def score_change(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """Score a change that an update left uncertain; it comes before all other doubts."""
+    is_uncertain = (record.get("change") or {}).get("class") == Change.UNCERTAIN.code
+    return (UNCERTAIN_CHANGE, "uncertain change") if is_uncertain else None
 
 
 def score_residuals(record: Mapping[str, Any]) -> tuple[float, str] | None:

@@ -5,7 +5,9 @@ Each building is tested against the new points; what did not change stays.
 request    what the user asked for
 earlier    the earlier run: its parameters, settings and clouds
 dates      when the new points were surveyed
+members    the buildings of an update: earlier ones, and those of new footprints
 plan       the plan of the update, from the earlier buildings
+identity   which earlier building each of new footprints is
 register   the common shift between the two surveys
 residuals  heights of points over the earlier roof
 cells      both surveys compared in cells of a metre
@@ -14,6 +16,7 @@ judge      the class of a building: unchanged, changed, gone, ...
 kinds      what changed: a part raised, a dormer built, ...
 before     the earlier points sorted and the surveys registered, before there are work tiles
 lineage    parts of the new roof that continue parts of the earlier one
+places     places that changed as parameters.jsonl holds them, roofs in one frame
 solve      a work tile brought up to date
 tile       that, by name, for processes that have imported nothing yet
 tables     changes.csv and changes.gpkg

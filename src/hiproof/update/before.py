@@ -21,7 +21,8 @@ from ..errors import HiproofError, InputError
 from ..log import LOGGER
 from ..parametric.building import build
 from .earlier import EarlierRun
-from .plan import EARLIER_FOLDER, load_earlier, save_earlier
+from .members import load_members
+from .plan import EARLIER_FOLDER, save_earlier_plan
 from .register import SampledRoof, register_surveys
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Epochs, Surveys
@@ -44,7 +45,7 @@ def prepare_surveys(
     if (state / SURVEYS_FILE).exists() and (state / EARLIER_FOLDER / SORTED_MARK).exists():
         return
     shutil.rmtree(state / EARLIER_FOLDER, ignore_errors=True)
-    save_earlier(state, plan, earlier)
+    save_earlier_plan(state, plan, earlier)
     sort_earlier(earlier.clouds, state / EARLIER_FOLDER, executor)
     shift = register_surveys(draw_samples(state, plan, request.terrain))
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
@@ -71,15 +72,15 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
 
     They are those of squares that a hash of their place draws, until there are enough.
     """
-    records, chosen = load_earlier(state), draw_buildings(plan)
-    for tile, members in plan.tiles.items():
-        inside = [index for index in members if index in chosen]
+    members, chosen = load_members(state), draw_buildings(plan)
+    for tile, indices in plan.tiles.items():
+        inside = [index for index in indices if index in chosen and members[index]["record"]]
         if not inside:
             continue
         epochs = Epochs(state, tile, terrain, np.zeros(3))
         for index in inside:
             try:
-                roof = build(records[index], plan.settings.compose).roof
+                roof = build(members[index]["record"], plan.settings.compose).roof
             except HiproofError:
                 continue
             old, new = epochs.select(plan.jobs[index])

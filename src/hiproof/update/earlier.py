@@ -14,6 +14,7 @@ from typing import Any
 from ..errors import HiproofError, InputError, InputWarning
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
+from ..fit.registration import Registration
 from ..formats import FORMATS
 from ..parametric.file import opened_parameters
 from ..parametric.record import read_building, refuse_other_kinds
@@ -29,13 +30,15 @@ class EarlierRun:
 
     Its head and settings come with them.
 
-    `clouds` are those that the run was made of, empty where not all of them exist.
+    `footprint_shift` (m) is how far the run moved all footprints. `clouds` are those that the run
+    was made of, empty where not all of them exist.
     """
 
     head: FileHead
     records: tuple[dict[str, Any], ...]
     settings: Settings
     clouds: tuple[str, ...]
+    footprint_shift: tuple[float, float] = (0.0, 0.0)
 
 
 def find_parameters(folder: Path) -> Path:
@@ -75,7 +78,16 @@ def read_earlier(folder: Path) -> EarlierRun:
             "its models alone; changes that the models leave out are not told from their errors",
             InputWarning,
         )
-    return EarlierRun(head, records, settings, clouds)
+    return EarlierRun(head, records, settings, clouds, find_footprint_shift(record))
+
+
+def find_footprint_shift(record: dict[str, Any]) -> tuple[float, float]:
+    """Return how far (m) a run, or the first run before updates, moved all footprints."""
+    registration, update = record.get("registration"), record.get("update") or {}
+    if registration:
+        return Registration.from_dict(registration).shift
+    x, y = update.get("footprint_shift", (0.0, 0.0))
+    return float(x), float(y)
 
 
 def refuse_damaged(record: dict[str, Any], path: Path) -> None:

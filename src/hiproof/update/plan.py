@@ -1,15 +1,12 @@
 """The plan of an update: the buildings of the earlier run.
 
-The folder of an update holds, beside what every run has, `earlier.jsonl` with the objects of the
-earlier run by the numbers of their buildings, and `earlier/` with the plan and the points of the
-earlier survey.
+The folder of an update holds, beside what every run has, `earlier.jsonl` with the earlier building
+of each job, and `earlier/` with the plan and the points of the earlier survey.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-import json
 import warnings
 from pathlib import Path
 from typing import Any
@@ -23,28 +20,25 @@ from ..city.plan import (
     Job,
     WorkPlan,
     cut_into_tiles,
-    make_job,
     unusual_names,
 )
 from ..city.prepare import TILE_M, limit_buildings_per_tile, read_headers
 from ..errors import InputError, InputWarning
 from ..masking import mask
-from ..model import Footprint
-from ..parametric.record import polygon, read_outline, read_shift
 from ..read.crs import describe_crs, find_units, same_horizontal
 from ..read.overlap import format_box
 from ..settings import Settings
 from ..write.files import atomic
-from ..write.json_text import dump
 from ..write.parameters import crs_text
 from .earlier import EarlierRun
+from .members import make_members, save_members
 from .request import UpdateRequest
 
-EARLIER_FILE, EARLIER_FOLDER = "earlier.jsonl", "earlier"
+EARLIER_FOLDER = "earlier"
 
 
-def make_update_plan(request: UpdateRequest, earlier: EarlierRun) -> WorkPlan:
-    """Make the plan of an update.
+def make_update_plan(request: UpdateRequest, earlier: EarlierRun, state: Path) -> WorkPlan:
+    """Make the plan of an update, and keep its members in the folder `state`.
 
     Raises InputError where the clouds do not fit the run.
     """
@@ -52,7 +46,9 @@ def make_update_plan(request: UpdateRequest, earlier: EarlierRun) -> WorkPlan:
     settings = adopt_crs(request.settings, headers, earlier, request)
     frame = settle_frame(dataclasses.replace(request, settings=settings), headers)
     refuse_other_crs(frame, earlier, request)
-    jobs = tuple(make_earlier_job(i, record) for i, record in enumerate(earlier.records))
+    members = make_members(request, earlier, frame)
+    jobs = tuple(member.make_job(index) for index, member in enumerate(members))
+    save_members(state, members)
     refuse_elsewhere(jobs, frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)), request)
     settings = settle_classes(request.clouds, settings).replace({"reconstruct": {"align": "off"}})
     offset = earlier.head.offset
@@ -97,21 +93,6 @@ def refuse_other_crs(frame: Any, earlier: EarlierRun, request: UpdateRequest) ->
         )
 
 
-def make_earlier_job(index: int, record: dict[str, Any]) -> Job:
-    """Make the job of a building of the earlier run.
-
-    Its outline lies on its roof already.
-    """
-    outline = read_outline(record)
-    if outline is None:
-        rings = record.get("outline")
-        outline = shapely.Polygon() if rings is None else polygon(rings, "outline")
-    shift = read_shift(record) if record.get("parts") else (0.0, 0.0)
-    polygon_before = shapely.transform(outline, lambda xy: xy - shift)
-    footprint = Footprint(record["id"], polygon_before, record.get("attributes") or {})
-    return make_job(index, footprint, shift)
-
-
 def refuse_elsewhere(jobs: tuple[Job, ...], corners: np.ndarray, request: UpdateRequest) -> None:
     """Raise InputError where the new clouds meet none of the buildings.
 
@@ -133,28 +114,10 @@ def refuse_elsewhere(jobs: tuple[Job, ...], corners: np.ndarray, request: Update
     )
 
 
-def save_earlier(state: Path, plan: WorkPlan, earlier: EarlierRun) -> None:
-    """Keep the earlier buildings for the workers.
-
-    The plan by which their survey is read is kept too.
-    """
+def save_earlier_plan(state: Path, plan: WorkPlan, earlier: EarlierRun) -> None:
+    """Keep the plan by which the earlier survey is read."""
     folder = state / EARLIER_FOLDER
     (folder / "points").mkdir(parents=True, exist_ok=True)
-    with atomic(state / EARLIER_FILE) as temporary:
-        Path(temporary).write_bytes(b"".join(dump(record) + b"\n" for record in earlier.records))
     settings = earlier.settings.replace({"reconstruct": {"align": "off"}})
     with atomic(folder / "plan.jsonl") as temporary:
         dataclasses.replace(plan, settings=settings).save(Path(temporary))
-
-
-def load_earlier(state: Path) -> list[dict[str, Any]]:
-    """Load the earlier buildings by number, once a process."""
-    path = state / EARLIER_FILE
-    return load_records(path, path.stat().st_mtime_ns)
-
-
-@functools.lru_cache(maxsize=1)
-def load_records(path: Path, stamp: int) -> list[dict[str, Any]]:
-    """Load the objects at `path`, whose file has the time `stamp`."""
-    with path.open(encoding="utf-8") as lines:
-        return [json.loads(line) for line in lines]

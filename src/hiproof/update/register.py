@@ -38,7 +38,7 @@ CLEAR_SIGMAS = 3.0
 FEWEST_ROOFS = 8
 """Roofs from which on their noise is estimated rather than assumed."""
 
-CHANGED_SHARE = 0.2
+CHANGED_SHARE = 0.3
 """Share of the roofs that may have changed: those with the most stray cells do not count."""
 
 LEAST_M = 0.02

@@ -15,10 +15,12 @@ SIGNIFICANCE = 0.001
 class UpdateRequest(Request):
     """An update of the models in the folder `run` with new `clouds`, written to `out`.
 
-    `run_parameters` is the run's parameters.jsonl, whose state decides whether an interrupted
-    update may resume. `date` is that of the survey, "" to read it from the clouds.
+    `footprints` replace the outlines of the run, None to keep them. `run_parameters` is the run's
+    parameters.jsonl, whose state decides whether an interrupted update may resume. `date` is that
+    of the survey, "" to read it from the clouds.
     """
 
+    footprints: str | None = field(default=None, metadata=FILES_FIELD)
     run: Path = field(default=Path(), metadata=NO_MATTER)
     run_parameters: str = field(default="", metadata=FILES_FIELD)
     significance: float = SIGNIFICANCE

@@ -20,7 +20,7 @@ from ..status import Change
 from ..write.files import atomic
 from .before import prepare_surveys
 from .dates import find_survey_date
-from .earlier import choose_read_settings, read_earlier
+from .earlier import EarlierRun, choose_read_settings, read_earlier
 from .plan import make_update_plan
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Surveys
@@ -66,7 +66,7 @@ def update_area(
 
     def make_plan(_: Any, __: Progress) -> WorkPlan:
         (state / SURVEYS_FILE).unlink(missing_ok=True)
-        return make_update_plan(request, earlier)
+        return make_update_plan(request, earlier, state)
 
     def prepare(plan: WorkPlan, executor: Any, _: Progress) -> None:
         prepare_surveys(request, earlier, date, state, plan, executor)
@@ -75,7 +75,7 @@ def update_area(
         summary = reconstruct_in_folder(
             request, state, progress, Steps(make_plan, update_tile, prepare)
         )
-        return report_changes(request, state, summary)
+        return report_changes(request, earlier, state, summary)
 
 
 def refuse_same_folder(request: UpdateRequest) -> None:
@@ -87,7 +87,9 @@ def refuse_same_folder(request: UpdateRequest) -> None:
         )
 
 
-def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> UpdateSummary:
+def report_changes(
+    request: UpdateRequest, earlier: EarlierRun, state: Path, summary: Summary
+) -> UpdateSummary:
     """Write the tables of changes and complete run.json."""
     surveys, out = Surveys.load(state / SURVEYS_FILE), Path(request.out)
     found = collect_changes(out, surveys.date)
@@ -106,11 +108,11 @@ def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> Upd
         dict(sorted(by_kind.items())),
         files,
     )
-    add_to_record(request, result)
+    add_to_record(request, earlier, result)
     return result
 
 
-def add_to_record(request: UpdateRequest, result: UpdateSummary) -> None:
+def add_to_record(request: UpdateRequest, earlier: EarlierRun, result: UpdateSummary) -> None:
     """Add what is peculiar to an update to run.json."""
     path = Path(request.out) / "run.json"
     record = json.loads(path.read_text(encoding="utf-8"))
@@ -118,6 +120,7 @@ def add_to_record(request: UpdateRequest, result: UpdateSummary) -> None:
     record["update"] = {
         "run": str(request.run),
         "survey_date": surveys.date,
+        "footprint_shift": list(earlier.footprint_shift),
         "significance": surveys.significance,
         "compared_with": "points" if surveys.has_earlier else "models",
         "shift": surveys.shift.to_dict(),

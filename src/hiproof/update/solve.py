@@ -25,27 +25,31 @@ from ..city.plan import Job, WorkPlan, load_plan
 from ..city.solve import Surroundings, open_terrain, record_failure, solve_buildings, solve_one
 from ..city.sort import load_points
 from ..errors import report_error
-from ..frames import LocalFrame
+from ..log import LOGGER
 from ..model import Building, Roof
 from ..parametric.building import build
 from ..read.thin import without_repeats
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
-from ..write.parameters import outline_record
 from ..write.run_files import fragments
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
-from .plan import EARLIER_FOLDER, load_earlier
+from .members import UpdateMember, load_members
+from .places import (
+    demolish,
+    end_building,
+    explains,
+    move_to_frame,
+    place_new,
+    record_places,
+)
+from .plan import EARLIER_FOLDER
 from .register import SurveyShift
-from .residuals import measure_residuals
 
 SURVEYS_FILE = "surveys.json"
-DIFFERENCE_DIGITS = 4  # of differences: tenths of a millimetre
-PLACE_DIGITS = 3  # of the outlines of places: millimetres
-
-BETTER = 0.5
-"""Share of the earlier roof's distance from contradicting points that a new roof may keep."""
+BARE_SHARE = 0.5
+"""Share of an outline that has to lie bare before, for a building to be built since."""
 
 
 @dataclass(frozen=True)
@@ -102,196 +106,166 @@ def update_tile(
     The arguments are those of `solve_tile`.
     """
     root = Path(folder)
-    plan, surveys, records = load_plan(root), Surveys.load(root / SURVEYS_FILE), load_earlier(root)
+    plan, surveys, members = load_plan(root), Surveys.load(root / SURVEYS_FILE), load_members(root)
     epochs = Epochs(root, tile, terrain, surveys.shift.applied)
     keep = functools.partial(keep_failure, root, tile, plan)
 
+    updater = Updater(plan, epochs, surveys, keep)
+
     def solve(job: Job) -> tuple[Building, Fragments]:
-        return update_building(plan, job, records[job.index], epochs, surveys, keep)
+        building = updater.update(job, UpdateMember.read(members[job.index], job))
+        return fragments(building, plan.list_names(job), plan.head)
 
     return solve_buildings(root, plan, tile, solve, avoid)
 
 
-def update_building(
-    plan: WorkPlan,
-    job: Job,
-    record: dict[str, Any],
-    epochs: Epochs,
-    surveys: Surveys,
-    keep: Callable,
-) -> tuple[Building, Fragments]:
-    """Return a building brought up to date, and its texts."""
-    try:
-        earlier = build(record, plan.settings.compose)
-        if earlier.built is None:
-            return revisit_empty(plan, job, earlier, epochs, surveys, keep)
-        old, new = epochs.select(job)
-        to_local = earlier.roof.frame.to_local
-        verdict = judge_building(
+@dataclass(frozen=True)
+class Updater:
+    """Everything that the buildings of a work tile are brought up to date with."""
+
+    plan: WorkPlan
+    epochs: Epochs
+    surveys: Surveys
+    keep: Callable[..., None]
+
+    def update(self, job: Job, member: UpdateMember) -> Building:
+        """Return a building brought up to date, whatever happens to it."""
+        try:
+            if member.record is None:
+                return self.replace_earlier(job, member)
+            earlier = build(member.record, self.plan.settings.compose)
+            if earlier.built is None:
+                return self.revisit_empty(job, member, earlier)
+            return self.follow_verdict(job, member, earlier, self.judge(job, earlier))
+        except MemoryError:
+            raise
+        except Exception as error:
+            report = report_error(error)
+            LOGGER.info("building %s failed:\n%s", job.id, report.trace)
+            return record_failure(self.plan, job, report.detail)[0]
+
+    def judge(self, job: Job, earlier: Building) -> ChangeVerdict:
+        """Return the verdict on an earlier building by the points of both surveys."""
+        old, new = self.epochs.select(job)
+        frame, shift = earlier.roof.frame, self.surveys.shift
+        unexplained = earlier.quality.unexplained_area_m2
+        return judge_building(
             earlier.roof,
-            None if old is None else to_local(old),
-            to_local(new),
-            earlier.z_ground - earlier.roof.frame.origin[2],
-            surveys.shift.noise,
-            surveys.shift.sigma[2],
-            surveys.significance,
-            0.0 if math.isnan(u := earlier.quality.unexplained_area_m2) else u,
+            None if old is None else frame.to_local(old),
+            frame.to_local(new),
+            earlier.z_ground - frame.origin[2],
+            shift.noise,
+            shift.sigma[2],
+            self.surveys.significance,
+            0.0 if math.isnan(unexplained) else unexplained,
         )
-        return follow_verdict(verdict, plan, job, earlier, epochs, surveys, keep)
-    except MemoryError:
-        raise
-    except Exception as error:
-        report = report_error(error)
-        return record_failure(plan, job, report.detail)
 
+    def reconstruct(self, job: Job, member: UpdateMember) -> Building:
+        """Return a building made of the new points alone."""
+        new, _ = solve_one(self.plan, job, self.epochs.new, None, self.keep)
+        return dataclasses.replace(new, shift=member.shift)
 
-def follow_verdict(
-    verdict: ChangeVerdict,
-    plan: WorkPlan,
-    job: Job,
-    earlier: Building,
-    epochs: Epochs,
-    surveys: Surveys,
-    keep: Callable,
-) -> tuple[Building, Fragments]:
-    """Return the building that a verdict leads to."""
-    frame = earlier.roof.frame
-    if verdict.change is Change.UNCHANGED:
-        return finish(plan, job, earlier)
-    if verdict.change is Change.GONE:
-        places = record_places([demolish(earlier)], frame)
-        return finish(plan, job, mark(end_building(earlier), verdict, surveys, places))
-    if verdict.change is not Change.CHANGED:
-        places = record_places(name_doubts(verdict), frame)
-        return finish(plan, job, mark(earlier, verdict, surveys, places))
-    new, _ = solve_one(plan, job, epochs.new, None, keep)
-    roof = None if new.built is None else move_to_frame(new.roof, earlier.roof)
-    if roof is not None and not explains(roof, earlier.roof, verdict):
-        roof = None
-    z_ground = earlier.z_ground - frame.origin[2]
-    found = name_differences(verdict, earlier.roof, roof, z_ground, surveys.shift.sigma[2])
-    result, lineage = continue_parts(earlier, earlier if roof is None else new)
-    return finish(plan, job, mark(result, verdict, surveys, record_places(found, frame), lineage))
+    def follow_verdict(
+        self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
+    ) -> Building:
+        """Return the building that a verdict leads to."""
+        frame = earlier.roof.frame
+        if verdict.change is Change.GONE:
+            places = record_places([demolish(earlier)], frame)
+            return self.mark(end_building(earlier), verdict, places)
+        if verdict.change is Change.NOT_COVERED:
+            return self.mark(earlier, verdict, [])
+        if not member.is_same_outline:
+            return self.redraw(job, member, earlier, verdict)
+        if verdict.change is Change.UNCHANGED:
+            return earlier
+        if verdict.change is Change.UNCERTAIN:
+            return self.mark(earlier, verdict, record_places(name_doubts(verdict), frame))
+        new = self.reconstruct(job, member)
+        roof = None if new.built is None else move_to_frame(new.roof, earlier.roof)
+        if roof is not None and not explains(roof, earlier.roof, verdict):
+            roof = None
+        places = self.name_places(earlier, roof, verdict)
+        result, lineage = continue_parts(earlier, earlier if roof is None else new)
+        return self.mark(result, verdict, places, lineage)
 
+    def name_places(
+        self, earlier: Building, roof: Roof | None, verdict: ChangeVerdict
+    ) -> list[dict[str, Any]]:
+        """Return the places where a building changed, as its record has them."""
+        z_ground = earlier.z_ground - earlier.roof.frame.origin[2]
+        sigma = self.surveys.shift.sigma[2]
+        found = name_differences(verdict, earlier.roof, roof, z_ground, sigma)
+        return record_places(found, earlier.roof.frame)
 
-def explains(new: Roof, old: Roof, verdict: ChangeVerdict) -> bool:
-    """Return whether the new roof explains what contradicts the earlier one.
-
-    It has to lie much nearer to those points.
-    """
-    c = verdict.comparison
-    if c is None:
-        return False
-    members = [cluster.members for cluster in verdict.clusters]
-    chosen = np.isin(c.number, np.concatenate(members)) if members else c.number >= 0
-    points = c.points[chosen]
-    after, before = (np.abs(measure_residuals(roof, points)) for roof in (new, old))
-    return bool(np.nanmedian(after) < BETTER * np.nanmedian(before))
-
-
-def revisit_empty(
-    plan: WorkPlan,
-    job: Job,
-    earlier: Building,
-    epochs: Epochs,
-    surveys: Surveys,
-    keep: Callable,
-) -> tuple[Building, Fragments]:
-    """Return what the new points make of a building that had no model."""
-    new, _ = solve_one(plan, job, epochs.new, None, keep)
-    if new.built is None:
-        return finish(plan, job, earlier)
-    verdict = ChangeVerdict(Change.NEW, 0.0)
-    area = shapely.transform(new.roof.outline, new.roof.frame.to_world)
-    was_bare = earlier.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in earlier.detail
-    kinds = [ChangeKind.BUILT] if was_bare else []
-    height = float(np.median(new.solid.vertices[:, 2]) - new.z_ground)
-    places = [Difference(kind, height, math.nan, area.area, area, (-1, 0)) for kind in kinds]
-    return finish(plan, job, mark(new, verdict, surveys, record_places(places)))
-
-
-def finish(plan: WorkPlan, job: Job, building: Building) -> tuple[Building, Fragments]:
-    """Return the building and its texts."""
-    return fragments(building, plan.list_names(job), plan.head)
-
-
-def move_to_frame(roof: Roof, target: Roof) -> Roof:
-    """Return the roof with its parts in the frame of `target`."""
-    shift = roof.frame.origin - target.frame.origin
-    parts = tuple(
-        dataclasses.replace(
-            part,
-            translation=part.translation + shift,
-            pieces=tuple(piece.move(shift) for piece in part.pieces),
+    def redraw(
+        self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
+    ) -> Building:
+        """Return a building over another outline than before."""
+        new = self.reconstruct(job, member)
+        if new.built is None:
+            return self.mark(earlier, dataclasses.replace(verdict, change=Change.UNCERTAIN), [])
+        roof = move_to_frame(new.roof, earlier.roof)
+        is_changed = verdict.change is Change.CHANGED
+        places = self.name_places(earlier, roof, verdict) if is_changed else []
+        before = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
+        apart = shapely.symmetric_difference(before, job.area)
+        outline = Difference(
+            ChangeKind.OUTLINE_CHANGED, math.nan, math.nan, job.area.area - before.area, apart
         )
-        for part in roof.parts
-    )
-    return Roof(parts, shapely.transform(roof.outline, lambda xy: xy + shift[:2]), target.frame)
-
-
-def end_building(earlier: Building) -> Building:
-    """Return the building without its model: its ground lies bare."""
-    outline = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
-    return Building(
-        earlier.id,
-        Status.NO_BUILDING,
-        f"{Status.NO_BUILDING.value}; it was demolished",
-        footprint=outline,
-        attributes=earlier.attributes,
-    )
-
-
-def demolish(earlier: Building) -> Difference:
-    """Return the place that a demolished building leaves, in the roof's frame."""
-    outline = earlier.roof.outline
-    height = earlier.z_ground - float(np.median(earlier.solid.vertices[:, 2]))
-    return Difference(ChangeKind.DEMOLISHED, height, math.nan, outline.area, outline)
-
-
-def mark(
-    building: Building,
-    verdict: ChangeVerdict,
-    surveys: Surveys,
-    places: list[dict[str, Any]],
-    lineage: list[int | None] | None = None,
-) -> Building:
-    """Return the building with the record of its change."""
-    record = {
-        "class": verdict.change.code,
-        "survey": surveys.date,
-        "chance": float(f"{verdict.chance:.3g}"),
-        "places": places,
-        "lineage": lineage or [],
-        "predecessors": [],
-    }
-    return dataclasses.replace(building, change=record)
-
-
-def record_places(
-    places: list[Difference], frame: LocalFrame | None = None
-) -> list[dict[str, Any]]:
-    """Return places that changed as parameters.jsonl holds them.
-
-    `frame` is that of their outlines, None for the world.
-    """
-    result = []
-    for place in places:
-        area = place.place if frame is None else shapely.transform(place.place, frame.to_world)
-        polygons = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon"]
-        rounded = [shapely.transform(g, lambda xy: np.round(xy, PLACE_DIGITS)) for g in polygons]
-        result.append(
-            {
-                "kind": place.kind.code,
-                "difference": round_length(place.difference_m),
-                "sigma": round_length(place.sigma_m),
-                "area": round_length(place.area_m2),
-                "parts": [None if part < 0 else part for part in place.parts],
-                "outlines": [outline_record(polygon) for polygon in rounded],
-            }
+        result, lineage = continue_parts(earlier, new)
+        places += record_places([outline])
+        return self.mark(
+            result, dataclasses.replace(verdict, change=Change.CHANGED), places, lineage
         )
-    return result
 
+    def replace_earlier(self, job: Job, member: UpdateMember) -> Building:
+        """Return the building of a new footprint that is no earlier building."""
+        new = self.reconstruct(job, member)
+        if new.built is None:
+            return new
+        if not member.predecessors:
+            is_bare = self.was_bare(job)
+            return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare))
+        one = len(member.predecessors) == 1
+        kind = ChangeKind.SPLIT if one else ChangeKind.MERGED
+        place = Difference(kind, math.nan, math.nan, job.area.area, job.area, (-1, 0))
+        marked = self.mark(new, ChangeVerdict(Change.CHANGED), record_places([place]))
+        change = {**(marked.change or {}), "predecessors": list(member.predecessors)}
+        return dataclasses.replace(marked, change=change)
 
-def round_length(value: float) -> float | None:
-    """Round a length for a record, None where it is unknown."""
-    return round(float(value), DIFFERENCE_DIGITS) if math.isfinite(value) else None
+    def was_bare(self, job: Job) -> bool:
+        """Return whether the earlier survey shows bare ground over most of an outline."""
+        if self.epochs.old is None:
+            return False
+        old = self.epochs.old
+        bare = old.bare(job, old.select_roof_points(job), old.select_other_points(job))
+        bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
+        cells = np.unique(np.floor(bare[:, :2]), axis=0)
+        return len(cells) >= BARE_SHARE * job.area.area
+
+    def revisit_empty(self, job: Job, member: UpdateMember, earlier: Building) -> Building:
+        """Return what the new points make of a building that had no model."""
+        new = self.reconstruct(job, member)
+        if new.built is None:
+            return earlier
+        is_bare = earlier.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in earlier.detail
+        return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare))
+
+    def mark(
+        self,
+        building: Building,
+        verdict: ChangeVerdict,
+        places: list[dict[str, Any]],
+        lineage: list[int | None] | None = None,
+    ) -> Building:
+        """Return the building with the record of its change."""
+        record = {
+            "class": verdict.change.code,
+            "survey": self.surveys.date,
+            "chance": float(f"{verdict.chance:.3g}"),
+            "places": places,
+            "lineage": lineage or [],
+            "predecessors": [],
+        }
+        return dataclasses.replace(building, change=record)

@@ -1,0 +1,154 @@
+"""The buildings of an update: earlier ones, and those of new footprints."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import shapely
+
+from ..city.frame import AreaFrame
+from ..city.plan import Job, make_job
+from ..city.prepare import read_requested_footprints
+from ..model import Footprint
+from ..parametric.record import polygon, read_outline, read_shift
+from ..write.files import atomic
+from ..write.json_text import dump
+from .earlier import EarlierRun
+from .identity import Successor, match_outlines
+from .request import UpdateRequest
+
+EARLIER_FILE = "earlier.jsonl"
+
+
+@dataclass(frozen=True)
+class UpdateMember:
+    """A building of an update: its outline, and the earlier building that it is.
+
+    The outline lies on its roof. `record` is the earlier building's object of parameters.jsonl,
+    None for a new building. `is_same_outline` says whether its outline stands, `predecessors` are
+    ids of buildings that were split or merged, and `shift` (m) is how far the footprint was moved
+    onto the outline.
+    """
+
+    id: str
+    outline: shapely.Polygon
+    attributes: dict[str, Any]
+    record: dict[str, Any] | None = None
+    is_same_outline: bool = True
+    predecessors: tuple[str, ...] = ()
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @staticmethod
+    def read(values: dict[str, Any], job: Job) -> UpdateMember:
+        """Read the member of a job from what `save_members` kept of it."""
+        attributes = job.footprint.attributes if job.footprint else {}
+        return UpdateMember(
+            job.id,
+            job.area,
+            attributes,
+            values["record"],
+            values["is_same_outline"],
+            tuple(values["predecessors"]),
+            tuple(values["shift"]),
+        )
+
+    def make_job(self, index: int) -> Job:
+        """Make the job of the member."""
+        return make_job(index, Footprint(self.id, self.outline, self.attributes), (0.0, 0.0))
+
+
+def make_members(
+    request: UpdateRequest, earlier: EarlierRun, frame: AreaFrame
+) -> tuple[UpdateMember, ...]:
+    """Return the buildings of an update.
+
+    Without new footprints they are the earlier ones. With them these come first, and then what
+    they replace nothing of.
+    """
+    kept = [keep_member(record) for record in earlier.records]
+    if not request.footprints:
+        return tuple(kept)
+    footprints = read_requested_footprints(request, frame, where=None, bbox=None)
+    shift = earlier.footprint_shift
+    drawn = [shapely.transform(f.polygon, lambda xy: xy + shift) for f in footprints]
+    successors = match_outlines([member.outline for member in kept], drawn)
+    used = {s.earlier for s in successors} | {i for s in successors for i in s.predecessors}
+    others = [member for i, member in enumerate(kept) if i not in used]
+    names = {member.id for member in others} | {
+        kept[s.earlier].id for s in successors if s.earlier >= 0
+    }
+    result = []
+    for footprint, outline, successor in zip(footprints, drawn, successors, strict=True):
+        result.append(replace_member(footprint, outline, successor, kept, shift, names))
+        names.add(result[-1].id)
+    return (*result, *others)
+
+
+def keep_member(record: dict[str, Any]) -> UpdateMember:
+    """Return the building of an earlier object.
+
+    Its outline lies on its roof already.
+    """
+    outline = read_outline(record)
+    if outline is None:
+        rings = record.get("outline")
+        outline = shapely.Polygon() if rings is None else polygon(rings, "outline")
+    shift = read_shift(record) if record.get("parts") else (0.0, 0.0)
+    return UpdateMember(record["id"], outline, record.get("attributes") or {}, record, shift=shift)
+
+
+def replace_member(
+    footprint: Footprint,
+    outline: shapely.Polygon,
+    successor: Successor,
+    kept: list[UpdateMember],
+    shift: tuple[float, float],
+    names: set[str],
+) -> UpdateMember:
+    """Return the building of a new footprint, whose `outline` lies on its roof.
+
+    One that is an earlier building keeps its id. Another has its own, or a further one where that
+    is among the `names` that are taken.
+    """
+    if successor.earlier >= 0:
+        member = kept[successor.earlier]
+        if successor.is_same_outline:
+            return dataclasses.replace(member, attributes=footprint.attributes)
+        return dataclasses.replace(
+            member,
+            outline=outline,
+            attributes=footprint.attributes,
+            is_same_outline=False,
+            shift=shift,
+        )
+    predecessors = tuple(kept[i].id for i in successor.predecessors)
+    id, number = footprint.id, 2
+    while id in names:
+        id, number = f"{footprint.id}-{number}", number + 1
+    return UpdateMember(id, outline, footprint.attributes, None, False, predecessors, shift)
+
+
+def save_members(state: Path, members: tuple[UpdateMember, ...]) -> None:
+    """Keep the members for the workers; their outlines stand in the plan."""
+    names = ("record", "is_same_outline", "predecessors", "shift")
+    lines = [dump({name: getattr(member, name) for name in names}) for member in members]
+    with atomic(state / EARLIER_FILE) as temporary:
+        Path(temporary).write_bytes(b"".join(line + b"\n" for line in lines))
+
+
+def load_members(state: Path) -> list[dict[str, Any]]:
+    """Load what was kept of the members by number, once a process."""
+    path = state / EARLIER_FILE
+    return load_lines(path, path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=1)
+def load_lines(path: Path, stamp: int) -> list[dict[str, Any]]:
+    """Load the objects at `path`, whose file has the time `stamp`."""
+    with path.open(encoding="utf-8") as lines:
+        return [json.loads(line) for line in lines]

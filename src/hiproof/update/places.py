@@ -1,0 +1,114 @@
+"""Places that changed as parameters.jsonl holds them.
+
+Roofs are brought into one frame for that.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..frames import LocalFrame
+from ..model import Building, Roof
+from ..status import ChangeKind, Status
+from ..write.parameters import outline_record
+from .judge import ChangeVerdict
+from .kinds import Difference
+from .residuals import measure_residuals
+
+DIFFERENCE_DIGITS = 4  # of differences: tenths of a millimetre
+PLACE_DIGITS = 3  # of the outlines of places: millimetres
+
+BETTER = 0.5
+"""Share of the earlier roof's distance from contradicting points that a new roof may keep."""
+
+
+def explains(new: Roof, old: Roof, verdict: ChangeVerdict) -> bool:
+    """Return whether the new roof explains what contradicts the earlier one.
+
+    It has to lie much nearer to those points.
+    """
+    c = verdict.comparison
+    if c is None:
+        return False
+    members = [cluster.members for cluster in verdict.clusters]
+    chosen = np.isin(c.number, np.concatenate(members)) if members else c.number >= 0
+    points = c.points[chosen]
+    after, before = (np.abs(measure_residuals(roof, points)) for roof in (new, old))
+    return bool(np.nanmedian(after) < BETTER * np.nanmedian(before))
+
+
+def move_to_frame(roof: Roof, target: Roof) -> Roof:
+    """Return the roof with its parts in the frame of `target`."""
+    shift = roof.frame.origin - target.frame.origin
+    parts = tuple(
+        dataclasses.replace(
+            part,
+            translation=part.translation + shift,
+            pieces=tuple(piece.move(shift) for piece in part.pieces),
+        )
+        for part in roof.parts
+    )
+    return Roof(parts, shapely.transform(roof.outline, lambda xy: xy + shift[:2]), target.frame)
+
+
+def end_building(earlier: Building) -> Building:
+    """Return the building without its model: its ground lies bare."""
+    outline = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
+    return Building(
+        earlier.id,
+        Status.NO_BUILDING,
+        f"{Status.NO_BUILDING.value}; it was demolished",
+        footprint=outline,
+        attributes=earlier.attributes,
+    )
+
+
+def demolish(earlier: Building) -> Difference:
+    """Return the place that a demolished building leaves, in the roof's frame."""
+    outline = earlier.roof.outline
+    height = earlier.z_ground - float(np.median(earlier.solid.vertices[:, 2]))
+    return Difference(ChangeKind.DEMOLISHED, height, math.nan, outline.area, outline)
+
+
+def place_new(new: Building, was_bare: bool) -> list[dict[str, Any]]:
+    """Return the place of a new building, where its ground was bare before."""
+    if not was_bare:
+        return []
+    area = shapely.transform(new.roof.outline, new.roof.frame.to_world)
+    height = float(np.median(new.solid.vertices[:, 2]) - new.z_ground)
+    return record_places([Difference(ChangeKind.BUILT, height, math.nan, area.area, area, (-1, 0))])
+
+
+def record_places(
+    places: list[Difference], frame: LocalFrame | None = None
+) -> list[dict[str, Any]]:
+    """Return places that changed as parameters.jsonl holds them.
+
+    `frame` is that of their outlines, None for the world.
+    """
+    result = []
+    for place in places:
+        area = place.place if frame is None else shapely.transform(place.place, frame.to_world)
+        polygons = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon"]
+        rounded = [shapely.transform(g, lambda xy: np.round(xy, PLACE_DIGITS)) for g in polygons]
+        result.append(
+            {
+                "kind": place.kind.code,
+                "difference": round_length(place.difference_m),
+                "sigma": round_length(place.sigma_m),
+                "area": round_length(place.area_m2),
+                "parts": [None if part < 0 else part for part in place.parts],
+                "outlines": [outline_record(polygon) for polygon in rounded],
+            }
+        )
+    return result
+
+
+def round_length(value: float) -> float | None:
+    """Round a length for a record, None where it is unknown."""
+    return round(float(value), DIFFERENCE_DIGITS) if math.isfinite(value) else None
