@@ -150,6 +150,21 @@ def test_inner_shell_is_turned_inside_out(tmp_path):
     assert len(results) == 2 and all(check_solid(solid) == () for _, solid in results)
 
 
+def test_other_surfaces_of_a_shell_become_one_of_three(tmp_path):
+    model = city()
+    (geometry,) = model["CityObjects"]["house"]["geometry"]
+    geometry["semantics"]["surfaces"] = [
+        {"type": "OuterFloorSurface"},
+        {"type": "ClosureSurface"},
+        {"type": "OuterCeilingSurface"},
+    ]
+    ((_, solid),) = read_solids(write_text(tmp_path, "a.json", json.dumps(model)))
+    assert [face.kind for face in solid.faces] == [face.kind for face in SOLID.faces]
+    geometry["semantics"]["surfaces"][0]["type"] = "gable"
+    with pytest.raises(InputError, match="gable"):
+        list(read_solids(write_text(tmp_path, "b.json", json.dumps(model))))
+
+
 def test_open_ring_is_a_finding(tmp_path):
     text = gml()
     start = text.index("<gml:posList>") + len("<gml:posList>")

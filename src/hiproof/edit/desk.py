@@ -118,6 +118,7 @@ class Desk:
         """
         record, override, version = self.record(id)
         authorship = {name: (override or {}).get(name) for name in ("who", "when", "note")}
+        detail = finite(record.get("detail")) or ""
         result = {
             "id": id,
             "version": version,
@@ -126,11 +127,11 @@ class Desk:
         }
         result["said"] = {name: (override or {}).get(name) for name in SAID}
         result |= {
-            "outcome": record.get("detail") or "",
+            "outcome": detail,
             "reasons": self.run.by_id[id].doubt.reasons,
         }
         if not record.get("parts"):
-            return result | {"error": record.get("detail") or "no model"}
+            return result | {"error": detail or "no model"}
         try:
             return result | describe_building(
                 build(record, self.run.head.compose), np.zeros((0, 3))

@@ -321,7 +321,7 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
         for index, part in enumerate(list_at(record, "parts"))
     ]
     read_status(record, bool(parts))
-    for name in ("detail", "type", "ground_source"):
+    for name in ("detail", "type", "ground_source", "quality"):
         text_at(record, name)
     for name in ("z_ground", "objective"):
         figure(record, name)

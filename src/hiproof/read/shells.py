@@ -11,10 +11,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import WALL
+from ..model import GROUND, ROOF, WALL
 from .damage import excerpt
 
 Rings = tuple[tuple[int, ...], ...]
+
+KINDS = {
+    **{kind: kind for kind in (ROOF, WALL, GROUND)},
+    "OuterFloorSurface": ROOF,
+    "OuterCeilingSurface": GROUND,
+    "ClosureSurface": WALL,
+    "Window": WALL,
+    "Door": WALL,
+}
+"""What CityJSON's surfaces of a building's shell are, of the three that a model of ours has."""
 
 
 class ShellSurface(NamedTuple):
@@ -39,7 +49,7 @@ def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Shell
         for number in chain(numbers, repeat(None))
     )
     return [
-        ShellSurface(rings, semantics.get("type", WALL), semantics)
+        ShellSurface(rings, KINDS[semantics.get("type", WALL)], semantics)
         for rings, semantics in zip(faces, semantics_list)  # noqa: B905
     ]
 
@@ -63,7 +73,7 @@ def surface_at(number: Any, surfaces: list[Any]) -> dict[str, Any]:
     if type(number) is not int or not 0 <= number < len(surfaces):
         raise ValueError(f"semantic surface {excerpt(number)} of {len(surfaces)}")
     semantics = surfaces[number]
-    if not isinstance(semantics, dict) or not isinstance(semantics.get("type", WALL), str):
+    if not isinstance(semantics, dict) or str(semantics.get("type", WALL)) not in KINDS:
         raise ValueError(f"{excerpt(semantics)} as a semantic surface")
     return semantics
 
