@@ -1,12 +1,13 @@
 """Simulated cities surveyed twice: are changes found and named?
 
 usage: python -m benchmarks.changes [--seeds 100 101] [--count 100] [--densities 8 3]
-                                    [--keep FOLDER] [--verbose]
+                                    [--share 0.2] [--keep FOLDER] [--verbose]
 
-One building in five changes, by each kind in turn, and the same number of others get something that
-is no change: leaves over the roof in class 6, a crane, scaffolding, or no points on a side. Both
-surveys have their own noise; the second lies 5 cm higher and 20 cm aside. `hiproof reconstruct`
-runs on the first survey and `hiproof update` on the second. Changes count from 0.5 m over 4 m2 on.
+One building in five (--share) changes, by each kind in turn, and the same number of others get
+something that is no change: leaves over the roof in class 6, a crane, scaffolding, or no points on
+a side. Both surveys have their own noise; the second lies 5 cm higher and 20 cm aside. `hiproof
+reconstruct` runs on the first survey and `hiproof update` on the second. Changes count from 0.5 m
+over 4 m2 on.
 
 Seeds 0 to 9 are for choosing constants, 100 to 109 for reporting.
 """
@@ -36,7 +37,7 @@ from hiproof.simulate.town import Lot
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 
-CHANGED_SHARE = 0.2
+USUAL_SHARE = 0.2  # of the buildings that change; as many others are disturbed
 SHIFT_M = np.array([0.16, -0.12, 0.05])
 KINDS = (*CHANGES, "demolished", "built")
 DISTURBANCES = ("leaves", "crane", "scaffolding", "occlusion")
@@ -44,11 +45,13 @@ LEAST_M, LEAST_M2 = 0.5, 4.0
 NOTHING = "unchanged"
 
 
-def draw_truth(seed: int, lots: list[Lot]) -> tuple[dict[str, str], dict[str, Lot], dict[str, str]]:
+def draw_truth(
+    seed: int, lots: list[Lot], share: float
+) -> tuple[dict[str, str], dict[str, Lot], dict[str, str]]:
     """Return kinds of change by id, the lots that change, and disturbances."""
     rng = np.random.default_rng([seed, 77])
     order = rng.permutation(len(lots)).tolist()
-    count = max(1, round(CHANGED_SHARE * len(lots)))
+    count = max(1, round(share * len(lots)))
     kinds: dict[str, str] = {}
     after: dict[str, Lot] = {}
     number = 0
@@ -112,13 +115,15 @@ def disturb(rng: np.random.Generator, lot: Lot, kind: str, cloud: Scan) -> Scan:
     return dataclasses.replace(cloud, points=points)
 
 
-def write_city(folder: Path, seed: int, count: int, densities: tuple[float, float]) -> dict:
+def write_city(
+    folder: Path, seed: int, count: int, densities: tuple[float, float], share: float
+) -> dict:
     """Write both surveys and footprints of a city; return its truth."""
     city = City(count, seed, densities[0])
     stock = Stock(city)
     bounds = (*stock.low.min(axis=0), *stock.high.max(axis=0))
     lots = stock.near(bounds)
-    kinds, after, disturbed = draw_truth(seed, lots)
+    kinds, after, disturbed = draw_truth(seed, lots, share)
     folder.mkdir(parents=True, exist_ok=True)
     write_footprints(folder / "footprints.gpkg", lots)
     first = [lot for lot in lots if kinds.get(lot.id) != "built"]
@@ -159,13 +164,15 @@ def write_city(folder: Path, seed: int, count: int, densities: tuple[float, floa
     return truth
 
 
-def run_city(folder: Path, seed: int, count: int, densities: tuple[float, float]) -> dict:
+def run_city(
+    folder: Path, seed: int, count: int, densities: tuple[float, float], share: float
+) -> dict:
     """Return the truth and the answer of a city, with the seconds of run and update."""
     file = folder / "truth.json"
     truth = (
         json.loads(file.read_text())
         if file.exists()
-        else write_city(folder, seed, count, densities)
+        else write_city(folder, seed, count, densities, share)
     )
     start = time.process_time()
     if not (folder / "models" / "run.json").exists():
@@ -241,6 +248,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[100])
     parser.add_argument("--count", type=int, default=100, help="buildings a city")
     parser.add_argument("--densities", type=float, nargs=2, default=(8.0, 8.0))
+    parser.add_argument("--share", type=float, default=USUAL_SHARE, help="of buildings that change")
     parser.add_argument("--keep", type=Path, help="folder in which cities and models stay")
     parser.add_argument("--verbose", action="store_true", help="list every building that is wrong")
     given = parser.parse_args()
@@ -248,7 +256,13 @@ def main() -> None:
         folder = given.keep or Path(scratch)
         d = tuple(given.densities)
         results = [
-            run_city(folder / f"{seed}_{given.count}_{d[0]:g}_{d[1]:g}", seed, given.count, d)
+            run_city(
+                folder / f"{seed}_{given.count}_{d[0]:g}_{d[1]:g}_{given.share:g}",
+                seed,
+                given.count,
+                d,
+                given.share,
+            )
             for seed in given.seeds
         ]
         for result in results:

@@ -14,18 +14,21 @@ import numpy as np
 import shapely
 
 from ..city.plan import WorkPlan
-from ..city.registration import ENOUGH_FOOTPRINTS, SAMPLE_CELL_M, hash_cell
+from ..city.registration import SAMPLE_CELL_M, hash_cell
 from ..city.run import absolute
 from ..city.tasks import sort_cloud
 from ..errors import HiproofError, InputError
 from ..log import LOGGER
-from ..parametric.building import build
+from ..parametric.record import read_building
 from .earlier import EarlierRun
 from .members import load_members
 from .plan import EARLIER_FOLDER, save_earlier_plan
 from .register import SampledRoof, register_surveys
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Epochs, Surveys
+
+ENOUGH_ROOFS = 200
+"""Sampled roofs: they tell the shift to millimetres, and their noise to a tenth of it."""
 
 SORTED_MARK = "sorted"  # file in the earlier folder: its points are complete
 
@@ -80,8 +83,10 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
         epochs = Epochs(state, tile, terrain, np.zeros(3))
         for index in inside:
             try:
-                roof = build(members[index]["record"], plan.settings.compose).roof
+                roof = read_building(members[index]["record"])[1]
             except HiproofError:
+                continue
+            if roof is None:
                 continue
             old, new = epochs.select(plan.jobs[index])
             to_local = roof.frame.to_local
@@ -99,6 +104,6 @@ def draw_buildings(plan: WorkPlan) -> set[int]:
     chosen: set[int] = set()
     for cell in sorted(members, key=hash_cell):
         chosen |= members[cell]
-        if len(chosen) >= ENOUGH_FOOTPRINTS:
+        if len(chosen) >= ENOUGH_ROOFS:
             break
     return chosen

@@ -17,7 +17,7 @@ from ..evaluate.run import run_record
 from ..fit.registration import Registration
 from ..formats import FORMATS
 from ..parametric.file import opened_parameters
-from ..parametric.record import read_building, refuse_other_kinds
+from ..parametric.record import refuse_other_kinds
 from ..settings import ReadSettings, Settings
 from ..write.head import FileHead
 
@@ -91,10 +91,12 @@ def find_footprint_shift(record: dict[str, Any]) -> tuple[float, float]:
 
 
 def refuse_damaged(record: dict[str, Any], path: Path) -> None:
-    """Raise InputError for a building that cannot be read."""
+    """Raise InputError for a building that cannot be read.
+
+    Its geometry is made by the workers.
+    """
     try:
         refuse_other_kinds(record)
-        read_building(record)
     except HiproofError as error:
         raise InputError(f"building {record['id']:.80} in {path}: {error}") from error
 
