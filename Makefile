@@ -12,6 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 $(VENV)/core: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Installing hiproof and the packages that it needs into $(VENV); this takes a minute"
 	$(BIN)/pip install --quiet --disable-pip-version-check -e .
 	touch $@
 
@@ -35,6 +36,7 @@ demo: $(VENV)/core
 	$(BIN)/hiproof demo --out demo
 	$(BIN)/hiproof check demo/buildings.city.jsonl
 	@echo "The models lie in demo/: buildings.gml (CityGML), buildings.city.jsonl (CityJSON), parameters.jsonl, buildings.gpkg"
+	@echo "Look at them: $(BIN)/hiproof view demo"
 
 test: $(VENV)/test
 	$(BIN)/python -m pytest -m "not train" -n 2 --dist loadfile

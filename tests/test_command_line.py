@@ -15,6 +15,7 @@ from hiproof import progress
 from hiproof.cli.app import app
 from hiproof.cli.command import choose_level
 from hiproof.cli.commands import COMMANDS, FIRST_OPTIONS
+from hiproof.compiled import news
 from hiproof.errors import SettingsError
 from hiproof.log import Level, start
 from hiproof.progress import show_progress
@@ -147,6 +148,20 @@ def test_a_line_says_how_far_a_long_stage_is(show_stages, monkeypatch):
         time.sleep(0.2)
 
     assert "hiproof: fitting roofs: 25 of 100 buildings" in show_stages(work)
+
+
+def test_compiling_is_shown_in_place_of_the_stage_that_waits_for_it(show_stages):
+    def work(update):
+        news.listener(3, 10)
+        news.listener(5, 10)
+        update("sort", 0, 2)
+
+    assert show_stages(work) == [
+        "hiproof: reading inputs",
+        "hiproof: compiling for this machine, once for each version: up to 7 functions, about 10 s",
+        "hiproof: sorting points by building: 2 files",
+    ]
+    assert "compiling" not in "".join(show_stages(lambda update: None))
 
 
 def test_quiet_shows_nothing(show_stages):

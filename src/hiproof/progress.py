@@ -122,11 +122,14 @@ class StageLines:
 
     def __enter__(self) -> StageLines:
         self.is_shown, self.is_over = False, threading.Event()
+        self.lines = news.listener
+        news.listener = functools.partial(self.update, "compile")
         self.thread = threading.Thread(target=self.repeat, daemon=True)
         self.thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
+        news.listener = self.lines
         self.is_over.set()
         self.thread.join()
 
@@ -139,7 +142,10 @@ class StageLines:
 
     def show_stage(self) -> None:
         total, unit = self.total, STAGES[self.stage].unit
-        print_line(self.stage, count_things(total, unit) if total else "")
+        if self.stage == "compile" and total:
+            print(f"hiproof: {news.headline(self.finished, total)}", file=sys.stderr, flush=True)
+        else:
+            print_line(self.stage, count_things(total, unit) if total else "")
 
     def repeat(self) -> None:
         if self.is_over.wait(FIRST_S):

@@ -36,7 +36,7 @@ class Grade(Enum):
     """How good a model is, told from its points (evaluate/verdict.py)."""
 
     GOOD = "the roof follows its points"
-    FAIR = "some of its points speak against the roof"
+    FAIR = "some of its points do not fit the roof"
     POOR = "look at the building before you use it"
 
     @property

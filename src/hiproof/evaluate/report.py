@@ -119,7 +119,7 @@ def attention_list(run: EvaluatedRun) -> str:
         f"<code>{escape(show_command('RUN', kind))}</code></li>"
         for kind, count in find_overview(run).attention.items()
     )
-    return f"<p>Needs attention:</p><ul>{rows}</ul>" if rows else ""
+    return f"<p>Needs attention (RUN is the output folder):</p><ul>{rows}</ul>" if rows else ""
 
 
 def find_overview(run: EvaluatedRun) -> Overview:

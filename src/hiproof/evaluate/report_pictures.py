@@ -54,10 +54,11 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     )
     middle = float(np.median(values))
     x = CHART_WIDTH * (np.clip(middle, smallest, upper) - smallest) / (upper - smallest)
+    beyond = " and more" if short(values.max()) != short(upper) else ""
     axis = (
         f'<text x="0" y="{top + 16}">{short(smallest)}</text>'
         f'<text x="{CHART_WIDTH}" y="{top + 16}" '
-        f'text-anchor="end">{short(upper)}{" and more" if values.max() > upper else ""}</text>'
+        f'text-anchor="end">{short(upper)}{beyond}</text>'
         f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{top}" class="median"/>'
         f'<text x="{CHART_WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, '
         "mean "
