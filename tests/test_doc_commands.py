@@ -17,6 +17,7 @@ from hiproof.cli.app import app
 from hiproof.parametric.override import read_override
 from hiproof.settings import Settings
 from hiproof.simulate import demo_files
+from weather import write_epw
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -93,6 +94,7 @@ def inputs(tmp_path_factory):
     las = laspy.read(files["cloud"])
     las.points = las.points[shapely.intersects_xy(area, las.x, las.y)]
     las.write(folder / "tile.laz")
+    write_epw(folder / "delft.epw")
     (folder / "tiles").mkdir()
     shutil.copy(folder / "tile.laz", folder / "tiles/tile.laz")
     shutil.copy(files["footprints"], folder / "footprints.gpkg")

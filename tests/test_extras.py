@@ -40,9 +40,10 @@ PACKAGES = {
     "distributed": "city",
     "fsspec": "city",  # of points; GeoParquet by address asks for the smaller extra `parquet`
     "matplotlib": "report",
+    "pvlib": "sun",
 }
 
-CONVERSIONS = {"ifc", "trimesh", "pyvista", "geopandas"}  # what no run asks for
+CONVERSIONS = {"ifc", "trimesh", "pyvista", "geopandas", "sun"}  # what no run asks for
 
 # name: (package that is missing, TOML, further options)
 NEEDY = {

@@ -94,7 +94,7 @@ COMMANDS = {
         "hiproof build models/parameters.jsonl --out edited",
     ),
     "enrich": Entry(
-        "Export", "add party walls, areas and house types to a run", "hiproof enrich models"
+        "Export", "add party walls, house types and the sun to a run", "hiproof enrich models"
     ),
     "convert": Entry(
         "Export", "convert models to another format", "hiproof convert models models.glb"

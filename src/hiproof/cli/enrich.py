@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from ..log import count_things
 from ..progress import show_progress
 
@@ -27,6 +28,17 @@ def enrich(
             "residential or office (default: all are residential)"
         ),
     ] = "",
+    sun: Annotated[
+        bool, typer.Option("--sun", help="add the sun on every roof surface (extra `sun`)")
+    ] = False,
+    weather: Annotated[
+        Path | None,
+        typer.Option(help="weather of a typical year (EPW), for --sun (default: a clear sky)"),
+    ] = None,
+    albedo: Annotated[
+        float,
+        typer.Option(help="share of light that the ground reflects, for --sun", min=0.0, max=1.0),
+    ] = 0.2,
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -35,20 +47,25 @@ def enrich(
         ),
     ] = None,
 ) -> None:
-    """Add party walls, areas, house types and storeys to the models of a run.
+    """Add party walls, areas, house types and the sun to the models of a run.
 
     The run's own files stay as they are. A second call replaces the results of the first; run the
     same command again to resume an interrupted one.
 
     Exit code: 0 all buildings were written, 1 an internal error, 2 unusable input.
     """
+    if weather is not None and not sun:
+        raise InputError("expected --weather with --sun, got it alone; add --sun")
     with show_progress("enrich") as update:
+        from ..enrich.cadastre import SunQuestions
         from ..enrich.run import Questions, enrich_run
 
+        path = "" if weather is None else str(weather)
+        asked = Questions(touch, use_attribute, SunQuestions(path, albedo) if sun else None)
         result = enrich_run(
             run,
             out,
-            Questions(touch, use_attribute),
+            asked,
             jobs,
             lambda done, total: update("enrich", done, total),
         )

@@ -13,6 +13,7 @@ from ..write.attribute_list import OWN
 from ..write.roof_figures import find_ground_height, roof_figures
 from ..write.values import plain_text, round_value
 from .areas import OF_3DBAG, measure_areas
+from .cadastre import Cadastre
 from .cut import Region, cut_walls
 from .house_type import is_residential, name_house_type, name_tabula_class
 from .party import Contact
@@ -32,10 +33,13 @@ class Answers(NamedTuple):
     surfaces: dict[int, dict[str, Any]]
 
 
-def answer(town: Town, number: int, use_attribute: str = "") -> Answers:
+def answer(
+    town: Town, number: int, use_attribute: str = "", cadastre: Cadastre | None = None
+) -> Answers:
     """Answer all questions about building `number`.
 
-    `use_attribute` names the attribute of the input that has its use, empty where none has.
+    `use_attribute` names the attribute of the input that has its use, empty where none has. The sun
+    is left out without a `cadastre`.
     """
     building = town.read(number)
     if building.built is None:
@@ -52,6 +56,9 @@ def answer(town: Town, number: int, use_attribute: str = "") -> Answers:
         f"{OWN}neighbours_unknown": town.lacks_neighbours(number),
     }
     surfaces = {face: {f"{OWN}party_with": name} for face, name in party.items()}
+    if cadastre is not None:
+        sun, faces = cadastre.describe(number, solid)
+        attributes, surfaces = attributes | sun, surfaces | faces
     return Answers(with_solid(building, solid), attributes, surfaces)
 
 

@@ -31,6 +31,7 @@ from ..write.files import atomic, atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.head import FileHead
 from ..write.run_files import join_fragments
+from .cadastre import Cadastre, SunQuestions, refuse_wrong_questions
 from .party import PARTY_GAP_M
 from .records import Index, Records, index_records
 from .town import Town
@@ -46,6 +47,7 @@ class Questions(NamedTuple):
 
     touch_m: float = PARTY_GAP_M
     use_attribute: str = ""
+    sun: SunQuestions | None = None
 
 
 class Enriched(NamedTuple):
@@ -77,7 +79,10 @@ def enrich_run(
     index = index_records(parameters)
     with atomic_file(waiting / "index.npz") as file:
         np.savez(file, **index._asdict())
-    total = len(index.offsets)
+    records = Records(parameters, index)
+    if questions.sun is not None:
+        refuse_wrong_questions(records, questions.sun)
+    total = len(records)
     blocks = list_blocks(waiting, total)
     missing = [block for block in blocks if not block[0].is_file()]
     done = total - sum(last - first for _, first, last in missing)
@@ -91,7 +96,7 @@ def enrich_run(
             progress(done, total)
     finally:
         executor.close()
-    files = join_blocks(blocks, find_head(Records(parameters, index)), out)
+    files = join_blocks(blocks, find_head(records), out)
     write_record(parameters.parent, out, questions, total)
     shutil.rmtree(waiting.parent, ignore_errors=True)
     return Enriched(list(files.values()), total)
@@ -115,7 +120,9 @@ def make_waiting_folder(out: Path, parameters: Path, questions: Questions) -> Pa
             f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
             "path"
         ) from error
-    request = [__version__, str(parameters), state.st_size, state.st_mtime_ns, questions]
+    request: list[Any] = [__version__, str(parameters), state.st_size, state.st_mtime_ns, questions]
+    if questions.sun is not None and Path(questions.sun.weather).is_file():
+        request.append(Path(questions.sun.weather).stat().st_mtime_ns)
     key = hashlib.sha256(json.dumps(request).encode()).hexdigest()[:16]
     waiting = out / WAITING / key
     if waiting.parent.is_dir():
@@ -141,21 +148,28 @@ def list_blocks(waiting: Path, total: int) -> list[tuple[Path, int, int]]:
 
 def enrich_block(parameters: str, questions: Questions, block: str, first: int, last: int) -> None:
     """Write the texts of the buildings [first, last) to the file `block`."""
-    town = open_town(parameters, questions, str(Path(block).with_name("index.npz")))
+    town, cadastre = open_town(parameters, questions, str(Path(block).with_name("index.npz")))
     head = find_head(town.records)
     parts = [
-        make_fragments(town, number, head, questions.use_attribute) for number in range(first, last)
+        make_fragments(town, number, head, questions.use_attribute, cadastre)
+        for number in range(first, last)
     ]
     with atomic_file(block) as file:
         save_fragments(file, parts)
 
 
 @functools.lru_cache(1)
-def open_town(parameters: str, questions: Questions, index_file: str) -> Town:
-    """Open the run's buildings, once in each process."""
+def open_town(
+    parameters: str, questions: Questions, index_file: str
+) -> tuple[Town, Cadastre | None]:
+    """Open the run's buildings, and the sun on their roofs if asked.
+
+    It happens once in each process.
+    """
     with np.load(index_file, allow_pickle=False) as arrays:
         index = Index(**{name: arrays[name] for name in Index._fields})
-    return Town(Records(Path(parameters), index), questions.touch_m)
+    town = Town(Records(Path(parameters), index), questions.touch_m)
+    return town, None if questions.sun is None else Cadastre(town, questions.sun)
 
 
 def find_head(records: Records) -> FileHead:
@@ -189,6 +203,7 @@ def join_blocks(blocks: list[tuple[Path, int, int]], head: FileHead, out: Path) 
 def write_record(folder: Path, out: Path, questions: Questions, total: int) -> None:
     """Write the run's record for the enriched files, with what was asked."""
     asked: dict[str, Any] = {"hiproof": __version__, "buildings": total, **questions._asdict()}
+    asked["sun"] = questions.sun and questions.sun._asdict()
     record = masked_values({**run_record(folder), "enriched": asked})
     with atomic(out / "run.json") as hidden:
         hidden.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

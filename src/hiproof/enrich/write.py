@@ -12,6 +12,7 @@ from ..write.fragments import Fragments, Sheet
 from ..write.head import FileHead
 from ..write.values import plain_text
 from .answer import Answers, answer
+from .cadastre import Cadastre
 from .town import Town
 
 NOT_MADE = ("parameters",)
@@ -23,14 +24,20 @@ def list_kinds(write: WriteSettings) -> list[str]:
     return [kind for kind in requested_fragments(write) if kind not in NOT_MADE]
 
 
-def make_fragments(town: Town, number: int, head: FileHead, use_attribute: str = "") -> Fragments:
+def make_fragments(
+    town: Town,
+    number: int,
+    head: FileHead,
+    use_attribute: str = "",
+    cadastre: Cadastre | None = None,
+) -> Fragments:
     """Return the texts of building `number`, with all answers about it.
 
     A building whose geometry defeats a library stays as it was, and the log says so.
     """
     building = town.read(number)
     try:
-        result = answer(town, number, use_attribute)
+        result = answer(town, number, use_attribute, cadastre)
     except (ValueError, shapely.GEOSException) as error:
         LOGGER.warning("building %s was not enriched: %s", building.id, error)
         result = Answers(building, {}, {})

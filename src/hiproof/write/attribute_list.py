@@ -219,6 +219,28 @@ ENRICHED = (
 )
 """What `hiproof enrich` adds to a building."""
 
+ENRICHED_SUN = (
+    Attribute("roof_sun_kwh", "number", "kWh", "irradiation of all roof surfaces in a year"),
+    Attribute("pv_area_m2", "number", "m2", "area for panels: 0.3 m and more from roof edges"),
+    Attribute(
+        "pv_kwh",
+        "number",
+        "kWh",
+        "yield of such panels in a year: modules of 20 %, performance ratio 0.8",
+    ),
+)
+
+ENRICHED_SUN_SURFACE = (
+    Attribute("sun_kwh_m2", "number", "kWh/m2", "irradiation in a year, shaded by buildings"),
+    *(
+        Attribute(f"sun_kwh_m2_{month:02}", "number", "kWh/m2", f"the same in month {month}")
+        for month in range(1, 13)
+    ),
+    Attribute("sun_shaded_share", "number", "", "share of the direct light that buildings take"),
+    Attribute("pv_area_m2", "number", "m2", "area for panels, as of a building"),
+    Attribute("pv_kwh", "number", "kWh", "yield of such panels in a year"),
+)
+
 ENRICHED_3DBAG = (
     Attribute("b3_opp_grond", "number", "m2", "as hiproof_ground_area_m2"),
     Attribute("b3_opp_dak_plat", "number", "m2", "as hiproof_flat_roof_area_m2"),
@@ -572,6 +594,13 @@ TABLES = (
         "Surfaces, added by `hiproof enrich`",
         "`buildings.gml` and `buildings.city.jsonl` of the folder `enriched`",
         ENRICHED_SURFACE,
+    ),
+    AttributeTable("Buildings, added by `hiproof enrich --sun`", ENRICHED_FILES, ENRICHED_SUN, OWN),
+    AttributeTable(
+        "Roof surfaces, added by `hiproof enrich --sun`",
+        ENRICHED_FILES,
+        ENRICHED_SUN_SURFACE,
+        OWN,
     ),
     AttributeTable(
         "Building parts (`--parts-as buildingparts`)",

@@ -1,0 +1,87 @@
+"""The sun on a roof: irradiation by month, shaded by buildings.
+
+The sky is Hay and Davies': light from the sun's direction, circumsolar light included, is shaded
+where the sun stands below the horizon of a place; the isotropic light is weighted by the part of
+the sky that a place sees; light reflected by the ground is not shaded.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from ..model import Solid
+from .horizon import LIFT_M, SECTORS, find_horizon, measure_share
+from .sky import Sky
+
+MIDDLES = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS)
+SPACING_M = 1.0  # distance (m) of sample points on a roof face, in plan
+MOST_SAMPLES = 64  # of a face; larger faces have points farther apart
+
+
+class Irradiation(NamedTuple):
+    """What a roof face gets in a year.
+
+    `by_month` (12,) is in kWh/m2; `shaded_share` is the share of the direct light that buildings
+    take away.
+    """
+
+    by_month: np.ndarray
+    shaded_share: float
+
+
+def irradiate(
+    normal: np.ndarray, places: np.ndarray, edges: np.ndarray, sky: Sky, albedo: float
+) -> Irradiation:
+    """Return the irradiation of a roof face with a unit `normal` (3,).
+
+    `places` (n, 3) are sample points on it, `edges` (m, 2, 3) the roof edges that may shade them.
+    """
+    horizon = find_horizon(places + (0.0, 0.0, LIFT_M), edges)
+    facing = np.maximum(sky.sun @ normal, 0.0)
+    seen = measure_share(horizon, sky.sector, sky.tangent)
+    direct = facing * sky.direct
+    total = float(direct.sum())
+    visible = measure_sky(normal, horizon) / measure_sky(normal, np.zeros((1, SECTORS)))
+    by_month = (
+        np.bincount(sky.month, facing * sky.beam * seen, 12)
+        + sky.isotropic * visible * (1.0 + normal[2]) / 2.0
+        + sky.horizontal * albedo * (1.0 - normal[2]) / 2.0
+    )
+    return Irradiation(by_month, 1.0 - float(direct @ seen) / total if total > 0 else 0.0)
+
+
+def measure_sky(normal: np.ndarray, horizon: np.ndarray) -> float:
+    """Return the sky's view factor of a plane, the mean of places (n, SECTORS).
+
+    It is the integral of the cosine to the normal over the sky above the horizon and the plane, by
+    pi.
+    """
+    side = normal[0] * np.sin(MIDDLES) + normal[1] * np.cos(MIDDLES)
+    plane = np.arctan2(np.maximum(-side, 0.0), normal[2])
+    low = np.maximum(np.arctan(horizon), plane)
+    upright = normal[2] * (1.0 - np.sin(low) ** 2) / 2.0
+    level = side * (np.pi / 4.0 - low / 2.0 - np.sin(2.0 * low) / 4.0)
+    return float((upright + level).mean() * 2.0)
+
+
+def sample_face(solid: Solid, face: int, normal: np.ndarray) -> np.ndarray:
+    """Return sample points (n, 3) on a roof face, a grid in plan."""
+    outline = solid.project_face(solid.faces[face])
+    low_x, low_y, high_x, high_y = outline.bounds
+    step = max(SPACING_M, float(np.sqrt(outline.area / MOST_SAMPLES)))
+    x, y = (
+        np.linspace(low, high, 2 * count + 1)[1::2]
+        for low, high, count in (
+            (low_x, high_x, int(np.ceil((high_x - low_x) / step))),
+            (low_y, high_y, int(np.ceil((high_y - low_y) / step))),
+        )
+    )
+    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    xy = xy[shapely.contains_xy(outline, xy)]
+    if not len(xy):
+        xy = shapely.get_coordinates(shapely.point_on_surface(outline))
+    corner = solid.vertices[solid.faces[face].rings[0][0]]
+    return np.column_stack([xy, corner[2] - (xy - corner[:2]) @ normal[:2] / normal[2]])

@@ -1,0 +1,220 @@
+"""The sun on roofs: as pvlib has it without shade, and as rays have it with shade."""
+
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from hiproof.cli.app import app
+from hiproof.enrich.areas import area_vectors
+from hiproof.enrich.cadastre import Cadastre, SunQuestions, locate
+from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
+from hiproof.enrich.run import Questions, enrich_run
+from hiproof.enrich.sky import make_sky
+from hiproof.enrich.sun import irradiate, measure_sky, sample_face
+from hiproof.errors import InputError
+from hiproof.model import ROOF
+from hiproof.write.attribute_list import ENRICHED_SUN, ENRICHED_SUN_SURFACE, OWN
+from hiproof.write.head import FileHead
+from hiproof.write.meshes.triangles import faces_triangles
+from streets import open_street, place_house, write_street
+from weather import write_epw
+
+pvlib = pytest.importorskip("pvlib", reason="needs the extra sun")
+
+DELFT = (52.0, 4.36)
+NOTHING = np.empty((0, 2, 3))
+SLOPES = [(0, 180), (35, 180), (35, 0), (60, 90), (20, 250)]
+
+
+def make_normal(slope, azimuth):
+    b, a = math.radians(slope), math.radians(azimuth)
+    return np.array([math.sin(b) * math.sin(a), math.sin(b) * math.cos(a), math.cos(b)])
+
+
+def transpose_with_pvlib(times, values, slope, azimuth):
+    position = pvlib.location.Location(*DELFT).get_solarposition(times)
+    total = pvlib.irradiance.get_total_irradiance(
+        slope,
+        azimuth,
+        position["zenith"],
+        position["azimuth"],
+        values["dni"],
+        values["ghi"],
+        values["dhi"],
+        dni_extra=pvlib.irradiance.get_extra_radiation(times),
+        albedo=0.2,
+        model="haydavies",
+    )
+    return float(total["poa_global"].fillna(0.0).sum()) / 1000.0
+
+
+@pytest.mark.parametrize("slope, azimuth", SLOPES)
+def test_unshaded_roofs_are_as_pvlib_has_them(slope, azimuth, tmp_path):
+    times, values = write_epw(tmp_path / "a.epw")
+    sky = make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+    sun = irradiate(make_normal(slope, azimuth), np.zeros((1, 3)), NOTHING, sky, 0.2)
+    expected = transpose_with_pvlib(times, values, slope, azimuth)
+    assert sun.by_month.sum() == pytest.approx(expected, rel=1e-3)
+    assert sun.shaded_share == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_clear_sky_is_that_of_pvlib():
+    sun = irradiate(
+        make_normal(30, 180), np.zeros((1, 3)), NOTHING, make_sky(*DELFT, 0.0, 0.0), 0.2
+    )
+    assert 1700 < sun.by_month.sum() < 2400
+    assert sun.by_month.argmax() in (4, 5, 6) and sun.by_month.argmin() in (0, 11)
+
+
+@pytest.mark.parametrize("elevation", [10.0, 45.0, 70.0])
+def test_a_long_wall_hides_its_share_of_the_sky(elevation):
+    height = math.tan(math.radians(elevation))
+    wall = np.array([[[-1000.0, 1.0, height], [1000.0, 1.0, height]]])
+    seen = measure_sky(make_normal(0, 0), find_horizon(np.zeros((1, 3)), wall))
+    assert seen == pytest.approx((1 + math.cos(math.radians(elevation))) / 2, abs=2e-3)
+
+
+@pytest.mark.parametrize("slope, azimuth", SLOPES)
+def test_a_free_plane_sees_its_share_of_the_sky(slope, azimuth):
+    seen = measure_sky(make_normal(slope, azimuth), np.zeros((1, SECTORS)))
+    assert seen == pytest.approx((1 + math.cos(math.radians(slope))) / 2, abs=1e-3)
+
+
+def make_quarter():
+    """Return houses of several heights, close together, and a tower."""
+    rng = np.random.default_rng(4)
+    eaves = rng.uniform(3, 7, 9)
+    places = [(9.0 * i, 14.0 * k) for i in range(3) for k in range(3)]
+    houses = [
+        place_house(f"h{n}", x, y, 8.0, eave=float(eaves[n]), rise=3.0 * (n % 2), turn=20.0)
+        for n, (x, y) in enumerate(places)
+    ]
+    return [*houses, place_house("tower", 30.0, -10.0, 8.0, 8.0, 25.0, turn=20.0)]
+
+
+def list_triangles(solid):
+    """Return the triangles (m, 3, 3) of a solid."""
+    return solid.vertices[np.concatenate(faces_triangles(solid.vertices, solid.faces))]
+
+
+def cast_rays(triangles, places, directions):
+    """Return whether each place (n,) is free in each direction (t,), by all triangles (m, 3, 3)."""
+    corner, u, v = (
+        triangles[:, 0],
+        triangles[:, 1] - triangles[:, 0],
+        triangles[:, 2] - triangles[:, 0],
+    )
+    free = np.ones((len(places), len(directions)), bool)
+    for t, direction in enumerate(directions):
+        across = np.cross(direction, v)
+        size = (u * across).sum(axis=1)
+        size[np.abs(size) < 1e-12] = np.inf
+        aside = places[:, None] - corner
+        first = (aside * across).sum(axis=2) / size
+        over = np.cross(aside, u)
+        second, distance = over @ direction / size, (over * v).sum(axis=2) / size
+        hit = (first >= 0) & (second >= 0) & (first + second <= 1) & (distance > 1e-6)
+        free[:, t] = ~hit.any(axis=1)
+    return free
+
+
+def test_shade_is_as_rays_have_it(tmp_path):
+    town = open_street(tmp_path, make_quarter())
+    cadastre = Cadastre(town, SunQuestions())
+    buildings = [town.read(k) for k in range(len(town.records))]
+    shift = -buildings[0].solid.vertices[0]
+    solids = [building.solid.move(shift) for building in buildings]
+    triangles = np.concatenate([list_triangles(solid) for solid in solids])
+    sky = make_sky(*DELFT, 0.0, 0.0)
+    high = np.flatnonzero(sky.sun[:, 2] > math.sin(math.radians(1.0)))[::41]
+    differences = []
+    for number in (0, 3, 4, 7):
+        solid = buildings[number].solid
+        vectors = area_vectors(solid)
+        for face in (k for k, f in enumerate(solid.faces) if f.kind == ROOF):
+            normal = vectors[face] / np.linalg.norm(vectors[face])
+            places = sample_face(solid, face, normal)[::4] + (0, 0, 0.01)
+            edges = cadastre.surroundings.find_shading_edges(number, float(places[:, 2].min()))
+            direct = np.maximum(sky.sun[high] @ normal, 0.0) * sky.direct[high]
+            facing = direct > 0
+            horizon = find_horizon(places, edges)
+            own = measure_share(horizon, sky.sector[high], sky.tangent[high])[facing]
+            free = cast_rays(triangles, places + shift, sky.sun[high][facing]).mean(axis=0)
+            differences.append(direct[facing] @ (own - free) / direct.sum())
+    assert len(differences) >= 6
+    assert np.abs(differences).max() < 0.01
+
+
+def test_a_tower_shades_from_the_south_alone(tmp_path):
+    house = place_house("a", 0, 0)
+    shaded = {}
+    for name, y in (("south", -25.0), ("north", 15.0)):
+        town = open_street(tmp_path / name, [house, place_house("tower", 0, y, 6, 20, 30.0)])
+        shaded[name] = Cadastre(town, SunQuestions()).describe(0, town.read(0).solid)
+    free = open_street(tmp_path / "free", [house])
+    alone, surfaces = Cadastre(free, SunQuestions()).describe(0, free.read(0).solid)
+    year, share = "hiproof_roof_sun_kwh", "hiproof_sun_shaded_share"
+    assert shaded["south"][0][year] < 0.9 * alone[year] < shaded["north"][0][year] < alone[year]
+    assert shaded["south"][1].popitem()[1][share] > 0.15
+    assert shaded["north"][1].popitem()[1][share] < 0.03
+    (values,) = surfaces.values()
+    months = sum(values[f"hiproof_sun_kwh_m2_{m:02}"] for m in range(1, 13))
+    assert months == pytest.approx(values["hiproof_sun_kwh_m2"], abs=0.01)
+    assert values["hiproof_pv_area_m2"] == pytest.approx(5.4 * 9.4)
+    assert values["hiproof_pv_kwh"] == pytest.approx(
+        5.4 * 9.4 * 0.16 * values["hiproof_sun_kwh_m2"], rel=1e-4
+    )
+
+
+def test_places_know_true_north():
+    for epsg, x, y in ((32632, 250000.0, 5500000.0), (28992, 250000.0, 550000.0)):
+        from pyproj import CRS, Proj
+
+        longitude, latitude, north = locate(FileHead(f"EPSG:{epsg}"), x, y)
+        factors = Proj(CRS(f"EPSG:{epsg}")).get_factors(longitude, latitude)
+        assert abs(north) > 1.0 and abs(north) == pytest.approx(
+            abs(factors.meridian_convergence), abs=0.01
+        )
+    assert locate(FileHead("EPSG:32632"), 250000.0, 5500000.0)[2] > 0  # west of 9 degrees east
+
+
+def test_the_files_of_a_run_have_the_sun(tmp_path):
+    folder = write_street(tmp_path, [place_house("a", 0, 0), place_house("b", 9, 0, rise=3.0)])
+    write_epw(tmp_path / "a.epw")
+    command = ["enrich", str(folder), "--sun", "--weather", str(tmp_path / "a.epw"), "--jobs", "1"]
+    assert CliRunner().invoke(app, command).exit_code == 0
+    import pyogrio
+
+    for layer, declared in (("buildings", ENRICHED_SUN), ("roof_surfaces", ENRICHED_SUN_SURFACE)):
+        head, _, _, columns = pyogrio.raw.read(folder / "enriched/buildings.gpkg", layer=layer)
+        table = dict(zip(head["fields"], columns, strict=True))
+        assert {OWN + a.name for a in declared} <= set(table)
+        assert all((table[OWN + a.name] >= 0).all() for a in declared)
+
+
+@pytest.mark.parametrize(
+    "change, reason",
+    [
+        (lambda path: write_epw(path, latitude=45.0), "within 300 km of the buildings, got one 7"),
+        (lambda path: path.write_text("no weather"), "expected weather of a typical year as EPW"),
+        (lambda path: None, "expected weather of a typical year as EPW"),
+    ],
+)
+def test_weather_that_does_not_fit_is_refused(change, reason, tmp_path):
+    folder = write_street(tmp_path / "run", [place_house("a", 0, 0)])
+    change(tmp_path / "a.epw")
+    with pytest.raises(InputError, match=reason):
+        enrich_run(folder, questions=Questions(sun=SunQuestions(str(tmp_path / "a.epw"))))
+
+
+def test_a_run_without_a_crs_has_no_sun(tmp_path):
+    folder = write_street(tmp_path, [place_house("a", 0, 0)], crs=None)
+    with pytest.raises(InputError, match="expected a run with a CRS for --sun"):
+        enrich_run(folder, questions=Questions(sun=SunQuestions()))
+
+
+def test_weather_alone_is_refused(tmp_path):
+    result = CliRunner().invoke(app, ["enrich", str(tmp_path), "--weather", "a.epw"])
+    assert isinstance(result.exception, InputError)
