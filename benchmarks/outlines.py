@@ -29,7 +29,7 @@ from hiproof import read_points
 from hiproof.classify.split import cell_area, split_buildings
 from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
-from hiproof.fit.union.outline import outline_of_points
+from hiproof.fit.union.outline import draw_outline
 from hiproof.frames import LocalFrame
 from hiproof.read import read_footprints
 from hiproof.simulate import Defects, ScanSettings, random_building, random_compound, scan
@@ -71,7 +71,7 @@ def report_simulation(density: float, seeds: range) -> None:
     for kind in KINDS:
         outcomes = []
         for points, truth in (simulate_house(kind, density, seed) for seed in seeds):
-            outline = outline_of_points(points)
+            outline = draw_outline(points)
             outcomes.append((iou(outline, truth), count_corners(outline) == count_corners(truth)))
         print(make_row(f"{density:g}/m2 {kind}", outcomes), flush=True)
         total += outcomes
@@ -85,7 +85,7 @@ def outline_points(points: np.ndarray) -> shapely.Polygon:
     """
     frame = LocalFrame.around(points)
     try:
-        return shapely.transform(outline_of_points(frame.to_local(points)), frame.to_world)
+        return shapely.transform(draw_outline(frame.to_local(points)), frame.to_world)
     except FitError:
         return shapely.Polygon()
 

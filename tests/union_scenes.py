@@ -5,26 +5,26 @@ import math
 import numpy as np
 import shapely
 
-from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import scene_of
+from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.volumes import (
     COLUMNS,
     DIRECTION,
-    LEAN,
+    LEAN0,
     LEVEL,
-    OFFSET,
-    PLANES,
+    N_PLANES,
+    N_SIDES,
+    OFFSET0,
     REPLACES,
-    SIDES,
-    SLOPE,
+    SLOPE0,
     TIE,
     U0,
     U1,
     V0,
     V1,
-    base_only,
     equalise_slopes,
+    make_base,
 )
 from hiproof.primitives.family import GENERAL_SHAPES, Member
 
@@ -35,46 +35,62 @@ OUTLINES = (
 )
 
 
-def random_volume(rng, replacing=0.2):
+def draw_volume(rng, replacing=0.2):
     """A row (COLUMNS,) with a random rectangle, some of the five planes and a random tie; its ridge above its middle."""
     row = np.zeros(COLUMNS)
     row[DIRECTION] = rng.integers(2)
     u, v = np.sort(rng.uniform(-7.0, 7.0, (2, 2)), axis=1) + [[-0.5, 0.5]]
     row[U0], row[U1], row[V0], row[V1] = *u, *v
-    row[OFFSET : OFFSET + PLANES] = np.inf
-    some = rng.random(PLANES) < 0.5
-    some[rng.integers(PLANES)] = True
-    for k in np.nonzero(some)[0]:
-        row[OFFSET + k] = rng.uniform(-1.0, 2.0)
+    row[OFFSET0 : OFFSET0 + N_PLANES] = np.inf
+    is_chosen = rng.random(N_PLANES) < 0.5
+    is_chosen[rng.integers(N_PLANES)] = True
+    for k in np.nonzero(is_chosen)[0]:
+        row[OFFSET0 + k] = rng.uniform(-1.0, 2.0)
         if k < LEVEL:
-            row[SLOPE + k] = rng.uniform(0.1, 1.2)
-            row[LEAN + k] = rng.choice([0.0, rng.uniform(-0.3, 0.3)])
-            low = u[0] if k == 0 else -u[1] if k == 1 else v[0] if k == 2 else -v[1]
-            row[OFFSET + k] -= row[SLOPE + k] * low
+            row[SLOPE0 + k] = rng.uniform(0.1, 1.2)
+            row[LEAN0 + k] = rng.choice([0.0, rng.uniform(-0.3, 0.3)])
+            lower = u[0] if k == 0 else -u[1] if k == 1 else v[0] if k == 2 else -v[1]
+            row[OFFSET0 + k] -= row[SLOPE0 + k] * lower
     row[TIE], row[REPLACES] = rng.integers(3), float(rng.random() < replacing)
     equalise_slopes(row)
     return row
 
 
-def random_volumes(rng, most=5, replacing=0.2):
-    """A level base and up to `most` random volumes: rows (k, COLUMNS)."""
-    return np.vstack([base_only(-1.0), *[random_volume(rng, replacing) for _ in range(rng.integers(1, most + 1))]])
+def draw_volumes(rng, most_volumes=5, replacing=0.2):
+    """A level base and up to `most_volumes` random volumes: rows (k, COLUMNS)."""
+    return np.vstack(
+        [
+            make_base(-1.0),
+            *[draw_volume(rng, replacing) for _ in range(rng.integers(1, most_volumes + 1))],
+        ]
+    )
 
 
-def heights(volumes, U, V):
+def compute_heights(volumes, U, V):
     """Height of the roof and the volume that shows at U, V (directions, n): the definition, in plain NumPy."""
     z, top = np.full(U.shape[1], -np.inf), np.zeros(U.shape[1], int)
     for k, row in enumerate(volumes):
         u, v = U[int(row[DIRECTION])], V[int(row[DIRECTION])]
-        offset, slope = row[OFFSET : OFFSET + PLANES, None], row[SLOPE : SLOPE + SIDES, None]
-        up = np.array([u, -u, v, -v]) + row[LEAN : LEAN + SIDES, None] * [v, v, u, u]
-        h = np.min([*(offset[:LEVEL] + slope * up), np.broadcast_to(offset[LEVEL], u.shape)], axis=0)
-        shows = (row[U0] <= u) & (u <= row[U1]) & (row[V0] <= v) & (v <= row[V1]) & ((h > z) | (row[REPLACES] > 0))
+        offset, slope = (
+            row[OFFSET0 : OFFSET0 + N_PLANES, None],
+            row[SLOPE0 : SLOPE0 + N_SIDES, None],
+        )
+        rise = np.array([u, -u, v, -v]) + row[LEAN0 : LEAN0 + N_SIDES, None] * [v, v, u, u]
+        h = np.min(
+            [*(offset[:LEVEL] + slope * rise), np.broadcast_to(offset[LEVEL], u.shape)], axis=0
+        )
+        shows = (
+            (row[U0] <= u)
+            & (u <= row[U1])
+            & (row[V0] <= v)
+            & (v <= row[V1])
+            & ((h > z) | (row[REPLACES] > 0))
+        )
         z, top = np.where(shows, h, z), np.where(shows, k, top)
     return z, top
 
 
-def random_scene(rng, volumes=None, count=250, types=()):
+def draw_scene(rng, volumes=None, count=250, types=()):
     """A scene in two directions of points near the roof of `volumes` (level ground without), a tenth of them astray."""
     outline = OUTLINES[rng.integers(len(OUTLINES))]
     x0, y0, x1, y1 = outline.bounds
@@ -82,45 +98,63 @@ def random_scene(rng, volumes=None, count=250, types=()):
     xy = xy[shapely.contains_xy(outline, *xy.T)][:count]
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
     angles = [0.0, math.radians(rng.uniform(15.0, 75.0))]
-    scene = scene_of(plan, outline, angles, 3.0, 0.25, allowed_shapes(types))
-    z = heights(volumes, scene.U, scene.V)[0] if volumes is not None else np.zeros(scene.U.shape[1])
-    z = z + rng.normal(0.0, 0.03, len(z)) + (rng.random(len(z)) < 0.1) * rng.normal(0.0, 1.0, len(z))
-    low, high = z.min() - 0.3, z.max() + 0.3
-    return scene._replace(z=z, low=low, high=high)
+    scene = make_scene(plan, outline, angles, 3.0, 0.25, list_allowed_shapes(types))
+    z = (
+        compute_heights(volumes, scene.U, scene.V)[0]
+        if volumes is not None
+        else np.zeros(scene.U.shape[1])
+    )
+    z = (
+        z
+        + rng.normal(0.0, 0.03, len(z))
+        + (rng.random(len(z)) < 0.1) * rng.normal(0.0, 1.0, len(z))
+    )
+    lower, upper = z.min() - 0.3, z.max() + 0.3
+    return scene._replace(z=z, low=lower, high=upper)
 
 
-def member_of_shape(rng, shape, regular=False, skewed=False):
+def draw_member(rng, shape, regular=False, skewed=False):
     """A random member of the family called `shape` (or a kin of it), its ridge along its own u.
 
     `regular`: one eave and one slope, as most roofs have; `skewed`: planes that face a little off the axes.
     """
-    top, sides = next((has_top, sides) for (has_top, _, _), (name, sides) in GENERAL_SHAPES.items() if name == shape)
+    top, sides = next(
+        (has_top, sides)
+        for (has_top, _, _), (name, sides) in GENERAL_SHAPES.items()
+        if name == shape
+    )
     sides, half = list(sides), np.array([rng.uniform(6.0, 8.0), rng.uniform(3.5, 5.0)])
     eaves, slopes, leans = np.full(4, np.inf), np.zeros(4), np.zeros(4)
     eaves[sides] = rng.uniform(3.0, 6.0) + (0.0 if regular else rng.uniform(0.0, 0.4, len(sides)))
-    slopes[sides] = rng.uniform(0.5, 0.9) * (np.ones(len(sides)) if regular else rng.uniform(0.9, 1.1, len(sides)))
+    slopes[sides] = rng.uniform(0.5, 0.9) * (
+        np.ones(len(sides)) if regular else rng.uniform(0.9, 1.1, len(sides))
+    )
     if skewed:
         leans[sides] = rng.uniform(-0.1, 0.1, len(sides))
     reach = half[1] * slopes[sides].min() if sides else 0.0
     height = (
-        (eaves[sides].max() + rng.uniform(0.4, 0.6) * reach if sides else rng.uniform(3.0, 6.0)) if top else math.inf
+        (eaves[sides].max() + rng.uniform(0.4, 0.6) * reach if sides else rng.uniform(3.0, 6.0))
+        if top
+        else math.inf
     )
-    return Member(rng.uniform(-3.1, 3.1), rng.normal(0.0, 30.0, 2), half, eaves, slopes, height, leans)
+    return Member(
+        rng.uniform(-3.1, 3.1), rng.normal(0.0, 30.0, 2), half, eaves, slopes, height, leans
+    )
 
 
-def rectangle_of(member):
+def list_corners(member):
     """The plan (4, 2) of a member, counter-clockwise."""
     c, s = math.cos(member.kappa), math.sin(member.kappa)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * member.half
     return corners @ np.array([[c, s], [-s, c]]) + member.centre
 
 
-def lowest_of(planes, xy):
+def compute_lowest(planes, xy):
     """Height (n,) of the min of planes (k, 3) at `xy` (n, 2)."""
     return (xy @ planes[:, :2].T + planes[:, 2]).min(axis=1)
 
 
-def brute_rectangle(gain):
+def search_all_rectangles(gain):
     """The largest sum of `gain` (nu, nv) over a rectangle of its cells, all of them tried."""
     nu, nv = gain.shape
     return max(

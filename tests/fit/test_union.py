@@ -8,7 +8,7 @@ from hiproof.errors import FitError, InputError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit import fit_roof
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.clamp import CLAMP_M, LEAST_M2, MISSED_SPACINGS, clamped
+from hiproof.fit.union.clamp import CLAMP_M, LEAST_EXCESS_M2, MISSED_SPACINGS, clamp_parts
 from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings
 from points_of_roofs import sample_heights
@@ -22,12 +22,18 @@ def gable_with_shed(x, y):
 STEP_M = 0.1  # how near a step is to where it should be
 HOUSE = shapely.box(0, 0, 12, 7)
 L_SHAPE = shapely.Polygon([(0, 0), (12, 0), (12, 6), (5, 6), (5, 14), (0, 14)])
-COURTYARD = shapely.Polygon(shapely.box(0, 0, 14, 14).exterior.coords, [shapely.box(5, 5, 9, 9).exterior.coords])
+COURTYARD = shapely.Polygon(
+    shapely.box(0, 0, 14, 14).exterior.coords, [shapely.box(5, 5, 9, 9).exterior.coords]
+)
 TRIANGLE = shapely.Polygon([(0, 0), (9, 0), (2, 7)])
 STAR = shapely.Polygon(
     [
         (6 * r * np.cos(a), 6 * r * np.sin(a))
-        for a, r in zip(np.linspace(0, 2 * np.pi, 240, endpoint=False), np.tile([1.0, 0.9, 1.05], 80), strict=True)
+        for a, r in zip(
+            np.linspace(0, 2 * np.pi, 240, endpoint=False),
+            np.tile([1.0, 0.9, 1.05], 80),
+            strict=True,
+        )
     ]
 )
 SLENDER = shapely.box(0, 0, 30, 0.4)
@@ -41,18 +47,23 @@ OUTLINES = {
 }
 
 
-def height_of(fit, xy):
+def measure_height(fit, xy):
     return Roof(fit.roof_parts, fit.outline, None).height_at(xy)
 
 
 def test_a_house_with_a_flat_extension_is_three_planes():
     points = sample_heights(gable_with_shed, HOUSE)
     fit = fit_building(points, HOUSE)
-    planes = {tuple(np.round(plane, 9)) for part in fit.roof_parts for piece in part.pieces for plane in piece.planes}
+    planes = {
+        tuple(np.round(plane, 9))
+        for part in fit.roof_parts
+        for piece in part.pieces
+        for plane in piece.planes
+    }
     assert len(planes) == 3
-    away = np.abs(points[:, 0] - 8.0) > STEP_M
-    gap = height_of(fit, points[:, :2]) - points[:, 2]
-    assert np.sqrt(np.mean(gap[away] ** 2)) < 0.05
+    is_away = np.abs(points[:, 0] - 8.0) > STEP_M
+    gap = measure_height(fit, points[:, :2]) - points[:, 2]
+    assert np.sqrt(np.mean(gap[is_away] ** 2)) < 0.05
     assert fit.unexplained < 0.005
 
 
@@ -60,19 +71,23 @@ def test_a_house_with_a_flat_extension_is_three_planes():
 @pytest.mark.parametrize("points_wanted", [1, 2, 3, 4, 7, 30, 400])
 def test_pieces_cover_the_outline_and_stay_near_the_points(name, points_wanted):
     outline = OUTLINES[name]
-    points = sample_heights(lambda x, y: 5.0 + np.where(x + y > 6.0, 2.0, 0.1 * x), outline, density=60.0)[:points_wanted]
+    points = sample_heights(
+        lambda x, y: 5.0 + np.where(x + y > 6.0, 2.0, 0.1 * x), outline, density=60.0
+    )[:points_wanted]
     fit = fit_building(points, outline)
     outlines = [piece.outline for part in fit.roof_parts for piece in part.pieces]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in outlines)
     assert shapely.union_all(outlines).symmetric_difference(outline).area < 1e-6 * outline.area
     corners = np.concatenate([shapely.get_coordinates(polygon) for polygon in outlines])
     inside = points[:, 2]
-    heights = height_of(fit, corners)
+    heights = measure_height(fit, corners)
     heights = heights[np.isfinite(heights)]
-    slope = max(np.hypot(*piece.planes[:, :2].T).max() for part in fit.roof_parts for piece in part.pieces)
-    tip = slope * np.sqrt(2.0 * LEAST_M2)
-    beyond = CLAMP_M + MISSED_SPACINGS * slope * np.sqrt(outline.area / len(points)) + tip + 0.1
-    assert inside.min() - beyond <= heights.min() and heights.max() <= inside.max() + beyond
+    slope = max(
+        np.hypot(*piece.planes[:, :2].T).max() for part in fit.roof_parts for piece in part.pieces
+    )
+    tip = slope * np.sqrt(2.0 * LEAST_EXCESS_M2)
+    extra = CLAMP_M + MISSED_SPACINGS * slope * np.sqrt(outline.area / len(points)) + tip + 0.1
+    assert inside.min() - extra <= heights.min() and heights.max() <= inside.max() + extra
 
 
 @pytest.mark.parametrize(("below_m", "parts"), [(0.2, 1), (1.0, 2)])
@@ -80,21 +95,26 @@ def test_what_lies_beyond_the_points_is_a_part_unless_it_is_the_tip_of_a_corner(
     # Delft's 503100000018519 had a part of 0.02 m2
     plane = np.array([[1.0, 1.0, 5.0]])
     slope = Part("monopitch", (Piece(shapely.box(0, 0, 8, 8), plane),))
-    found = clamped([slope], 5.0 + CLAMP_M + below_m, 30.0, 0.0)
-    assert [part.type for part in found] == ["monopitch", "flat"][:parts]
-    areas = [piece.outline.area for part in found for piece in part.pieces]
-    assert sum(areas) == pytest.approx(64.0) and min(areas) > LEAST_M2
+    result = clamp_parts([slope], 5.0 + CLAMP_M + below_m, 30.0, 0.0)
+    assert [part.type for part in result] == ["monopitch", "flat"][:parts]
+    areas = [piece.outline.area for part in result for piece in part.pieces]
+    assert sum(areas) == pytest.approx(64.0) and min(areas) > LEAST_EXCESS_M2
 
 
 def test_a_steep_plane_that_falls_further_than_points_may_miss_an_eave_ends_near_the_lowest_point():
     # Delft's 503100000017310 at half its points: eleven square metres stood 1.3 m below all of them
-    steep, spacing = Part("monopitch", (Piece(shapely.box(0, 0, 8, 8), np.array([[2.5, 0.0, 0.0]])),)), 0.5
+    steep, spacing = (
+        Part("monopitch", (Piece(shapely.box(0, 0, 8, 8), np.array([[2.5, 0.0, 0.0]])),)),
+        0.5,
+    )
     missed = MISSED_SPACINGS * spacing * 2.5
-    (eave,) = clamped([steep], CLAMP_M + 0.9 * missed, 30.0, spacing)
+    (eave,) = clamp_parts([steep], CLAMP_M + 0.9 * missed, 30.0, spacing)
     assert eave is steep
-    fallen = clamped([steep], CLAMP_M + 3.0, 30.0, spacing)
+    fallen = clamp_parts([steep], CLAMP_M + 3.0, 30.0, spacing)
     assert [part.type for part in fallen] == ["monopitch", "flat"]
-    assert fallen[1].translation[2] == pytest.approx(3.0) and fallen[1].area == pytest.approx(8 * 3.0 / 2.5)
+    assert fallen[1].translation[2] == pytest.approx(3.0) and fallen[1].area == pytest.approx(
+        8 * 3.0 / 2.5
+    )
 
 
 def test_fewer_than_four_points_give_a_flat_roof_at_their_median():
@@ -106,24 +126,29 @@ def test_fewer_than_four_points_give_a_flat_roof_at_their_median():
 def test_the_order_of_the_points_does_not_matter():
     points = sample_heights(gable_with_shed, HOUSE)
     shuffled = points[np.random.default_rng(1).permutation(len(points))]
-    one, other = fit_building(points, HOUSE), fit_building(shuffled, HOUSE)
-    assert one.objective == other.objective
-    for part, twin in zip(one.roof_parts, other.roof_parts, strict=True):
+    first, other = fit_building(points, HOUSE), fit_building(shuffled, HOUSE)
+    assert first.objective == other.objective
+    for part, twin in zip(first.roof_parts, other.roof_parts, strict=True):
         assert part.pieces[0].outline.equals(twin.pieces[0].outline)
         assert (part.pieces[0].planes == twin.pieces[0].planes).all()
 
 
 def test_points_outside_the_outline_do_not_count():
     points = sample_heights(gable_with_shed, HOUSE)
-    beside = sample_heights(lambda x, y: 20.0 + 0.0 * x, shapely.box(12.5, 0, 20, 7))
-    assert fit_building(np.vstack([points, beside]), HOUSE).objective == fit_building(points, HOUSE).objective
+    neighbours = sample_heights(lambda x, y: 20.0 + 0.0 * x, shapely.box(12.5, 0, 20, 7))
+    assert (
+        fit_building(np.vstack([points, neighbours]), HOUSE).objective
+        == fit_building(points, HOUSE).objective
+    )
 
 
 def test_the_roof_moves_with_its_points():
     points, shift = sample_heights(gable_with_shed, HOUSE), np.array([103.0, -57.0, 12.0])
     moved = fit_building(points + shift, shapely.transform(HOUSE, lambda xy: xy + shift[:2]))
-    before = height_of(fit_building(points, HOUSE), points[:, :2])
-    assert height_of(moved, points[:, :2] + shift[:2]) == pytest.approx(before + shift[2], abs=1e-3)
+    original = measure_height(fit_building(points, HOUSE), points[:, :2])
+    assert measure_height(moved, points[:, :2] + shift[:2]) == pytest.approx(
+        original + shift[2], abs=1e-3
+    )
 
 
 def test_the_roof_turns_with_its_points():
@@ -132,17 +157,21 @@ def test_the_roof_turns_with_its_points():
     turn = np.array([[cos, -sin], [sin, cos]])
     turned = np.column_stack([points[:, :2] @ turn.T, points[:, 2]])
     fit = fit_building(turned, shapely.transform(HOUSE, lambda xy: xy @ turn.T))
-    before = height_of(fit_building(points, HOUSE), points[:, :2])
-    assert np.mean(np.abs(height_of(fit, turned[:, :2]) - before) < 0.05) > 0.97
+    original = measure_height(fit_building(points, HOUSE), points[:, :2])
+    assert np.mean(np.abs(measure_height(fit, turned[:, :2]) - original) < 0.05) > 0.97
 
 
 def test_one_unseen_side_of_a_gable_grows_no_spike():
     points = sample_heights(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
-    seen = points[points[:, 1] < 3.6]
-    fit = fit_building(seen, HOUSE)
-    corners = np.concatenate([shapely.get_coordinates(p.outline) for part in fit.roof_parts for p in part.pieces])
-    heights = np.concatenate([p.height_at(corners) for part in fit.roof_parts for p in part.pieces[:1]])
-    assert np.nanmax(height_of(fit, corners)) <= seen[:, 2].max() + 0.5
+    visible = points[points[:, 1] < 3.6]
+    fit = fit_building(visible, HOUSE)
+    corners = np.concatenate(
+        [shapely.get_coordinates(p.outline) for part in fit.roof_parts for p in part.pieces]
+    )
+    heights = np.concatenate(
+        [p.height_at(corners) for part in fit.roof_parts for p in part.pieces[:1]]
+    )
+    assert np.nanmax(measure_height(fit, corners)) <= visible[:, 2].max() + 0.5
     assert len(heights)
 
 
@@ -159,7 +188,8 @@ def test_points_of_another_shape_are_not_taken_for_others(columns):
 
 
 @pytest.mark.parametrize(
-    "outline", [shapely.Polygon(), shapely.LineString([(0, 0), (9, 9)]), shapely.box(0, 0, np.inf, 7)]
+    "outline",
+    [shapely.Polygon(), shapely.LineString([(0, 0), (9, 9)]), shapely.box(0, 0, np.inf, 7)],
 )
 def test_an_outline_without_area_is_an_error_with_a_sentence(outline):
     with pytest.raises(FitError, match="expected an outline with an area"):
@@ -176,22 +206,27 @@ def test_repeated_points_and_points_on_a_line_are_survived():
     line = np.column_stack([np.linspace(0.5, 11.5, 50), np.full(50, 3.0), np.full(50, 4.0)])
     for points in (line, np.repeat(line[:1], 30, axis=0), np.vstack([line, line])):
         fit = fit_building(points, HOUSE)
-        assert height_of(fit, points[:, :2]) == pytest.approx(points[:, 2], abs=0.05)
+        assert measure_height(fit, points[:, :2]) == pytest.approx(points[:, 2], abs=0.05)
 
 
 def test_a_single_gable_comes_out_as_from_the_single_primitive_road():
     points = sample_heights(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
     part = fit_building(points, HOUSE).roof_parts[0]
-    alone = fit_roof(points, outline=HOUSE)
-    assert part.type == alone.type == "gable"
-    for name, value in alone.parameters.items():
-        assert part.parameters[name] == pytest.approx(value, abs=max(alone.sigma[name], 1e-9))
-    assert part.translation == pytest.approx(alone.translation + alone.global_translation, abs=alone.sigma["t_z"])
-    assert part.kappa == pytest.approx(alone.kappa)
+    separate = fit_roof(points, outline=HOUSE)
+    assert part.type == separate.type == "gable"
+    for name, value in separate.parameters.items():
+        assert part.parameters[name] == pytest.approx(value, abs=max(separate.sigma[name], 1e-9))
+    assert part.translation == pytest.approx(
+        separate.translation + separate.global_translation, abs=separate.sigma["t_z"]
+    )
+    assert part.kappa == pytest.approx(separate.kappa)
 
 
 def test_parts_are_named_by_the_catalogue_with_parameters_and_deviations():
-    parts = {part.type: part for part in fit_building(sample_heights(gable_with_shed, HOUSE), HOUSE).roof_parts}
+    parts = {
+        part.type: part
+        for part in fit_building(sample_heights(gable_with_shed, HOUSE), HOUSE).roof_parts
+    }
     assert set(parts) == {"gable", "flat"}
     assert parts["gable"].parameters["height"] == pytest.approx(0.9 * 3.5, abs=0.05)
     assert 0.0 < parts["gable"].sigma["height"] < 0.05
@@ -223,16 +258,23 @@ def test_teeth_are_equally_wide_however_the_points_beside_a_step_lie():
 def test_uneven_teeth_stay_uneven():
     edges = np.array([0.0, 5.0, 10.4, 15.0])
     hall = shapely.box(0, 0, 12, 15)
-    points = sample_heights(lambda x, y: 4.0 + 0.5 * (y - edges[np.searchsorted(edges, y, side="right") - 1]), hall)
+    points = sample_heights(
+        lambda x, y: 4.0 + 0.5 * (y - edges[np.searchsorted(edges, y, side="right") - 1]), hall
+    )
     fit = fit_building(points, hall)
-    assert {part.type for part in fit.roof_parts} == {"monopitch"}  # a saw-tooth's parameters say one width
-    found = np.unique(np.round(tooth_edges(fit), 1))
-    assert found == pytest.approx(edges, abs=0.11)
+    assert {part.type for part in fit.roof_parts} == {
+        "monopitch"
+    }  # a saw-tooth's parameters say one width
+    result = np.unique(np.round(tooth_edges(fit), 1))
+    assert result == pytest.approx(edges, abs=0.11)
 
 
 @pytest.mark.parametrize(
     ("half_width", "depth", "top", "parts"),
-    [(0.9, 2.0, 8.0, {"main": 1, "full": 2, "fine": 2}), (0.6, 1.0, 6.9, {"main": 1, "full": 1, "fine": 2})],
+    [
+        (0.9, 2.0, 8.0, {"main": 1, "full": 2, "fine": 2}),
+        (0.6, 1.0, 6.9, {"main": 1, "full": 1, "fine": 2}),
+    ],
 )
 def test_detail_says_how_small_a_dormer_may_be(half_width, depth, top, parts):
     def with_dormer(x, y):
@@ -240,11 +282,15 @@ def test_detail_says_how_small_a_dormer_may_be(half_width, depth, top, parts):
         return np.where(dormer, top, 8.0 - 0.9 * np.abs(y - 3.5))
 
     points = sample_heights(with_dormer, HOUSE)
-    found = {
-        detail: len(fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": detail}})).roof_parts)
+    result = {
+        detail: len(
+            fit_building(
+                points, HOUSE, Settings.from_dict({"compound": {"detail": detail}})
+            ).roof_parts
+        )
         for detail in parts
     }
-    assert found == parts
+    assert result == parts
 
 
 def test_without_an_outline_the_plan_is_estimated():

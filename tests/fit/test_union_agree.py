@@ -7,62 +7,68 @@ import pytest
 import shapely
 
 from hiproof.fit.union import agree, fit_building
-from hiproof.fit.union.agree import hide_again, roof_misfit
-from hiproof.fit.union.allowed import allowed_shapes
-from hiproof.fit.union.finish import found_planes
+from hiproof.fit.union.agree import restore_risen_planes, sum_misfit
+from hiproof.fit.union.allowed import list_allowed_shapes
+from hiproof.fit.union.finish import read_volume_planes
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import scene_of
-from hiproof.fit.union.volumes import LEVEL, OFFSET, base_only
+from hiproof.fit.union.scene import make_scene
+from hiproof.fit.union.volumes import LEVEL, OFFSET0, make_base
 from hiproof.model import Roof
 from points_of_roofs import sample_heights
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 6), (6, 6), (6, 15), (0, 15)])
 
 
-def two_wings(lower):
+def make_wings(lower):
     """Gables along both legs of L_SHAPE, equally steep and wide, the second `lower` than the first."""
 
     def height(x, y):
-        one = np.where(y < 6.0, 8.0 - 0.8 * np.abs(y - 3.0), -np.inf)
+        first = np.where(y < 6.0, 8.0 - 0.8 * np.abs(y - 3.0), -np.inf)
         other = np.where(x < 6.0, 8.0 - lower - 0.8 * np.abs(x - 3.0), -np.inf)
-        return np.maximum(one, other)
+        return np.maximum(first, other)
 
     return height
 
 
-def tops(fit):
+def list_ridge_heights(fit):
     """The heights of the highest point of every part with a ridge, ascending."""
     return sorted(
-        float(part.translation[2] + part.parameters["height"]) for part in fit.roof_parts if part.type == "gable"
+        float(part.translation[2] + part.parameters["height"])
+        for part in fit.roof_parts
+        if part.type == "gable"
     )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_wings_of_one_height_have_one_ridge_height(seed):
-    fit = fit_building(sample_heights(two_wings(0.0), L_SHAPE, 10.0, 0.02, seed), L_SHAPE)
-    low, high = tops(fit)
-    assert high - low < 1e-4
-    assert high == pytest.approx(8.0, abs=0.05)
+    fit = fit_building(sample_heights(make_wings(0.0), L_SHAPE, 10.0, 0.02, seed), L_SHAPE)
+    lower, upper = list_ridge_heights(fit)
+    assert upper - lower < 1e-4
+    assert upper == pytest.approx(8.0, abs=0.05)
 
 
 @pytest.mark.parametrize("lower", [0.15, 0.4])
 def test_wings_of_two_heights_keep_them(lower):
-    low, high = tops(fit_building(sample_heights(two_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE))
-    assert high - low == pytest.approx(lower, abs=0.04)
+    low, upper = list_ridge_heights(
+        fit_building(sample_heights(make_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE)
+    )
+    assert upper - low == pytest.approx(lower, abs=0.04)
 
 
 def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
     """Where no common fit is proper the wings keep their own planes; they took any, and pitches became negative."""
-    fit = fit_building(sample_heights(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
-    low, high = tops(fit)
-    assert high - low < 1e-4
-    monkeypatch.setattr(agree, "proper", lambda *_: False)
-    low, high = tops(fit_building(sample_heights(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE))
-    assert high - low > 1e-3
-    assert (low, high) == pytest.approx((8.0, 8.0), abs=0.15)
+    fit = fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
+    lower, upper = list_ridge_heights(fit)
+    assert upper - lower < 1e-4
+    monkeypatch.setattr(agree, "is_proper", lambda *_: False)
+    lower, upper = list_ridge_heights(
+        fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
+    )
+    assert upper - lower > 1e-3
+    assert (lower, upper) == pytest.approx((8.0, 8.0), abs=0.15)
 
 
-def bent(angle_deg):
+def make_bent_house(angle_deg):
     """The outline of a house that bends by an angle halfway along, 7 m wide, and the height of its one roof."""
     half = np.radians(0.5 * angle_deg)
     along = np.array(
@@ -71,30 +77,41 @@ def bent(angle_deg):
     across = np.array([[-np.sin(half), np.cos(half)], [np.sin(half), np.cos(half)]])
 
     def height(x, y):
-        left = x < 0.0
-        d = np.where(left, across[0] @ np.stack([x, y]), across[1] @ np.stack([x, y]))
+        remainder = x < 0.0
+        d = np.where(remainder, across[0] @ np.stack([x, y]), across[1] @ np.stack([x, y]))
         return 9.0 - 0.7 * np.abs(d)
 
     corner = 3.5 / np.cos(half)
     ends = -10.0 * along[0], 10.0 * along[1]
     sides = 3.5 * across[0], 3.5 * across[1]
-    ring = [ends[0] - sides[0], (0, -corner), ends[1] - sides[1], ends[1] + sides[1], (0, corner), ends[0] + sides[0]]
+    ring = [
+        ends[0] - sides[0],
+        (0, -corner),
+        ends[1] - sides[1],
+        ends[1] + sides[1],
+        (0, corner),
+        ends[0] + sides[0],
+    ]
     return shapely.Polygon(ring), height
 
 
 @pytest.mark.parametrize("angle", [20.0, 32.0, 44.0])
 def test_a_bent_house_is_two_wings_that_meet_on_one_line(angle):
-    outline, height = bent(angle)
+    outline, height = make_bent_house(angle)
     fit = fit_building(sample_heights(height, outline, 8.0, 0.02), outline)
     assert [part.type for part in fit.roof_parts] == ["gable", "gable"]
-    xy = shapely.get_coordinates(shapely.intersection(outline.buffer(-0.1), shapely.MultiPoint(grid_over(outline))))
+    xy = shapely.get_coordinates(
+        shapely.intersection(outline.buffer(-0.1), shapely.MultiPoint(make_grid(outline)))
+    )
     error = Roof(fit.roof_parts, fit.outline, None).height_at(xy) - height(xy[:, 0], xy[:, 1])
     assert np.abs(error).max() < 0.1
 
 
-def grid_over(outline):
+def make_grid(outline):
     x0, y0, x1, y1 = outline.bounds
-    return np.stack(np.meshgrid(np.arange(x0, x1, 0.25), np.arange(y0, y1, 0.25)), axis=-1).reshape(-1, 2)
+    return np.stack(np.meshgrid(np.arange(x0, x1, 0.25), np.arange(y0, y1, 0.25)), axis=-1).reshape(
+        -1, 2
+    )
 
 
 def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
@@ -102,14 +119,14 @@ def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
     outline = shapely.box(0.0, 0.0, 20.0, 8.0)
     points = sample_heights(lambda x, y: 5.0 + 0.0 * x, outline, 5.0, 0.02)
     plan = lay_out_plan(points, outline)
-    scene = scene_of(plan, outline, [0.0], 3.0, 0.2, allowed_shapes(()))
-    volumes = np.repeat(base_only(5.0 - plan.frame.origin[2]), 3, axis=0)
-    volumes[0, OFFSET + LEVEL] -= 9.0
-    volumes[1, OFFSET + LEVEL] -= 0.01  # over all of it, hidden
-    found = [found_planes(volume, scene) for volume in volumes]
-    risen = replace(found[1], rows=found[1].rows + [0.0, 0.0, 0.4])
-    assert roof_misfit(volumes, [found[0], risen, found[2]], scene) > 0.5 * scene.n
-    planes = hide_again(volumes, [found[0], risen, found[2]], scene)
-    assert roof_misfit(volumes, planes, scene) == roof_misfit(volumes, found, scene)
-    shifted = replace(found[2], rows=found[2].rows + [0.0, 0.0, 0.02])
-    assert hide_again(volumes, [*found[:2], shifted], scene)[2] is shifted
+    scene = make_scene(plan, outline, [0.0], 3.0, 0.2, list_allowed_shapes(()))
+    volumes = np.repeat(make_base(5.0 - plan.frame.origin[2]), 3, axis=0)
+    volumes[0, OFFSET0 + LEVEL] -= 9.0
+    volumes[1, OFFSET0 + LEVEL] -= 0.01  # over all of it, hidden
+    result = [read_volume_planes(volume, scene) for volume in volumes]
+    risen = replace(result[1], rows=result[1].rows + [0.0, 0.0, 0.4])
+    assert sum_misfit(volumes, [result[0], risen, result[2]], scene) > 0.5 * scene.n
+    planes = restore_risen_planes(volumes, [result[0], risen, result[2]], scene)
+    assert sum_misfit(volumes, planes, scene) == sum_misfit(volumes, result, scene)
+    shifted = replace(result[2], rows=result[2].rows + [0.0, 0.0, 0.02])
+    assert restore_risen_planes(volumes, [*result[:2], shifted], scene)[2] is shifted

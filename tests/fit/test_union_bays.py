@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from shapely import box
 
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.bays import LEAST_M2, MOST_M2, MOST_SHARE, pieces_of
+from hiproof.fit.union.bays import LEAST_BAY_M2, MOST_BAY_M2, MOST_BAY_SHARE, list_small_pieces
 
 HOUSE = box(0, 0, 16, 12)
 BUMPS = {
@@ -19,15 +19,15 @@ BUMPS = {
 }
 
 
-def scanned(rng, outline, height, density=5.0):
+def scan_roof(rng, outline, height, density=5.0):
     """Points (n, 3) spread by chance over `outline`, where the roof is `height` high."""
-    low, high = np.array(outline.bounds[:2]), np.array(outline.bounds[2:])
-    xy = rng.uniform(low, high, (int(density * np.prod(high - low)), 2))
+    lower, upper = np.array(outline.bounds[:2]), np.array(outline.bounds[2:])
+    xy = rng.uniform(lower, upper, (int(density * np.prod(upper - lower)), 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
     return np.column_stack([xy, height(*xy.T) + rng.normal(0.0, 0.02, len(xy))])
 
 
-def heights(fit, x, y):
+def measure_height(fit, x, y):
     return max(float(part.height_at(np.array([[x, y]]))[0]) for part in fit.roof_parts)
 
 
@@ -37,11 +37,13 @@ def test_a_small_bay_has_the_height_of_its_own_few_points(name, seed):
     bump = BUMPS[name]
     outline = HOUSE.union(bump)
     rng = np.random.default_rng(seed)
-    points = scanned(rng, outline, lambda x, y: np.where(shapely.contains_xy(bump, x, y), 3.0, 8.0))
+    points = scan_roof(
+        rng, outline, lambda x, y: np.where(shapely.contains_xy(bump, x, y), 3.0, 8.0)
+    )
     fit = fit_building(points, outline)
     middle = bump.centroid
-    assert heights(fit, middle.x, middle.y) == pytest.approx(3.0, abs=0.1)
-    assert heights(fit, 8.0, 6.0) == pytest.approx(8.0, abs=0.1)
+    assert measure_height(fit, middle.x, middle.y) == pytest.approx(3.0, abs=0.1)
+    assert measure_height(fit, 8.0, 6.0) == pytest.approx(8.0, abs=0.1)
     assert len(fit.roof_parts) == 2
 
 
@@ -52,7 +54,9 @@ def test_a_bay_under_the_same_roof_is_none(name, seed):
     outline = HOUSE.union(BUMPS[name])
     rng = np.random.default_rng(seed)
     for slope in (0.0, 0.5):
-        fit = fit_building(scanned(rng, outline, lambda x, y, k=slope: 8.0 - k * np.hypot(0, x - 8)), outline)
+        fit = fit_building(
+            scan_roof(rng, outline, lambda x, y, k=slope: 8.0 - k * np.hypot(0, x - 8)), outline
+        )
         assert len(fit.roof_parts) == 1
 
 
@@ -62,18 +66,20 @@ def test_a_bay_too_narrow_for_the_base_has_its_height_all_the_same(seed):
     house, strip = box(0, 0, 9, 5), box(9, 2.0, 9.45, 5)
     outline = house.union(strip)
     rng = np.random.default_rng(seed)
-    points = scanned(rng, outline, lambda x, y: np.where(x > 9, 3.0, 8.0 - 0.7 * np.abs(x - 4.5)), density=8.0)
+    points = scan_roof(
+        rng, outline, lambda x, y: np.where(x > 9, 3.0, 8.0 - 0.7 * np.abs(x - 4.5)), density=8.0
+    )
     fit = fit_building(points, outline)
-    assert heights(fit, 9.2, 3.5) == pytest.approx(3.0, abs=0.1)
+    assert measure_height(fit, 9.2, 3.5) == pytest.approx(3.0, abs=0.1)
     assert sorted(part.type for part in fit.roof_parts) == ["flat", "gable"]
 
 
 def test_returns_of_its_walls_are_no_roof_of_a_bay():
     rng, bump = np.random.default_rng(0), BUMPS["beside a wall"]
     outline = HOUSE.union(bump)
-    roof = scanned(rng, outline, lambda x, y: np.full(len(x), 8.0))
+    roof = scan_roof(rng, outline, lambda x, y: np.full(len(x), 8.0))
     along = bump.exterior.intersection(outline.exterior).buffer(0.05).intersection(outline)
-    walls = scanned(rng, along, lambda x, y: rng.uniform(0.0, 7.5, len(x)), density=150.0)
+    walls = scan_roof(rng, along, lambda x, y: rng.uniform(0.0, 7.5, len(x)), density=150.0)
     assert len(walls) > 8
     assert len(fit_building(np.vstack([roof, walls]), outline).roof_parts) == 1
 
@@ -83,13 +89,15 @@ def test_returns_of_its_walls_are_no_roof_of_a_bay():
 def test_pieces_are_what_lines_of_walls_cut_off(seed):
     """Each lies within the outline, is simple, and all of its border but one line is the outline's."""
     rng = np.random.default_rng(seed)
-    parts = [box(*(low := rng.uniform(0, 8, 2)), *(low + rng.uniform(1, 8, 2))) for _ in range(3)]
+    parts = [
+        box(*(lower := rng.uniform(0, 8, 2)), *(lower + rng.uniform(1, 8, 2))) for _ in range(3)
+    ]
     outline = max(shapely.get_parts(shapely.union_all(parts)), key=lambda polygon: polygon.area)
     outline = shapely.Polygon(outline.exterior)
-    for ring in pieces_of(outline):
+    for ring in list_small_pieces(outline):
         piece = shapely.Polygon(ring)
         assert piece.is_valid and piece.exterior.is_ccw
-        assert LEAST_M2 <= piece.area <= min(MOST_M2, MOST_SHARE * outline.area) + 1e-9
+        assert LEAST_BAY_M2 <= piece.area <= min(MOST_BAY_M2, MOST_BAY_SHARE * outline.area) + 1e-9
         assert piece.difference(outline).area < 1e-9
         inner = piece.exterior.difference(outline.exterior.buffer(1e-6))
         assert len(shapely.get_parts(shapely.line_merge(inner))) == 1
@@ -97,4 +105,4 @@ def test_pieces_are_what_lines_of_walls_cut_off(seed):
 
 
 def test_a_rectangle_has_no_pieces():
-    assert pieces_of(HOUSE) == []
+    assert list_small_pieces(HOUSE) == []

@@ -15,34 +15,41 @@ from hiproof.parametric.arrange import merged_parts, split_part
 from points_of_roofs import sample_heights
 
 EAVE = 3.0
-OCTAGON = shapely.Polygon([(5 * math.cos(a), 5 * math.sin(a)) for a in np.arange(8) * math.pi / 4 + math.pi / 8])
+OCTAGON = shapely.Polygon(
+    [(5 * math.cos(a), 5 * math.sin(a)) for a in np.arange(8) * math.pi / 4 + math.pi / 8]
+)
 CANTED_END = shapely.Polygon([(0, 0), (12, 0), (14.5, 2.5), (14.5, 5.5), (12, 8), (0, 8)])
 
 
-def over_walls(outline, slope, gable=()):
+def make_height(outline, slope, gable=()):
     """Height of a roof that rises from every wall of a convex outline but those of these numbers."""
     ring = shapely.get_coordinates(shapely.orient_polygons(outline))
     walls = [(a, b - a) for k, (a, b) in enumerate(pairwise(ring)) if k not in gable]
 
     def height(x, y):
-        off = [(way[0] * (y - at[1]) - way[1] * (x - at[0])) / np.hypot(*way) for at, way in walls]
-        return EAVE + slope * np.min(off, axis=0)
+        offsets = [
+            (way[0] * (y - positions[1]) - way[1] * (x - positions[0])) / np.hypot(*way)
+            for positions, way in walls
+        ]
+        return EAVE + slope * np.min(offsets, axis=0)
 
     return height
 
 
-def house(name):
+def make_house(name):
     """Outline and height of one of the houses."""
     if name == "tower":
-        return OCTAGON, over_walls(OCTAGON, 1.0)
-    return CANTED_END, over_walls(CANTED_END, 0.7, gable=[5])
+        return OCTAGON, make_height(OCTAGON, 1.0)
+    return CANTED_END, make_height(CANTED_END, 0.7, gable=[5])
 
 
-def cants_in(part):
-    return sorted(value for name, value in part.parameters.items() if name.startswith("facing_cant"))
+def list_cants(part):
+    return sorted(
+        value for name, value in part.parameters.items() if name.startswith("facing_cant")
+    )
 
 
-def misfit(parts, outline, height):
+def compute_misfit(parts, outline, height):
     xy = np.random.default_rng(7).uniform(outline.bounds[:2], outline.bounds[2:], (4000, 2))
     xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
     roof = np.max([part.height_at(xy) for part in parts], axis=0)
@@ -50,65 +57,74 @@ def misfit(parts, outline, height):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(("name", "kind", "count"), [("tower", "pyramid", 4), ("bay", "side_hip", 2)])
+@pytest.mark.parametrize(
+    ("name", "kind", "count"), [("tower", "pyramid", 4), ("bay", "side_hip", 2)]
+)
 def test_a_roof_that_rises_from_every_wall_is_one_part(name, kind, count, seed):
-    outline, height = house(name)
+    outline, height = make_house(name)
     (part,) = fit_building(sample_heights(height, outline, 8.0, 0.02, seed), outline).roof_parts
     assert part.type == kind
-    assert len(cants_in(part)) == count
-    assert misfit([part], outline, height) < 0.03
+    assert len(list_cants(part)) == count
+    assert compute_misfit([part], outline, height) < 0.03
     assert all(0.0 < part.sigma[f"pitch_cant{k + 1}"] < 3.0 for k in range(count))
 
 
 @pytest.mark.parametrize("degrees", [33.0, 117.0, 250.0])
 def test_cants_turn_with_the_points(degrees):
-    outline, height = house("bay")
+    outline, height = make_house("bay")
     points = sample_heights(height, outline, 8.0, 0.02, 1)
     turned = affinity.rotate(outline, degrees, (0, 0))
     c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
     moved = np.column_stack([points[:, :2] @ np.array([[c, s], [-s, c]]), points[:, 2]])
-    (one,), (other,) = fit_building(points, outline).roof_parts, fit_building(moved, turned).roof_parts
+    (first,), (other,) = (
+        fit_building(points, outline).roof_parts,
+        fit_building(moved, turned).roof_parts,
+    )
     xy = points[:, :2] @ np.array([[c, s], [-s, c]])
-    assert other.pieces[0].height_at(xy) == pytest.approx(one.pieces[0].height_at(points[:, :2]), abs=0.02)
+    assert other.pieces[0].height_at(xy) == pytest.approx(
+        first.pieces[0].height_at(points[:, :2]), abs=0.02
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_bay_runs_into_the_roof_behind_it(seed):
     """A hipped bay with slanted sides on a gabled house: two parts, the bay's planes over three of its walls and a part of the house."""
     bay = shapely.Polygon([(4.5, 3), (9.5, 3), (9.5, 10), (8.5, 11.5), (5.5, 11.5), (4.5, 10)])
-    outline, over_bay = shapely.union(shapely.box(0, 0, 14, 9), bay), over_walls(bay, 0.8)
+    outline, over_bay = shapely.union(shapely.box(0, 0, 14, 9), bay), make_height(bay, 0.8)
 
     def height(x, y):
         main = np.where(y <= 9, EAVE + 0.8 * np.minimum(y, 9 - y), -np.inf)
         return np.where(shapely.intersects_xy(bay, x, y), np.maximum(main, over_bay(x, y)), main)
 
     parts = fit_building(sample_heights(height, outline, 10.0, 0.02, seed), outline).roof_parts
-    assert sorted(len(cants_in(part)) for part in parts) == [0, 2]
-    assert misfit(parts, outline, height) < 0.03
+    assert sorted(len(list_cants(part)) for part in parts) == [0, 2]
+    assert compute_misfit(parts, outline, height) < 0.03
 
 
 def test_a_gable_over_a_cut_corner_has_no_cant():
     outline = shapely.Polygon([(0, 0), (10, 0), (12, 2), (12, 8), (0, 8)])
     points = sample_heights(lambda x, y: 8.0 - 0.8 * np.abs(y - 4.0), outline, 8.0, 0.02)
     (part,) = fit_building(points, outline).roof_parts
-    assert part.type == "gable" and not cants_in(part)
+    assert part.type == "gable" and not list_cants(part)
 
 
 def test_a_canted_roof_is_built_again_of_its_parameters():
-    outline, height = house("bay")
+    outline, height = make_house("bay")
     building = hiproof.reconstruct(sample_heights(height, outline, 8.0, 0.02), outline)
     record = hiproof.write.parameters.building_record(building)
-    again = hiproof.build(record)
-    assert cants_in(building.parts[0]) and not check_solid(building.solid)
-    assert np.array_equal(again.solid.vertices, building.solid.vertices)
+    second = hiproof.build(record)
+    assert list_cants(building.parts[0]) and not check_solid(building.solid)
+    assert np.array_equal(second.solid.vertices, building.solid.vertices)
     higher = building.with_part(0, ridge_height=float(building.solid.vertices[:, 2].max()) + 1.0)
-    assert cants_in(higher.parts[0]) == cants_in(building.parts[0]) and not check_solid(higher.solid)
+    assert list_cants(higher.parts[0]) == list_cants(building.parts[0]) and not check_solid(
+        higher.solid
+    )
     refitted = higher.refit(sample_heights(height, outline, 8.0, 0.02, 3))
     assert (
-        misfit(
+        compute_misfit(
             refitted.roof.parts,
             shapely.transform(outline, refitted.roof.frame.to_local),
-            lambda x, y: local(refitted, height, x, y),
+            lambda x, y: compute_local_height(refitted, height, x, y),
         )
         < 0.04
     )
@@ -116,17 +132,17 @@ def test_a_canted_roof_is_built_again_of_its_parameters():
 
 @pytest.mark.parametrize("side", ["length", "width"])
 def test_a_part_cut_in_two_and_merged_again_has_its_cants_over_the_same_walls(side):
-    outline, height = house("bay")
+    outline, height = make_house("bay")
     building = hiproof.reconstruct(sample_heights(height, outline, 8.0, 0.02), outline)
     record = hiproof.write.parameters.building_record(building)
     halves = split_part(record["parts"][0], side, 0.6)
     merged = hiproof.build({**record, "parts": [merged_parts(*halves)]})
     xy = shapely.get_coordinates(building.roof.outline.buffer(-0.5))
-    assert len(cants_in(merged.parts[0])) == 2
+    assert len(list_cants(merged.parts[0])) == 2
     assert merged.roof.height_at(xy) == pytest.approx(building.roof.height_at(xy), abs=1e-6)
 
 
-def local(building, height, x, y):
+def compute_local_height(building, height, x, y):
     """`height` seen from the frame of a building's roof."""
     origin = building.roof.frame.origin
     return height(x + origin[0], y + origin[1]) - origin[2]

@@ -23,25 +23,29 @@ HOUSES = {
 }
 
 
-def wing(x, y, rectangle, gables, eave=EAVE):
+def compute_wing(x, y, rectangle, gables, eave=EAVE):
     """Height of one wing, minus infinity beside it."""
     west, south, east, north = rectangle
     inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
-    away = {"w": x - west, "e": east - x, "s": y - south, "n": north - y}
-    rise = np.min([d for side, d in away.items() if side not in gables], axis=0)
+    is_away = {"w": x - west, "e": east - x, "s": y - south, "n": north - y}
+    rise = np.min([d for side, d in is_away.items() if side not in gables], axis=0)
     return np.where(inside, eave + SLOPE * rise, -np.inf)
 
 
-def house(name):
+def make_house(name):
     """Outline and height of one of HOUSES."""
     outline = shapely.union_all([shapely.box(*rectangle) for rectangle, _ in HOUSES[name]])
-    return outline, lambda x, y: np.max([wing(x, y, *own) for own in HOUSES[name]], axis=0)
+    return outline, lambda x, y: np.max([compute_wing(x, y, *own) for own in HOUSES[name]], axis=0)
 
 
-def roof_edges(fit):
+def measure_roof_edges(fit):
     """Lengths in plan (m,) of all edges of the solid's roof."""
     solid = compose(Roof(fit.roof_parts, fit.outline, LocalFrame(np.zeros(3))), -3.0)
-    rings = [solid.vertices[list(ring)][:, :2] for face in solid.select_faces(ROOF) for ring in face.rings]
+    rings = [
+        solid.vertices[list(ring)][:, :2]
+        for face in solid.select_faces(ROOF)
+        for ring in face.rings
+    ]
     return np.concatenate([np.hypot(*(np.roll(ring, -1, axis=0) - ring).T) for ring in rings])
 
 
@@ -49,10 +53,10 @@ def roof_edges(fit):
 @pytest.mark.parametrize("beside", [(0.0, 0.0), (0.05, 0.04), (-0.06, 0.03)])
 @pytest.mark.parametrize("seed", range(2))
 def test_creases_end_in_corners_where_points_lie_a_little_beside_the_outline(name, beside, seed):
-    outline, height = house(name)
+    outline, height = make_house(name)
     fit = fit_building(sample_heights(height, outline, 5.0, 0.02, seed) + (*beside, 0.0), outline)
     assert len(fit.roof_parts) == 2
-    assert roof_edges(fit).min() > DRAWN_M
+    assert measure_roof_edges(fit).min() > DRAWN_M
 
 
 @pytest.mark.parametrize("lower", [0.25, 0.5])
@@ -60,7 +64,7 @@ def test_eaves_of_two_heights_keep_them_though_their_hip_ends_beside_the_corner(
     outline = shapely.box(0, 0, 14, 8)
 
     def height(x, y):
-        return np.minimum(wing(x, y, (0, 0, 14, 8), ""), EAVE - lower + SLOPE * x)
+        return np.minimum(compute_wing(x, y, (0, 0, 14, 8), ""), EAVE - lower + SLOPE * x)
 
     points = sample_heights(height, outline, 10.0, 0.02)
     fit = fit_building(points, outline)
@@ -73,10 +77,10 @@ def test_a_step_below_a_hip_lies_where_its_plane_meets_the_eaves(seed):
     outline = shapely.box(0, 0, 16, 8)
 
     def height(x, y):
-        return np.where(x < 10.3, wing(x, y, (0, 0, 10.3, 8), ""), 1.0)
+        return np.where(x < 10.3, compute_wing(x, y, (0, 0, 10.3, 8), ""), 1.0)
 
     fit = fit_building(sample_heights(height, outline, 2.0, 0.02, seed), outline)
     lowest = min(fit.roof_parts, key=lambda part: part.pieces[0].planes[:, 2].min())
     assert lowest.type == "flat"
     assert min(piece.outline.bounds[0] for piece in lowest.pieces) == pytest.approx(10.3, abs=0.1)
-    assert roof_edges(fit).min() > DRAWN_M
+    assert measure_roof_edges(fit).min() > DRAWN_M

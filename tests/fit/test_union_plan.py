@@ -7,52 +7,57 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union.allowed import allowed_shapes
-from hiproof.fit.union.apart import told_apart
-from hiproof.fit.union.cants import finished, walls_of
-from hiproof.fit.union.finish import cost_of, inverse_of, least_squares, weighted_moments
-from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.allowed import list_allowed_shapes
+from hiproof.fit.union.apart import split_volumes
+from hiproof.fit.union.cants import fit_planes, list_walls
+from hiproof.fit.union.finish import (
+    invert_matrix,
+    solve_least_squares,
+    sum_moments,
+    sum_point_costs,
+)
+from hiproof.fit.union.larger import combine_parts
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.regions import Site, regions_of
-from hiproof.fit.union.scene import scene_of
-from hiproof.fit.union.sides import Side, corners_of, sides_of
-from hiproof.fit.union.unite import ends_of
+from hiproof.fit.union.regions import PlanSite, cut_regions
+from hiproof.fit.union.scene import make_scene
+from hiproof.fit.union.sides import Side, choose_sides, find_corners
+from hiproof.fit.union.unite import gather_ends
 from hiproof.fit.union.volumes import (
     LEVEL,
-    OFFSET,
+    OFFSET0,
     REPLACES,
-    SLOPE,
+    SLOPE0,
     U0,
     V0,
     V1,
-    base_only,
-    roof_heights,
+    compute_roof_heights,
+    make_base,
 )
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
-from union_scenes import OUTLINES, random_volume, rectangle_of
+from union_scenes import OUTLINES, draw_volume, list_corners
 
 
-def laid_out(rng, outline, volumes=None):
+def lay_out_scene(rng, outline, volumes=None):
     """Plan and scene (one direction) of points at random over `outline`, on the roof of `volumes` where given."""
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (400, 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
-    scene = scene_of(plan, outline, [0.0], 3.0, 0.25, allowed_shapes(()))
+    scene = make_scene(plan, outline, [0.0], 3.0, 0.25, list_allowed_shapes(()))
     if volumes is not None:
-        scene = scene._replace(z=roof_heights(volumes, scene.U, scene.V)[0])
+        scene = scene._replace(z=compute_roof_heights(volumes, scene.U, scene.V)[0])
     return plan, scene
 
 
-def level_volumes(rng, count):
+def draw_level_volumes(rng, count):
     """A base and `count` volumes of one direction with level tops among others, rectangles at random."""
-    rows = [random_volume(rng, replacing=0.3) for _ in range(count)]
+    rows = [draw_volume(rng, replacing=0.3) for _ in range(count)]
     for row in rows:
         row[0] = 0.0
-        row[OFFSET + LEVEL] = min(row[OFFSET + LEVEL], 4.0)
-    return np.vstack([base_only(-1.0), *rows])
+        row[OFFSET0 + LEVEL] = min(row[OFFSET0 + LEVEL], 4.0)
+    return np.vstack([make_base(-1.0), *rows])
 
 
 # --- regions ---------------------------------------------------------------------------------------------------------
@@ -63,32 +68,36 @@ def level_volumes(rng, count):
 def test_regions_cover_the_outline_and_nothing_else(seed, base):
     rng = np.random.default_rng(seed)
     outline = OUTLINES[seed % len(OUTLINES)]
-    volumes = level_volumes(rng, 1 + seed % 4)
-    plan, scene = laid_out(rng, outline, volumes)
-    sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)
-    planes = finished(volumes, sides, walls_of(outline, plan), scene, {})
-    regions = regions_of(volumes, planes, sides, Site(outline, plan, scene, {}), base)
+    volumes = draw_level_volumes(rng, 1 + seed % 4)
+    plan, scene = lay_out_scene(rng, outline, volumes)
+    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
+    planes = fit_planes(volumes, sides, list_walls(outline, plan), scene, {})
+    regions = cut_regions(volumes, planes, sides, PlanSite(outline, plan, scene, {}), base)
     assert len(regions) == len(volumes)
-    polygons = [polygon for own in regions for polygon in own]
+    polygons = [polygon for item in regions for polygon in item]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
     united = shapely.union_all(polygons)
     assert united.difference(outline.buffer(1e-5)).area < 1e-9
-    assert shapely.buffer(outline.difference(united), -1e-4).is_empty  # no gap wider than composing closes
+    assert shapely.buffer(
+        outline.difference(united), -1e-4
+    ).is_empty  # no gap wider than composing closes
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     rng = np.random.default_rng(seed)
-    outline, volumes = OUTLINES[0], level_volumes(rng, 3)
+    outline, volumes = OUTLINES[0], draw_level_volumes(rng, 3)
     volumes[-1, U0 : V1 + 1] = -3.0, 1.0, -2.0, 2.0
     volumes[-1, REPLACES] = 1.0
-    plan, scene = laid_out(rng, outline, volumes)
-    sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)
-    planes = finished(volumes, sides, walls_of(outline, plan), scene, {})
-    regions = regions_of(volumes, planes, sides, Site(outline, plan, scene, {}), True)
+    plan, scene = lay_out_scene(rng, outline, volumes)
+    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
+    planes = fit_planes(volumes, sides, list_walls(outline, plan), scene, {})
+    regions = cut_regions(volumes, planes, sides, PlanSite(outline, plan, scene, {}), True)
     recess = shapely.union_all(regions[-1])
     assert recess.area > 1.0
-    assert all(polygon.intersection(recess).area < 1e-3 for own in regions[:-1] for polygon in own)
+    assert all(
+        polygon.intersection(recess).area < 1e-3 for item in regions[:-1] for polygon in item
+    )
 
 
 # --- sides -----------------------------------------------------------------------------------------------------------
@@ -98,56 +107,68 @@ def test_a_side_lies_on_the_line_of_the_outline_that_it_all_but_follows():
     """A front out of square by three degrees: the volume's side takes its line, the other three their own."""
     lean = math.tan(math.radians(3.0))
     outline = shapely.Polygon([(-6, -4 - 6 * lean), (6, -4 + 6 * lean), (6, 4), (-6, 4)])
-    volumes = np.vstack([base_only(-5.0), base_only(2.0)])
+    volumes = np.vstack([make_base(-5.0), make_base(2.0)])
     volumes[1, U0 : V1 + 1] = -6.0, 6.0, -4.0, 4.0
-    plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
-    corners = (shapely.get_coordinates(outline)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
-    volumes[1, U0 : V1 + 1] = corners[:, 0].min(), corners[:, 0].max(), corners[:, 1].min() + 0.3, corners[:, 1].max()
-    sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)[1]
+    plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
+    corners = (
+        shapely.get_coordinates(outline)[:-1] - plan.frame.origin[:2]
+    ) @ plan.frame.rotation.T
+    volumes[1, U0 : V1 + 1] = (
+        corners[:, 0].min(),
+        corners[:, 0].max(),
+        corners[:, 1].min() + 0.3,
+        corners[:, 1].max(),
+    )
+    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)[1]
     assert all(side.anchored for side in sides)
-    found = shapely.Polygon(plan.frame.xy_local(corners_of(sides)))
-    assert found.symmetric_difference(outline).area < 1e-6
+    result = shapely.Polygon(plan.frame.xy_local(find_corners(sides)))
+    assert result.symmetric_difference(outline).area < 1e-6
 
 
 def test_sides_meet_in_the_corners_of_their_rectangle():
-    corners = corners_of([Side(-2.0), Side(3.0), Side(-1.0), Side(4.0)])
+    corners = find_corners([Side(-2.0), Side(3.0), Side(-1.0), Side(4.0)])
     assert corners.tolist() == [[-2.0, -1.0], [3.0, -1.0], [3.0, 4.0], [-2.0, 4.0]]
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_corners_lie_on_both_of_their_sides(seed):
     rng = np.random.default_rng(seed)
-    sides = [Side(at, lean) for at, lean in zip((-3.0, 3.0, -2.0, 2.0), rng.uniform(-0.2, 0.2, 4), strict=True)]
-    for (u, v), (i, j) in zip(corners_of(sides), ((0, 2), (1, 2), (1, 3), (0, 3)), strict=True):
-        assert u == pytest.approx(sides[i].at + sides[i].lean * v)
-        assert v == pytest.approx(sides[j].at + sides[j].lean * u)
+    sides = [
+        Side(positions, lean)
+        for positions, lean in zip((-3.0, 3.0, -2.0, 2.0), rng.uniform(-0.2, 0.2, 4), strict=True)
+    ]
+    for (u, v), (i, j) in zip(find_corners(sides), ((0, 2), (1, 2), (1, 3), (0, 3)), strict=True):
+        assert u == pytest.approx(sides[i].offset + sides[i].lean * v)
+        assert v == pytest.approx(sides[j].offset + sides[j].lean * u)
 
 
 def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
     outline = OUTLINES[0]
-    volumes = np.vstack([base_only(-5.0), base_only(2.0)])
+    volumes = np.vstack([make_base(-5.0), make_base(2.0)])
     volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
-    plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
-    side = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)[1][1]
+    plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
+    side = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)[1][1]
     assert side == Side(1.3, sigma=side.sigma)
     assert 0.0 < side.sigma < 0.2  # the gap between the points on either side
 
 
-def tooth(low, high, offset):
-    """A volume of one plane that rises towards higher v, from v = `low` to `high`."""
-    row = base_only(0.0)[0]
-    row[U0 : V1 + 1] = -11.0, 11.0, low, high
-    row[OFFSET + LEVEL], row[OFFSET + 2], row[SLOPE + 2] = np.inf, offset, 0.26
+def make_tooth(lower, upper, offset):
+    """A volume of one plane that rises towards higher v, from v = `lower` to `upper`."""
+    row = make_base(0.0)[0]
+    row[U0 : V1 + 1] = -11.0, 11.0, lower, upper
+    row[OFFSET0 + LEVEL], row[OFFSET0 + 2], row[SLOPE0 + 2] = np.inf, offset, 0.26
     return row
 
 
 def test_a_strip_by_which_what_is_hidden_ran_too_far_is_no_part():
     """A tooth that runs on under the next one, and shows beyond it where the roof is all but as high."""
     outline = shapely.box(-10.0, -7.0, 10.0, 7.0)
-    base, hiding = base_only(-1.6)[0], tooth(-4.8, -0.3, 0.93)
-    _, scene = laid_out(np.random.default_rng(0), outline, np.array([base, tooth(-0.3, 4.0, -0.23), hiding]))
-    found = told_apart(np.array([base, tooth(-5.2, 4.0, -0.23), hiding]), scene)
-    assert found[:, V0].tolist() == pytest.approx([base[V0], -0.3, -4.8])
+    base, hiding = make_base(-1.6)[0], make_tooth(-4.8, -0.3, 0.93)
+    _, scene = lay_out_scene(
+        np.random.default_rng(0), outline, np.array([base, make_tooth(-0.3, 4.0, -0.23), hiding])
+    )
+    result = split_volumes(np.array([base, make_tooth(-5.2, 4.0, -0.23), hiding]), scene)
+    assert result[:, V0].tolist() == pytest.approx([base[V0], -0.3, -4.8])
 
 
 # --- larger shapes ---------------------------------------------------------------------------------------------------
@@ -155,20 +176,20 @@ def test_a_strip_by_which_what_is_hidden_ran_too_far_is_no_part():
 KAPPAS = [0.0, 0.7, -2.5]
 
 
-def teeth(count, kappa, slope=0.5, width=5.0, length=12.0, uneven=0.0):
+def make_teeth(count, kappa, slope=0.5, width=5.0, length=12.0, uneven=0.0):
     """Monopitches behind one another, in no order, a part each; every second one `uneven` (m) wider than the others."""
     shape, parts, v = get("monopitch"), [], 0.0
     for k in range(count):
-        own = width + (uneven if k % 2 else 0.0)
-        theta_p = {"width": own, "length": length, "height": slope * own}
-        across = v + 0.5 * own
+        item = width + (uneven if k % 2 else 0.0)
+        theta_p = {"width": item, "length": length, "height": slope * item}
+        across = v + 0.5 * item
         place = np.array([-math.sin(kappa) * across + 40.0, math.cos(kappa) * across - 7.0, 4.0])
         parts.append(shape.part(shape.to_theta(theta_p, kappa, place)))
-        v += own
+        v += item
     return [parts[k] for k in np.random.default_rng(count).permutation(count)]
 
 
-def height_of(parts, xy):
+def measure_height(parts, xy):
     z = np.full(len(xy), -np.inf)
     for piece in (piece for part in parts for piece in part.pieces):
         inside = shapely.contains_xy(piece.outline, *xy.T)
@@ -176,8 +197,10 @@ def height_of(parts, xy):
     return z
 
 
-def strewn_over(parts, count=400):
-    outline = shapely.union_all([piece.outline for part in parts for piece in part.pieces]).buffer(-0.01)
+def scatter_points(parts, count=400):
+    outline = shapely.union_all([piece.outline for part in parts for piece in part.pieces]).buffer(
+        -0.01
+    )
     x0, y0, x1, y1 = outline.bounds
     xy = np.random.default_rng(0).uniform((x0, y0), (x1, y1), (count, 2))
     return xy[shapely.contains_xy(outline, *xy.T)]
@@ -186,59 +209,77 @@ def strewn_over(parts, count=400):
 @pytest.mark.parametrize("kappa", KAPPAS)
 @pytest.mark.parametrize("count", [2, 3, 6])
 def test_equal_monopitches_in_a_row_are_one_saw_tooth(count, kappa):
-    parts = teeth(count, kappa)
-    (shed,) = put_together(parts)
+    parts = make_teeth(count, kappa)
+    (shed,) = combine_parts(parts)
     assert shed.type == "shed" and shed.parameters["teeth"] == count
     assert shed.parameters["width"] == pytest.approx(5.0 * count)
-    xy = strewn_over(parts)
-    assert np.mean(np.abs(height_of([shed], xy) - height_of(parts, xy)) < 1e-6) > 0.99
+    xy = scatter_points(parts)
+    assert np.mean(np.abs(measure_height([shed], xy) - measure_height(parts, xy)) < 1e-6) > 0.99
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
 def test_a_tooth_whose_lower_end_is_hidden_is_a_tooth_of_its_row(kappa):
     """The middle one of three, which reaches under its neighbour: neither of the others follows the other."""
     parts = sorted(
-        teeth(3, kappa), key=lambda part: np.array([-math.sin(kappa), math.cos(kappa)]) @ part.translation[:2]
+        make_teeth(3, kappa),
+        key=lambda part: np.array([-math.sin(kappa), math.cos(kappa)]) @ part.translation[:2],
     )
     shape, back = get("monopitch"), np.array([math.sin(kappa), -math.cos(kappa), 0.0])
     middle = parts[1]
     longer = {"width": 8.0, "length": 12.0, "height": 4.0}  # 3 m of it under the first tooth
-    under = shape.part(shape.to_theta(longer, kappa, middle.translation + 1.5 * back + [0.0, 0.0, -1.5]))
-    (shed,) = put_together([parts[0], under, parts[2]])
+    lowered = shape.part(
+        shape.to_theta(longer, kappa, middle.translation + 1.5 * back + [0.0, 0.0, -1.5])
+    )
+    (shed,) = combine_parts([parts[0], lowered, parts[2]])
     assert shed.type == "shed" and shed.parameters["teeth"] == 3
-    xy = strewn_over(parts)
-    assert np.mean(np.abs(height_of([shed], xy) - height_of(parts, xy)) < 1e-6) > 0.99
+    xy = scatter_points(parts)
+    assert np.mean(np.abs(measure_height([shed], xy) - measure_height(parts, xy)) < 1e-6) > 0.99
 
 
 def test_monopitches_that_face_each_other_or_differ_stay_apart():
-    one, other = teeth(2, 0.0)
+    first, other = make_teeth(2, 0.0)
     shape = get("monopitch")
     turned = shape.part(shape.to_theta(other.parameters, other.kappa + math.pi, other.translation))
-    steeper = teeth(2, 0.0, slope=0.9)[1]
+    steeper = make_teeth(2, 0.0, slope=0.9)[1]
     for second in (turned, steeper):
-        assert sorted(part.type for part in put_together([one, second])) == ["monopitch", "monopitch"]
+        assert sorted(part.type for part in combine_parts([first, second])) == [
+            "monopitch",
+            "monopitch",
+        ]
 
 
 @pytest.mark.parametrize("higher", [0.22, -0.22])
 def test_two_all_but_level_roofs_at_two_heights_are_no_saw_tooth(higher):
     """Their planes tell nothing of how wide teeth are; where no wall did either and they told of less than nothing, the fit failed."""
-    first, second = sorted(teeth(2, 1.6, slope=0.033, width=3.7, length=2.8), key=lambda part: part.translation[0])
+    first, second = sorted(
+        make_teeth(2, 1.6, slope=0.033, width=3.7, length=2.8), key=lambda part: part.translation[0]
+    )
     second = replace(
         second,
-        pieces=tuple(replace(piece, planes=piece.planes + [0.0, 0.0, higher]) for piece in second.pieces),
+        pieces=tuple(
+            replace(piece, planes=piece.planes + [0.0, 0.0, higher]) for piece in second.pieces
+        ),
         translation=second.translation + [0.0, 0.0, higher],
     )
     shape = get("flat")
-    around = shape.part(shape.to_theta({"width": 30.0, "length": 30.0}, 1.6, np.array([36.0, -7.0, 3.0])))
-    assert sorted(part.type for part in put_together([first, second, around])) == ["flat", "monopitch", "monopitch"]
+    context = shape.part(
+        shape.to_theta({"width": 30.0, "length": 30.0}, 1.6, np.array([36.0, -7.0, 3.0]))
+    )
+    assert sorted(part.type for part in combine_parts([first, second, context])) == [
+        "flat",
+        "monopitch",
+        "monopitch",
+    ]
 
 
 def test_larger_shapes_only_where_they_are_allowed():
-    assert {part.type for part in put_together(teeth(3, 0.0), ("monopitch", "flat"))} == {"monopitch"}
-    assert [part.type for part in put_together(teeth(3, 0.0), ("shed",))] == ["shed"]
+    assert {part.type for part in combine_parts(make_teeth(3, 0.0), ("monopitch", "flat"))} == {
+        "monopitch"
+    }
+    assert [part.type for part in combine_parts(make_teeth(3, 0.0), ("shed",))] == ["shed"]
 
 
-def gambrel_in_parts(rng, kappa):
+def draw_gambrel_parts(rng, kappa):
     """A gambrel as a gable on the top of a truncated gable, both over the plan of their own."""
     width, length, slope, upper = (
         rng.uniform(8.0, 11.0),
@@ -264,7 +305,7 @@ def gambrel_in_parts(rng, kappa):
         np.full(4, 3.0 + break_height) + [none, none, 0.0, 0.0],
         np.array([0.0, 0.0, upper, upper]),
     )
-    return [member.part([shapely.Polygon(rectangle_of(member))]) for member in (lower, top)], (
+    return [member.part([shapely.Polygon(list_corners(member))]) for member in (lower, top)], (
         width,
         length,
         break_height,
@@ -275,69 +316,83 @@ def gambrel_in_parts(rng, kappa):
 @pytest.mark.parametrize("kappa", KAPPAS)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_gable_on_a_truncated_gable_is_a_gambrel(seed, kappa):
-    parts, (width, length, break_height, break_width) = gambrel_in_parts(np.random.default_rng(seed), kappa)
-    (found,) = put_together(parts)
-    assert found.type == "gambrel"
-    expected = {"width": width, "length": length, "break_height": break_height, "break_width": break_width}
-    assert {name: found.parameters[name] for name in expected} == pytest.approx(expected, abs=1e-6)
-    xy = strewn_over(parts)
-    assert height_of([found], xy) == pytest.approx(height_of(parts, xy), abs=1e-6)
+    parts, (width, length, break_height, break_width) = draw_gambrel_parts(
+        np.random.default_rng(seed), kappa
+    )
+    (result,) = combine_parts(parts)
+    assert result.type == "gambrel"
+    expected = {
+        "width": width,
+        "length": length,
+        "break_height": break_height,
+        "break_width": break_width,
+    }
+    assert {name: result.parameters[name] for name in expected} == pytest.approx(expected, abs=1e-6)
+    xy = scatter_points(parts)
+    assert measure_height([result], xy) == pytest.approx(measure_height(parts, xy), abs=1e-6)
 
 
 @pytest.mark.parametrize("kappa", KAPPAS)
 @pytest.mark.parametrize(("further", "steeper"), [(1.0, 0.0), (0.0, 0.01)])
 def test_a_gable_whose_ridge_lies_off_its_middle_is_a_gambrels_top(further, steeper, kappa):
     """Where a rectangle ends under other parts, and a hundredth of slope, say nothing of what is seen."""
-    (lower, upper), sizes = gambrel_in_parts(np.random.default_rng(1), kappa)
+    (lower, upper), sizes = draw_gambrel_parts(np.random.default_rng(1), kappa)
     half_break, slope = 0.5 * sizes[3], upper.parameters["height"] / (0.5 * sizes[3])
     eave = float(upper.translation[2])
-    off = Member(
+    offsets = Member(
         kappa,
         upper.translation[:2] + 0.5 * further * np.array([-math.sin(kappa), math.cos(kappa)]),
         np.array([0.5 * sizes[1], half_break + 0.5 * further]),
         np.array([np.inf, np.inf, eave, eave - slope * further]),
         np.array([0.0, 0.0, slope + steeper, slope]),
     )
-    top = off.part([piece.outline for piece in upper.pieces])
-    assert top.type == ("asymmetric_gable" if steeper else "gable") and "ridge_offset" in top.parameters
-    (found,) = put_together([lower, top])
-    assert found.type == "gambrel"
-    assert found.parameters["break_width"] == pytest.approx(sizes[3], abs=0.2)
+    top = offsets.part([piece.outline for piece in upper.pieces])
+    assert (
+        top.type == ("asymmetric_gable" if steeper else "gable")
+        and "ridge_offset" in top.parameters
+    )
+    (result,) = combine_parts([lower, top])
+    assert result.type == "gambrel"
+    assert result.parameters["break_width"] == pytest.approx(sizes[3], abs=0.2)
 
 
 def test_a_gable_beside_a_truncated_gable_is_no_gambrel():
-    (lower, upper), _ = gambrel_in_parts(np.random.default_rng(0), 0.0)
-    aside = Part(
+    (lower, upper), _ = draw_gambrel_parts(np.random.default_rng(0), 0.0)
+    shifted = Part(
         upper.type,
         tuple(
-            Piece(shapely.transform(piece.outline, lambda xy: xy + [0.0, 12.0]), piece.planes) for piece in upper.pieces
+            Piece(shapely.transform(piece.outline, lambda xy: xy + [0.0, 12.0]), piece.planes)
+            for piece in upper.pieces
         ),
         upper.parameters,
         upper.kappa,
         upper.translation + [0.0, 12.0, 0.0],
     )
-    assert sorted(part.type for part in put_together([lower, aside])) == ["gable", "truncated_gable"]
+    assert sorted(part.type for part in combine_parts([lower, shifted])) == [
+        "gable",
+        "truncated_gable",
+    ]
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_moments_are_the_sums_over_the_points_of_each_plane(seed):
     rng = np.random.default_rng(seed)
     rows = np.full((5, 3), np.nan)
-    there = rng.permutation(5)[:3]
-    rows[there] = rng.uniform(-1.0, 1.0, (3, 3))
+    is_present = rng.permutation(5)[:3]
+    rows[is_present] = rng.uniform(-1.0, 1.0, (3, 3))
     points = rng.uniform(-2.0, 2.0, (3, 60))
-    at = np.vstack([points[:2], np.ones(60)])
-    heights = np.where(np.isfinite(rows[:, 2:]), np.nan_to_num(rows) @ at, np.inf)
-    left = points[2] - heights.min(axis=0)
-    weight = np.clip(1.0 - (left / 0.8) ** 2, 0.0, None) ** 2
-    moments, products, total, misfit = weighted_moments(rows, points, 0.8)
+    positions = np.vstack([points[:2], np.ones(60)])
+    heights = np.where(np.isfinite(rows[:, 2:]), np.nan_to_num(rows) @ positions, np.inf)
+    remainder = points[2] - heights.min(axis=0)
+    weight = np.clip(1.0 - (remainder / 0.8) ** 2, 0.0, None) ** 2
+    moments, products, total, misfit = sum_moments(rows, points, 0.8)
     for k in range(5):
-        own = weight * (heights.argmin(axis=0) == k)
-        assert moments[k] == pytest.approx((at * own) @ at.T, abs=1e-9)
-        assert products[k] == pytest.approx(at @ (own * points[2]), abs=1e-9)
-    assert (total, misfit) == pytest.approx((weight.sum(), (weight * left**2).sum()))
-    plain = np.clip((np.abs(left) - 0.05) / 0.3, 0.0, 1.0) ** 2
-    assert cost_of(rows, points, 0.05, 0.3) == pytest.approx(plain.sum())
+        item = weight * (heights.argmin(axis=0) == k)
+        assert moments[k] == pytest.approx((positions * item) @ positions.T, abs=1e-9)
+        assert products[k] == pytest.approx(positions @ (item * points[2]), abs=1e-9)
+    assert (total, misfit) == pytest.approx((weight.sum(), (weight * remainder**2).sum()))
+    plain = np.clip((np.abs(remainder) - 0.05) / 0.3, 0.0, 1.0) ** 2
+    assert sum_point_costs(rows, points, 0.05, 0.3) == pytest.approx(plain.sum())
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -352,8 +407,10 @@ def test_least_squares_find_planes_that_explain_all_points(seed):
     rows[2:] = np.nan
     uv = rng.uniform(-4.0, 4.0, (2, 200))
     points = np.vstack([uv, np.nanmin(rows @ np.vstack([uv, np.ones(200)]), axis=0)])
-    found, covariance, cost = least_squares(rows + rng.normal(0.0, 0.02, rows.shape), design, points, 0.03, 0.2)
-    assert found[:2] == pytest.approx(rows[:2], abs=1e-5) and np.isnan(found[2:]).all()
+    result, covariance, cost = solve_least_squares(
+        rows + rng.normal(0.0, 0.02, rows.shape), design, points, 0.03, 0.2
+    )
+    assert result[:2] == pytest.approx(rows[:2], abs=1e-5) and np.isnan(result[2:]).all()
     assert np.abs(covariance).max() < 1e-9 and cost == pytest.approx(0.0, abs=1e-9)
 
 
@@ -361,4 +418,6 @@ def test_least_squares_find_planes_that_explain_all_points(seed):
 def test_the_inverse_of_a_symmetric_matrix_is_numpys(size):
     root = np.random.default_rng(size).normal(size=(size, size))
     matrix = root @ root.T
-    assert inverse_of(matrix, 0.1) == pytest.approx(np.linalg.inv(matrix + 0.1 * np.eye(size)), rel=1e-9)
+    assert invert_matrix(matrix, 0.1) == pytest.approx(
+        np.linalg.inv(matrix + 0.1 * np.eye(size)), rel=1e-9
+    )

@@ -3,43 +3,43 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.union.candidates import facings, groups_of
-from hiproof.fit.union.plan import grid_lines, signed_depth
+from hiproof.fit.union.candidates import group_planes, turn_to_walls
+from hiproof.fit.union.plan import lay_lines, measure_depth
 from hiproof.fit.union.planes import (
     NEIGHBOUR_RADIUS_M,
     Cloud,
     Grid,
-    best_rectangle,
-    distinct,
-    gain_by_point,
-    median_of_few,
-    neighbours_of,
-    reach_of_rows,
-    truncated,
+    bound_rows,
+    fill_point_gains,
+    find_best_rectangle,
+    find_median,
+    find_neighbours,
+    select_distinct,
+    truncate_cost,
 )
-from union_scenes import brute_rectangle
+from union_scenes import search_all_rectangles
 
 
-def found_rectangle(gain, least):
+def find_rectangle(gain, least_sum):
     reach = np.empty(len(gain) + 1)
-    reach_of_rows(gain, reach)
-    return best_rectangle(gain, least, reach, np.empty(gain.shape[1]))
+    bound_rows(gain, reach)
+    return find_best_rectangle(gain, least_sum, reach, np.empty(gain.shape[1]))
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_best_rectangle_is_that_of_brute_force(seed):
     gain = np.random.default_rng(seed).normal(-0.1, 1.0, (1 + seed % 5, 6))
-    score, i0, i1, j0, j1 = found_rectangle(gain, -np.inf)
-    assert score == pytest.approx(brute_rectangle(gain))
+    score, i0, i1, j0, j1 = find_rectangle(gain, -np.inf)
+    assert score == pytest.approx(search_all_rectangles(gain))
     assert gain[i0:i1, j0:j1].sum() == pytest.approx(score)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_rectangle_is_found_only_above_what_is_asked(seed):
     gain = np.random.default_rng(seed).normal(-0.1, 1.0, (5, 6))
-    best = brute_rectangle(gain)
-    assert found_rectangle(gain, best - 1e-9)[0] == pytest.approx(best)
-    score, i0, i1, j0, j1 = found_rectangle(gain, best + 1e-9)
+    best = search_all_rectangles(gain)
+    assert find_rectangle(gain, best - 1e-9)[0] == pytest.approx(best)
+    score, i0, i1, j0, j1 = find_rectangle(gain, best + 1e-9)
     assert score == best + 1e-9
     assert (i1 - i0) * (j1 - j0) == 0
 
@@ -48,27 +48,29 @@ def test_a_rectangle_is_found_only_above_what_is_asked(seed):
 def test_no_rectangle_reaches_beyond_its_rows(seed):
     gain = np.random.default_rng(seed).normal(-0.3, 1.0, (4, 5))
     reach = np.empty(5)
-    reach_of_rows(gain, reach)
+    bound_rows(gain, reach)
     for first in range(4):
-        assert brute_rectangle(gain[first:]) <= reach[first] + 1e-12
+        assert search_all_rectangles(gain[first:]) <= reach[first] + 1e-12
 
 
 @pytest.mark.parametrize("n", [1, 6, 200])
 def test_neighbours_are_those_of_sorting_all_distances(n):
     u, v = np.random.default_rng(n).uniform(0.0, 8.0, (2, n))
     cell = np.zeros(n, np.int64)
-    near, nearest = np.empty(n, np.int64), np.empty(17, np.int64)
-    count, kept = neighbours_of(Cloud(u, v, u, cell, cell), n // 2, np.empty(n), near, np.empty(17), nearest)
+    nearby, nearest = np.empty(n, np.int64), np.empty(17, np.int64)
+    count, n_kept = find_neighbours(
+        Cloud(u, v, u, cell, cell), n // 2, np.empty(n), nearby, np.empty(17), nearest
+    )
     distance = np.hypot(u - u[n // 2], v - v[n // 2])
-    assert near[:count].tolist() == np.nonzero(distance < NEIGHBOUR_RADIUS_M)[0].tolist()
-    assert kept == min(count, 17)
-    assert nearest[:kept].tolist() == np.argsort(distance)[:kept].tolist()
+    assert nearby[:count].tolist() == np.nonzero(distance < NEIGHBOUR_RADIUS_M)[0].tolist()
+    assert n_kept == min(count, 17)
+    assert nearest[:n_kept].tolist() == np.argsort(distance)[:n_kept].tolist()
 
 
 @pytest.mark.parametrize("count", range(1, 18))
 def test_the_median_of_few_is_the_median(count):
     values = np.random.default_rng(count).normal(0.0, 1.0, count).round(1)
-    assert median_of_few(values.copy()) == pytest.approx(np.median(values))
+    assert find_median(values.copy()) == pytest.approx(np.median(values))
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
@@ -77,16 +79,16 @@ def test_the_gain_of_a_min_of_planes_is_the_drop_of_truncated_cost(count):
     u, v, z = rng.uniform(-3.0, 3.0, (3, 60))
     cell = np.zeros(60, np.int64)
     planes, current, gain = rng.normal(0.0, 0.5, (5, 3)), rng.random(60), np.empty(60)
-    total = gain_by_point(Cloud(u, v, z, cell, cell), planes, count, current, 0.2, gain)
+    total = fill_point_gains(Cloud(u, v, z, cell, cell), planes, count, current, 0.2, gain)
     roof = (planes[:count, :1] * u + planes[:count, 1:2] * v + planes[:count, 2:]).min(axis=0)
-    expected = current - np.array([truncated(dz, 0.2) for dz in z - roof])
+    expected = current - np.array([truncate_cost(dz, 0.2) for dz in z - roof])
     assert gain == pytest.approx(expected)
     assert total == pytest.approx(expected[expected > 0.0].sum())
 
 
 def test_hypotheses_of_one_bin_become_one():
     planes = np.array([[0.5, 0.0, 1.0], [0.501, 0.0, 1.001], [0.0, 0.0, 1.0], [0.5, 0.0, 2.0]])
-    assert distinct(planes, 0.0, 0.0).tolist() == planes[[0, 2, 3]].tolist()
+    assert select_distinct(planes, 0.0, 0.0).tolist() == planes[[0, 2, 3]].tolist()
 
 
 def test_depth_is_the_distance_to_the_border_negative_outside_and_in_holes():
@@ -97,13 +99,13 @@ def test_depth_is_the_distance_to_the_border_negative_outside_and_in_holes():
     starts = np.concatenate([ring, hole])
     ends = np.concatenate([np.roll(ring, -1, axis=0), np.roll(hole, -1, axis=0)])
     x, y = np.array([1.0, 5.0, -2.0, 5.0]), np.array([5.0, 5.0, 5.0, 3.5])
-    assert signed_depth(x, y, starts, ends) == pytest.approx([1.0, -1.0, -2.0, 0.5])
+    assert measure_depth(x, y, starts, ends) == pytest.approx([1.0, -1.0, -2.0, 0.5])
 
 
 @pytest.mark.parametrize("vertices", [0, 3, 40, 500])
 def test_grid_lines_are_few_whatever_the_outline(vertices):
-    at = np.random.default_rng(0).uniform(0.0, 30.0, vertices)
-    lines = grid_lines(0.0, 30.0, at, 0.5)
+    positions = np.random.default_rng(0).uniform(0.0, 30.0, vertices)
+    lines = lay_lines(0.0, 30.0, positions, 0.5)
     assert len(lines) <= 29
     assert (np.diff(lines) > 0).all() and lines[0] == 0.0 and lines[-1] == 30.0
 
@@ -113,20 +115,23 @@ def test_groups_of_planes_are_all_pairs_with_a_ridge_and_few_larger_ones():
     grid = Grid(np.arange(0.0, 12.5, 0.5), np.arange(0.0, 8.5, 0.5))
     slopes = [(0.7, 0.0, 3.0), (-0.7, 0.0, 11.4), (0.0, 0.7, 3.0), (0.0, -0.7, 8.6)]
     planes = np.array([*slopes, (0.0, 0.0, 5.0)])
-    groups, sizes = groups_of(planes, np.zeros((0, 5, 3)), np.zeros(0, np.int64), grid)
-    found = {frozenset(map(tuple, group[:size].tolist())) for group, size in zip(groups, sizes, strict=True)}
+    groups, sizes = group_planes(planes, np.zeros((0, 5, 3)), np.zeros(0, np.int64), grid)
+    result = {
+        frozenset(map(tuple, group[:size].tolist()))
+        for group, size in zip(groups, sizes, strict=True)
+    }
     along, across, top = set(slopes[:2]), set(slopes[2:]), {(0.0, 0.0, 5.0)}
     larger = [along, across, along | across]
     expected = [{p} for p in (*slopes, *top)] + larger + [group | top for group in larger]
-    assert found == {frozenset(group) for group in expected}
+    assert result == {frozenset(group) for group in expected}
     assert len(groups) == len(expected)
 
 
 def test_a_plane_faces_the_walls_that_it_very_nearly_faces():
     pool = np.array([(0.7, 0.02, 3.0), (0.0, 0.0, 5.0), (0.5, 0.3, 4.0)])
     leans, middle = np.array([(-0.06, np.inf), (np.inf, np.inf)]), np.array([5.0, 4.0])
-    found = facings(pool, middle, leans)
-    at_middle = found[:, :2] @ middle + found[:, 2]
-    assert found[:, 1].tolist() == pytest.approx([0.0, 0.042, 0.0, 0.3])
-    assert found[:, 0].tolist() == [0.7, 0.7, 0.0, 0.5]
+    result = turn_to_walls(pool, middle, leans)
+    at_middle = result[:, :2] @ middle + result[:, 2]
+    assert result[:, 1].tolist() == pytest.approx([0.0, 0.042, 0.0, 0.3])
+    assert result[:, 0].tolist() == [0.7, 0.7, 0.0, 0.5]
     assert at_middle == pytest.approx((pool[:, :2] @ middle + pool[:, 2])[[0, 0, 1, 2]])

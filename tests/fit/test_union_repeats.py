@@ -6,28 +6,28 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.repeats import move_volume, repeat_volumes
-from hiproof.fit.union.scene import scene_of
+from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.volumes import (
     DIRECTION,
     LEVEL,
-    OFFSET,
-    SLOPE,
+    OFFSET0,
+    SLOPE0,
     U0,
     V1,
-    base_only,
-    roof_heights,
+    compute_roof_heights,
+    make_base,
 )
 from points_of_roofs import sample_heights
-from union_scenes import random_volume
+from union_scenes import draw_volume
 
 OUTLINE = shapely.box(-12, -5, 12, 5)
 WIDE_M, DORMERS = 1.6, (-9.0, -5.6, -2.2, 1.2, 4.6, 8.0)  # m: where each begins along the eave
 
 
-def height_with(dormers):
+def make_height(dormers):
     """The heights of a monopitch with flat dormers at its lower side."""
 
     def height(x, y):
@@ -39,27 +39,27 @@ def height_with(dormers):
     return height
 
 
-def volumes_with_one(base_m):
+def make_volumes(base_m):
     """The monopitch and the first dormer over a base far below, heights over `base_m`.
 
     The plan's u is y, its v is -x: the longer side of the outline lies along v.
     """
-    volumes = np.repeat(base_only(-50.0), 3, axis=0)
+    volumes = np.repeat(make_base(-50.0), 3, axis=0)
     volumes[1, U0 : V1 + 1] = -5.0, 5.0, -12.0, 12.0
-    volumes[1, OFFSET + LEVEL] = np.inf
-    volumes[1, [OFFSET, SLOPE]] = 7.0 - base_m, 0.6
+    volumes[1, OFFSET0 + LEVEL] = np.inf
+    volumes[1, [OFFSET0, SLOPE0]] = 7.0 - base_m, 0.6
     volumes[2, U0 : V1 + 1] = -5.0, -2.0, -DORMERS[0] - WIDE_M, -DORMERS[0]
-    volumes[2, OFFSET + LEVEL] = 6.5 - base_m
+    volumes[2, OFFSET0 + LEVEL] = 6.5 - base_m
     return volumes
 
 
 @pytest.mark.parametrize("dormers", [DORMERS, DORMERS[:1], (DORMERS[0], DORMERS[4])])
 def test_each_dormer_of_a_row_is_found_from_one_of_them(dormers):
-    points = sample_heights(height_with(dormers), OUTLINE, 4.0, 0.02)
+    points = sample_heights(make_height(dormers), OUTLINE, 4.0, 0.02)
     plan = lay_out_plan(points, OUTLINE)
-    scene = scene_of(plan, OUTLINE, [0.0], 3.0, 0.2, allowed_shapes(()))
-    found = repeat_volumes(volumes_with_one(plan.frame.origin[2]), scene)
-    begins = np.sort(-found[2:, V1])
+    scene = make_scene(plan, OUTLINE, [0.0], 3.0, 0.2, list_allowed_shapes(()))
+    result = repeat_volumes(make_volumes(plan.frame.origin[2]), scene)
+    begins = np.sort(-result[2:, V1])
     assert begins == pytest.approx(dormers, abs=0.5)  # points are half a metre apart
 
 
@@ -67,10 +67,13 @@ def test_each_dormer_of_a_row_is_found_from_one_of_them(dormers):
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0, 1]), st.floats(-20.0, 20.0))
 def test_a_moved_volume_is_as_high_at_moved_places(seed, axis, step_m):
     rng = np.random.default_rng(seed)
-    volume = random_volume(rng, replacing=0.0)
+    volume = draw_volume(rng, replacing=0.0)
     volume[DIRECTION] = 0.0
     u, v = rng.uniform(-9.0, 9.0, (2, 1, 200))
     moved = move_volume(volume, axis, step_m)[None]
     shifted = (u + step_m, v) if axis == 0 else (u, v + step_m)
-    before, after = roof_heights(volume[None], u, v)[0], roof_heights(moved, *shifted)[0]
-    assert after == pytest.approx(before, abs=1e-6)
+    original, changed_state = (
+        compute_roof_heights(volume[None], u, v)[0],
+        compute_roof_heights(moved, *shifted)[0],
+    )
+    assert changed_state == pytest.approx(original, abs=1e-6)

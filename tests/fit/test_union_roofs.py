@@ -10,7 +10,7 @@ from benchmarks.matching import has_hidden_end, list_right_types, merge_alike
 
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.larger import combine_parts
 from hiproof.fit.union.names import REGISTERED_M, REGISTERED_PLAN_M
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
@@ -19,81 +19,86 @@ from hiproof.settings import Settings
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_building, random_compound, scan
 from hiproof.simulate.scene import Defects
 from roof_zoo import FRAME
-from union_scenes import lowest_of, member_of_shape, rectangle_of
+from union_scenes import compute_lowest, draw_member, list_corners
 
 DENSITY = 8.0
 WINGED = [(kind, type) for kind in ("L", "T", "U", "cross") for type in ("gable", "hip")]
-SPLIT = ("half_mansard", "corner_mansard")  # slopes on some sides beside a level top are told as two parts now and then
+SPLIT = (
+    "half_mansard",
+    "corner_mansard",
+)  # slopes on some sides beside a level top are told as two parts now and then
 DEAD_M = 0.06  # what residuals may be without a cost: slopes that differ by less are told as equal
 
 
-def strewn(outline, rng, density=DENSITY):
+def scatter(outline, rng, density=DENSITY):
     """Places (n, 2) at random in `outline`, `density` a square metre."""
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
     return xy[shapely.contains_xy(outline, *xy.T)]
 
 
-def height_of(fit, xy):
+def measure_height(fit, xy):
     return Roof(fit.roof_parts, fit.outline, FRAME).height_at(xy)
 
 
-def rmse(fit, xy, z):
-    return math.sqrt(np.mean((height_of(fit, xy) - z) ** 2))
+def compute_rmse(fit, xy, z):
+    return math.sqrt(np.mean((measure_height(fit, xy) - z) ** 2))
 
 
 @cache
-def fitted_member(shape, seed, regular=True):
+def fit_member(shape, seed, regular=True):
     """A member of the family, points on it without noise, and its fit."""
     rng = np.random.default_rng([seed, len(shape)])
-    member = member_of_shape(rng, shape, regular)
-    outline = shapely.Polygon(rectangle_of(member))
-    xy = strewn(outline, rng)
-    z = lowest_of(member.planes(), xy)
+    member = draw_member(rng, shape, regular)
+    outline = shapely.Polygon(list_corners(member))
+    xy = scatter(outline, rng)
+    z = compute_lowest(member.planes(), xy)
     return member, xy, z, fit_building(np.column_stack([xy, z]), outline)
 
 
 @cache
-def winged(kind, type, seed):
+def draw_wings(kind, type, seed):
     """A compound of that kind of roofs of that type, the `seed`-th drawn, with points on it without noise."""
     for draw in range(1000):
         rng = np.random.default_rng([draw, len(kind), seed])
         building = random_compound(rng, kind)
         if building.type == type:
             break
-    xy = strewn(building.outline, rng)
+    xy = scatter(building.outline, rng)
     return building, np.column_stack([xy, building.roof.height_at(xy)])
 
 
 @cache
-def fitted_winged(kind, type, seed):
-    building, points = winged(kind, type, seed)
+def fit_wings(kind, type, seed):
+    building, points = draw_wings(kind, type, seed)
     return building, points, fit_building(points, building.outline)
 
 
-def some_fits():
+def iterate_fits():
     """Fits of all sorts, for what holds of every one."""
-    yield from (fitted_member(shape, 0)[3] for shape, _ in GENERAL_SHAPES.values())
-    yield from (fitted_winged(kind, type, 0)[2] for kind, type in WINGED)
+    yield from (fit_member(shape, 0)[3] for shape, _ in GENERAL_SHAPES.values())
+    yield from (fit_wings(kind, type, 0)[2] for kind, type in WINGED)
 
 
 # --- found again -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("shape", [shape for shape, _ in GENERAL_SHAPES.values() if shape not in SPLIT])
+@pytest.mark.parametrize(
+    "shape", [shape for shape, _ in GENERAL_SHAPES.values() if shape not in SPLIT]
+)
 def test_every_shape_of_the_family_is_found_again(shape, seed):
-    member, xy, z, fit = fitted_member(shape, seed)
+    member, xy, z, fit = fit_member(shape, seed)
     assert [part.type for part in fit.roof_parts] == [member.name]
-    assert rmse(fit, xy, z) < 0.02
+    assert compute_rmse(fit, xy, z) < 0.02
     assert fit.unexplained == 0.0
 
 
 @pytest.mark.parametrize("shape", ["gable", "hip", "side_hip", "truncated_gable", "mansard"])
 def test_pitches_and_eaves_that_differ_are_found_within_the_allowance(shape):
-    _, xy, z, fit = fitted_member(shape, 1, regular=False)
+    _, xy, z, fit = fit_member(shape, 1, regular=False)
     assert len(fit.roof_parts) == 1
-    assert rmse(fit, xy, z) < DEAD_M
+    assert compute_rmse(fit, xy, z) < DEAD_M
     assert fit.unexplained == 0.0
 
 
@@ -101,35 +106,41 @@ def test_pitches_and_eaves_that_differ_are_found_within_the_allowance(shape):
 def test_the_catalogues_other_shapes_are_found_again(type):
     rng = np.random.default_rng(3)
     building = random_building(rng, type)
-    xy = strewn(building.outline, rng)
+    xy = scatter(building.outline, rng)
     z = building.roof.height_at(xy)
     fit = fit_building(np.column_stack([xy, z]), building.outline)
     (truth,) = building.roof.parts
-    assert [part.type for part in fit.roof_parts] in [[name] for name in list_right_types(truth, hidden=False)]
-    assert np.mean(np.abs(height_of(fit, xy) - z) < DEAD_M) > 0.9
-    assert np.median(np.abs(height_of(fit, xy) - z)) < 0.01
+    assert [part.type for part in fit.roof_parts] in [
+        [name] for name in list_right_types(truth, hidden=False)
+    ]
+    assert np.mean(np.abs(measure_height(fit, xy) - z) < DEAD_M) > 0.9
+    assert np.median(np.abs(measure_height(fit, xy) - z)) < 0.01
 
 
-def told_right(building, fit):
+def is_right(building, fit):
     """Whether a fit has the true number of parts, and types that these may be called by."""
     parts = building.roof.parts
-    hidden = [has_hidden_end(part, [other for other in parts if other is not part]) for part in parts]
-    names = set().union(*(list_right_types(part, end) for part, end in zip(parts, hidden, strict=True)))
+    hidden = [
+        has_hidden_end(part, [other for other in parts if other is not part]) for part in parts
+    ]
+    names = set().union(
+        *(list_right_types(part, end) for part, end in zip(parts, hidden, strict=True))
+    )
     return len(fit.roof_parts) == len(parts) and all(part.type in names for part in fit.roof_parts)
 
 
 def test_winged_roofs_are_found_again():
     """All within the allowance, and but for one of eight exactly, as the volumes that they are."""
-    fits = [fitted_winged(kind, type, 0) for kind, type in WINGED]
-    off = np.array([rmse(fit, points[:, :2], points[:, 2]) for _, points, fit in fits])
-    right = np.array([told_right(building, fit) for building, _, fit in fits])
-    assert (off < DEAD_M).all()
-    assert (right & (off < 0.02)).sum() >= len(fits) - 1
+    fits = [fit_wings(kind, type, 0) for kind, type in WINGED]
+    offsets = np.array([compute_rmse(fit, points[:, :2], points[:, 2]) for _, points, fit in fits])
+    right = np.array([is_right(building, fit) for building, _, fit in fits])
+    assert (offsets < DEAD_M).all()
+    assert (right & (offsets < 0.02)).sum() >= len(fits) - 1
 
 
 @pytest.mark.parametrize("kind", ["L", "T", "cross"])
 def test_most_scanned_winged_roofs_are_told_as_the_two_primitives_they_are(kind):
-    right = near = 0
+    right = nearby = 0
     for seed in range(6):
         rng = np.random.default_rng([seed, len(kind)])
         building = random_compound(rng, kind)
@@ -138,50 +149,60 @@ def test_most_scanned_winged_roofs_are_told_as_the_two_primitives_they_are(kind)
         fit = fit_building(points, building.outline)
         right += len(fit.roof_parts) == len(building.roof.parts)
         xy = points[shapely.contains_xy(building.outline.buffer(-0.3), *points[:, :2].T), :2]
-        near += np.nanmean(np.abs(height_of(fit, xy) - building.roof.height_at(xy)) < 0.1) > 0.95
+        nearby += (
+            np.nanmean(np.abs(measure_height(fit, xy) - building.roof.height_at(xy)) < 0.1) > 0.95
+        )
     assert right >= 4
-    assert near >= 5
+    assert nearby >= 5
 
 
 # --- what it must not depend on --------------------------------------------------------------------------------------
 
 
-def same_roof(fit, other, xy, xy_other, up=0.0):
+def is_same_roof(fit, other, xy, xy_other, rise=0.0):
     """Whether two fits have the same types, and heights within a centimetre at nearly all of the same places."""
-    gap = np.abs(height_of(other, xy_other) - up - height_of(fit, xy))
-    types = sorted(part.type for part in fit.roof_parts) == sorted(part.type for part in other.roof_parts)
+    gap = np.abs(measure_height(other, xy_other) - rise - measure_height(fit, xy))
+    types = sorted(part.type for part in fit.roof_parts) == sorted(
+        part.type for part in other.roof_parts
+    )
     return types and np.mean(gap < 0.01) > 0.99
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.2, -1.9])
 @pytest.mark.parametrize(("kind", "type"), [("L", "gable"), ("T", "hip"), ("cross", "gable")])
 def test_the_answer_turns_with_the_points(kind, type, angle):
-    building, points, fit = fitted_winged(kind, type, 0)
+    building, points, fit = fit_wings(kind, type, 0)
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, s], [-s, c]])
     turned = np.column_stack([points[:, :2] @ turn, points[:, 2]])
-    there = fit_building(turned, shapely.transform(building.outline, lambda xy: xy @ turn))
-    assert same_roof(fit, there, points[:, :2], turned[:, :2])
+    is_present = fit_building(turned, shapely.transform(building.outline, lambda xy: xy @ turn))
+    assert is_same_roof(fit, is_present, points[:, :2], turned[:, :2])
 
 
 @pytest.mark.parametrize("shape", ["gable", "side_hip", "truncated_gable", "mansard"])
 def test_parameters_do_not_depend_on_how_the_roof_is_turned(shape):
-    _, xy, z, fit = fitted_member(shape, 0)
-    half_turn = fit_building(np.column_stack([-xy, z]), shapely.transform(fit.outline, lambda xy: -xy))
-    assert half_turn.roof_parts[0].parameters == pytest.approx(fit.roof_parts[0].parameters, abs=1e-3)
+    _, xy, z, fit = fit_member(shape, 0)
+    half_turn = fit_building(
+        np.column_stack([-xy, z]), shapely.transform(fit.outline, lambda xy: -xy)
+    )
+    assert half_turn.roof_parts[0].parameters == pytest.approx(
+        fit.roof_parts[0].parameters, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize(("kind", "type"), [("L", "gable"), ("U", "hip")])
 def test_the_answer_moves_with_the_points(kind, type):
-    building, points, fit = fitted_winged(kind, type, 0)
+    building, points, fit = fit_wings(kind, type, 0)
     shift = np.array([103.0, -57.0, 12.0])
-    there = fit_building(points + shift, shapely.transform(building.outline, lambda xy: xy + shift[:2]))
-    assert same_roof(fit, there, points[:, :2], points[:, :2] + shift[:2], 12.0)
+    is_present = fit_building(
+        points + shift, shapely.transform(building.outline, lambda xy: xy + shift[:2])
+    )
+    assert is_same_roof(fit, is_present, points[:, :2], points[:, :2] + shift[:2], 12.0)
 
 
 @pytest.mark.parametrize(("kind", "type"), [("L", "gable"), ("U", "hip")])
 def test_the_answer_does_not_depend_on_the_order_of_points(kind, type):
-    building, points, fit = fitted_winged(kind, type, 0)
+    building, points, fit = fit_wings(kind, type, 0)
     shuffled = fit_building(np.random.default_rng(1).permutation(points), building.outline)
     assert shuffled.objective == fit.objective
     for part, twin in zip(fit.roof_parts, shuffled.roof_parts, strict=True):
@@ -193,34 +214,39 @@ def test_the_answer_does_not_depend_on_the_order_of_points(kind, type):
 
 
 def test_planes_follow_from_the_parameters_to_a_millimetre():
-    for fit in some_fits():
+    for fit in iterate_fits():
         for part in fit.roof_parts:
             planes = compute_planes(part.type, part.parameters, part.kappa, part.translation)
             for piece in part.pieces:
                 xy = shapely.get_coordinates(piece.outline)
-                assert lowest_of(planes, xy) == pytest.approx(piece.height_at(xy), abs=1e-3)
+                assert compute_lowest(planes, xy) == pytest.approx(piece.height_at(xy), abs=1e-3)
 
 
 def test_pieces_cover_the_outline_and_no_more():
-    for fit in some_fits():
+    for fit in iterate_fits():
         outlines = [piece.outline for part in fit.roof_parts for piece in part.pieces]
-        assert shapely.union_all(outlines).symmetric_difference(fit.outline).area < 1e-5 * fit.outline.area
+        assert (
+            shapely.union_all(outlines).symmetric_difference(fit.outline).area
+            < 1e-5 * fit.outline.area
+        )
 
 
 def test_the_roof_of_the_solid_is_the_height_of_the_parts():
-    for number, fit in enumerate(some_fits()):
+    for number, fit in enumerate(iterate_fits()):
         roof = Roof(fit.roof_parts, fit.outline, FRAME)
         solid = compose(roof, -2.0)
         assert check_solid(solid) == ()
-        xy = strewn(fit.outline.buffer(-0.05), np.random.default_rng(number), 2.0)
-        found = np.full(len(xy), np.nan)
+        xy = scatter(fit.outline.buffer(-0.05), np.random.default_rng(number), 2.0)
+        result = np.full(len(xy), np.nan)
         for face in solid.select_faces("RoofSurface"):
             rings = [solid.vertices[list(ring)] for ring in face.rings]
-            inside = shapely.contains_xy(shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]), *xy.T)
+            inside = shapely.contains_xy(
+                shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]]), *xy.T
+            )
             design = np.column_stack([rings[0][:, :2], np.ones(len(rings[0]))])
             plane = np.linalg.lstsq(design, rings[0][:, 2], rcond=None)[0]
-            found[inside] = xy[inside] @ plane[:2] + plane[2]
-        assert np.mean(np.abs(found - roof.height_at(xy)) > 2e-3) < 5e-3
+            result[inside] = xy[inside] @ plane[:2] + plane[2]
+        assert np.mean(np.abs(result - roof.height_at(xy)) > 2e-3) < 5e-3
 
 
 @pytest.mark.parametrize("shape", ["gable", "hip", "side_hip", "monopitch"])
@@ -228,12 +254,16 @@ def test_errors_are_about_as_large_as_the_deviations_say(shape):
     ratios = []
     for seed in range(8):
         rng = np.random.default_rng([seed, 77])
-        member = member_of_shape(rng, shape, regular=True)
-        outline = shapely.Polygon(rectangle_of(member))
-        xy = strewn(outline, rng)
-        z = lowest_of(member.planes(), xy) + rng.normal(0.0, 0.05, len(xy)) + rng.normal(0.0, REGISTERED_M)
-        beside = rng.normal(0.0, REGISTERED_PLAN_M, 2)
-        (part,) = fit_building(np.column_stack([xy + beside, z]), outline).roof_parts
+        member = draw_member(rng, shape, regular=True)
+        outline = shapely.Polygon(list_corners(member))
+        xy = scatter(outline, rng)
+        z = (
+            compute_lowest(member.planes(), xy)
+            + rng.normal(0.0, 0.05, len(xy))
+            + rng.normal(0.0, REGISTERED_M)
+        )
+        neighbours = rng.normal(0.0, REGISTERED_PLAN_M, 2)
+        (part,) = fit_building(np.column_stack([xy + neighbours, z]), outline).roof_parts
         truth = member.canonical().part([outline])
         errors = {name: part.parameters[name] - value for name, value in truth.parameters.items()}
         errors["t_z"] = part.translation[2] - truth.translation[2]
@@ -261,7 +291,9 @@ def test_a_side_at_a_step_has_a_deviation_and_one_on_the_outline_or_hidden_has_n
     outline = shapely.box(-10.0, -4.0, 10.0, 4.0) | shapely.box(-2.5, 4.0, 2.5, 12.0)
     xy = xy[shapely.contains_xy(outline, *xy.T)]
     house = np.where(np.abs(xy[:, 1]) < 4.0, 9.0 - 0.8 * np.abs(xy[:, 1]), -np.inf)
-    wing = np.where((np.abs(xy[:, 0]) < 2.5) & (xy[:, 1] > 0.0), 7.8 - 0.8 * np.abs(xy[:, 0]), -np.inf)
+    wing = np.where(
+        (np.abs(xy[:, 0]) < 2.5) & (xy[:, 1] > 0.0), 7.8 - 0.8 * np.abs(xy[:, 0]), -np.inf
+    )
     z = np.maximum(house, wing) + rng.normal(0.0, 0.02, len(xy))
     parts = fit_building(np.column_stack([xy, z]), outline).roof_parts
     short = min(parts, key=lambda part: part.parameters["width"])
@@ -270,30 +302,46 @@ def test_a_side_at_a_step_has_a_deviation_and_one_on_the_outline_or_hidden_has_n
 
 # --- types that are allowed ------------------------------------------------------------------------------------------
 
-LISTS = [("flat",), ("gable",), ("hip", "flat"), ("pyramid",), ("monopitch",), ("shed",), ("gambrel", "mansard")]
+LISTS = [
+    ("flat",),
+    ("gable",),
+    ("hip", "flat"),
+    ("pyramid",),
+    ("monopitch",),
+    ("shed",),
+    ("gambrel", "mansard"),
+]
 
 
 @pytest.mark.parametrize("types", LISTS)
 def test_parts_have_the_types_asked_for_or_are_flat(types):
     settings = Settings.from_dict({"fit": {"types": list(types)}})
     for kind, type in (("L", "gable"), ("T", "hip")):
-        building, points = winged(kind, type, 0)
+        building, points = draw_wings(kind, type, 0)
         fit = fit_building(points, building.outline, settings)
         assert {part.type for part in fit.roof_parts} <= {*types, "flat"}
-        far = np.abs(height_of(fit, points[:, :2]) - points[:, 2]) > settings.compound.tolerance_m
-        assert fit.unexplained == pytest.approx(np.mean(far), abs=0.05)
+        is_far = (
+            np.abs(measure_height(fit, points[:, :2]) - points[:, 2])
+            > settings.compound.tolerance_m
+        )
+        assert fit.unexplained == pytest.approx(np.mean(is_far), abs=0.05)
 
 
 def test_a_hip_that_may_only_be_a_gable_is_no_hip_of_that_name():
-    _, xy, z, _ = fitted_member("hip", 0)
+    _, xy, z, _ = fit_member("hip", 0)
     fit = fit_building(
-        np.column_stack([xy, z]), fitted_member("hip", 0)[3].outline, Settings.from_dict({"fit": {"types": ["gable"]}})
+        np.column_stack([xy, z]),
+        fit_member("hip", 0)[3].outline,
+        Settings.from_dict({"fit": {"types": ["gable"]}}),
     )
     assert {part.type for part in fit.roof_parts} <= {"gable", "flat"}
 
 
 def test_components_and_names_belong_together():
-    assert all(get(name).name == name and set(parts) <= set(CATALOGUE) for name, parts in COMPONENTS.items())
+    assert all(
+        get(name).name == name and set(parts) <= set(CATALOGUE)
+        for name, parts in COMPONENTS.items()
+    )
 
 
 def test_a_tooth_with_something_more_is_a_tooth():
@@ -305,18 +353,20 @@ def test_a_tooth_with_something_more_is_a_tooth():
     row = [shape.part(shape.to_theta(tooth, -0.5 * math.pi, centre)) for centre in centres]
     wide = {"width": 9.0, "length": 10.0, "height": 3.6}
     row[3] = shape.part(shape.to_theta(wide, -0.5 * math.pi, centres[3] - [2.0, 0.0, 1.6]))
-    (found,) = put_together(row)
-    assert found.type == "shed" and found.parameters["teeth"] == 4
-    xy = strewn(outline.buffer(-0.3), np.random.default_rng(0))
-    before = np.max([part.height_at(xy) for part in row], axis=0)
-    assert np.mean(np.abs(found.height_at(xy) - before) < 0.05) > 0.95
+    (result,) = combine_parts(row)
+    assert result.type == "shed" and result.parameters["teeth"] == 4
+    xy = scatter(outline.buffer(-0.3), np.random.default_rng(0))
+    original = np.max([part.height_at(xy) for part in row], axis=0)
+    assert np.mean(np.abs(result.height_at(xy) - original) < 0.05) > 0.95
 
 
 @pytest.mark.parametrize("kind, seed", [("row", 3), ("row", 11), ("row", 19), ("L_of_hips", 1)])
-def test_what_shows_along_the_outline_alone_makes_no_part_and_keeps_houses_in_a_row_apart(kind, seed):
+def test_what_shows_along_the_outline_alone_makes_no_part_and_keeps_houses_in_a_row_apart(
+    kind, seed
+):
     """Rows whose ends are equal around a lower house, and hips that hide a volume but for a micrometre."""
-    found, wanted = count_parts(kind, 5.0, seed)
-    assert found == wanted
+    result, wanted = count_parts(kind, 5.0, seed)
+    assert result == wanted
 
 
 def count_parts(kind, density, seed):

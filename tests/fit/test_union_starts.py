@@ -7,39 +7,45 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.allowed import allowed_shapes
-from hiproof.fit.union.apart import in_a_row
-from hiproof.fit.union.candidates import candidates_of
-from hiproof.fit.union.grow import ground_of, regrown
-from hiproof.fit.union.objective import objective
-from hiproof.fit.union.plan import emptiness, lay_out_plan
+from hiproof.fit.union.allowed import list_allowed_shapes
+from hiproof.fit.union.apart import is_in_row
+from hiproof.fit.union.candidates import list_candidates
+from hiproof.fit.union.grow import prepare_growth, regrow_volumes
+from hiproof.fit.union.objective import compute_objective
+from hiproof.fit.union.plan import lay_out_plan, measure_emptiness
 from hiproof.fit.union.planes import Cloud
-from hiproof.fit.union.scene import directions_of, scene_of
-from hiproof.fit.union.volumes import U0, V0, V1, base_only
+from hiproof.fit.union.scene import find_directions, make_scene
+from hiproof.fit.union.volumes import U0, V0, V1, make_base
 from hiproof.model import Roof
 from roof_zoo import FRAME
-from union_scenes import random_scene, random_volumes
+from union_scenes import draw_scene, draw_volumes
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 7), (7, 7), (7, 15), (0, 15)])
 U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6), (6, 14), (0, 14)])
 
 
-def scene_over(outline, density=4.0):
+def make_scene_over(outline, density=4.0):
     """The scene of level points strewn over `outline`."""
     rng = np.random.default_rng(0)
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
-    return plan, scene_of(plan, outline, directions_of(outline, plan), 1.0, 0.25, allowed_shapes(()))
+    return plan, make_scene(
+        plan, outline, find_directions(outline, plan), 1.0, 0.25, list_allowed_shapes(())
+    )
 
 
 def test_two_hips_that_share_a_corner_are_two_hips():
     """Alike hips over the wings of an L: each plane of one goes on in the other."""
-    xy = scene_points(L_SHAPE, 6.0)
+    xy = scatter_points(L_SHAPE, 6.0)
     arms = [(0, 14, 0, 7), (0, 7, 0, 15)]
     z = np.max(
-        [np.min([xy[:, 0] - a, b - xy[:, 0], xy[:, 1] - c, d - xy[:, 1]], axis=0) for a, b, c, d in arms], axis=0
+        [
+            np.min([xy[:, 0] - a, b - xy[:, 0], xy[:, 1] - c, d - xy[:, 1]], axis=0)
+            for a, b, c, d in arms
+        ],
+        axis=0,
     )
     fit = fit_building(np.column_stack([xy, 5.0 + 0.7 * z]), L_SHAPE)
     assert len(fit.roof_parts) == 2
@@ -49,15 +55,15 @@ def test_two_hips_that_share_a_corner_are_two_hips():
 @pytest.mark.parametrize("seed", range(3))
 def test_growing_anew_never_costs(seed):
     rng = np.random.default_rng(seed)
-    volumes, scene = random_volumes(rng, replacing=0.0), random_scene(rng)
-    value = objective(volumes, scene, np.inf)
-    candidates = candidates_of(scene, np.arange(scene.n), 12)
-    found, lower = regrown(volumes, value, ground_of(scene, candidates), candidates)
+    volumes, scene = draw_volumes(rng, replacing=0.0), draw_scene(rng)
+    value = compute_objective(volumes, scene, np.inf)
+    candidates = list_candidates(scene, np.arange(scene.n), 12)
+    result, lower = regrow_volumes(volumes, value, prepare_growth(scene, candidates), candidates)
     assert lower <= value
-    assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
+    assert compute_objective(result, scene, np.inf) == pytest.approx(lower, rel=1e-9)
 
 
-def scene_points(outline, density):
+def scatter_points(outline, density):
     rng = np.random.default_rng(1)
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
@@ -66,9 +72,9 @@ def scene_points(outline, density):
 
 def test_a_gable_over_walls_that_are_not_parallel_is_one_part():
     outline = shapely.Polygon([(0, 0), (14, 0.9), (14, 8.2), (0, 8)])
-    xy = scene_points(outline, 6.0)
-    low, high = 0.9 / 14.0, 0.2 / 14.0
-    z = 6.0 + 0.7 * np.minimum((xy[:, 1] - low * xy[:, 0]), (8.0 + high * xy[:, 0] - xy[:, 1]))
+    xy = scatter_points(outline, 6.0)
+    lower, upper = 0.9 / 14.0, 0.2 / 14.0
+    z = 6.0 + 0.7 * np.minimum((xy[:, 1] - lower * xy[:, 0]), (8.0 + upper * xy[:, 0] - xy[:, 1]))
     fit = fit_building(np.column_stack([xy, z]), outline)
     assert [part.type for part in fit.roof_parts] == ["gable"] or len(fit.roof_parts) == 1
     assert np.abs(Roof(fit.roof_parts, fit.outline, FRAME).height_at(xy) - z).mean() < 0.05
@@ -77,10 +83,10 @@ def test_a_gable_over_walls_that_are_not_parallel_is_one_part():
 def test_what_a_wall_hides_is_the_lower_roof():
     """A strip beside a high wall without points, but for some along its far side."""
     outline = shapely.box(0, 0, 12, 8)
-    xy = scene_points(outline, 6.0)
-    high = xy[:, 0] < 9.5
-    seen = high | (xy[:, 0] > 11.4)
-    fit = fit_building(np.column_stack([xy, np.where(high, 9.0, 3.0)])[seen], outline)
+    xy = scatter_points(outline, 6.0)
+    upper = xy[:, 0] < 9.5
+    visible = upper | (xy[:, 0] > 11.4)
+    fit = fit_building(np.column_stack([xy, np.where(upper, 9.0, 3.0)])[visible], outline)
     roof = Roof(fit.roof_parts, fit.outline, FRAME)
     strip = np.column_stack([np.full(7, 11.0), np.linspace(1.0, 7.0, 7)])
     assert np.abs(roof.height_at(strip) - 3.0).max() < 0.1
@@ -93,26 +99,26 @@ def test_cells_are_as_empty_as_a_plain_count_says(seed):
     nu, nv = rng.integers(1, 7, 2)
     i, j = rng.integers(0, nu, 9), rng.integers(0, nv, 9)
     expected = rng.uniform(0.1, 2.0, (nu, nv))
-    found = emptiness(Cloud(i + 0.5, j + 0.5, np.zeros(9), i, j), expected)
+    result = measure_emptiness(Cloud(i + 0.5, j + 0.5, np.zeros(9), i, j), expected)
     for a in range(nu):
         for b in range(nv):
             count = ((np.abs(i - a) <= 1) & (np.abs(j - b) <= 1)).sum()
             usual = expected[max(a - 1, 0) : a + 2, max(b - 1, 0) : b + 2].sum()
-            assert found[a, b] == pytest.approx(min(max(1.0 - 2.0 * count / usual, 0.0), 1.0))
+            assert result[a, b] == pytest.approx(min(max(1.0 - 2.0 * count / usual, 0.0), 1.0))
 
 
 def test_what_hides_a_row_is_as_deep_as_the_outline_lets_it_be():
-    own, higher = (base_only(5.0)[0] for _ in range(2))
-    own[U0 : V1 + 1], higher[U0 : V1 + 1] = (0.0, 18.0, 0.0, 8.0), (6.0, 12.0, -0.6, 8.7)
+    item, higher = (make_base(5.0)[0] for _ in range(2))
+    item[U0 : V1 + 1], higher[U0 : V1 + 1] = (0.0, 18.0, 0.0, 8.0), (6.0, 12.0, -0.6, 8.7)
     y = np.linspace(0.1, 7.9, 20)
-    assert in_a_row(own, higher[None], V0, y)
-    assert not in_a_row(own, higher[None], V0, np.linspace(-1.0, 9.0, 20))
+    assert is_in_row(item, higher[None], V0, y)
+    assert not is_in_row(item, higher[None], V0, np.linspace(-1.0, 9.0, 20))
 
 
 def test_houses_beside_a_higher_one_are_told_apart():
     """Three gables in a row under one direction, the first and the last alike."""
     outline = shapely.box(0, 0, 18, 8)
-    xy = scene_points(outline, 8.0)
+    xy = scatter_points(outline, 8.0)
     middle = (xy[:, 0] > 6) & (xy[:, 0] < 12)
     z = 6.0 + 1.2 * middle - 0.7 * np.abs(xy[:, 1] - 4.0)
     fit = fit_building(np.column_stack([xy, z]), outline)
@@ -124,7 +130,7 @@ def test_houses_beside_a_higher_one_are_told_apart():
 def test_gables_at_both_walls_below_a_ridge_are_two():
     """One under the roof from wall to wall would explain them as well; it does not stand out of the roof as a wing does."""
     outline = shapely.box(0, 0, 14, 10)
-    xy = scene_points(outline, 8.0)
+    xy = scatter_points(outline, 8.0)
     roof = 4.0 + 1.0 * (5.0 - np.abs(xy[:, 1] - 5.0))
     gable = 6.5 - 0.6 * np.abs(xy[:, 0] - 7.0)
     z = np.where(np.abs(xy[:, 0] - 7.0) < 2.0, np.maximum(roof, gable), roof)
@@ -137,16 +143,18 @@ def test_gables_at_both_walls_below_a_ridge_are_two():
 def test_a_level_roof_ends_where_a_gable_begins_whose_eaves_are_lower(wide):
     """Along the eaves nothing but the points tells that the level roof does not run on over them."""
     outline = shapely.box(0, 0, 6.0 + wide, 10.7)
-    xy = scene_points(outline, 5.0)
+    xy = scatter_points(outline, 5.0)
     gable = 6.75 + 0.65 * (5.35 - np.abs(xy[:, 1] - 5.35))
-    parts = fit_building(np.column_stack([xy, np.where(xy[:, 0] < 6.0, gable, 7.1)]), outline).roof_parts
+    parts = fit_building(
+        np.column_stack([xy, np.where(xy[:, 0] < 6.0, gable, 7.1)]), outline
+    ).roof_parts
     areas = {part.type: part.area / 10.7 for part in parts}
     assert areas == {"gable": pytest.approx(6.0, abs=0.2), "flat": pytest.approx(wide, abs=0.2)}
 
 
 def test_a_wing_that_crosses_the_roof_stays_one():
     outline = shapely.union(shapely.box(0, 0, 20, 8), shapely.box(7, -5, 13, 13))
-    xy = scene_points(outline, 8.0)
+    xy = scatter_points(outline, 8.0)
     main = np.where((xy[:, 1] > 0) & (xy[:, 1] < 8), 8.0 - 0.7 * np.abs(xy[:, 1] - 4.0), 0.0)
     wing = np.where((xy[:, 0] > 7) & (xy[:, 0] < 13), 7.0 - 0.7 * np.abs(xy[:, 0] - 10.0), 0.0)
     fit = fit_building(np.column_stack([xy, np.maximum(main, wing)]), outline)
@@ -157,8 +165,10 @@ def test_what_a_scanner_saw_of_a_wall_makes_no_plane():
     """A monopitch with returns of the wall under its upper edge."""
     outline = shapely.box(0, 0, 10, 6)
     rng = np.random.default_rng(2)
-    xy = scene_points(outline, 6.0)
-    wall = np.column_stack([rng.uniform(0, 10, 14), rng.uniform(5.7, 5.84, 14), rng.uniform(6.5, 8.0, 14)])
+    xy = scatter_points(outline, 6.0)
+    wall = np.column_stack(
+        [rng.uniform(0, 10, 14), rng.uniform(5.7, 5.84, 14), rng.uniform(6.5, 8.0, 14)]
+    )
     fit = fit_building(np.vstack([np.column_stack([xy, 5.0 + 0.55 * xy[:, 1]]), wall]), outline)
     assert [part.type for part in fit.roof_parts] == ["monopitch"]
 
@@ -166,7 +176,7 @@ def test_what_a_scanner_saw_of_a_wall_makes_no_plane():
 def test_a_level_roof_is_one_part_however_long():
     """Longer than the raster's nodes lie close: its steps are no gaps."""
     outline = shapely.box(0, 0, 130, 14)
-    xy = scene_points(outline, 1.5)
+    xy = scatter_points(outline, 1.5)
     tower = (xy[:, 0] > 60) & (xy[:, 0] < 75)
     fit = fit_building(np.column_stack([xy, np.where(tower, 12.0, 6.0)]), outline)
     assert len(fit.roof_parts) <= 3

@@ -9,9 +9,9 @@ import shapely
 from benchmarks.compounds import draw_compound
 
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.larger import put_together
-from hiproof.fit.union.regions import area_of
-from hiproof.fit.union.shown import with_slivers
+from hiproof.fit.union.larger import combine_parts
+from hiproof.fit.union.regions import unite_outlines
+from hiproof.fit.union.shown import absorb_slivers
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from points_of_roofs import sample_heights
@@ -19,46 +19,55 @@ from points_of_roofs import sample_heights
 SLOPE, WIDTH, LENGTH, LOW = 0.5, 5.0, 12.0, 4.0  # of every tooth; the height at which each begins
 
 
-def placed(name, theta_p, kappa, across, z):
+def place_part(name, theta_p, kappa, across, z):
     """A part of the catalogue whose rectangle's middle lies so far `across` the row."""
     shape = get(name)
     place = np.array([-math.sin(kappa) * across + 40.0, math.cos(kappa) * across - 7.0, z])
     return shape.part(shape.to_theta(theta_p, kappa, place))
 
 
-def seen_tooth(number, start, end, kappa):
+def make_seen_tooth(number, start, end, kappa):
     """The tooth of that number from the row's foot on, seen from `start` to `end`."""
     size = {"width": end - start, "length": LENGTH, "height": SLOPE * (end - start)}
-    return placed("monopitch", size, kappa, 0.5 * (start + end), LOW + SLOPE * (start - number * WIDTH))
+    return place_part(
+        "monopitch", size, kappa, 0.5 * (start + end), LOW + SLOPE * (start - number * WIDTH)
+    )
 
 
-def seen_row(count, kappa, rng):
+def make_seen_row(count, kappa, rng):
     """Teeth whose steps were seen up to 0.2 m from where they are, and the level annex behind the last; where that begins."""
     ends = WIDTH * np.arange(count + 1) + np.r_[0.0, rng.uniform(-0.2, 0.2, count)]
-    teeth = [seen_tooth(k, *ends[k : k + 2], kappa) for k in range(count)]
-    behind = count * WIDTH + 6.0
-    annex = {"width": behind - ends[-1], "length": LENGTH}
-    return [*teeth, placed("flat", annex, kappa, 0.5 * (ends[-1] + behind), 3.0)]
+    teeth = [make_seen_tooth(k, *ends[k : k + 2], kappa) for k in range(count)]
+    end = count * WIDTH + 6.0
+    annex = {"width": end - ends[-1], "length": LENGTH}
+    return [*teeth, place_part("flat", annex, kappa, 0.5 * (ends[-1] + end), 3.0)]
 
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("count", [2, 4, 6])
 def test_planes_tell_how_wide_teeth_are(count, seed):
     rng = np.random.default_rng(seed)
-    parts = seen_row(count, rng.uniform(-3.0, 3.0), rng)
-    found = {part.type: part for part in put_together([parts[k] for k in rng.permutation(len(parts))])}
-    assert set(found) == {"shed", "flat"}
-    assert found["shed"].parameters["width"] == pytest.approx(count * WIDTH, abs=1e-6)
-    assert found["shed"].area == pytest.approx(count * WIDTH * LENGTH, abs=1e-3)
-    assert found["shed"].translation[2] == pytest.approx(LOW, abs=1e-6)
-    assert area_of(list(found.values())).area == pytest.approx((count * WIDTH + 6.0) * LENGTH, abs=1e-3)
+    parts = make_seen_row(count, rng.uniform(-3.0, 3.0), rng)
+    result = {
+        part.type: part for part in combine_parts([parts[k] for k in rng.permutation(len(parts))])
+    }
+    assert set(result) == {"shed", "flat"}
+    assert result["shed"].parameters["width"] == pytest.approx(count * WIDTH, abs=1e-6)
+    assert result["shed"].area == pytest.approx(count * WIDTH * LENGTH, abs=1e-3)
+    assert result["shed"].translation[2] == pytest.approx(LOW, abs=1e-6)
+    assert unite_outlines(list(result.values())).area == pytest.approx(
+        (count * WIDTH + 6.0) * LENGTH, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("kappa", [0.0, 0.7, -2.5])
 def test_a_strip_between_teeth_is_no_roof_of_its_own(kappa):
-    before, behind = seen_tooth(0, 0.0, WIDTH - 0.4, kappa), seen_tooth(1, WIDTH, 2.0 * WIDTH, kappa)
-    strip = placed("flat", {"width": 0.4, "length": LENGTH}, kappa, WIDTH - 0.2, 5.0)
-    (shed,) = put_together([before, strip, behind])
+    original, end = (
+        make_seen_tooth(0, 0.0, WIDTH - 0.4, kappa),
+        make_seen_tooth(1, WIDTH, 2.0 * WIDTH, kappa),
+    )
+    strip = place_part("flat", {"width": 0.4, "length": LENGTH}, kappa, WIDTH - 0.2, 5.0)
+    (shed,) = combine_parts([original, strip, end])
     assert shed.type == "shed"
     assert shed.area == pytest.approx(2.0 * WIDTH * LENGTH, abs=1e-3)
 
@@ -73,12 +82,12 @@ def test_a_row_with_slanted_ends_and_nothing_beside_it_is_one_saw_tooth(kappa):
     )
     row = []
     for k, ring in enumerate(rings):
-        tooth = seen_tooth(k, k * WIDTH, (k + 1) * WIDTH, kappa)
+        tooth = make_seen_tooth(k, k * WIDTH, (k + 1) * WIDTH, kappa)
         outline = shapely.Polygon(np.array(ring) @ np.array([[c, s], [-s, c]]) + [40.0, -7.0])
         row.append(replace(tooth, pieces=(Piece(outline, tooth.pieces[0].planes),)))
-    (shed,) = put_together(row)
+    (shed,) = combine_parts(row)
     assert shed.type == "shed"
-    assert shed.area == pytest.approx(area_of(row).area, abs=1e-3)
+    assert shed.area == pytest.approx(unite_outlines(row).area, abs=1e-3)
     assert shed.parameters["width"] == pytest.approx(2.0 * WIDTH, abs=1e-6)
 
 
@@ -88,20 +97,34 @@ def test_wings_beside_a_yard_or_in_a_row_are_two_and_what_crosses_a_roof_is_one(
 
     across = shapely.union(shapely.box(-12, -4, 12, 4), shapely.box(-3, -11, 3, 11))
     row = shapely.box(-3, -11, 3, 11)
-    beside = shapely.union_all([shapely.box(-12, -4, 12, 4), shapely.box(-12, 4, -6, 11), shapely.box(6, 4, 12, 11)])
-    for outline, count in ((across, 2), (row, 3), (beside, 3)):
+    neighbours = shapely.union_all(
+        [shapely.box(-12, -4, 12, 4), shapely.box(-12, 4, -6, 11), shapely.box(6, 4, 12, 11)]
+    )
+    for outline, count in ((across, 2), (row, 3), (neighbours, 3)):
         parts = fit_building(sample_heights(z, outline), outline).roof_parts
         assert [part.type for part in parts] == ["flat"] * count
-        assert sorted(round(part.translation[2], 1) for part in parts) == [6.0] * (count - 1) + [9.0]
+        assert sorted(round(part.translation[2], 1) for part in parts) == [6.0] * (count - 1) + [
+            9.0
+        ]
 
 
 def test_a_strip_a_grid_step_off_its_neighbour_joins_it():
-    flat = [(-2.758176, 19.310466), (1.171256, 11.801776), (-10.364279, 5.765023), (-14.293711, 13.273712)]
-    strip = [(-10.364279, 5.765022), (1.171257, 11.801776), (1.200482, 11.745931), (-10.335054, 5.709177)]
+    flat = [
+        (-2.758176, 19.310466),
+        (1.171256, 11.801776),
+        (-10.364279, 5.765023),
+        (-14.293711, 13.273712),
+    ]
+    strip = [
+        (-10.364279, 5.765022),
+        (1.171257, 11.801776),
+        (1.200482, 11.745931),
+        (-10.335054, 5.709177),
+    ]
     level = np.array([[0.0, 0.0, 3.0]])
-    one, other = (Part("flat", (Piece(shapely.Polygon(ring), level),)) for ring in (flat, strip))
-    (part,) = with_slivers([one], other, math.inf)
-    assert part.area == pytest.approx(one.area + other.area, abs=1e-3)
+    first, other = (Part("flat", (Piece(shapely.Polygon(ring), level),)) for ring in (flat, strip))
+    (part,) = absorb_slivers([first], other, math.inf)
+    assert part.area == pytest.approx(first.area + other.area, abs=1e-3)
 
 
 def test_a_row_that_only_touches_what_it_would_reach_into_is_a_saw_tooth():

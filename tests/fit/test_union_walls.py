@@ -5,29 +5,29 @@ import pytest
 import shapely
 from scipy.spatial import cKDTree
 
-from hiproof.fit.union.plan import BORDER_M, off_facades, ring_edges, signed_depth
-from hiproof.fit.union.slivers import FEWEST_SEEN, without_specks
-from hiproof.fit.union.volumes import V1, roof_heights
+from hiproof.fit.union.plan import FACADE_BORDER_M, find_roof_points, measure_depth, ring_edges
+from hiproof.fit.union.slivers import FEWEST_SEEN, drop_specks
+from hiproof.fit.union.volumes import V1, compute_roof_heights
 from hiproof.fit.walls import STEEPEST_ROOF, WALL_REACH_SPACINGS
 from hiproof.fit.walls import on_walls as found_on_walls
-from union_scenes import OUTLINES, random_scene, random_volumes
+from union_scenes import OUTLINES, draw_scene, draw_volumes
 
 
-def hip(rng, outline, density, pitch):
+def scan_hip(rng, outline, density, pitch):
     """Points (n, 3) of a roof that rises from all of the `outline` with the same `pitch`, eaves 5 m high; and their depth (n,)."""
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    depth = signed_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline))
+    depth = measure_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline))
     xy, depth = xy[depth >= 0.0], depth[depth >= 0.0]
     return np.column_stack([xy, 5.0 + pitch * depth]), depth
 
 
-def on_walls(rng, outline, count):
+def scan_walls(rng, outline, count):
     """Points (count, 3) of walls, up to 5 cm inside of the outline, more than a metre below the eaves; and their depth."""
     ring = outline.exterior
-    at = shapely.line_interpolate_point(ring, rng.uniform(0.0, ring.length, count))
-    xy = shapely.get_coordinates(at) * 0.995
-    depth = signed_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline))
+    positions = shapely.line_interpolate_point(ring, rng.uniform(0.0, ring.length, count))
+    xy = shapely.get_coordinates(positions) * 0.995
+    depth = measure_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline))
     return np.column_stack([xy, rng.uniform(0.0, 3.0, count)]), depth
 
 
@@ -35,53 +35,60 @@ def on_walls(rng, outline, count):
 @pytest.mark.parametrize("seed", range(3))
 def test_sparse_roofs_keep_every_point_and_lose_those_of_their_walls(outline, seed):
     rng = np.random.default_rng(seed)
-    roof, depth = hip(rng, outline, 2.0, rng.uniform(0.0, STEEPEST_ROOF))
-    walls, wall_depth = on_walls(rng, outline, 20)
-    assert wall_depth.max() < BORDER_M
-    near = np.abs(walls[:, None, :2] - roof[None, depth >= BORDER_M, :2])
+    roof, depth = scan_hip(rng, outline, 2.0, rng.uniform(0.0, STEEPEST_ROOF))
+    walls, wall_depth = scan_walls(rng, outline, 20)
+    assert wall_depth.max() < FACADE_BORDER_M
+    nearby = np.abs(walls[:, None, :2] - roof[None, depth >= FACADE_BORDER_M, :2])
     reach = WALL_REACH_SPACINGS * np.sqrt(outline.area / (len(roof) + len(walls)))
-    seen = np.hypot(near[..., 0], near[..., 1]).min(axis=1) < reach  # far from any roof point a steep roof may be
+    visible = (
+        np.hypot(nearby[..., 0], nearby[..., 1]).min(axis=1) < reach
+    )  # far from any roof point a steep roof may be
 
-    every = np.vstack([roof, walls])
-    kept = every[off_facades(every, np.concatenate([depth, wall_depth]), outline.area)]
-    assert set(map(tuple, roof)) <= set(map(tuple, kept))
-    assert not set(map(tuple, walls[seen])) & set(map(tuple, kept))
+    all_rows = np.vstack([roof, walls])
+    n_kept = all_rows[find_roof_points(all_rows, np.concatenate([depth, wall_depth]), outline.area)]
+    assert set(map(tuple, roof)) <= set(map(tuple, n_kept))
+    assert not set(map(tuple, walls[visible])) & set(map(tuple, n_kept))
 
 
 def test_walls_are_told_by_what_stands_high_nearby():
     """Against scipy's tree of points."""
     rng = np.random.default_rng(8)
     roof, points = (rng.uniform((0, 0, 5), (9, 7, 9), (n, 3)) for n in (120, 60))
-    near = cKDTree(roof[:, :2]).query_ball_point(points[:, :2], WALL_REACH_SPACINGS * 0.7)
+    nearby = cKDTree(roof[:, :2]).query_ball_point(points[:, :2], WALL_REACH_SPACINGS * 0.7)
     drop = STEEPEST_ROOF * WALL_REACH_SPACINGS * 0.7
-    told = [any(roof[k, 2] > point[2] + drop for k in own) for point, own in zip(points, near, strict=True)]
-    assert 0 < sum(told) < len(told)
-    assert found_on_walls(points, roof, 0.7).tolist() == told
+    is_given = [
+        any(roof[k, 2] > point[2] + drop for k in item)
+        for point, item in zip(points, nearby, strict=True)
+    ]
+    assert 0 < sum(is_given) < len(is_given)
+    assert found_on_walls(points, roof, 0.7).tolist() == is_given
 
 
 def test_dense_clouds_lose_all_points_next_to_the_border():
-    roof, depth = hip(np.random.default_rng(1), OUTLINES[0], 10.0, 0.5)
-    assert np.array_equal(off_facades(roof, depth, OUTLINES[0].area), depth >= BORDER_M)
+    roof, depth = scan_hip(np.random.default_rng(1), OUTLINES[0], 10.0, 0.5)
+    assert np.array_equal(find_roof_points(roof, depth, OUTLINES[0].area), depth >= FACADE_BORDER_M)
 
 
 def test_too_few_points_lose_none():
     points = np.array([[5.95, 0.0, 3.0], [0.0, 3.95, 0.0], [0.0, 0.0, 5.0]])
     depth = np.array([0.05, 0.05, 4.0])
-    assert off_facades(points, depth, 96.0).all()
+    assert find_roof_points(points, depth, 96.0).all()
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_no_volume_of_several_is_a_speck(seed):
     rng = np.random.default_rng(seed)
-    volumes, scene = random_volumes(rng), random_scene(rng)
-    left = without_specks(volumes.copy(), scene)
-    seen, before = (
-        np.bincount(roof_heights(rows, scene.U, scene.V)[1][: scene.n], minlength=len(rows))[1:]
-        for rows in (left, volumes)
+    volumes, scene = draw_volumes(rng), draw_scene(rng)
+    remainder = drop_specks(volumes.copy(), scene)
+    visible, original = (
+        np.bincount(
+            compute_roof_heights(rows, scene.U, scene.V)[1][: scene.n], minlength=len(rows)
+        )[1:]
+        for rows in (remainder, volumes)
     )
-    assert len(left) == 2 or seen.min() >= FEWEST_SEEN
-    if before.min() >= FEWEST_SEEN:
-        assert (left == volumes).all()
+    assert len(remainder) == 2 or visible.min() >= FEWEST_SEEN
+    if original.min() >= FEWEST_SEEN:
+        assert (remainder == volumes).all()
     else:
-        assert len(left) < len(volumes) or len(volumes) == 2
-    assert (left[1:, V1] <= volumes[:, V1].max()).all()
+        assert len(remainder) < len(volumes) or len(volumes) == 2
+    assert (remainder[1:, V1] <= volumes[:, V1].max()).all()

@@ -14,7 +14,7 @@ from hiproof.simulate import Defects, ScanSettings, random_compound, scan_solids
 weld = importlib.import_module("hiproof.fit.union.weld")
 
 
-def scanned(kind, seed):
+def scan_compound(kind, seed):
     """Points and outline of a simulated compound in its local frame, 5 points a square metre."""
     roof = random_compound(np.random.default_rng(seed), kind).roof
     settings = ScanSettings(density=5.0, defects=Defects.none())
@@ -22,56 +22,57 @@ def scanned(kind, seed):
     return cloud.points[cloud.points[:, 2] > -2.0], roof.outline
 
 
-def before_welding(monkeypatch, kind, seed):
+def capture_problem(monkeypatch, kind, seed):
     """What `weld` is called with for a compound: its problem and the roof as the search left it."""
-    seen = {}
+    visible = {}
 
     def spy(volumes, sides, agreement, site, base):
-        seen["problem"] = weld.problem_of(volumes, agreement, site, base)
-        seen["state"] = weld.state_before(sides, seen["problem"])
+        visible["problem"] = weld.make_problem(volumes, agreement, site, base)
+        visible["state"] = weld.begin_state(sides, visible["problem"])
         return weld.weld(volumes, sides, agreement, site, base)
 
     monkeypatch.setattr(union, "weld", spy)
-    points, outline = scanned(kind, seed)
+    points, outline = scan_compound(kind, seed)
     fit = fit_building(points, outline)
     assert fit.outline.equals(outline)
-    return seen["problem"], seen["state"]
+    return visible["problem"], visible["state"]
 
 
-def price(state, problem, box=None):
+def price_box(state, problem, box=None):
     """Price and corners of a roof, in a window or as a whole."""
     box = problem.outline.envelope if box is None else box
-    window = weld.window_of(box, weld.quads_of(state, problem), problem)
-    whole = weld.window_of(weld.whole_box(problem), weld.quads_of(state, problem), problem)
-    beyond = weld.owners_beyond(weld.draw(state, whole, problem).plans[0], box)
-    drawing = weld.draw(state, window, problem)
-    return weld.price_of(state, drawing, beyond, window, problem), drawing.corners
+    window = weld.make_window(box, weld.list_quads(state, problem), problem)
+    whole = weld.make_window(weld.make_whole_box(problem), weld.list_quads(state, problem), problem)
+    extra = weld.list_owners_beyond(weld.draw_window(state, whole, problem).plans[0], box)
+    drawing = weld.draw_window(state, window, problem)
+    return weld.price_window(state, drawing, extra, window, problem), drawing.corners
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("L", 1), ("dormered", 2), ("two_level", 3), ("T", 4)])
 def test_a_welded_roof_costs_no_more_and_welding_again_changes_nothing(monkeypatch, kind, seed):
-    problem, state = before_welding(monkeypatch, kind, seed)
+    problem, state = capture_problem(monkeypatch, kind, seed)
     volumes, site, agreement, base, *_ = problem
     sides, planes, _ = weld.weld(volumes, state.sides, agreement, site, base)
-    after = state._replace(sides=sides, planes=planes)
-    assert price(after, problem) <= price(state, problem)
-    again, *_ = weld.weld(volumes, sides, agreement._replace(planes=planes), site, base)
-    assert again == sides
+    changed_state = state._replace(sides=sides, planes=planes)
+    assert price_box(changed_state, problem) <= price_box(state, problem)
+    second, *_ = weld.weld(volumes, sides, agreement._replace(planes=planes), site, base)
+    assert second == sides
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("dormered", 2), ("dormered", 5), ("T", 4)])
 def test_a_window_judges_a_moved_side_as_the_whole_roof_does(monkeypatch, kind, seed):
-    problem, state = before_welding(monkeypatch, kind, seed)
+    problem, state = capture_problem(monkeypatch, kind, seed)
     compared = 0
     for k in range(1, len(problem.volumes)):
         for edge, side in enumerate(state.sides[k]):
             if not side.anchored:
-                line = Side(side.at + 0.4, side.lean, False, side.sigma)
-                moved = weld.with_line_moved(state.sides, k, edge, line, problem)
-                after = state._replace(sides=moved)
-                box = weld.box_of(weld.Repair(0.4, {(k, edge): line}), state, problem)
+                line = Side(side.offset + 0.4, side.lean, False, side.sigma)
+                moved = weld.move_line(state.sides, k, edge, line, problem)
+                changed_state = state._replace(sides=moved)
+                box = weld.frame_repair(weld.Repair(0.4, {(k, edge): line}), state, problem)
                 in_window, on_roof = (
-                    np.subtract(price(after, problem, b), price(state, problem, b)) for b in (box, None)
+                    np.subtract(price_box(changed_state, problem, b), price_box(state, problem, b))
+                    for b in (box, None)
                 )
                 assert in_window == pytest.approx(on_roof, abs=1e-6)
                 compared += 1
@@ -80,15 +81,17 @@ def test_a_window_judges_a_moved_side_as_the_whole_roof_does(monkeypatch, kind, 
 
 def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):
     """Where a welded side is moved by 2 cm, welding leaves no more corners than there were."""
-    problem, state = before_welding(monkeypatch, "dormered", 2)
+    problem, state = capture_problem(monkeypatch, "dormered", 2)
     volumes, site, agreement, base, *_ = problem
     sides, planes, _ = weld.weld(volumes, state.sides, agreement, site, base)
     settled = state._replace(sides=sides, planes=planes)
     for k in range(1, len(volumes)):
         for edge, side in enumerate(sides[k]):
             if not side.anchored and np.isfinite(side.sigma):
-                line = Side(side.at + 0.02, side.lean, False, side.sigma)
-                apart = weld.with_line_moved(sides, k, edge, line, problem)
-                back, *_ = weld.weld(volumes, apart, agreement._replace(planes=planes), site, base)
+                line = Side(side.offset + 0.02, side.lean, False, side.sigma)
+                displaced = weld.move_line(sides, k, edge, line, problem)
+                back, *_ = weld.weld(
+                    volumes, displaced, agreement._replace(planes=planes), site, base
+                )
                 moved = state._replace(sides=back, planes=planes)
-                assert price(moved, problem)[1] <= price(settled, problem)[1]
+                assert price_box(moved, problem)[1] <= price_box(settled, problem)[1]

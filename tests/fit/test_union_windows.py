@@ -7,15 +7,15 @@ import shapely
 from hiproof import reconstruct
 from hiproof.compose import check_solid
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.allowed import allowed_shapes
-from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, cheapest_cut
+from hiproof.fit.union.allowed import list_allowed_shapes
+from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from hiproof.fit.union.box import NOWHERE
 from hiproof.fit.union.groups import draw_in_groups
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.regions import Site
-from hiproof.fit.union.scene import directions_of, scene_of
-from hiproof.fit.union.unite import drawn, ends_of
-from hiproof.fit.union.volumes import LEVEL, OFFSET, PLANES, U0, U1, V0, V1, base_only
+from hiproof.fit.union.regions import PlanSite
+from hiproof.fit.union.scene import find_directions, make_scene
+from hiproof.fit.union.unite import draw_roof, gather_ends
+from hiproof.fit.union.volumes import LEVEL, N_PLANES, OFFSET0, U0, U1, V0, V1, make_base
 from hiproof.fit.union.whole import Whole
 from hiproof.status import Status
 from points_of_roofs import sample_heights
@@ -24,7 +24,7 @@ HALL = shapely.box(0, 0, 35, 22)
 BOXES = [(x, y, x + 4.0, y + 3.0) for x in (3.0, 15.0, 27.0) for y in (3.0, 15.0)]
 
 
-def hall(x, y):
+def compute_hall(x, y):
     """A level roof of 770 m2 with six boxes of 12 m2 that stand 3 m above it."""
     z = np.full(np.shape(x), 8.0)
     for x0, y0, x1, y1 in BOXES:
@@ -32,87 +32,93 @@ def hall(x, y):
     return z
 
 
-def heights(fit, xy):
+def measure_heights(fit, xy):
     return np.max([part.height_at(xy) for part in fit.roof_parts], axis=0)
 
 
-def whole_of(height, outline, density=5.0):
+def make_whole(height, outline, density=5.0):
     plan = lay_out_plan(sample_heights(height, outline, density, 0.02), outline)
-    scene = scene_of(plan, outline, directions_of(outline, plan), 2.0, 0.2, allowed_shapes(()))
+    scene = make_scene(
+        plan, outline, find_directions(outline, plan), 2.0, 0.2, list_allowed_shapes(())
+    )
     return Whole(scene, plan, outline)
 
 
 def test_boxes_on_a_large_level_roof_are_found():
-    fit = fit_building(sample_heights(hall, HALL, 5.0, 0.02), HALL)
+    fit = fit_building(sample_heights(compute_hall, HALL, 5.0, 0.02), HALL)
     xy = np.array([[0.5 * (x0 + x1), 0.5 * (y0 + y1)] for x0, y0, x1, y1 in BOXES])
-    assert heights(fit, xy) == pytest.approx(11.0, abs=0.03)
-    assert heights(fit, xy + [5.0, 0.0]) == pytest.approx(8.0, abs=0.03)
+    assert measure_heights(fit, xy) == pytest.approx(11.0, abs=0.03)
+    assert measure_heights(fit, xy + [5.0, 0.0]) == pytest.approx(8.0, abs=0.03)
     assert len(fit.roof_parts) == 7
 
 
 def test_the_roof_does_not_depend_on_the_order_of_its_points():
-    points = sample_heights(hall, HALL, 3.0, 0.02)
-    one = fit_building(points, HALL)
+    points = sample_heights(compute_hall, HALL, 3.0, 0.02)
+    first = fit_building(points, HALL)
     other = fit_building(points[np.random.default_rng(1).permutation(len(points))], HALL)
-    assert len(one.roof_parts) == len(other.roof_parts)
-    for mine, theirs in zip(one.roof_parts, other.roof_parts, strict=True):
-        for piece, same in zip(mine.pieces, theirs.pieces, strict=True):
-            assert piece.outline.equals(same.outline)
-            assert np.array_equal(piece.planes, same.planes)
+    assert len(first.roof_parts) == len(other.roof_parts)
+    for own_piece, theirs in zip(first.roof_parts, other.roof_parts, strict=True):
+        for piece, twin in zip(own_piece.pieces, theirs.pieces, strict=True):
+            assert piece.outline.equals(twin.outline)
+            assert np.array_equal(piece.planes, twin.planes)
 
 
 def test_halves_far_apart_have_the_roofs_that_each_has_alone():
     left, right = shapely.box(0, 0, 26, 12), shapely.box(90, 0, 116, 12)
-    both = shapely.union_all([left, right, shapely.box(25, 5, 91, 7)])
+    joint = shapely.union_all([left, right, shapely.box(25, 5, 91, 7)])
 
     def gables(x, y):
-        return np.where((x < 26) | (x > 90), 9.0 - 0.7 * np.abs(y - 6.0), 4.0) + np.where(x > 90, 1.0, 0.0)
+        return np.where((x < 26) | (x > 90), 9.0 - 0.7 * np.abs(y - 6.0), 4.0) + np.where(
+            x > 90, 1.0, 0.0
+        )
 
-    together = fit_building(sample_heights(gables, both, 4.0, 0.02), both)
+    together = fit_building(sample_heights(gables, joint, 4.0, 0.02), joint)
     for half in (left, right):
-        alone = fit_building(sample_heights(gables, half, 4.0, 0.02), half)
+        separate = fit_building(sample_heights(gables, half, 4.0, 0.02), half)
         inside = shapely.buffer(half, -0.5)
         x, y = np.meshgrid(np.arange(0.5, 116.0), np.arange(0.5, 12.0))
         xy = np.column_stack([x.ravel(), y.ravel()])
         xy = xy[shapely.contains_xy(inside, xy[:, 0], xy[:, 1])]
-        assert heights(together, xy) == pytest.approx(heights(alone, xy), abs=0.03)
+        assert measure_heights(together, xy) == pytest.approx(
+            measure_heights(separate, xy), abs=0.03
+        )
     assert sorted(part.type for part in together.roof_parts) == ["flat", "gable", "gable"]
 
 
 def test_a_large_roof_is_a_valid_solid():
-    model = reconstruct(sample_heights(hall, HALL, 3.0, 0.02), HALL)
+    model = reconstruct(sample_heights(compute_hall, HALL, 3.0, 0.02), HALL)
     assert model.status is Status.MODELLED
     assert not check_solid(model.built.solid)
 
 
 def test_a_cut_falls_on_a_step_and_blocks_are_small():
     outline = shapely.box(-30, 0, 30, 15)
-    whole = whole_of(lambda x, y: np.where(x < 8.0, 6.0, 9.0), outline)
+    whole = make_whole(lambda x, y: np.where(x < 8.0, 6.0, 9.0), outline)
     raster = HeightRaster(whole)
-    axis, at = cheapest_cut(raster, whole.box)
+    axis, positions = find_cheapest_cut(raster, whole.box)
     step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
     assert whole.area > BLOCK_M2
-    assert at == pytest.approx(step[axis], abs=2 * raster.pitch)
+    assert positions == pytest.approx(step[axis], abs=2 * raster.pitch)
 
 
 def test_a_volume_without_width_lies_nowhere():
-    whole = whole_of(hall, HALL)
+    whole = make_whole(compute_hall, HALL)
     line = whole.volumes[0].copy()
     line[U0 : V1 + 1] = 3.0, 9.0, 4.0, 4.0
     whole.set_volumes(np.vstack([whole.volumes, line]))
     assert whole.boxes[1].tolist() == list(NOWHERE)
-    assert whole.volumes_in(whole.box) == []
+    assert whole.list_volumes(whole.box) == []
 
 
 def test_a_roof_drawn_in_groups_is_drawn_as_all_at_once():
     """Also where a group lies inside and sees no edge of the outline."""
     rng, outline = np.random.default_rng(4), shapely.box(0, 0, 48, 48)
-    volumes = np.vstack([base_only(2.0), np.zeros((144, base_only(2.0).shape[1]))])
-    volumes[1:, OFFSET : OFFSET + PLANES] = np.inf
+    volumes = np.vstack([make_base(2.0), np.zeros((144, make_base(2.0).shape[1]))])
+    volumes[1:, OFFSET0 : OFFSET0 + N_PLANES] = np.inf
     i, j = np.divmod(np.arange(144), 12)
     volumes[1:, U0], volumes[1:, U1] = 4.0 * i, 4.0 * i + 4.0
     volumes[1:, V0], volumes[1:, V1] = 4.0 * j, 4.0 * j + 4.0
-    levels = volumes[1:, OFFSET + LEVEL] = rng.uniform(4.0, 12.0, 144)
+    levels = volumes[1:, OFFSET0 + LEVEL] = rng.uniform(4.0, 12.0, 144)
 
     def height(x, y):
         column, row = np.clip(np.array([x, y]) // 4.0, 0, 11).astype(int)
@@ -121,11 +127,13 @@ def test_a_roof_drawn_in_groups_is_drawn_as_all_at_once():
     plan = lay_out_plan(sample_heights(height, outline, 3.0, 0.02), outline)
     volumes[1:, [U0, U1]] -= plan.frame.origin[0]
     volumes[1:, [V0, V1]] -= plan.frame.origin[1]
-    volumes[:, OFFSET + LEVEL] -= plan.frame.origin[2]
-    scene = scene_of(plan, outline, [0.0], 2.0, 0.2, allowed_shapes(()))
-    ends = ends_of(outline, plan, scene)
-    at_once = drawn(volumes, ends, scene, {})
-    in_groups, _ = draw_in_groups(volumes, ends, Site(outline, plan, scene, {}), {})
-    for mine, theirs in zip(in_groups.sides[1:], at_once.sides[1:], strict=True):
-        assert [side.at for side in mine] == pytest.approx([side.at for side in theirs], abs=1e-6)
-        assert [side.anchored for side in mine] == [side.anchored for side in theirs]
+    volumes[:, OFFSET0 + LEVEL] -= plan.frame.origin[2]
+    scene = make_scene(plan, outline, [0.0], 2.0, 0.2, list_allowed_shapes(()))
+    ends = gather_ends(outline, plan, scene)
+    at_once = draw_roof(volumes, ends, scene, {})
+    in_groups, _ = draw_in_groups(volumes, ends, PlanSite(outline, plan, scene, {}), {})
+    for own_piece, theirs in zip(in_groups.sides[1:], at_once.sides[1:], strict=True):
+        assert [side.offset for side in own_piece] == pytest.approx(
+            [side.offset for side in theirs], abs=1e-6
+        )
+        assert [side.anchored for side in own_piece] == [side.anchored for side in theirs]

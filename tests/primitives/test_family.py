@@ -20,7 +20,7 @@ from hiproof.primitives.family import (
     read_member,
 )
 from hiproof.primitives.parameters import refuse_no_shape
-from union_scenes import lowest_of, member_of_shape, rectangle_of
+from union_scenes import compute_lowest, draw_member, list_corners
 
 SHAPE_NAMES = [name for name, _ in GENERAL_SHAPES.values()]
 each_shape = pytest.mark.parametrize("shape", SHAPE_NAMES)
@@ -36,7 +36,7 @@ def members(shape, count=12):
     """
     for seed in range(count):
         rng = np.random.default_rng([seed, SHAPE_NAMES.index(shape)])
-        member = member_of_shape(rng, shape, regular=seed % 4 == 1, skewed=seed % 4 == 2)
+        member = draw_member(rng, shape, regular=seed % 4 == 1, skewed=seed % 4 == 2)
         yield add_cants(rng, member) if seed % 4 == 3 and any(member.has) else member
 
 
@@ -60,7 +60,7 @@ def add_cants(rng, member, limit=3):
 
 def strew_over_plan(member):
     """Places (200, 2) strewn over a member's plan and a little beyond."""
-    corners = rectangle_of(member)
+    corners = list_corners(member)
     shares = np.random.default_rng(0).uniform(-0.1, 1.1, (200, 2))
     return corners[0] + shares @ np.array([corners[1] - corners[0], corners[3] - corners[0]])
 
@@ -92,7 +92,9 @@ def test_planes_follow_from_written_parameters_to_a_millimetre(shape):
         written = {name: round(value, 6) for name, value in parameters.items()}
         planes = compute_planes(member.name, written, round(kappa, 6), np.round(translation, 6))
         xy = strew_over_plan(member)
-        assert lowest_of(planes, xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-3)
+        assert compute_lowest(planes, xy) == pytest.approx(
+            compute_lowest(member.planes(), xy), abs=1e-3
+        )
 
 
 def draw_members_without_run():
@@ -150,8 +152,8 @@ def test_turning_the_axes_keeps_surface_plan_and_name(shape):
         turned, xy = member, strew_over_plan(member)
         for _ in range(4):
             turned = turned.turn()
-            assert lowest_of(turned.planes(), xy) == pytest.approx(
-                lowest_of(member.planes(), xy), abs=1e-9
+            assert compute_lowest(turned.planes(), xy) == pytest.approx(
+                compute_lowest(member.planes(), xy), abs=1e-9
             )
             assert shapely.equals_exact(plan_of(turned), plan_of(member), 1e-9, normalize=True)
             assert turned.name == member.name
@@ -159,7 +161,7 @@ def test_turning_the_axes_keeps_surface_plan_and_name(shape):
 
 
 def plan_of(member):
-    return shapely.Polygon(rectangle_of(member))
+    return shapely.Polygon(list_corners(member))
 
 
 @each_shape
@@ -181,7 +183,7 @@ def test_a_member_over_its_whole_plan_is_the_lowest_of_its_planes(shape):
         xy = strew_over_plan(member)
         assert part.type == member.name
         assert part.pieces[0].height_at(xy) == pytest.approx(
-            lowest_of(member.planes(), xy), abs=1e-9
+            compute_lowest(member.planes(), xy), abs=1e-9
         )
         assert part.translation[2] == pytest.approx(member.base)
 
@@ -223,7 +225,7 @@ def test_names_are_told_from_planes_eaves_and_pitches():
             kin = next((names for names in KIN if shape in names), (shape,))
             assert member.name in kin
     rng = np.random.default_rng(0)
-    gable = member_of_shape(rng, "gable", regular=True)
+    gable = draw_member(rng, "gable", regular=True)
     assert gable.name == "gable" and set(gable.describe()[0]) == set(get("gable").parameters)
 
 
@@ -277,14 +279,14 @@ def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes
             for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])
         ]
     )
-    sigma = member.part([shapely.Polygon(rectangle_of(member))], None, changes).sigma
+    sigma = member.part([shapely.Polygon(list_corners(member))], None, changes).sigma
     assert 0.0 < max(sigma.values()) < 0.01
 
 
 @pytest.mark.parametrize("regular", [False, True])
 @each_shape
 def test_several_members_are_measured_as_each_of_them(shape, regular):
-    member = member_of_shape(np.random.default_rng(3), shape, regular=regular).canonical()
+    member = draw_member(np.random.default_rng(3), shape, regular=regular).canonical()
     kind = get(shape) if regular else None
     if not regular and any(member.has):
         member = add_cants(np.random.default_rng(4), member)
@@ -330,7 +332,7 @@ def test_a_cant_rises_square_from_its_wall(shape):
     """
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        member = member_of_shape(rng, shape)
+        member = draw_member(rng, shape)
         if not any(member.has):
             continue
         parameters, kappa, translation = add_cants(rng, member).describe()
@@ -381,9 +383,7 @@ def test_a_name_stands_for_itself_its_kin_or_nothing(name):
 def test_what_is_no_type_or_lacks_a_parameter_is_told_in_a_sentence():
     with pytest.raises(FitError, match=r"expected a roof type .* got 'onion'"):
         compute_planes("onion", {"pitch_front": 30.0}, 0.0, np.zeros(3))
-    parameters, kappa, translation = member_of_shape(
-        np.random.default_rng(0), "corner"
-    ).side_by_side()
+    parameters, kappa, translation = draw_member(np.random.default_rng(0), "corner").side_by_side()
     del parameters["eave_front"]
     with pytest.raises(FitError, match="expected the parameter eave_front of a corner roof"):
         compute_planes("corner", parameters, kappa, translation)

@@ -43,11 +43,11 @@ def moves() -> None:
     """
     from ..fit.union import fit_building
     from ..fit.union.improve import improve, simplify
-    from ..fit.union.objective import objective
-    from ..fit.union.volumes import base_only
+    from ..fit.union.objective import compute_objective
+    from ..fit.union.volumes import make_base
 
-    scene, base = make_house_scene()[1], base_only(-3.0)
-    value = objective(base, scene, np.inf)
+    scene, base = make_house_scene()[1], make_base(-3.0)
+    value = compute_objective(base, scene, np.inf)
     improve(base, scene, value, np.array([0.7]), 1)
     simplify(base, scene, value, 0.1)
     fit_building(house(), L_OUTLINE)
@@ -55,21 +55,21 @@ def moves() -> None:
 
 def planes() -> None:
     """Compile the planes and gables with which the search begins."""
-    from ..fit.union.candidates import HOUSE, candidates_of
+    from ..fit.union.candidates import HOUSE, list_candidates
 
     _, scene = make_house_scene()
-    candidates_of(scene, np.arange(scene.n), HOUSE.planes)
+    list_candidates(scene, np.arange(scene.n), HOUSE.planes)
 
 
 def make_house_scene() -> tuple:
     """Return the plan of the house, and the search's scene."""
-    from ..fit.union.allowed import allowed_shapes
+    from ..fit.union.allowed import list_allowed_shapes
     from ..fit.union.plan import lay_out_plan
-    from ..fit.union.scene import directions_of, scene_of
+    from ..fit.union.scene import find_directions, make_scene
 
     plan = lay_out_plan(house(), OUTLINE)
-    return plan, scene_of(
-        plan, OUTLINE, directions_of(OUTLINE, plan), 1.5, 0.25, allowed_shapes(())
+    return plan, make_scene(
+        plan, OUTLINE, find_directions(OUTLINE, plan), 1.5, 0.25, list_allowed_shapes(())
     )
 
 

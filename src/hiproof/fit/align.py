@@ -25,7 +25,7 @@ from ..geometry.rings import counterclockwise, ring_edges
 from .outline.cost import cost_at_depth
 from .outline.lines import make_lines
 from .outline.settle import compute_span, side_offsets
-from .union.plan import signed_depth
+from .union.plan import measure_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
 AROUND_M = 4.0  # of points that are asked for around it
@@ -194,7 +194,7 @@ def count_points_within(xy: np.ndarray, footprint: shapely.Polygon, overhang: fl
         start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(lower, count, strict=True)
     )
     depth = (
-        signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
+        measure_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
         + overhang
     )
     costs = costs_at(depth / BLUR_M).reshape(count)

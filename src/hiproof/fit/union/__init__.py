@@ -59,33 +59,35 @@ from ...model import Part, Piece, as_xyz
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
-from .apart import told_apart
-from .bays import with_bays
-from .cants import Known
-from .clamp import clamped
+from .apart import split_volumes
+from .bays import add_bays
+from .cants import Cache
+from .clamp import clamp_parts
 from .fit import BuildingFit
 from .groups import draw_in_groups, run_in_groups
-from .larger import put_together
-from .names import part_of
-from .objective import base_shows
-from .outline import outline_of_points
-from .own import in_own_shapes
+from .larger import combine_parts
+from .names import name_part
+from .objective import is_base_visible
+from .outline import draw_outline
+from .own import fit_custom_shapes
 from .plan import Plan, lay_out_plan
-from .prices import COMMON_HOUSE_M2, evidence_per_unit
-from .regions import Site, besides, places_of, polygons_of
+from .prices import COMMON_HOUSE_M2, compute_unit_points
+from .regions import PlanSite, exclude_parts, list_part_polygons, list_polygons
 from .repeats import repeat_volumes
 from .scene import Scene
 from .search import find_volumes
-from .shown import find_highest, that_show
-from .slivers import without_slivers, without_specks
-from .unite import Ends, ends_of, ends_within, united
+from .shown import find_highest, keep_visible
+from .slivers import drop_slivers, drop_specks
+from .unite import OutlineEnds, gather_ends, select_ends, unite_volumes
 from .weld import weld
 
 __all__ = ["BuildingFit", "fit_building"]
 
 
 def fit_building(
-    points_local: np.ndarray, outline: shapely.Polygon | None = None, settings: Settings | None = None
+    points_local: np.ndarray,
+    outline: shapely.Polygon | None = None,
+    settings: Settings | None = None,
 ) -> BuildingFit:
     """Fit the roof of one building to `points_local` (n, 3), in metres of a local frame, over `outline` (same frame).
 
@@ -102,72 +104,84 @@ def fit_building(
     settings = settings or Settings()
     points_local = as_xyz(points_local)
     points_local = points_local[is_plausible(points_local)]
-    outline = outline_of_points(points_local) if outline is None else outline
-    outline = largest_polygon(outline)
+    outline = draw_outline(points_local) if outline is None else outline
+    outline = select_largest_polygon(outline)
     plan = lay_out_plan(points_local, outline)
     if len(plan.cloud.u) == 0:
-        raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
+        raise FitError(
+            "expected roof points inside the outline, got none; add a cloud that covers the building"
+        )
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    site, ends = Site(outline, plan, scene, {}), ends_of(outline, plan, scene)
-    known: Known = {}
-    volumes = repeat_volumes(tidy_volumes(volumes, ends, site, known), scene)
-    unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
-    roof, agreement = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, site, known)
-    volumes, base = roof.volumes, bool(base_shows(roof.volumes, scene))
+    site, ends = PlanSite(outline, plan, scene, {}), gather_ends(outline, plan, scene)
+    cache: Cache = {}
+    volumes = repeat_volumes(tidy_volumes(volumes, ends, site, cache), scene)
+    unit = compute_unit_points(plan.density, COMMON_HOUSE_M2, settings.compound)
+    roof, agreement = draw_in_groups(
+        add_bays(volumes, outline, plan, scene, unit), ends, site, cache
+    )
+    volumes, base = roof.volumes, bool(is_base_visible(roof.volumes, scene))
     sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
     parts = [
-        part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)
-        for k, own in places_of(regions, outline, plan)
+        name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, types)
+        for k, polygons in list_part_polygons(regions, outline, plan)
     ]
-    shown = that_show(parts, plan, scene)
-    parts = in_own_shapes(put_together(shown, types), points_local, settings)
-    parts = [as_allowed(part, types, points_local) for part in parts]
-    low, high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
-    parts = clamped(parts, low, high, 1.0 / math.sqrt(plan.density))
-    if besides(parts, shown):  # new ones, which may hide others
-        parts = that_show(parts, plan, scene, widest_m2=0.0)
-    far = unexplained_share(parts, plan, settings.compound.tolerance_m)
-    return BuildingFit(tuple(parts), outline, value, scene.n, far)
+    visible = keep_visible(parts, plan, scene)
+    parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
+    parts = [restrict_type(part, types, points_local) for part in parts]
+    z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
+    parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
+    if exclude_parts(parts, visible):  # new ones, which may hide others
+        parts = keep_visible(parts, plan, scene, widest_m2=0.0)
+    unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
+    return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
 
 
-def tidy_volumes(volumes: np.ndarray, ends: Ends, site: Site, known: Known) -> np.ndarray:
+def tidy_volumes(
+    volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
+) -> np.ndarray:
     """The volumes without specks and slivers, those that show in several places split, those that are one united."""
 
     def tidy(rows: np.ndarray, scene: Scene, _: list[int] | None) -> np.ndarray:
-        return told_apart(without_slivers(without_specks(rows, scene), scene), scene)
+        return split_volumes(drop_slivers(drop_specks(rows, scene), scene), scene)
 
-    def unite(rows: np.ndarray, scene: Scene, own: list[int] | None) -> np.ndarray:
-        if own is None:
-            return united(rows, ends, scene, known).volumes
-        return united(rows, ends_within(ends, scene), scene, {}, own).volumes
+    def unite(rows: np.ndarray, scene: Scene, movable: list[int] | None) -> np.ndarray:
+        if movable is None:
+            return unite_volumes(rows, ends, scene, cache).volumes
+        return unite_volumes(rows, select_ends(ends, scene), scene, {}, movable).volumes
 
     return run_in_groups(unite, run_in_groups(tidy, volumes, site), site)
 
 
-def largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
+def select_largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
     """The largest polygon of an outline, made valid. Raises FitError for one without area."""
-    known = math.isfinite(outline.area)
-    polygons = polygons_of(shapely.make_valid(outline)) if known else []
+    is_finite = math.isfinite(outline.area)
+    polygons = list_polygons(shapely.make_valid(outline)) if is_finite else []
     if not polygons:
-        raise FitError(f"expected an outline with an area, got a {outline.geom_type} without; give a polygon")
+        raise FitError(
+            f"expected an outline with an area, got a {outline.geom_type} without; give a polygon"
+        )
     return max(polygons, key=lambda polygon: polygon.area)
 
 
-def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
+def measure_unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
     """The share of the plan's points further than `tolerance_m` from the max of the parts."""
     xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
     z, _ = find_highest(parts, xy)
     return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 
-def as_allowed(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
+def restrict_type(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
     """The part, or a flat one at its points' median height (n, 3) where its type is none of `types`."""
     if name_among(part.type, types) or part.type == "flat":
         return part
-    inside = np.any([shapely.contains_xy(p.outline, points[:, 0], points[:, 1]) for p in part.pieces], axis=0)
+    inside = np.any(
+        [shapely.contains_xy(p.outline, points[:, 0], points[:, 1]) for p in part.pieces], axis=0
+    )
     z = points[inside, 2] if inside.any() else np.array([part.translation[2]])
     level = np.array([[0.0, 0.0, float(np.sort(z)[len(z) // 2])]])
     pieces = tuple(Piece(piece.outline, level) for piece in part.pieces)
-    size: dict[str, float] = {name: part.parameters[name] for name in ("width", "length") if name in part.parameters}
+    size: dict[str, float] = {
+        name: part.parameters[name] for name in ("width", "length") if name in part.parameters
+    }
     return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], level[0, 2]]))

@@ -7,11 +7,11 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from .around import look_around
-from .candidates import best_rectangles
-from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
+from .around import measure_context
+from .candidates import find_best_rectangles
+from .edges import EVERYWHERE, MIN_SIDE_M, NO_GAIN, move_edges
 from .improve import improve
-from .objective import costs, objective_with
+from .objective import compute_costs, compute_objective_with
 from .prices import (
     FREELY_UNITS,
     NEW_MOVED_UNITS,
@@ -22,7 +22,18 @@ from .prices import (
     SAME_UNITS,
 )
 from .refit import refit
-from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, is_fixed, roof_heights
+from .volumes import (
+    DIRECTION,
+    LEAN0,
+    N_SIDES,
+    REPLACES,
+    U0,
+    U1,
+    V0,
+    V1,
+    compute_roof_heights,
+    is_fixed,
+)
 
 MOST_VOLUMES = 24  # of one building: a bound on time
 TRIED_EACH_WAY = 2  # candidates of the largest gain that are tried in earnest
@@ -35,11 +46,11 @@ ALONG_WALL = 1e-6  # of a lean; numerically the same
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 # How adding ends: no candidate helps; nothing is left to explain, or as much as may be was tried; a known roof has come back.
-NONE_HELPS, ENOUGH, COME_BACK = 0, 1, 2
+NONE_HELPS, NOTHING_LEFT, ROOF_IS_KNOWN = 0, 1, 2
 
 # What volumes grow on: the scene, in which cells (directions, n + g) of its lines along u and v the points and ghosts lie, and the slopes
 # (m,) to try for a further plane.
-Ground = namedtuple("Ground", "scene cell_u cell_v slopes")
+GrowthGrid = namedtuple("GrowthGrid", "scene cell_u cell_v slopes")
 
 
 @compiled
@@ -53,71 +64,82 @@ def add_volumes(volumes, value, ground, candidates, additions, known_count, know
     scene = ground.scene
     while additions > 0:
         additions -= 1
-        if len(unexplained(volumes, scene)) < FEWEST_UNEXPLAINED or len(volumes) >= MOST_VOLUMES:
-            return volumes, value, ENOUGH, 0
-        trial, found = best_addition(volumes, value, ground, candidates)
-        if found == np.inf:
+        if (
+            len(find_unexplained(volumes, scene)) < FEWEST_UNEXPLAINED
+            or len(volumes) >= MOST_VOLUMES
+        ):
+            return volumes, value, NOTHING_LEFT, 0
+        trial, trial_value = find_best_addition(volumes, value, ground, candidates)
+        if trial_value == np.inf:
             return volumes, value, NONE_HELPS, additions
-        if len(trial) == known_count and is_the_same(found, known_value, scene, SAME_BEFORE_UNITS):
-            return trial, found, COME_BACK, additions
-        volumes, value = improve(trial, scene, found, ground.slopes, 1)
-        if len(volumes) == known_count and is_the_same(value, known_value, scene, SAME_UNITS):
-            return volumes, value, COME_BACK, additions
-    return volumes, value, ENOUGH, 0
+        if len(trial) == known_count and has_same_cost(
+            trial_value, known_value, scene, SAME_BEFORE_UNITS
+        ):
+            return trial, trial_value, ROOF_IS_KNOWN, additions
+        volumes, value = improve(trial, scene, trial_value, ground.slopes, 1)
+        if len(volumes) == known_count and has_same_cost(value, known_value, scene, SAME_UNITS):
+            return volumes, value, ROOF_IS_KNOWN, additions
+    return volumes, value, NOTHING_LEFT, 0
 
 
 @compiled
-def is_the_same(value, known, scene, more_units):
+def has_same_cost(value, known_value, scene, more_units):
     """Whether a roof costs as much as a known one, but for the `more_units` that fitting may still gain."""
-    return -min(more_units, REGROWN_UNITS) < (value - known) / scene.evidence < more_units
+    return -min(more_units, REGROWN_UNITS) < (value - known_value) / scene.evidence < more_units
 
 
 @compiled
-def unexplained(volumes, scene):
+def find_unexplained(volumes, scene):
     """Points (m,) that the roof leaves unexplained; where there are none, those that it explains poorly if that is dear."""
-    z, _ = roof_heights(volumes, scene.U, scene.V)
-    cost = costs(z, scene)[: scene.n]
-    far = np.nonzero(cost > UNEXPLAINED)[0]
-    if len(far) < FEWEST_UNEXPLAINED and cost.sum() > ROOF_UNITS * scene.evidence:
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    cost = compute_costs(z, scene)[: scene.n]
+    unexplained_points = np.nonzero(cost > UNEXPLAINED)[0]
+    if len(unexplained_points) < FEWEST_UNEXPLAINED and cost.sum() > ROOF_UNITS * scene.evidence:
         return np.nonzero(cost > POORLY)[0]
-    return far
+    return unexplained_points
 
 
 @compiled
-def best_addition(volumes, value, ground, candidates):
+def find_best_addition(volumes, value, ground, candidates):
     """The volumes with the one more that lowers the objective most, and that objective; infinite where none does."""
     best, lowest, scene = volumes, np.inf, ground.scene
     if len(candidates) == 0:
         return best, lowest
-    around = look_around(volumes, scene.U, scene.V, len(volumes))
-    z_now = around.without
-    cost_now = costs(z_now, scene)
+    context = measure_context(volumes, scene.U, scene.V, len(volumes))
+    z_now = context.roof_without
+    cost_now = compute_costs(z_now, scene)
     for replacing in (False, True):
-        gains, cells = best_rectangles(scene, candidates, ground.cell_u, ground.cell_v, cost_now, z_now, replacing)
+        gains, cells = find_best_rectangles(
+            scene, candidates, ground.cell_u, ground.cell_v, cost_now, z_now, replacing
+        )
         for m in np.argsort(-gains, kind="mergesort")[:TRIED_EACH_WAY]:
             if not gains[m] > 0.0:
                 break
-            joined = np.concatenate((volumes, candidates[m : m + 1]))
-            lines, new = scene.lines[int(candidates[m, DIRECTION])], joined[-1]
+            extended = np.concatenate((volumes, candidates[m : m + 1]))
+            lines, new = scene.lines[int(candidates[m, DIRECTION])], extended[-1]
             new[U0], new[U1] = lines[0, cells[m, 0]], lines[0, cells[m, 1]]
             new[V0], new[V1] = lines[1, cells[m, 2]], lines[1, cells[m, 3]]
-            least = FREELY_UNITS * scene.evidence if leans_freely(new, scene) else 0.0
+            surcharge = FREELY_UNITS * scene.evidence if has_free_plane(new, scene) else 0.0
             if replacing and len(volumes) > 1:
                 new[REPLACES] = 1.0
-            trial, found = settle_new(joined.copy(), scene, min(value, lowest) - least, around)
-            if found < np.inf:
-                best, lowest = trial, found
+            trial, trial_value = settle_new(
+                extended.copy(), scene, min(value, lowest) - surcharge, context
+            )
+            if trial_value < np.inf:
+                best, lowest = trial, trial_value
             if replacing:
                 new[REPLACES] = 0.0
-                best, lowest = with_neighbour_cut(volumes, joined, scene, best, lowest, value, least)
+                best, lowest = cut_back_neighbours(
+                    volumes, extended, scene, best, lowest, value, surcharge
+                )
     return best, lowest
 
 
 @compiled
-def leans_freely(volume, scene):
+def has_free_plane(volume, scene):
     """Whether a plane of the volume faces neither along an axis nor a wall."""
-    for plane in range(SIDES):
-        lean = abs(volume[LEAN + plane])
+    for plane in range(N_SIDES):
+        lean = abs(volume[LEAN0 + plane])
         if lean > 0.0:
             walls = scene.leans[int(volume[DIRECTION]), plane // 2]
             if np.abs(np.abs(walls) - lean).min() > ALONG_WALL:
@@ -126,47 +148,52 @@ def leans_freely(volume, scene):
 
 
 @compiled
-def with_neighbour_cut(volumes, joined, scene, best, lowest, value, least):
-    """The best of `best`, `lowest` in cost, and the ways of having the last of the volumes `joined` by cutting one that it overlaps back to
+def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge):
+    """The best of `best`, `lowest` in cost, and the ways of having the last of the volumes `extended` by cutting one that it overlaps back to
     where it begins."""
-    last = len(joined) - 1
+    last = len(extended) - 1
     for j in range(1, last):
-        if is_fixed(joined, j) or joined[j, DIRECTION] != joined[last, DIRECTION]:
+        if is_fixed(extended, j) or extended[j, DIRECTION] != extended[last, DIRECTION]:
             continue
-        if not overlap(joined[j], joined[last]):
+        if not has_overlap(extended[j], extended[last]):
             continue
         for edge in range(4):
-            low, high = joined[j, U0 + (edge & 2)], joined[j, U1 + (edge & 2)]
-            stop = joined[last, U0 + (edge ^ 1)]
-            over = stop - low if edge % 2 == 0 else high - stop
-            if CUT_LEAST_M < over < CUT_MOST_SHARE * (high - low) and high - low - over >= MIN_SIDE_M:
-                cut = joined.copy()
+            start, end = extended[j, U0 + (edge & 2)], extended[j, U1 + (edge & 2)]
+            stop = extended[last, U0 + (edge ^ 1)]
+            overhang = stop - start if edge % 2 == 0 else end - stop
+            if (
+                CUT_LEAST_M < overhang < CUT_MOST_SHARE * (end - start)
+                and end - start - overhang >= MIN_SIDE_M
+            ):
+                cut = extended.copy()
                 cut[j, U0 + edge] = stop
-                around = look_around(cut, scene.U, scene.V, last)
-                trial, found = settle_new(cut, scene, min(value, lowest) - least, around)
-                if found < np.inf:
-                    best, lowest = trial, found
+                context = measure_context(cut, scene.U, scene.V, last)
+                trial, trial_value = settle_new(cut, scene, min(value, lowest) - surcharge, context)
+                if trial_value < np.inf:
+                    best, lowest = trial, trial_value
     return best, lowest
 
 
 @compiled
-def overlap(one, other):
+def has_overlap(row, other):
     """Whether two rectangles have more than a strip in common."""
-    u = min(one[U1], other[U1]) - max(one[U0], other[U0])
-    return min(u, min(one[V1], other[V1]) - max(one[V0], other[V0])) > CUT_LEAST_M
+    u = min(row[U1], other[U1]) - max(row[U0], other[U0])
+    return min(u, min(row[V1], other[V1]) - max(row[V0], other[V0])) > CUT_LEAST_M
 
 
 @compiled
-def settle_new(volumes, scene, value, around):
+def settle_new(volumes, scene, value, context):
     """Volumes whose last one is new, that one fitted and its edges moved twice; infinite where that is not below `value`.
 
     One that begins too far above `value` to come below it is given up.
     """
-    k, found = len(volumes) - 1, np.inf
+    k, trial_value = len(volumes) - 1, np.inf
     for units in NEW_UNITS, NEW_MOVED_UNITS:
-        refit(volumes, scene, k, around)
-        found = objective_with(volumes, scene, k, around, value + units * scene.evidence)
-        if found == np.inf:
+        refit(volumes, scene, k, context)
+        trial_value = compute_objective_with(
+            volumes, scene, k, context, value + units * scene.evidence
+        )
+        if trial_value == np.inf:
             break
-        found = move_edges(volumes, scene, k, found, EVERYWHERE, around)
-    return volumes, found if found < value - LEAST_GAIN else np.inf
+        trial_value = move_edges(volumes, scene, k, trial_value, EVERYWHERE, context)
+    return volumes, trial_value if trial_value < value - NO_GAIN else np.inf

@@ -16,32 +16,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .corners import creases_at_corners
+from .corners import list_corner_equations
 from .finish import (
     LEVEL_SLACK,
+    RISE_SIGN,
     ROUNDS,
-    SIGN,
     Planes,
-    cost_of,
-    found_planes,
-    normal_equations,
-    proper,
-    weighted_moments,
+    form_normal_equations,
+    is_proper,
+    read_volume_planes,
+    sum_moments,
+    sum_point_costs,
 )
-from .members import Member, members_of, unknowns_of
-from .objective import misfits
+from .members import LinearVolume, list_members, solve_unknowns
+from .objective import compute_misfits
 from .prices import CREASE_UNITS, PARAMETER_COST
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, REPLACES, SIDES, U0, U1, V0, V1
+from .volumes import DIRECTION, N_SIDES, REPLACES, U0, U1, V0, V1
 
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
-LEVELLED_M, SIGMAS = 0.01, 2.5
+LEVELLED_M, AGREEMENT_SIGMAS = 0.01, 2.5
 REACHED_M = 0.003  # m within which others have brought what is further apart: nobody builds such a difference
 RIDGE = 1e-9  # of the mean diagonal of the normal equations: what no point tells stays as it was
 LEVEL_FALL = 1e-9  # rise over run; numerically level
-HELD = 1e-6  # an equation that the others leave so little of holds by them
+NO_REMAINDER = 1e-6  # an equation that the others leave so little of holds by them
 # Share of the points that agreement may leave unexplained besides. Steep planes that agree below their neighbours may
 # rise above these, which only the whole roof's misfit shows: each volume's own points lie where it shows alone.
 MOST_WORSE_SHARE = 0.02
@@ -50,7 +50,7 @@ RISEN_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class Fit:
+class CommonFit:
     """The unknowns (p,) and their covariance (p, p), every member's rows (k, 3) and what the points cost."""
 
     unknowns: np.ndarray
@@ -60,12 +60,12 @@ class Fit:
     basis: np.ndarray
 
 
-class Asked(NamedTuple):
+class Condition(NamedTuple):
     """An equation (m, p) that nearly holds: how far in height (m) from it, between which two members, how far it may be whatever the
     points' deviations, and units that are spared besides its parameters."""
 
     gap: float
-    two: tuple[int, int]
+    pair: tuple[int, int]
     equation: np.ndarray
     allowed: float = LEVELLED_M
     spared: float = 0.0
@@ -79,128 +79,163 @@ class Agreement(NamedTuple):
     """
 
     planes: list[Planes]
-    members: dict[int, Member]
+    members: dict[int, LinearVolume]
     basis: np.ndarray
     start: np.ndarray
     cost: float | None = None
 
 
-def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> Agreement:
+def agree_planes(
+    volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene
+) -> Agreement:
     """The planes of all volumes fitted together, equal in what they have in common and at the corners of the outline."""
-    members = members_of(volumes, sides, planes, scene)
-    known = list(members.values())
-    if not known:
+    members = list_members(volumes, sides, planes, scene)
+    members_known = list(members.values())
+    if not members_known:
         return Agreement(planes, members, np.zeros((0, 0)), np.zeros(0))
-    start = unknowns_of(known)
-    alone = Agreement(planes, members, np.eye(len(start)), start)
-    at_corners = (Asked(*one, np.inf, CREASE_UNITS) for one in creases_at_corners(known, start, scene.corners[0]))
-    asked = sorted((*likely(known, start), *at_corners), key=lambda one: one.gap)
-    found = fitted_as_asked(known, start, asked, scene) if asked else None
-    if found is None:
-        return alone
+    start = solve_unknowns(members_known)
+    separate = Agreement(planes, members, np.eye(len(start)), start)
+    at_corners = (
+        Condition(*condition, np.inf, CREASE_UNITS)
+        for condition in list_corner_equations(members_known, start, scene.corners[0])
+    )
+    conditions = sorted(
+        (*find_likely_conditions(members_known, start), *at_corners),
+        key=lambda condition: condition.gap,
+    )
+    common = fit_conditions(members_known, start, conditions, scene) if conditions else None
+    if common is None:
+        return separate
     agreed_planes = list(planes)
-    for k, member, rows in zip(members, known, found.rows, strict=True):
-        agreed_planes[k] = replace(planes[k], rows=rows, design=member.own, covariance=found.covariance)
-    worse = roof_misfit(volumes, agreed_planes, scene) - roof_misfit(volumes, planes, scene)
+    for k, member, rows in zip(members, members_known, common.rows, strict=True):
+        agreed_planes[k] = replace(
+            planes[k], rows=rows, design=member.full_design, covariance=common.covariance
+        )
+    worse = sum_misfit(volumes, agreed_planes, scene) - sum_misfit(volumes, planes, scene)
     if worse > MOST_WORSE_SHARE * scene.n:
-        return alone
-    return Agreement(agreed_planes, members, found.basis, start, found.cost)
+        return separate
+    return Agreement(agreed_planes, members, common.basis, start, common.cost)
 
 
-def roof_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
+def sum_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
     """Sum up what all points cost (points) under `planes`, each volume within its rectangle."""
-    return float(misfits_under(volumes, planes, scene)[0].sum())
+    return float(measure_misfits(volumes, planes, scene)[0].sum())
 
 
-def misfits_under(
+def measure_misfits(
     volumes: np.ndarray, planes: list[Planes], scene: Scene
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what each point costs under `planes`, and which volume shows there: two arrays (n,)."""
     n = scene.n
     heights, top = np.full(n, -np.inf), np.zeros(n, int)
-    for k, (volume, own) in enumerate(zip(volumes, planes, strict=True)):
+    for k, (volume, volume_planes) in enumerate(zip(volumes, planes, strict=True)):
         u, v = scene.U[int(volume[DIRECTION]), :n], scene.V[int(volume[DIRECTION]), :n]
         inside = (u >= volume[U0]) & (u <= volume[U1]) & (v >= volume[V0]) & (v <= volume[V1])
-        within = np.flatnonzero(inside)
-        rows = own.rows[np.isfinite(own.rows[:, 2])]
-        z = (rows @ np.array([u[within], v[within], np.ones(len(within))])).min(axis=0)
-        shows = np.full(len(within), True) if volume[REPLACES] else z > heights[within]
-        heights[within[shows]], top[within[shows]] = z[shows], k
-    return misfits(scene.z[:n], heights, scene), top
+        numbers = np.flatnonzero(inside)
+        rows = volume_planes.rows[np.isfinite(volume_planes.rows[:, 2])]
+        z = (rows @ np.array([u[numbers], v[numbers], np.ones(len(numbers))])).min(axis=0)
+        shows = np.full(len(numbers), True) if volume[REPLACES] else z > heights[numbers]
+        heights[numbers[shows]], top[numbers[shows]] = z[shows], k
+    return compute_misfits(scene.z[:n], heights, scene), top
 
 
-def hide_again(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> list[Planes]:
+def restore_risen_planes(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> list[Planes]:
     """Return the planes, as the search found them where a volume rises above others and fits less.
 
     Planes are fitted to the points over which their volume shows. Where it lies hidden, such as one
     of two gables of nearly the same slopes, they may come out above the other.
     """
     planes = list(planes)
-    found = [found_planes(row, scene) for row in volumes]
-    before, _ = misfits_under(volumes, found, scene)
+    search_planes = [read_volume_planes(row, scene) for row in volumes]
+    search_misfits, _ = measure_misfits(volumes, search_planes, scene)
     while True:
-        after, top = misfits_under(volumes, planes, scene)
-        worse = np.bincount(top, after - before, len(planes))
-        worse[[own is as_found for own, as_found in zip(planes, found, strict=True)]] = 0.0
+        misfits_now, top = measure_misfits(volumes, planes, scene)
+        worse = np.bincount(top, misfits_now - search_misfits, len(planes))
+        worse[
+            [
+                volume_planes is as_found
+                for volume_planes, as_found in zip(planes, search_planes, strict=True)
+            ]
+        ] = 0.0
         excess = worse - RISEN_SHARE * np.bincount(top, minlength=len(planes))
         k = int(np.argmax(excess))
         if excess[k] <= 0.0:
             return planes
-        planes[k] = found[k]
+        planes[k] = search_planes[k]
 
 
-def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked], scene: Scene) -> Fit | None:
-    """The fit under all that may hold of what is `asked`, one after another; None where nothing does.
+def fit_conditions(
+    members: list[LinearVolume], start: np.ndarray, conditions: list[Condition], scene: Scene
+) -> CommonFit | None:
+    """The fit under all that may hold of what is `conditions`, one after another; None where nothing does.
 
     Its covariance is what the points tell: a corner of the outline says where planes meet, not how well that is known.
     """
-    held, told, basis = np.zeros((0, len(start))), np.zeros((0, len(start))), np.eye(len(start))
-    begun = sums_at_first(members, scene)
-    best = free = fitted(members, basis, start, scene, begun)
-    if not math.isfinite(free.cost):  # improper: members keep their planes until a proper fit is found
+    equations, point_equations, basis = (
+        np.zeros((0, len(start))),
+        np.zeros((0, len(start))),
+        np.eye(len(start)),
+    )
+    begun = sum_at_start(members, scene)
+    best = free = fit_members(members, basis, start, scene, begun)
+    if not math.isfinite(
+        free.cost
+    ):  # improper: members keep their planes until a proper fit is found
         rows = [member.rows for member in members]
-        best = Fit(start, free.covariance, rows, cost_of_rows(members, rows, scene), basis)
-    while asked:
-        later, before = [], len(held)
-        for one in asked:
-            near = one.gap <= one.allowed or one.gap * still_left(one, start, best) <= REACHED_M
-            if not near and not may_hold(one.equation, start, free.covariance):
-                later.append(one)  # what holds may bring it nearer
+        best = CommonFit(start, free.covariance, rows, sum_row_costs(members, rows, scene), basis)
+    while conditions:
+        later, n_before = [], len(equations)
+        for condition in conditions:
+            is_near = (
+                condition.gap <= condition.allowed
+                or condition.gap * measure_remainder(condition, start, best) <= REACHED_M
+            )
+            if not is_near and not is_within_noise(condition.equation, start, free.covariance):
+                later.append(condition)  # what holds may bring it nearer
                 continue
-            saved = int(np.linalg.matrix_rank(one.equation @ basis, tol=HELD))
-            if saved == 0:
+            n_saved = int(np.linalg.matrix_rank(condition.equation @ basis, tol=NO_REMAINDER))
+            if n_saved == 0:
                 continue
-            with_it = np.vstack([held, one.equation])
-            left = null_space(with_it)
-            found = fitted(members, left, start, scene, begun)
-            if found.cost <= best.cost + worth(one, saved, members, scene):
-                held, basis, best = with_it, left, found
-                told = told if one.spared else np.vstack([told, one.equation])
-        asked = later if len(held) > before else []
-    if len(held) > len(told):
-        as_told = fitted(members, null_space(told), start, scene, begun)
+            with_it = np.vstack([equations, condition.equation])
+            free_basis = find_null_space(with_it)
+            trial = fit_members(members, free_basis, start, scene, begun)
+            if trial.cost <= best.cost + compute_allowance(condition, n_saved, members, scene):
+                equations, basis, best = with_it, free_basis, trial
+                point_equations = (
+                    point_equations
+                    if condition.spared
+                    else np.vstack([point_equations, condition.equation])
+                )
+        conditions = later if len(equations) > n_before else []
+    if len(equations) > len(point_equations):
+        as_told = fit_members(members, find_null_space(point_equations), start, scene, begun)
         best = replace(best, covariance=as_told.covariance)
-    return best if len(held) else None
+    return best if len(equations) else None
 
 
-def worth(one: Asked, saved: int, members: list[Member], scene: Scene) -> float:
+def compute_allowance(
+    condition: Condition, n_saved: int, members: list[LinearVolume], scene: Scene
+) -> float:
     """What may stay unexplained where an equation holds that saves so many parameters (points)."""
-    slack = LEVEL_SLACK * sum(members[k].points.shape[1] for k in one.two)
-    return float(scene.evidence * (PARAMETER_COST * saved + one.spared) + slack)
+    slack = LEVEL_SLACK * sum(members[k].points.shape[1] for k in condition.pair)
+    return float(scene.evidence * (PARAMETER_COST * n_saved + condition.spared) + slack)
 
 
-def still_left(one: Asked, start: np.ndarray, fit: Fit) -> float:
+def measure_remainder(condition: Condition, start: np.ndarray, fit: CommonFit) -> float:
     """What is left of how far an equation was from holding at `start`."""
-    return float(np.abs(one.equation @ fit.unknowns).max() / max(np.abs(one.equation @ start).max(), HELD))
+    return float(
+        np.abs(condition.equation @ fit.unknowns).max()
+        / max(np.abs(condition.equation @ start).max(), NO_REMAINDER)
+    )
 
 
-def may_hold(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray) -> bool:
+def is_within_noise(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray) -> bool:
     """Whether `equation` (m, p) is no further from holding than the points leave open."""
     sigma = np.sqrt(np.maximum(((equation @ covariance) * equation).sum(axis=1), 0.0))
-    return bool((np.abs(equation @ unknowns) < SIGMAS * sigma).all())
+    return bool((np.abs(equation @ unknowns) < AGREEMENT_SIGMAS * sigma).all())
 
 
-class Seen(NamedTuple):
+class VisiblePlane(NamedTuple):
     """A plane of a member that its points show: its number, its coefficients a, b, c (3,) in the first direction's axes and by
     all unknowns (3, p) there, and u, v, 1 (3, n) of its points."""
 
@@ -210,7 +245,7 @@ class Seen(NamedTuple):
     places: np.ndarray
 
 
-class Measure(NamedTuple):
+class Dimension(NamedTuple):
     """A height or a slope of a member: its value, by all unknowns (p,), and what it is multiplied with to be a height (m)."""
 
     value: float
@@ -218,86 +253,106 @@ class Measure(NamedTuple):
     reach: float
 
 
-def likely(members: list[Member], start: np.ndarray) -> Iterator[Asked]:
+def find_likely_conditions(members: list[LinearVolume], start: np.ndarray) -> Iterator[Condition]:
     """What nearly holds between members at the unknowns `start`."""
-    planes = [seen_planes(member, start) for member in members]
+    planes = [list_visible_planes(member, start) for member in members]
     measures = [
-        [list(kind) for kind in (slopes(member, start), ridges(member, start), eaves(member, start))]
+        [
+            list(kind)
+            for kind in (
+                list_slopes(member, start),
+                list_ridges(member, start),
+                list_eaves(member, start),
+            )
+        ]
         for member in members
     ]
     for j, k in combinations(range(len(members)), 2):
-        for one in planes[j]:
+        for plane in planes[j]:
             for other in planes[k]:
-                gap = gap_of_planes(one, other)
+                gap = measure_plane_gap(plane, other)
                 if gap < NEAR_M:
-                    yield Asked(gap, (j, k), one_plane(one, other))
-        for some, others in zip(measures[j], measures[k], strict=True):
-            for x in some:
-                for y in others:
+                    yield Condition(gap, (j, k), equate_planes(plane, other))
+        for dimensions, other_dimensions in zip(measures[j], measures[k], strict=True):
+            for x in dimensions:
+                for y in other_dimensions:
                     gap = max(x.reach, y.reach) * abs(x.value - y.value)
                     if gap < NEAR_M:
-                        yield Asked(gap, (j, k), (x.equation - y.equation)[None])
+                        yield Condition(gap, (j, k), (x.equation - y.equation)[None])
 
 
-def seen_planes(member: Member, start: np.ndarray) -> list[Seen]:
-    common, places = member.common @ start, member.places
-    return [Seen(p, common[p], member.common[p], places[:, on]) for p, on in member.seen.items()]
+def list_visible_planes(member: LinearVolume, start: np.ndarray) -> list[VisiblePlane]:
+    common, places = member.common_design @ start, member.places
+    return [
+        VisiblePlane(p, common[p], member.common_design[p], places[:, numbers])
+        for p, numbers in member.visible.items()
+    ]
 
 
-def gap_of_planes(one: Seen, other: Seen) -> float:
+def measure_plane_gap(plane: VisiblePlane, other: VisiblePlane) -> float:
     """How far apart (m) two planes are at most where their points are; infinite where they are not near at the first of these."""
-    apart = one.coefficients - other.coefficients
-    if max(abs(float(apart @ seen.places[:, 0])) for seen in (one, other)) >= NEAR_M:
+    difference = plane.coefficients - other.coefficients
+    if max(abs(float(difference @ item.places[:, 0])) for item in (plane, other)) >= NEAR_M:
         return np.inf
-    return max(float(np.abs(apart @ seen.places).max()) for seen in (one, other))
+    return max(float(np.abs(difference @ item.places).max()) for item in (plane, other))
 
 
-def one_plane(one: Seen, other: Seen) -> np.ndarray:
+def equate_planes(plane: VisiblePlane, other: VisiblePlane) -> np.ndarray:
     """That two planes are one (2, p): as high in the middle of their points and as steep; which way each faces is known before."""
-    apart = one.equation - other.equation
-    middle = 0.5 * (one.places.mean(axis=1) + other.places.mean(axis=1))
-    a, b, _ = one.coefficients + other.coefficients
+    difference = plane.equation - other.equation
+    middle = 0.5 * (plane.places.mean(axis=1) + other.places.mean(axis=1))
+    a, b, _ = plane.coefficients + other.coefficients
     along = np.array([a, b, 0.0]) / max(math.hypot(a, b), LEVEL_FALL)
-    return np.stack([middle, along]) @ apart
+    return np.stack([middle, along]) @ difference
 
 
-def slopes(member: Member, start: np.ndarray) -> Iterator[Measure]:
+def list_slopes(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
     """The slopes of a member's inclined planes; half of how far their points reach along the fall makes them heights."""
-    for p, on in member.seen.items():
-        if p < SIDES:
-            along = member.points[p // 2, on]
-            equation = SIGN[p] * member.own[p, p // 2]
-            yield Measure(float(equation @ start), equation, 0.5 * float(along.max() - along.min()))
+    for p, numbers in member.visible.items():
+        if p < N_SIDES:
+            along = member.points[p // 2, numbers]
+            equation = RISE_SIGN[p] * member.full_design[p, p // 2]
+            yield Dimension(
+                float(equation @ start), equation, 0.5 * float(along.max() - along.min())
+            )
 
 
-def ridges(member: Member, start: np.ndarray) -> Iterator[Measure]:
+def list_ridges(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
     """The heights of a member's ridges, as they change from `start`."""
     for p, q in ((0, 1), (2, 3)):
-        if p in member.seen and q in member.seen:
-            axis, rows = p // 2, member.own[[p, q]] @ start
+        if p in member.visible and q in member.visible:
+            axis, rows = p // 2, member.full_design[[p, q]] @ start
             rise, fall = rows[0, axis], -rows[1, axis]
-            at = np.ones(3)
-            at[1 - axis] = median(member.points[1 - axis].tolist())
-            at[axis] = (rows[1] - rows[0])[[1 - axis, 2]] @ (at[1 - axis], 1.0) / (rise + fall)
-            equation = at @ (fall * member.own[p] + rise * member.own[q]) / (rise + fall)
-            yield Measure(float(equation @ start), equation, 1.0)
+            place = np.ones(3)
+            place[1 - axis] = median(member.points[1 - axis].tolist())
+            place[axis] = (
+                (rows[1] - rows[0])[[1 - axis, 2]] @ (place[1 - axis], 1.0) / (rise + fall)
+            )
+            equation = (
+                place
+                @ (fall * member.full_design[p] + rise * member.full_design[q])
+                / (rise + fall)
+            )
+            yield Dimension(float(equation @ start), equation, 1.0)
 
 
-def eaves(member: Member, start: np.ndarray) -> Iterator[Measure]:
+def list_eaves(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
     """The heights of a member's eaves on the outline."""
-    for p in member.seen:
-        if p < SIDES and member.sides[p].anchored:
-            equation = member.own[p, 2] + member.sides[p].at * member.own[p, p // 2]
-            yield Measure(float(equation @ start), equation, 1.0)
+    for p in member.visible:
+        if p < N_SIDES and member.sides[p].anchored:
+            equation = (
+                member.full_design[p, 2] + member.sides[p].offset * member.full_design[p, p // 2]
+            )
+            yield Dimension(float(equation @ start), equation, 1.0)
 
 
-def null_space(equations: np.ndarray) -> np.ndarray:
+def find_null_space(equations: np.ndarray) -> np.ndarray:
     """An orthonormal basis (p, q) of all unknowns of which `equations` (m, p) are zero."""
     _, values, rows = np.linalg.svd(equations)
-    return rows[int((values > HELD).sum()) :].T
+    return rows[int((values > NO_REMAINDER).sum()) :].T
 
 
-class Sums(NamedTuple):
+class NormalSums(NamedTuple):
     """Normal equations of all members' unknowns (p, p) and (p,), and of their points: the sum of
     the weights, and of the weighted squares of what is left."""
 
@@ -307,56 +362,69 @@ class Sums(NamedTuple):
     misfit: float
 
 
-def sums_at_first(members: list[Member], scene: Scene) -> Sums:
+def sum_at_start(members: list[LinearVolume], scene: Scene) -> NormalSums:
     """The sums in the first round of a fit, which starts from the members' planes."""
-    return sums_of(members, [member.rows for member in members], 2.0 * (scene.dead + scene.width))
+    return sum_equations(
+        members, [member.rows for member in members], 2.0 * (scene.dead + scene.width)
+    )
 
 
-def sums_of(members: list[Member], rows: list[np.ndarray], reach: float) -> Sums:
+def sum_equations(members: list[LinearVolume], rows: list[np.ndarray], reach: float) -> NormalSums:
     """The sums over points within `reach` (m) of the members' planes `rows`."""
-    size = members[0].own.shape[2]
+    size = members[0].full_design.shape[2]
     normal, right, total, misfit = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
     for member, planes in zip(members, rows, strict=True):
-        moments, products, weight, left = weighted_moments(planes, member.points, reach)
-        there = np.isfinite(planes[:, 2])
-        matrix, vector = normal_equations(member.design, moments, products, there)
-        own = slice(member.first, member.first + len(vector))
-        normal[own, own], right[own] = matrix, vector
+        moments, products, weight, left = sum_moments(planes, member.points, reach)
+        is_present = np.isfinite(planes[:, 2])
+        matrix, vector = form_normal_equations(member.design, moments, products, is_present)
+        unknowns = slice(member.first, member.first + len(vector))
+        normal[unknowns, unknowns], right[unknowns] = matrix, vector
         total, misfit = total + weight, misfit + left
-    return Sums(normal, right, total, misfit)
+    return NormalSums(normal, right, total, misfit)
 
 
-def fitted(
-    members: list[Member],
+def fit_members(
+    members: list[LinearVolume],
     basis: np.ndarray,
     start: np.ndarray,
     scene: Scene,
-    begun: Sums | None = None,
-) -> Fit:
+    begun: NormalSums | None = None,
+) -> CommonFit:
     """All planes by biweighted least squares, over unknowns (p,) that are `basis` (p, q) times any.
 
     `begun` are the sums at first, where these are known.
     """
-    own, rows = np.concatenate([member.own for member in members]), [member.rows for member in members]
+    designs, rows = (
+        np.concatenate([member.full_design for member in members]),
+        [member.rows for member in members],
+    )
     ends = [*accumulate(map(len, rows), initial=0)]
     absent, scale = np.isnan(np.concatenate(rows)), scene.dead + scene.width
-    sums = begun or sums_at_first(members, scene)
+    sums = begun or sum_at_start(members, scene)
     for turn in range(ROUNDS):
-        sums = sums if turn == 0 else sums_of(members, rows, 1.5 * scale)
+        sums = sums if turn == 0 else sum_equations(members, rows, 1.5 * scale)
         ridge = RIDGE * max(np.trace(sums.normal) / len(start), 1e-6)
-        held = basis.T @ sums.normal @ basis + ridge * np.eye(basis.shape[1])
-        inverse = basis @ np.linalg.inv(held) @ basis.T
+        matrix = basis.T @ sums.normal @ basis + ridge * np.eye(basis.shape[1])
+        inverse = basis @ np.linalg.inv(matrix) @ basis.T
         unknowns = inverse @ (sums.right + ridge * start)
-        every = own @ unknowns
-        every[absent] = np.nan
-        rows = [every[low:high] for low, high in pairwise(ends)]
-    cost = cost_of_rows(members, rows, scene)
-    if not all(proper(own, member.walls) for member, own in zip(members, rows, strict=True)):
+        all_rows = designs @ unknowns
+        all_rows[absent] = np.nan
+        rows = [all_rows[begin:end] for begin, end in pairwise(ends)]
+    cost = sum_row_costs(members, rows, scene)
+    if not all(
+        is_proper(volume_rows, member.walls)
+        for member, volume_rows in zip(members, rows, strict=True)
+    ):
         cost = np.inf
-    return Fit(unknowns, inverse * sums.misfit / max(sums.weight, 1.0), rows, cost, basis)
+    return CommonFit(unknowns, inverse * sums.misfit / max(sums.weight, 1.0), rows, cost, basis)
 
 
-def cost_of_rows(members: list[Member], rows: list[np.ndarray], scene: Scene) -> float:
+def sum_row_costs(members: list[LinearVolume], rows: list[np.ndarray], scene: Scene) -> float:
     """What the points of members cost under their planes `rows` (k, 3)."""
     pairs = zip(members, rows, strict=True)
-    return float(sum(cost_of(own, member.points, scene.dead, scene.width) for member, own in pairs))
+    return float(
+        sum(
+            sum_point_costs(volume_rows, member.points, scene.dead, scene.width)
+            for member, volume_rows in pairs
+        )
+    )

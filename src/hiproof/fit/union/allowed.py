@@ -12,19 +12,31 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.family import COMPONENTS, GENERAL_SHAPES, KIN
 
 
-def components_of(name: str) -> tuple[str, ...]:
+def list_components(name: str) -> tuple[str, ...]:
     """What a type that no volume has by itself may be put together from: any shape where nothing is said of it."""
-    return () if CATALOGUE[name].is_of_family else COMPONENTS.get(name, tuple(name for name, _ in GENERAL_SHAPES.values()))
+    return (
+        ()
+        if CATALOGUE[name].is_of_family
+        else COMPONENTS.get(name, tuple(name for name, _ in GENERAL_SHAPES.values()))
+    )
 
 
-def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
+def list_allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
     """Which shapes (2, 3, 3, 2) volumes may have to become parts of these `types` (all where there are none)."""
     allowed = np.zeros((2, 3, 3, 2), bool)
-    names = {part for name in types or CATALOGUE for part in (name, *components_of(name))} | {"flat"}
-    kin = {name: base for base, *others in KIN for name in others}
+    names = {part for name in types or CATALOGUE for part in (name, *list_components(name))} | {
+        "flat"
+    }
+    kin = {name: base for base, *kin_names in KIN for name in kin_names}
     for (top, along, across), (shape, _) in GENERAL_SHAPES.items():
-        ties = [tied for tied in (0, 1) if shape != "gable" or ("gable", "asymmetric_gable")[tied] in names]
+        ties = [
+            tied
+            for tied in (0, 1)
+            if shape != "gable" or ("gable", "asymmetric_gable")[tied] in names
+        ]
         if shape in names or any(kin.get(name) == shape for name in names):
             for tied in ties:
-                allowed[int(top), along, across, tied] = allowed[int(top), across, along, tied] = True
+                allowed[int(top), along, across, tied] = allowed[int(top), across, along, tied] = (
+                    True
+                )
     return allowed

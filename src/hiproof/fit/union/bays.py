@@ -14,7 +14,7 @@ import shapely
 
 from ...geometry.rings import counterclockwise
 from .add import UNEXPLAINED
-from .objective import base_shows, misfits
+from .objective import compute_misfits, is_base_visible
 from .plan import Plan
 from .prices import BAY_UNITS
 from .regions import THICK_M
@@ -23,30 +23,30 @@ from .volumes import (
     COLUMNS,
     DIRECTION,
     LEVEL,
-    OFFSET,
-    PLANES,
+    N_PLANES,
+    OFFSET0,
     REPLACES,
     U0,
     U1,
     V0,
     V1,
+    compute_roof_heights,
     is_allowed,
-    roof_heights,
 )
 
 # m2 of a bay, and its share of the outline at most: what is larger has points enough for the search; m of its narrower side
-LEAST_M2, MOST_M2, MOST_SHARE, LEAST_WIDTH_M = 0.25, 12.0, 0.34, 0.3
+LEAST_BAY_M2, MOST_BAY_M2, MOST_BAY_SHARE, LEAST_BAY_WIDTH_M = 0.25, 12.0, 0.34, 0.3
 # of a bay's area: so much of the outline lies at most within the rectangle around it; of that: so much is the bay at least, which a bay window
 # fills to 0.7 and a wedge beside a wall that bends to a half; how many times as long as wide it is at most
 FILLED, FULL, SLENDER = 1.25, 0.6, 10.0
-SAME_M = 0.1  # rectangles whose sides all lie nearer are one bay's
-FEWEST = 2  # points that the roof leaves unexplained and the level volume explains
+SAME_BAY_M = 0.1  # rectangles whose sides all lie nearer are one bay's
+FEWEST_BAY_POINTS = 2  # points that the roof leaves unexplained and the level volume explains
 LEAST_TURN = 1e-9  # of two walls, by their directions: numerically parallel
 NEAREST = 1e-3  # of a wall's length from its end: the line begins there
-SAME_PLACE_M = 1e-6  # numerically one place
+SAME_CORNER_M = 1e-6  # numerically one place
 
 
-class Seen(NamedTuple):
+class BuildingPoints(NamedTuple):
     """All points of a building: U, V (directions, n) and z (n,), ascending, those next to the border among them."""
 
     U: np.ndarray
@@ -54,60 +54,72 @@ class Seen(NamedTuple):
     z: np.ndarray
 
 
-def with_bays(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, unit: float) -> np.ndarray:
+def add_bays(
+    volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, unit: float
+) -> np.ndarray:
     """The volumes with a level one in each bay of `outline` where that explains more than a `unit` (points) costs."""
-    left = rectangles_of(outline, plan, scene)
-    if not left:
+    remaining = list_bay_rectangles(outline, plan, scene)
+    if not remaining:
         return volumes
-    seen = all_points(plan, scene)
-    while left:
-        gains, levels = zip(*(level_over(bay, volumes, seen, scene, unit) for bay in left), strict=True)
+    points = gather_points(plan, scene)
+    while remaining:
+        gains, levels = zip(
+            *(fit_level_volume(bay, volumes, points, scene, unit) for bay in remaining), strict=True
+        )
         best = int(np.argmax(gains))
         if gains[best] <= 0.0:
             break
         volumes = np.vstack([volumes, levels[best]])
-        del left[best]
+        del remaining[best]
     return volumes
 
 
-def all_points(plan: Plan, scene: Scene) -> Seen:
+def gather_points(plan: Plan, scene: Scene) -> BuildingPoints:
     (u, v, z), c, s = plan.border, scene.turn[:, :1], scene.turn[:, 1:]
-    every = np.concatenate([scene.z[: scene.n], z])
-    order = np.argsort(every, kind="stable")
+    all_z = np.concatenate([scene.z[: scene.n], z])
+    order = np.argsort(all_z, kind="stable")
     U = np.concatenate([scene.U[:, : scene.n], c * u + s * v], axis=1)
     V = np.concatenate([scene.V[:, : scene.n], c * v - s * u], axis=1)
-    return Seen(U[:, order], V[:, order], every[order])
+    return BuildingPoints(U[:, order], V[:, order], all_z[order])
 
 
-def level_over(bay: np.ndarray, volumes: np.ndarray, seen: Seen, scene: Scene, unit: float) -> tuple[float, np.ndarray]:
+def fit_level_volume(
+    bay: np.ndarray, volumes: np.ndarray, points: BuildingPoints, scene: Scene, unit: float
+) -> tuple[float, np.ndarray]:
     """What a level volume over a bay's rectangle gains at the height that most of its points have (points), and that volume."""
     row, direction = np.zeros(COLUMNS), int(bay[0])
-    u, v = seen.U[direction], seen.V[direction]
-    within = (u >= bay[1]) & (u <= bay[2]) & (v >= bay[3]) & (v <= bay[4])
-    z = seen.z[within]
-    if len(z) < FEWEST:
+    u, v = points.U[direction], points.V[direction]
+    is_inside = (u >= bay[1]) & (u <= bay[2]) & (v >= bay[3]) & (v <= bay[4])
+    z = points.z[is_inside]
+    if len(z) < FEWEST_BAY_POINTS:
         return -np.inf, row
-    where = [np.ascontiguousarray(axis[:, within]) for axis in (seen.U, seen.V)]
-    roof, top = roof_heights(volumes, *where)
-    now = misfits(z, roof, scene)
+    coordinates = [np.ascontiguousarray(axis[:, is_inside]) for axis in (points.U, points.V)]
+    roof, top = compute_roof_heights(volumes, *coordinates)
+    current = compute_misfits(z, roof, scene)
     narrow = min(bay[2] - bay[1], bay[4] - bay[3])
-    if narrow < 2.0 * THICK_M or not base_shows(volumes, scene):
+    if narrow < 2.0 * THICK_M or not is_base_visible(volumes, scene):
         # what little there is of the base is drawn as the roof beside
-        beside, _ = roof_heights(continued(volumes, narrow), *where)
-        now = np.where(top > 0, now, misfits(z, beside, scene))
+        neighbour_z, _ = compute_roof_heights(widen_volumes(volumes, narrow), *coordinates)
+        current = np.where(top > 0, current, compute_misfits(z, neighbour_z, scene))
     reach = scene.dead + scene.width
     first, last = np.searchsorted(z, z - reach, "right"), np.searchsorted(z, z + reach, "left")
-    near = slice(*max(zip(first, last, strict=True), key=lambda ends: ends[1] - ends[0]))
-    height = median(z[near].tolist())
-    row[OFFSET : OFFSET + PLANES] = np.inf
-    row[OFFSET + LEVEL], row[DIRECTION], row[REPLACES] = height, direction, height < median(roof.tolist())
+    band = slice(*max(zip(first, last, strict=True), key=lambda ends: ends[1] - ends[0]))
+    height = median(z[band].tolist())
+    row[OFFSET0 : OFFSET0 + N_PLANES] = np.inf
+    row[OFFSET0 + LEVEL], row[DIRECTION], row[REPLACES] = (
+        height,
+        direction,
+        height < median(roof.tolist()),
+    )
     row[U0 : V1 + 1] = bay[1:]
-    if (now[near] > UNEXPLAINED).sum() < FEWEST or not is_allowed(row, scene.allowed):
+    if (current[band] > UNEXPLAINED).sum() < FEWEST_BAY_POINTS or not is_allowed(
+        row, scene.allowed
+    ):
         return -np.inf, row
-    return float(now.sum() - misfits(z, height, scene).sum()) - BAY_UNITS * unit, row
+    return float(current.sum() - compute_misfits(z, height, scene).sum()) - BAY_UNITS * unit, row
 
 
-def continued(volumes: np.ndarray, by_m: float) -> np.ndarray:
+def widen_volumes(volumes: np.ndarray, by_m: float) -> np.ndarray:
     """The volumes, without the base, so far beyond their edges."""
     wider = volumes[1:].copy()
     wider[:, [U0, V0]] -= by_m
@@ -115,87 +127,128 @@ def continued(volumes: np.ndarray, by_m: float) -> np.ndarray:
     return wider
 
 
-def rectangles_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[np.ndarray]:
+def list_bay_rectangles(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[np.ndarray]:
     """The bays' rectangles, each once: direction and u0, u1, v0, v1 in its axes."""
-    found: list[np.ndarray] = []
-    for piece in pieces_of(outline):
-        bay = rectangle_around(piece, outline, plan, scene)
-        if bay is not None and not any(np.abs(bay - other).max() < SAME_M for other in found):
-            found.append(bay)
-    return found
+    rectangles: list[np.ndarray] = []
+    for piece in list_small_pieces(outline):
+        bay = fit_bay_rectangle(piece, outline, plan, scene)
+        if bay is not None and not any(
+            np.abs(bay - other).max() < SAME_BAY_M for other in rectangles
+        ):
+            rectangles.append(bay)
+    return rectangles
 
 
-def rectangle_around(ring: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> np.ndarray | None:
+def fit_bay_rectangle(
+    ring: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene
+) -> np.ndarray | None:
     """Around a piece's ring (m, 2) in the direction in which it holds least of the outline besides; None where that is too much."""
-    own, area = (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T, 0.5 * float(cross(ring, following(ring)).sum())
-    best, least = None, FILLED * area
+    local_ring, area = (
+        (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T,
+        0.5 * float(cross_vectors(ring, shift_corners(ring)).sum()),
+    )
+    best, least_area = None, FILLED * area
     for direction, (c, s) in enumerate(scene.turn):
-        turned = own @ np.array([[c, -s], [s, c]])
-        low, high = turned.min(axis=0), turned.max(axis=0)
-        narrow, wide = sorted((high - low).tolist())
-        if area <= FULL * narrow * wide or narrow < max(LEAST_WIDTH_M, wide / SLENDER):
+        turned = local_ring @ np.array([[c, -s], [s, c]])
+        lower, upper = turned.min(axis=0), turned.max(axis=0)
+        narrow, wide = sorted((upper - lower).tolist())
+        if area <= FULL * narrow * wide or narrow < max(LEAST_BAY_WIDTH_M, wide / SLENDER):
             continue
-        corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) @ np.array([[c, s], [-s, c]])
-        held = shapely.intersection(shapely.Polygon(plan.frame.xy_local(corners)), outline).area
-        if held < least:
-            best, least = np.array([direction, low[0], high[0], low[1], high[1]]), held
+        corners = np.array([lower, (upper[0], lower[1]), upper, (lower[0], upper[1])]) @ np.array(
+            [[c, s], [-s, c]]
+        )
+        covered_area = shapely.intersection(
+            shapely.Polygon(plan.frame.xy_local(corners)), outline
+        ).area
+        if covered_area < least_area:
+            best, least_area = (
+                np.array([direction, lower[0], upper[0], lower[1], upper[1]]),
+                covered_area,
+            )
     return best
 
 
-def pieces_of(outline: shapely.Polygon) -> list[np.ndarray]:
+def list_small_pieces(outline: shapely.Polygon) -> list[np.ndarray]:
     """Rings (m, 2), counterclockwise, of what is small of the pieces that walls cut off, drawn on from corners that point inwards."""
     ring = counterclockwise(outline.exterior)[:-1]
-    after = following(ring) - ring
-    before = np.concatenate([after[-1:], after[:-1]])
-    inwards = np.nonzero(cross(before, after) < 0.0)[0]
+    next_edges = shift_corners(ring) - ring
+    previous_edges = np.concatenate([next_edges[-1:], next_edges[:-1]])
+    inwards = np.nonzero(cross_vectors(previous_edges, next_edges) < 0.0)[0]
     if not len(inwards):
         return []
-    corners, ways = np.tile(inwards, 2), np.concatenate([before[inwards], -after[inwards]])
-    edges, places = first_crossings(ring, corners, ways)
-    firsts, lasts, places = np.r_[corners, edges + 1], np.r_[edges, corners], np.tile(places, (2, 1))
-    areas, most = areas_of(ring, firsts, lasts, places), min(MOST_M2, MOST_SHARE * outline.area)
-    small = np.nonzero((areas >= LEAST_M2) & (areas <= most))[0]
+    corners, ways = (
+        np.tile(inwards, 2),
+        np.concatenate([previous_edges[inwards], -next_edges[inwards]]),
+    )
+    edges, places = find_first_crossings(ring, corners, ways)
+    firsts, lasts, places = (
+        np.r_[corners, edges + 1],
+        np.r_[edges, corners],
+        np.tile(places, (2, 1)),
+    )
+    areas, most_area = (
+        measure_areas(ring, firsts, lasts, places),
+        min(MOST_BAY_M2, MOST_BAY_SHARE * outline.area),
+    )
+    small = np.nonzero((areas >= LEAST_BAY_M2) & (areas <= most_area))[0]
     return [
-        closed_at(ring[np.arange(firsts[k], firsts[k] + (lasts[k] - firsts[k]) % len(ring) + 1) % len(ring)], places[k])
+        close_ring(
+            ring[
+                np.arange(firsts[k], firsts[k] + (lasts[k] - firsts[k]) % len(ring) + 1) % len(ring)
+            ],
+            places[k],
+        )
         for k in small
     ]
 
 
-def closed_at(corners: np.ndarray, place: np.ndarray) -> np.ndarray:
+def close_ring(corners: np.ndarray, place: np.ndarray) -> np.ndarray:
     """The `corners` (m, 2) and a `place` after them, where that is none of the two beside it: a line may end at a corner."""
-    beside = np.abs(corners[[0, -1]] - place).max(axis=1).min()
-    return np.vstack([corners, place]) if beside > SAME_PLACE_M else corners
+    distance = np.abs(corners[[0, -1]] - place).max(axis=1).min()
+    return np.vstack([corners, place]) if distance > SAME_CORNER_M else corners
 
 
-def areas_of(ring: np.ndarray, firsts: np.ndarray, lasts: np.ndarray, places: np.ndarray) -> np.ndarray:
+def measure_areas(
+    ring: np.ndarray, firsts: np.ndarray, lasts: np.ndarray, places: np.ndarray
+) -> np.ndarray:
     """Areas (k,) of what a ring's (n, 2) corners from `firsts` on to `lasts` (k,) enclose with `places` (k, 2)."""
     twice = np.vstack([ring, ring])
-    sums = np.r_[0.0, np.cumsum(cross(twice[:-1], twice[1:]))]
+    sums = np.r_[0.0, np.cumsum(cross_vectors(twice[:-1], twice[1:]))]
     firsts = firsts % len(ring)
     lasts = firsts + (lasts - firsts) % len(ring)
-    return 0.5 * (sums[lasts] - sums[firsts] + cross(twice[lasts], places) + cross(places, twice[firsts]))
+    return 0.5 * (
+        sums[lasts]
+        - sums[firsts]
+        + cross_vectors(twice[lasts], places)
+        + cross_vectors(places, twice[firsts])
+    )
 
 
-def following(ring: np.ndarray) -> np.ndarray:
+def shift_corners(ring: np.ndarray) -> np.ndarray:
     """The corner after each of a ring's (n, 2)."""
     return np.concatenate([ring[1:], ring[:1]])
 
 
-def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def cross_vectors(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def first_crossings(ring: np.ndarray, corners: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_first_crossings(
+    ring: np.ndarray, corners: np.ndarray, ways: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The edges (k,) of a ring (n, 2), by their numbers, at which lines from its `corners` (k,) along `ways` (k, 2) leave it first, and
     the places (k, 2); without any it is the corner itself."""
-    edges, off = following(ring) - ring, ring - ring[corners, None]
-    turn = cross(ways[:, None], edges)
+    edges, offsets = shift_corners(ring) - ring, ring - ring[corners, None]
+    turn = cross_vectors(ways[:, None], edges)
     with np.errstate(divide="ignore", invalid="ignore"):
-        along, across = cross(off, edges) / turn, cross(off, ways[:, None]) / turn
+        along, across = (
+            cross_vectors(offsets, edges) / turn,
+            cross_vectors(offsets, ways[:, None]) / turn,
+        )
     meets = (np.abs(turn) > LEAST_TURN) & (along > NEAREST) & (across >= 0.0) & (across <= 1.0)
-    every = np.arange(len(corners))
-    meets[every, corners] = meets[every, corners - 1] = False
+    numbers = np.arange(len(corners))
+    meets[numbers, corners] = meets[numbers, corners - 1] = False
     along = np.where(meets, along, np.inf)
     first = np.argmin(along, axis=1)
-    far = along[every, first]
-    return first, ring[corners] + np.where(np.isfinite(far), far, 0.0)[:, None] * ways
+    distances = along[numbers, first]
+    return first, ring[corners] + np.where(np.isfinite(distances), distances, 0.0)[:, None] * ways

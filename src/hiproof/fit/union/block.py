@@ -7,19 +7,21 @@ import numpy as np
 from .box import Box
 from .candidates import Effort
 from .grow import grow
-from .moves import move_all_edges, refit_each
-from .objective import objective
+from .moves import move_all_edges, refit_volumes
+from .objective import compute_objective
 from .scene import Scene
-from .volumes import U0, V1, roof_heights
+from .volumes import U0, V1, compute_roof_heights
 from .whole import Whole
-from .window import end_at_border, forget_settled, open_window
+from .window import end_at_border, forget_digests, open_window
 
 # A block's points: those that structure is looked for in, and those that settle it. 2.7 and 5 per square metre of the
 # largest block; with a house's 600 points dormers and annexes of blocks stay unseen.
-SEARCH_POINTS, SETTLE_POINTS = 1600, 3000
+BLOCK_POINTS, SETTLE_POINTS = 1600, 3000
 SETTLE_REACH_M = 0.7  # m that edges may move when more points settle them
 # Growing more than one volume anew gains nothing there and costs a quarter of the time (Vienna's even places @5).
-BLOCK = Effort(pool_points=1200, seeds=200, pairs=400, planes=30, new_planes=16, gables=10, regrown=1)
+BLOCK = Effort(
+    pool_points=1200, seeds=200, pairs=400, planes=30, new_planes=16, gables=10, regrown=1
+)
 BARE_SHARE = 0.01  # of a block: its base becomes a level volume where more of it shows
 
 
@@ -29,31 +31,31 @@ def search_block(whole: Whole, box: Box) -> None:
     if settling is None:
         return
     rows = volumes[1:]
-    if base_is_bare(volumes, settling):
+    if is_base_bare(volumes, settling):
         base = volumes[:1].copy()
         base[0, U0 : V1 + 1] = box
         rows = np.concatenate([base, rows])
-    whole.replace([], forget_settled(end_at_border(whole, rows.copy(), box)))
+    whole.replace([], forget_digests(end_at_border(whole, rows.copy(), box)))
 
 
 def find_in_block(whole: Whole, box: Box) -> tuple[np.ndarray, Scene | None]:
     """The volumes of a block by itself, its own base first, and the scene that settled them; None for hardly a point."""
-    scene, settling = open_window(whole, box, SEARCH_POINTS), open_window(whole, box, SETTLE_POINTS)
+    scene, settling = open_window(whole, box, BLOCK_POINTS), open_window(whole, box, SETTLE_POINTS)
     if scene is None or settling is None:
         return whole.volumes, None
     volumes, _ = grow(scene, BLOCK)
-    return settle_all(volumes, settling)[0], settling
+    return settle_volumes(volumes, settling)[0], settling
 
 
-def settle_all(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float]:
+def settle_volumes(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float]:
     """Refit the volumes and move their edges a little on every point of `scene`."""
-    volumes, value = refit_each(volumes, scene, objective(volumes, scene, np.inf))
+    volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene, np.inf))
     value = move_all_edges(volumes, scene, value, SETTLE_REACH_M)
-    return refit_each(volumes, scene, value)
+    return refit_volumes(volumes, scene, value)
 
 
-def base_is_bare(volumes: np.ndarray, scene: Scene) -> bool:
+def is_base_bare(volumes: np.ndarray, scene: Scene) -> bool:
     """Whether more than a sliver of the base shows."""
-    _, top = roof_heights(volumes, scene.U, scene.V)
+    _, top = compute_roof_heights(volumes, scene.U, scene.V)
     cells = scene.weight[scene.n :][top[scene.n :] == 0].sum()
     return bool(max(cells, 0.5 * (top[: scene.n] == 0).sum()) > BARE_SHARE * scene.n)

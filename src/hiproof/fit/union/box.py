@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-SLACK_M = 0.3  # m by which what lies inside a box may reach beyond it: what hides an edge is no nearer
+BOX_SLACK_M = (
+    0.3  # m by which what lies inside a box may reach beyond it: what hides an edge is no nearer
+)
 
 
 class Box(NamedTuple):
@@ -28,39 +30,41 @@ class Box(NamedTuple):
         return Box(self.u0 - by_m, self.u1 + by_m, self.v0 - by_m, self.v1 + by_m)
 
     def contains(self, other: Box) -> bool:
-        """Tell whether another box lies inside this one, but for SLACK_M."""
+        """Tell whether another box lies inside this one, but for BOX_SLACK_M."""
         return (
-            other.u0 >= self.u0 - SLACK_M
-            and other.u1 <= self.u1 + SLACK_M
-            and other.v0 >= self.v0 - SLACK_M
-            and other.v1 <= self.v1 + SLACK_M
+            other.u0 >= self.u0 - BOX_SLACK_M
+            and other.u1 <= self.u1 + BOX_SLACK_M
+            and other.v0 >= self.v0 - BOX_SLACK_M
+            and other.v1 <= self.v1 + BOX_SLACK_M
         )
 
     def overlaps(self, other: Box) -> bool:
-        return self.u0 < other.u1 and self.u1 > other.u0 and self.v0 < other.v1 and self.v1 > other.v0
+        return (
+            self.u0 < other.u1 and self.u1 > other.u0 and self.v0 < other.v1 and self.v1 > other.v0
+        )
 
-    def holds(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    def find_inside(self, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Which of the places u, v (n,) lie in the box (n,)."""
         return (self.u0 <= u) & (u <= self.u1) & (self.v0 <= v) & (v <= self.v1)
 
-    def split(self, axis: int, at: float) -> tuple[Box, Box]:
+    def split(self, axis: int, place: float) -> tuple[Box, Box]:
         """Cut the box in two across an axis (0 for u, 1 for v)."""
         if axis == 0:
-            return self._replace(u1=at), self._replace(u0=at)
-        return self._replace(v1=at), self._replace(v0=at)
+            return self._replace(u1=place), self._replace(u0=place)
+        return self._replace(v1=place), self._replace(v0=place)
 
 
 NOWHERE = Box(np.inf, -np.inf, np.inf, -np.inf)  # the box of nothing
 
 
-def box_around(boxes: Iterable[Box]) -> Box:
+def enclose_boxes(boxes: Iterable[Box]) -> Box:
     """The smallest box around several."""
-    every = np.array(list(boxes))
+    limits = np.array(list(boxes))
     return Box(
-        float(every[:, 0].min()),
-        float(every[:, 1].max()),
-        float(every[:, 2].min()),
-        float(every[:, 3].max()),
+        float(limits[:, 0].min()),
+        float(limits[:, 1].max()),
+        float(limits[:, 2].min()),
+        float(limits[:, 3].max()),
     )
 
 
@@ -69,7 +73,7 @@ def clip_to_box(geometry: shapely.Geometry, box: Box) -> shapely.Geometry:
     return shapely.clip_by_rect(geometry, box.u0, box.v0, box.u1, box.v1)
 
 
-def box_of(geometry: shapely.Geometry) -> Box:
+def measure_box(geometry: shapely.Geometry) -> Box:
     """The box around a geometry; NOWHERE around an empty one."""
     if geometry.is_empty:
         return NOWHERE

@@ -21,215 +21,255 @@ from .finish import (
     FLATTEST,
     Planes,
     Wall,
-    cost_of,
-    finished_volume,
-    least_squares,
-    points_of,
-    proper,
-    shown_points,
+    find_visible_points,
+    fit_volume_planes,
+    is_proper,
+    solve_least_squares,
+    sum_point_costs,
+    take_points,
 )
-from .members import lies_inside
-from .objective import misfits
+from .members import is_inside_sides
+from .objective import compute_misfits
 from .plan import Plan
 from .prices import PARAMETER_COST
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, LEVEL, SIDES
+from .volumes import DIRECTION, LEVEL, N_SIDES
 
-SHORTEST_M = 0.6  # of a wall
-FEWEST_INCLINED = 2  # planes of a volume with cants: one slope alone is cut off by walls and runs on
+SHORTEST_WALL_M = 0.6  # of a wall
+FEWEST_INCLINED = (
+    2  # planes of a volume with cants: one slope alone is cut off by walls and runs on
+)
 OFF_RAD = math.radians(12.0)  # by which it faces another way than each of the volume's sides
-NEAR_M = 0.1  # m inside the wall, in its middle, where the volume must be
-APART_M, DEEP_M = 0.1, 0.5  # points in which planes meet are one within; they lie so far before the wall at least
+INSIDE_WALL_M = 0.1  # m inside the wall, in its middle, where the volume must be
+MEETING_GAP_M, MEETING_DEPTH_M = (
+    0.1,
+    0.5,
+)  # points in which planes meet are one within; they lie so far before the wall at least
 MEET_M = 0.05  # m by which the roof may be lower than the point in which three planes meet
-SLOPES = (0.5, 0.8, 1.2)  # rise over run to begin with, besides those of the volume's planes
+START_SLOPES = (0.5, 0.8, 1.2)  # rise over run to begin with, besides those of the volume's planes
 
 
-class Way(NamedTuple):
+class PlaneForm(NamedTuple):
     """A further plane as linear in p unknowns of all (3, p), the last `more` of which are its own."""
 
     design: np.ndarray
-    more: int
+    n_own: int
 
 
 # Planes and roofs by all that they depend on in one scene: planes by their volume, its sides, and
 # the points over which it shows, roofs by their volumes.
-Known = dict[Any, Any]
+Cache = dict[Any, Any]
 
 
-def finished(
-    volumes: np.ndarray, sides: list[list[Side]], walls: np.ndarray, scene: Scene, known: Known
+def fit_planes(
+    volumes: np.ndarray, sides: list[list[Side]], walls: np.ndarray, scene: Scene, cache: Cache
 ) -> list[Planes]:
     """The planes of every volume, in its direction's axes, over its sides and over those of the outline's `walls` (m, 2, 2) that cut
-    its corners off; those `known` are not fitted again, those found become known."""
+    its corners off; those `cache` are not fitted again, those found become known."""
     planes = []
-    for volume, own, members in zip(volumes, sides, shown_points(volumes, scene), strict=True):
-        key = volume.tobytes(), tuple(own), members.tobytes()
-        if key not in known:
-            found = finished_volume(volume, own, scene, members)
-            if found.inclined >= FEWEST_INCLINED and found.design.shape[2]:
-                beside = own_walls(walls, own, scene.turn[int(volume[DIRECTION])])
-                found = canted(found, beside, own, points_of(volume, members, scene), scene)
-            known[key] = found
-        planes.append(known[key])
+    for volume, volume_sides, members in zip(
+        volumes, sides, find_visible_points(volumes, scene), strict=True
+    ):
+        key = volume.tobytes(), tuple(volume_sides), members.tobytes()
+        if key not in cache:
+            fit = fit_volume_planes(volume, volume_sides, scene, members)
+            if fit.inclined >= FEWEST_INCLINED and fit.design.shape[2]:
+                cutting_walls = select_cutting_walls(
+                    walls, volume_sides, scene.turn[int(volume[DIRECTION])]
+                )
+                fit = add_cants(
+                    fit, cutting_walls, volume_sides, take_points(volume, members, scene), scene
+                )
+            cache[key] = fit
+        planes.append(cache[key])
     return planes
 
 
-def walls_of(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
+def list_walls(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     """Starts and ends (m, 2, 2) of the outline's outer walls, the inside to the left, in the first direction's axes."""
     ring = (counterclockwise(outline.exterior) - plan.frame.origin[:2]) @ plan.frame.rotation.T
     ends = np.stack([ring[:-1], ring[1:]], axis=1)
-    return ends[np.hypot(*(ends[:, 1] - ends[:, 0]).T) > SHORTEST_M]
+    return ends[np.hypot(*(ends[:, 1] - ends[:, 0]).T) > SHORTEST_WALL_M]
 
 
-def seen_along(walls: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def orient_walls(walls: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The middles (m, 2) of `walls` (m, 2, 2) in the axes of the direction at `turn`, and which way they look out (m, 2)."""
     c, s = turn
     ends = walls @ np.array([[c, -s], [s, c]])
     ways = ends[:, 1] - ends[:, 0]
-    return ends.mean(axis=1), np.column_stack([ways[:, 1], -ways[:, 0]]) / np.hypot(*ways.T)[:, None]
+    return ends.mean(axis=1), np.column_stack([ways[:, 1], -ways[:, 0]]) / np.hypot(*ways.T)[
+        :, None
+    ]
 
 
-def own_walls(walls: np.ndarray, sides: list[Side], turn: np.ndarray) -> list[Wall]:
+def select_cutting_walls(walls: np.ndarray, sides: list[Side], turn: np.ndarray) -> list[Wall]:
     """Those of the `walls` (m, 2, 2) that end a volume and face another way than its sides, in its own axes at `turn`."""
-    middle, outwards = seen_along(walls, turn)
+    middle, outwards = orient_walls(walls, turn)
     facing = np.arctan2(outwards[:, 1], outwards[:, 0])
-    off = np.abs(np.remainder(facing[:, None] - facings_of(sides) + np.pi, 2.0 * np.pi) - np.pi).min(axis=1)
-    kept = np.flatnonzero(lies_inside(middle - NEAR_M * outwards, sides) & (off > OFF_RAD))
-    if len(kept) > MOST_CANTS:  # of a round wall
+    angles = np.abs(
+        np.remainder(facing[:, None] - measure_facings(sides) + np.pi, 2.0 * np.pi) - np.pi
+    ).min(axis=1)
+    numbers = np.flatnonzero(
+        is_inside_sides(middle - INSIDE_WALL_M * outwards, sides) & (angles > OFF_RAD)
+    )
+    if len(numbers) > MOST_CANTS:  # of a round wall
         return []
-    return [Wall(float(f), float(x)) for f, x in zip(facing[kept], (outwards * middle).sum(axis=1)[kept], strict=True)]
+    return [
+        Wall(float(f), float(x))
+        for f, x in zip(facing[numbers], (outwards * middle).sum(axis=1)[numbers], strict=True)
+    ]
 
 
-def facings_of(sides: list[Side]) -> np.ndarray:
+def measure_facings(sides: list[Side]) -> np.ndarray:
     """The directions (4,) in which the sides look (rad)."""
     left, right, front, back = (math.atan(side.lean) for side in sides)
     return np.array([math.pi - left, -right, -0.5 * math.pi + front, 0.5 * math.pi + back])
 
 
-def canted(planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene) -> Planes:
+def add_cants(
+    planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene
+) -> Planes:
     """The planes with one over each of the `walls` that pays, the best first; `points` (3, m) are the volume's."""
-    left = list(walls)
-    while left and len(planes.walls) < MOST_CANTS:
-        if misfit_below(planes, points, scene) <= scene.evidence * PARAMETER_COST:
+    remaining = list(walls)
+    while remaining and len(planes.walls) < MOST_CANTS:
+        if bound_gain(planes, points, scene) <= scene.evidence * PARAMETER_COST:
             break
-        best = min(with_one_more(planes, left, sides, points, scene), key=worth, default=planes)
-        if worth(best) >= worth(planes):
+        best = min(
+            add_one_cant(planes, remaining, sides, points, scene), key=price_planes, default=planes
+        )
+        if price_planes(best) >= price_planes(planes):
             break
-        left.remove(best.walls[-1])
+        remaining.remove(best.walls[-1])
         planes = best
     return planes
 
 
-def worth(planes: Planes) -> float:
+def price_planes(planes: Planes) -> float:
     return planes.cost + planes.price
 
 
-def with_one_more(
+def add_one_cant(
     planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene
 ) -> Iterator[Planes]:
     """The planes with one more over one of the `walls`, in every way."""
-    places = meeting_places(planes, sides)
+    places = find_meeting_places(planes, sides)
     for wall in walls:
-        start = start_over(wall, planes, points, scene)
-        for way in ways_over(wall, planes, places):
-            found = fitted_with(planes, wall, way, start, points, scene)
-            if proper(found.rows, found.walls):
-                yield found
+        start = find_start_plane(wall, planes, points, scene)
+        for form in list_forms(wall, planes, places):
+            trial = fit_with_cant(planes, wall, form, start, points, scene)
+            if is_proper(trial.rows, trial.walls):
+                yield trial
 
 
-def misfit_below(planes: Planes, points: np.ndarray, scene: Scene) -> float:
+def bound_gain(planes: Planes, points: np.ndarray, scene: Scene) -> float:
     """What the points (3, m) below the planes cost: no more can further planes gain."""
     z = np.nanmin(planes.rows @ np.vstack([points[:2], np.ones(points.shape[1])]), axis=0)
-    return float(misfits(points[2], np.maximum(z, points[2]), scene).sum())
+    return float(compute_misfits(points[2], np.maximum(z, points[2]), scene).sum())
 
 
-def ways_over(wall: Wall, planes: Planes, places: list[np.ndarray]) -> Iterator[Way]:
+def list_forms(wall: Wall, planes: Planes, places: list[np.ndarray]) -> Iterator[PlaneForm]:
     """Ways for a plane to rise from `wall`, through one of the `places` in which others meet or free, the more regular ones first."""
     count, depth = planes.design.shape[2], wall.depth
-    own, eave = np.eye(count + 2), level_eave(planes)
-    eaves = [own[count + 1]] if eave is None else [own[eave], own[count + 1]]
+    unit_rows, eave = np.eye(count + 2), find_level_eave(planes)
+    eaves = [unit_rows[count + 1]] if eave is None else [unit_rows[eave], unit_rows[count + 1]]
     for place in places:
         deep = float(depth @ (*place, 1.0))
-        if deep > DEEP_M:
-            top = np.append(height_by_unknowns(planes, place), [0.0, 0.0])
-            for low in eaves:
-                yield trimmed(np.outer(depth, (top - low) / deep) + np.outer([0.0, 0.0, 1.0], low), count)
-    for low in eaves:
-        yield trimmed(np.outer(depth, own[count]) + np.outer([0.0, 0.0, 1.0], low), count)
+        if deep > MEETING_DEPTH_M:
+            top = np.append(express_height(planes, place), [0.0, 0.0])
+            for eave_form in eaves:
+                yield trim_form(
+                    np.outer(depth, (top - eave_form) / deep)
+                    + np.outer([0.0, 0.0, 1.0], eave_form),
+                    count,
+                )
+    for eave_form in eaves:
+        yield trim_form(
+            np.outer(depth, unit_rows[count]) + np.outer([0.0, 0.0, 1.0], eave_form), count
+        )
 
 
-def trimmed(design: np.ndarray, count: int) -> Way:
+def trim_form(design: np.ndarray, count: int) -> PlaneForm:
     """The way by all unknowns and only those of the two further ones after `count` that it has."""
-    used = design[:, count:].any(axis=0)
-    return Way(np.hstack([design[:, :count], design[:, count:][:, used]]), int(used.sum()))
+    is_used = design[:, count:].any(axis=0)
+    return PlaneForm(
+        np.hstack([design[:, :count], design[:, count:][:, is_used]]), int(is_used.sum())
+    )
 
 
-def level_eave(planes: Planes) -> int | None:
+def find_level_eave(planes: Planes) -> int | None:
     """The unknown that is the height of all level eaves; None where there are none."""
-    shared = (planes.design[:SIDES, 2] == 1.0).sum(axis=0)
+    shared = (planes.design[:N_SIDES, 2] == 1.0).sum(axis=0)
     return int(shared.argmax()) if shared.max() > 1 else None
 
 
-def meeting_places(planes: Planes, sides: list[Side]) -> list[np.ndarray]:
+def find_meeting_places(planes: Planes, sides: list[Side]) -> list[np.ndarray]:
     """Where (2,) three or more of the inclined planes meet on the roof."""
-    there = [k for k in np.flatnonzero(np.isfinite(planes.rows[:, 2])).tolist() if k != LEVEL]
-    found: list[np.ndarray] = []
-    for three in combinations(there, 3):
-        a, b, c = planes.rows[list(three)]
-        apart = np.array([a - b, a - c])
-        if abs(np.linalg.det(apart[:, :2])) < FLATTEST**2:
+    numbers = [k for k in np.flatnonzero(np.isfinite(planes.rows[:, 2])).tolist() if k != LEVEL]
+    meeting_points: list[np.ndarray] = []
+    for triple in combinations(numbers, 3):
+        a, b, c = planes.rows[list(triple)]
+        differences = np.array([a - b, a - c])
+        if abs(np.linalg.det(differences[:, :2])) < FLATTEST**2:
             continue
-        place = np.linalg.solve(apart[:, :2], -apart[:, 2])
-        heights = planes.rows[there] @ (*place, 1.0)
-        if a @ (*place, 1.0) > heights.min() + MEET_M or not lies_inside(place[None], sides)[0]:
+        place = np.linalg.solve(differences[:, :2], -differences[:, 2])
+        heights = planes.rows[numbers] @ (*place, 1.0)
+        if a @ (*place, 1.0) > heights.min() + MEET_M or not is_inside_sides(place[None], sides)[0]:
             continue
-        if all(np.hypot(*(place - other)) > APART_M for other in found):
-            found.append(place)
-    return found
+        if all(np.hypot(*(place - other)) > MEETING_GAP_M for other in meeting_points):
+            meeting_points.append(place)
+    return meeting_points
 
 
-def height_by_unknowns(planes: Planes, place: np.ndarray) -> np.ndarray:
+def express_height(planes: Planes, place: np.ndarray) -> np.ndarray:
     """The roof's height (p,) at a place in which planes meet, by their unknowns: the mean of theirs."""
-    at = np.array([*place, 1.0])
-    heights = planes.rows @ at
+    position = np.array([*place, 1.0])
+    heights = planes.rows @ position
     meet = np.flatnonzero(heights < np.nanmin(heights) + MEET_M)
-    return (at @ planes.design[meet]).mean(axis=0)
+    return (position @ planes.design[meet]).mean(axis=0)
 
 
-def fitted_with(planes: Planes, wall: Wall, way: Way, start: np.ndarray, points: np.ndarray, scene: Scene) -> Planes:
+def fit_with_cant(
+    planes: Planes, wall: Wall, form: PlaneForm, start: np.ndarray, points: np.ndarray, scene: Scene
+) -> Planes:
     """All planes of a volume fitted with one more over `wall`, from `start` (3,) on."""
     count, _, width = planes.design.shape
-    design = np.zeros((count + 1, 3, width + way.more))
-    design[:count, :, :width], design[count] = planes.design, way.design
+    design = np.zeros((count + 1, 3, width + form.n_own))
+    design[:count, :, :width], design[count] = planes.design, form.design
     begun = np.vstack([planes.rows, start])
-    rows, covariance, cost = least_squares(begun, design, points, scene.dead, scene.width)
-    price = planes.price + scene.evidence * PARAMETER_COST * max(way.more, 1)
+    rows, covariance, cost = solve_least_squares(begun, design, points, scene.dead, scene.width)
+    price = planes.price + scene.evidence * PARAMETER_COST * max(form.n_own, 1)
     return Planes(rows, cost, design, covariance, (*planes.walls, wall), price)
 
 
-def quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
+def compute_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
     """What so large `shares` of the values (n,) lie below: between two of these, on a line."""
-    ordered, found = np.sort(values).tolist(), []
+    ordered, levels = np.sort(values).tolist(), []
     for share in shares:
-        k, rest = divmod((len(ordered) - 1) * share, 1.0)
-        low, high = ordered[int(k)], ordered[min(int(k) + 1, len(ordered) - 1)]
-        step = high - low
-        found.append(low + step * rest if rest < 0.5 else high - step * (1.0 - rest))
-    return found
+        k, remainder = divmod((len(ordered) - 1) * share, 1.0)
+        lower, upper = ordered[int(k)], ordered[min(int(k) + 1, len(ordered) - 1)]
+        step = upper - lower
+        levels.append(
+            lower + step * remainder if remainder < 0.5 else upper - step * (1.0 - remainder)
+        )
+    return levels
 
 
-def start_over(wall: Wall, planes: Planes, points: np.ndarray, scene: Scene) -> np.ndarray:
+def find_start_plane(wall: Wall, planes: Planes, points: np.ndarray, scene: Scene) -> np.ndarray:
     """The plane (3,) over `wall` that explains most of `points` (3, m), of some slopes and heights."""
     inclined = planes.rows[np.isfinite(planes.rows[:, 2])][:, :2]
-    slopes = {round(x, 2) for x in np.hypot(*inclined.T).tolist() if x > FLATTEST} | set(SLOPES)
+    slopes = {round(x, 2) for x in np.hypot(*inclined.T).tolist() if x > FLATTEST} | set(
+        START_SLOPES
+    )
     deep = wall.depth[:2] @ points[:2] + wall.depth[2]
-    (near_m,) = quantiles(deep, (0.2,))
-    lows = quantiles(points[2, deep < near_m], (0.02, 0.25, 0.5))
+    (near_m,) = compute_quantiles(deep, (0.2,))
+    lows = compute_quantiles(points[2, deep < near_m], (0.02, 0.25, 0.5))
     rows = np.vstack([planes.rows, np.zeros(3)])
-    tried = [slope * wall.depth + [0.0, 0.0, low] for slope in sorted(slopes) for low in lows]
+    trial_rows = [
+        slope * wall.depth + [0.0, 0.0, eave] for slope in sorted(slopes) for eave in lows
+    ]
     costs = []
-    for row in tried:
+    for row in trial_rows:
         rows[-1] = row
-        costs.append(cost_of(rows, points, scene.dead, scene.width))
-    return tried[int(np.argmin(costs))]
+        costs.append(sum_point_costs(rows, points, scene.dead, scene.width))
+    return trial_rows[int(np.argmin(costs))]

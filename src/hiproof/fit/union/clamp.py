@@ -9,92 +9,113 @@ import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part, Piece
-from .regions import polygons_of
+from .regions import list_polygons
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
-NOWHERE = shapely.Polygon()  # what no place of a piece is beyond
-LEAST_M2 = 0.1  # of a piece beyond; less is the tip of a corner and no part
-MISSED_SPACINGS = (
-    0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner
-)
+NO_AREA = shapely.Polygon()  # what no place of a piece is beyond
+LEAST_EXCESS_M2 = 0.1  # of a piece beyond; less is the tip of a corner and no part
+MISSED_SPACINGS = 0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner
 
 
-def clamped(parts: list[Part], low: float, high: float, spacing: float) -> list[Part]:
-    """`parts` within `low` and `high` but for what points `spacing` (m) apart miss, and level parts in place of what lies beyond."""
-    found = []
+def clamp_parts(parts: list[Part], z_low: float, z_high: float, spacing: float) -> list[Part]:
+    """`parts` within `z_low` and `z_high` but for what points `spacing` (m) apart miss, and level parts in place of what lies beyond."""
+    new_parts = []
     for part in parts:
         steepest = max(float(np.hypot(*piece.planes[:, :2].T).max()) for piece in part.pieces)
         missed = MISSED_SPACINGS * spacing * steepest
-        found += clamped_part(part, low - CLAMP_M, high + CLAMP_M + missed, missed)
-    return found
+        new_parts += clamp_part(part, z_low - CLAMP_M, z_high + CLAMP_M + missed, missed)
+    return new_parts
 
 
-def clamped_part(part: Part, low: float, high: float, missed: float = 0.0) -> list[Part]:
-    """The part where it is between `low` and `high`, and a level part where it is below or above; itself where it is neither, or falls below
-    `low` by no more than what points may have `missed` (m) of an eave."""
-    kept, beneath, above = [], [], []
+def clamp_part(part: Part, z_low: float, z_high: float, missed: float = 0.0) -> list[Part]:
+    """The part where it is between `z_low` and `z_high`, and a level part where it is below or above; itself where it is neither, or falls below
+    `z_low` by no more than what points may have `missed` (m) of an eave."""
+    kept_pieces, beneath, overhead = [], [], []
     for piece in part.pieces:
-        sunken, risen = beyond(piece, low - missed, high)
-        if sunken.area + risen.area < LEAST_M2:
-            kept.append(piece)
+        sunken, risen = find_excess(piece, z_low - missed, z_high)
+        if sunken.area + risen.area < LEAST_EXCESS_M2:
+            kept_pieces.append(piece)
             continue
-        sunken = beyond(piece, low, high)[0] if sunken.area > 0.0 else sunken
-        beneath += polygons_of(sunken)
-        above += polygons_of(risen)
-        rest = shapely.difference(piece.outline, with_area(shapely.union(sunken, risen)), grid_size=OVERLAY_GRID_M)
-        kept += [Piece(polygon, piece.planes) for polygon in polygons_of(rest)]
-    if not beneath and not above:
+        sunken = find_excess(piece, z_low, z_high)[0] if sunken.area > 0.0 else sunken
+        beneath += list_polygons(sunken)
+        overhead += list_polygons(risen)
+        remainder = shapely.difference(
+            piece.outline, with_area(shapely.union(sunken, risen)), grid_size=OVERLAY_GRID_M
+        )
+        kept_pieces += [Piece(polygon, piece.planes) for polygon in list_polygons(remainder)]
+    if not beneath and not overhead:
         return [part]
-    found = [dataclasses.replace(part, pieces=tuple(kept))] if kept else []
-    return found + [level_part(polygons, z) for polygons, z in ((beneath, low), (above, high)) if polygons]
+    new_parts = [dataclasses.replace(part, pieces=tuple(kept_pieces))] if kept_pieces else []
+    return new_parts + [
+        make_level_part(polygons, z)
+        for polygons, z in ((beneath, z_low), (overhead, z_high))
+        if polygons
+    ]
 
 
-def beyond(piece: Piece, low: float, high: float) -> tuple[shapely.Geometry, shapely.Geometry]:
-    """Where a piece is below `low`, which one of its planes is there, and where above `high`, as all of them are."""
-    z, sunken, risen = corner_heights(piece), NOWHERE, NOWHERE
-    if z.min() < low:
-        rings = [ring_above(box_around(piece.outline), *line) for line in ([0.0, 0.0, low] - piece.planes).tolist()]
-        below = with_area(shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=OVERLAY_GRID_M))
-        sunken = with_area(shapely.intersection(piece.outline, below, grid_size=OVERLAY_GRID_M))
-    if z.max(axis=0).min() > high:
-        ring = box_around(piece.outline)
-        for line in (piece.planes - [0.0, 0.0, high]).tolist():
-            ring = ring_above(ring, *line)
+def find_excess(
+    piece: Piece, z_low: float, z_high: float
+) -> tuple[shapely.Geometry, shapely.Geometry]:
+    """Where a piece is below `z_low`, which one of its planes is there, and where above `z_high`, as all of them are."""
+    z, sunken, risen = compute_corner_heights(piece), NO_AREA, NO_AREA
+    if z.min() < z_low:
+        rings = [
+            clip_ring(draw_box(piece.outline), *line)
+            for line in ([0.0, 0.0, z_low] - piece.planes).tolist()
+        ]
+        sunken_area = with_area(
+            shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=OVERLAY_GRID_M)
+        )
+        sunken = with_area(
+            shapely.intersection(piece.outline, sunken_area, grid_size=OVERLAY_GRID_M)
+        )
+    if z.max(axis=0).min() > z_high:
+        ring = draw_box(piece.outline)
+        for line in (piece.planes - [0.0, 0.0, z_high]).tolist():
+            ring = clip_ring(ring, *line)
         if ring:
-            risen = with_area(shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=OVERLAY_GRID_M))
+            risen = with_area(
+                shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=OVERLAY_GRID_M)
+            )
     return sunken, risen
 
 
-def corner_heights(piece: Piece) -> np.ndarray:
+def compute_corner_heights(piece: Piece) -> np.ndarray:
     """Heights (n, k) of a piece's k planes at the corners of its outline."""
     return shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
 
 
-def level_part(polygons: list[shapely.Polygon], z: float) -> Part:
+def make_level_part(polygons: list[shapely.Polygon], z: float) -> Part:
     """A flat part over `polygons` at height `z`."""
     x0, y0, x1, y1 = shapely.total_bounds(np.array(polygons, object))
     plane = np.array([[0.0, 0.0, z]])
     size = {"width": float(y1 - y0), "length": float(x1 - x0)}
     return Part(
-        "flat", tuple(Piece(p, plane) for p in polygons), size, 0.0, np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), z])
+        "flat",
+        tuple(Piece(p, plane) for p in polygons),
+        size,
+        0.0,
+        np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), z]),
     )
 
 
-def box_around(polygon: shapely.Polygon) -> list[tuple[float, float]]:
+def draw_box(polygon: shapely.Polygon) -> list[tuple[float, float]]:
     """The corners of a box that `polygon` lies in the midst of."""
     x0, y0, x1, y1 = polygon.bounds
     return [(x0 - 1.0, y0 - 1.0), (x1 + 1.0, y0 - 1.0), (x1 + 1.0, y1 + 1.0), (x0 - 1.0, y1 + 1.0)]
 
 
-def ring_above(ring: list[tuple[float, float]], a: float, b: float, c: float) -> list[tuple[float, float]]:
+def clip_ring(
+    ring: list[tuple[float, float]], a: float, b: float, c: float
+) -> list[tuple[float, float]]:
     """The part of a convex ring, or of none, where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
     signed = [a * x + b * y + c for x, y in ring]
-    kept = []
+    vertices = []
     for k, (vertex, z) in enumerate(zip(ring, signed, strict=True)):
         z_before = signed[k - 1]
         if (z >= 0.0) != (z_before >= 0.0):
             (x0, y0), share = ring[k - 1], z_before / (z_before - z)
-            kept.append((x0 + share * (vertex[0] - x0), y0 + share * (vertex[1] - y0)))
+            vertices.append((x0 + share * (vertex[0] - x0), y0 + share * (vertex[1] - y0)))
         if z >= 0.0:
-            kept.append(vertex)
-    return kept if len(kept) > 2 else []
+            vertices.append(vertex)
+    return vertices if len(vertices) > 2 else []

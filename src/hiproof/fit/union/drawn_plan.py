@@ -19,9 +19,9 @@ from .plan import Plan
 from .scene import Scene
 from .volumes import DIRECTION
 
-STRAIGHT_M = 0.02  # m; a corner nearer to the line between its two neighbours is none
-REACH_M = 0.0012  # m; as a solid's plan is arranged at the first attempt
-SAME_PLANE = 1e-5  # rise over run, and m: planes and slopes nearer to each other are one
+STRAIGHT_CORNER_M = 0.02  # m; a corner nearer to the line between its two neighbours is none
+PLAN_REACH_M = 0.0012  # m; as a solid's plan is arranged at the first attempt
+EQUAL_PLANE = 1e-5  # rise over run, and m: planes and slopes nearer to each other are one
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class DrawnPlan:
     corners: int
 
     @property
-    def shown(self) -> np.ndarray:
+    def visible_planes(self) -> np.ndarray:
         """The numbers of the planes that show."""
         return np.unique(self.beside[self.beside >= 0])
 
@@ -57,7 +57,7 @@ class DrawnPlan:
         return apart
 
 
-def part_over(
+def make_part(
     regions: list[list[shapely.Polygon]],
     volumes: np.ndarray,
     planes: list[Planes],
@@ -68,11 +68,11 @@ def part_over(
     pieces, owner = [], []
     for k, polygons in enumerate(regions):
         if polygons:
-            there = np.flatnonzero(np.isfinite(planes[k].rows[:, 2]))
+            numbers = np.flatnonzero(np.isfinite(planes[k].rows[:, 2]))
             turn = scene.turn[int(volumes[k, DIRECTION])]
-            rows = local_planes(planes[k].rows[there], turn, plan)
+            rows = transform_planes(planes[k].rows[numbers], turn, plan)
             pieces += [Piece(polygon, rows) for polygon in polygons]
-            owner += [(k, p) for p in there.tolist()] * len(polygons)
+            owner += [(k, p) for p in numbers.tolist()] * len(polygons)
     return Part("free", tuple(pieces)), owner
 
 
@@ -84,20 +84,22 @@ def draw_plan(
     options = ComposeSettings()
     try:
         problem = plan_problem(roof)
-        cells = arrange(problem, REACH_M, options.min_face_area_m2, options.min_face_width_m)
+        cells = arrange(problem, PLAN_REACH_M, options.min_face_area_m2, options.min_face_width_m)
     except CompositionError:
         return None
-    return counted_plan(cells, problem.planes, np.array(owner))
+    return make_drawn_plan(cells, problem.planes, np.array(owner))
 
 
-def counted_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan | None:
+def make_drawn_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan | None:
     """The plan of `cells`, in metres; None where a plane is in it that no volume owns."""
-    split = split_at_crossings(cells.xy, cells.edges, cells.side, grid_planes, REACH_M / GRID_M)
+    split = split_at_crossings(
+        cells.xy, cells.edges, cells.side, grid_planes, PLAN_REACH_M / GRID_M
+    )
     xy, edges, side, ties = split
     if not len(edges) or side.max() >= len(owner):
         return None
-    low = -1e9  # grid units; far below any roof
-    _, _, follow, _, level, vertices = stack_levels(xy, edges, side, grid_planes, low, ties)
+    floor = -1e9  # grid units; far below any roof
+    _, _, follow, _, level, vertices = stack_levels(xy, edges, side, grid_planes, floor, ties)
     roofed = side.ravel() != OUTSIDE
     ends = np.column_stack([level, level[follow]])[roofed]
     planes = grid_planes * [1.0, 1.0, GRID_M]
@@ -107,20 +109,20 @@ def counted_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan
 
 def count_corners(ends: np.ndarray, vertices: np.ndarray) -> int:
     """Count the vertices (n, 3) at the `ends` (m, 2) of edges that are not straight between two."""
-    one, other = ends[ends[:, 0] != ends[:, 1]].T
+    starts, other = ends[ends[:, 0] != ends[:, 1]].T
     size = len(vertices)
-    pairs = np.unique(np.minimum(one, other) * size + np.maximum(one, other))
-    one, other = np.divmod(pairs, size)
-    at = np.concatenate([one, other])
-    beside = np.concatenate([other, one])[np.argsort(at, kind="stable")]
-    count = np.bincount(at, minlength=size)
+    pairs = np.unique(np.minimum(starts, other) * size + np.maximum(starts, other))
+    starts, other = np.divmod(pairs, size)
+    begins = np.concatenate([starts, other])
+    neighbours = np.concatenate([other, starts])[np.argsort(begins, kind="stable")]
+    count = np.bincount(begins, minlength=size)
     middle = np.flatnonzero(count == 2)
     first = (np.cumsum(count) - count)[middle]
-    v, a, b = vertices[middle], vertices[beside[first]], vertices[beside[first + 1]]
+    v, a, b = vertices[middle], vertices[neighbours[first]], vertices[neighbours[first + 1]]
     way = b - a
     share = ((v - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12)
-    off = np.linalg.norm(v - a - share[:, None] * way, axis=1)
-    straight = (off < STRAIGHT_M) & (share > 0.0) & (share < 1.0)
+    offsets = np.linalg.norm(v - a - share[:, None] * way, axis=1)
+    straight = (offsets < STRAIGHT_CORNER_M) & (share > 0.0) & (share < 1.0)
     return int(np.count_nonzero(count)) - int(straight.sum())
 
 
@@ -132,14 +134,14 @@ def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
     c, s = turns.T
     a, b, z = rows.T
     common = np.column_stack([c * a - s * b, s * a + c * b, z])
-    apart = np.abs(common[:, None] - common).max(axis=2) > SAME_PLANE
+    is_apart = np.abs(common[:, None] - common).max(axis=2) > EQUAL_PLANE
     slopes = np.sort(np.hypot(rows[:, 0], rows[:, 1]))
-    slopes = slopes[slopes > SAME_PLANE]
-    distinct = sum(apart[k, :k].all() for k in range(len(rows)))
-    return int(distinct) + int((np.diff(slopes, prepend=0.0) > SAME_PLANE).sum())
+    slopes = slopes[slopes > EQUAL_PLANE]
+    distinct = sum(is_apart[k, :k].all() for k in range(len(rows)))
+    return int(distinct) + int((np.diff(slopes, prepend=0.0) > EQUAL_PLANE).sum())
 
 
-def local_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
+def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
     """Planes (k, 3) of local x, y, 1 from those in axes turned by `turn` from the plan's."""
     c, s = turn
     gradients = rows[:, :2] @ np.array([[c, s], [-s, c]]) @ plan.frame.rotation

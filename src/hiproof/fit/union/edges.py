@@ -9,97 +9,119 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .around import roof_everywhere
-from .objective import BASE_SHARE, costs
+from .around import compute_roof_everywhere
+from .objective import BASE_SHARE, compute_costs
 from .prices import BASE_COST
-from .steps import among_vertices, edge_cost, walls_of
+from .steps import gather_walls, locate_line, price_edge
 from .volumes import (
     DIRECTION,
     LEVEL,
-    OFFSET,
-    SLOPE,
+    OFFSET0,
+    SLOPE0,
     U0,
     U1,
     V0,
     V1,
-    volume_cost,
+    price_volume,
 )
 
 MIN_SIDE_M = 0.8  # m; a narrower volume is no part of a roof but a gutter or a parapet
 BETWEEN_M = 0.4  # how far an edge may go to a place midway between points,
-SMALL_REACH_M = 1.0  # once it is settled to within this: in the search it would rather stay on a line
-BEYOND_M = 0.6  # an edge outside the outline by so much does not show
-NEAR_VERTEX_M = 1.5  # m within which corners of the outline are places to put an edge
-SMALL_STEPS, SMALL_STEP_M = 4, 0.1  # steps tried to either side of where an edge lies, and m of a step
-TOUCH_M = 0.04  # m within which two volumes count as touching
-SAME_M = 1e-3  # places nearer than this are one: of corners of the outline and grid lines at them the corner, which comes first
-LEAST_GAIN = 1e-6  # of the objective; numerically none
+SMALL_REACH_M = (
+    1.0  # once it is settled to within this: in the search it would rather stay on a line
+)
+BEYOND_OUTLINE_M = 0.6  # an edge outside the outline by so much does not show
+VERTEX_REACH_M = 1.5  # m within which corners of the outline are places to put an edge
+SMALL_STEPS, SMALL_STEP_M = (
+    4,
+    0.1,
+)  # steps tried to either side of where an edge lies, and m of a step
+MOVE_TOUCH_M = 0.04  # m within which two volumes count as touching
+EQUAL_PLACE_M = 1e-3  # places nearer than this are one: of corners of the outline and grid lines at them the corner, which comes first
+NO_GAIN = 1e-6  # of the objective; numerically none
 EVERYWHERE = 60.0  # m: no edge is further from where it may go
 
 
 @compiled
-def move_edges(volumes, scene, k, value, reach, around):
+def move_edges(volumes, scene, k, value, reach, context):
     """Move each edge of volume k (in place) by at most `reach` to the place of the lowest objective; returns that."""
-    everywhere, without = roof_everywhere(volumes, scene.U, scene.V, k, around), around.without
-    before, gain, bare = costs(without, scene), costs(everywhere, scene), np.zeros(len(without))
-    base, always_bare = volumes[0, OFFSET + LEVEL], 0.0
+    everywhere, roof_without = (
+        compute_roof_everywhere(volumes, scene.U, scene.V, k, context),
+        context.roof_without,
+    )
+    cost_without, gain, bare = (
+        compute_costs(roof_without, scene),
+        compute_costs(everywhere, scene),
+        np.zeros(len(roof_without)),
+    )
+    base, always_bare = volumes[0, OFFSET0 + LEVEL], 0.0
     for i in range(len(gain)):
-        gain[i] = gain[i] - before[i] if everywhere[i] != without[i] else 0.0
+        gain[i] = gain[i] - cost_without[i] if everywhere[i] != roof_without[i] else 0.0
     for i in range(scene.n, len(bare)):
-        if without[i] == base:
+        if roof_without[i] == base:
             always_bare += scene.weight[i]
             bare[i] = scene.weight[i] if everywhere[i] != base else 0.0
-    fixed = before.sum()
+    fixed = cost_without.sum()
     for j in range(1, len(volumes)):
-        fixed += scene.evidence * volume_cost(volumes[j])
+        fixed += scene.evidence * price_volume(volumes[j])
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
     touched = np.zeros((len(volumes), 4), np.bool_)
-    walls, is_charged, direction = walls_of(scene), False, int(volumes[k, DIRECTION])
+    walls, is_charged, direction = gather_walls(scene), False, int(volumes[k, DIRECTION])
     for edge in range(4):
-        places, m = places_of(volumes, scene, k, edge)
+        places, m = list_edge_places(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
         sign = -1.0 if edge % 2 == 0 else 1.0
-        distance, gains, covered = sums_outward(volumes, scene, k, edge, gain, bare)
-        places[m] = between_points(distance, gains, sign, start) if reach < SMALL_REACH_M else start
-        best, chosen = value - LEAST_GAIN, start
-        least = np.full(m + 1, np.inf)  # what the roof costs at each place before its edges are charged
+        distance, gains, covered = sum_outward(volumes, scene, k, edge, gain, bare)
+        places[m] = (
+            find_place_between(distance, gains, sign, start) if reach < SMALL_REACH_M else start
+        )
+        best, best_place = value - NO_GAIN, start
+        bounds = np.full(
+            m + 1, np.inf
+        )  # what the roof costs at each place before its edges are charged
         for q in range(m + 1):
             t = places[q]
             if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
                 continue
             p = np.searchsorted(distance, sign * t, side="right")
-            least[q] = fixed + (gains[p - 1] if p > 0 else 0.0)
+            bounds[q] = fixed + (gains[p - 1] if p > 0 else 0.0)
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
-                least[q] += scene.evidence * BASE_COST
+                bounds[q] += scene.evidence * BASE_COST
         while True:
-            cheapest = np.argmin(least)
-            t, trial = places[cheapest], least[cheapest]
+            cheapest = np.argmin(bounds)
+            t, trial = places[cheapest], bounds[cheapest]
             if trial >= best:
                 break
-            least[cheapest] = np.inf
+            bounds[cheapest] = np.inf
             if is_repeated(places, cheapest):
                 continue
             if not is_charged:
                 is_charged = True
-                charge_all(volumes, walls, direction, charge, boxes)
-            trial = charged(volumes, walls, k, edge, t, trial, best, charge, boxes, touched)
+                charge_edges(volumes, walls, direction, charge, boxes)
+            trial = charge_move(volumes, walls, k, edge, t, trial, best, charge, boxes, touched)
             if trial < best:
-                best, chosen = trial, t
-        if chosen != start:
-            volumes[k, U0 + edge] = chosen
+                best, best_place = trial, t
+        if best_place != start:
+            volumes[k, U0 + edge] = best_place
             value, is_charged = best, False
     return value
 
 
 @compiled
-def sums_outward(volumes, scene, k, edge, gain, bare):
+def sum_outward(volumes, scene, k, edge, gain, bare):
     """Points and ghosts that an edge of volume k passes on its way out from the opposite one, in that order: their distances along
     the way, ascending, and the sums of `gain` and of `bare` up to each."""
     direction = int(volumes[k, DIRECTION])
     u, v, order = scene.U[direction], scene.V[direction], scene.order[direction, edge // 2]
     x, across = (u, v) if edge < 2 else (v, u)
-    low, high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
-    sign, opposite, count = (-1.0 if edge % 2 == 0 else 1.0), volumes[k, U0 + (edge ^ 1)], len(order)
+    cross_low, cross_high = (
+        (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+    )
+    sign, opposite, count = (
+        (-1.0 if edge % 2 == 0 else 1.0),
+        volumes[k, U0 + (edge ^ 1)],
+        len(order),
+    )
     distance, gains, covered = np.empty(count), np.empty(count), np.empty(count)
     first, last = 0, count  # of the order, where the way begins: found by halving
     while first < last:
@@ -112,7 +134,7 @@ def sums_outward(volumes, scene, k, edge, gain, bare):
     m = 0
     for q in range(first, count):
         i = order[q if edge % 2 == 1 else count - 1 - q]
-        if low <= across[i] <= high:
+        if cross_low <= across[i] <= cross_high:
             gained += gain[i]
             bared += bare[i]
             distance[m], gains[m], covered[m] = sign * x[i], gained, bared
@@ -121,29 +143,31 @@ def sums_outward(volumes, scene, k, edge, gain, bare):
 
 
 @compiled
-def between_points(distance, gains, sign, start):
+def find_place_between(distance, gains, sign, start):
     """The place near an edge's `start`, midway between two points, where the misfit is lowest.
 
     `distance` (m,) of the points along the edge's way out, ascending, and `gains` (m,), the misfit up to each of them.
     """
-    low = np.searchsorted(distance, sign * start - BETWEEN_M)
-    high = np.searchsorted(distance, sign * start + BETWEEN_M)
+    first = np.searchsorted(distance, sign * start - BETWEEN_M)
+    last = np.searchsorted(distance, sign * start + BETWEEN_M)
     lowest, place = np.inf, start
-    for p in range(max(low, 1), min(high, len(distance) - 1) + 1):
+    for p in range(max(first, 1), min(last, len(distance) - 1) + 1):
         if gains[p - 1] < lowest:
             lowest, place = gains[p - 1], sign * 0.5 * (distance[p - 1] + distance[p])
     return place
 
 
 @compiled
-def places_of(volumes, scene, k, edge):
+def list_edge_places(volumes, scene, k, edge):
     """Where an edge may go: corners of the outline, grid lines, small steps, other volumes' edges and ridges, outside."""
     direction, axis, start = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     lines, vertices = scene.lines[direction, axis], scene.vertices[direction, axis]
-    places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2)  # one is the caller's
+    places = np.empty(
+        len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2
+    )  # one is the caller's
     m, last = 0, lines[0]
     for x in vertices:
-        if abs(x - start) < NEAR_VERTEX_M:
+        if abs(x - start) < VERTEX_REACH_M:
             places[m] = x
             m += 1
     for x in lines:
@@ -158,11 +182,13 @@ def places_of(volumes, scene, k, edge):
         if j != k and int(volumes[j, DIRECTION]) == direction:
             places[m], places[m + 1] = volumes[j, U0 + 2 * axis], volumes[j, U1 + 2 * axis]
             m += 2
-            rising, falling = volumes[j, OFFSET + 2 * axis], volumes[j, OFFSET + 2 * axis + 1]
+            rising, falling = volumes[j, OFFSET0 + 2 * axis], volumes[j, OFFSET0 + 2 * axis + 1]
             if rising < np.inf and falling < np.inf:
-                places[m] = (falling - rising) / (volumes[j, SLOPE + 2 * axis] + volumes[j, SLOPE + 2 * axis + 1])
+                places[m] = (falling - rising) / (
+                    volumes[j, SLOPE0 + 2 * axis] + volumes[j, SLOPE0 + 2 * axis + 1]
+                )
                 m += 1
-    places[m] = lines[0] - BEYOND_M if edge % 2 == 0 else last + BEYOND_M
+    places[m] = lines[0] - BEYOND_OUTLINE_M if edge % 2 == 0 else last + BEYOND_OUTLINE_M
     return places, m + 1
 
 
@@ -170,13 +196,13 @@ def places_of(volumes, scene, k, edge):
 def is_repeated(places, q):
     """Whether the q-th place is one of those before it."""
     for p in range(q):
-        if abs(places[p] - places[q]) < SAME_M:
+        if abs(places[p] - places[q]) < EQUAL_PLACE_M:
             return True
     return False
 
 
 @compiled(allocates=False)
-def charge_all(volumes, walls, direction, charge, boxes):
+def charge_edges(volumes, walls, direction, charge, boxes):
     """Fill `charge` (k, 4) with the cost of every edge, and `boxes` (k, 4, 4) with its bounds in the axes of `direction`, none where it
     lies outside the outline."""
     c, s = walls.turn[direction, 0], walls.turn[direction, 1]
@@ -188,9 +214,9 @@ def charge_all(volumes, walls, direction, charge, boxes):
         for e in range(4):
             boxes[j, e, 0] = boxes[j, e, 2] = np.inf
             boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
-            if not among_vertices(walls, other, e // 2, volumes[j, U0 + e])[0]:
+            if not locate_line(walls, other, e // 2, volumes[j, U0 + e])[0]:
                 continue  # it shows nowhere, whatever moves beside it
-            charge[j, e] = edge_cost(volumes, walls, j, e)
+            charge[j, e] = price_edge(volumes, walls, j, e)
             for end in range(2):
                 a = volumes[j, U0 + e] if e < 2 else volumes[j, U0 + end]
                 b = volumes[j, V0 + end] if e < 2 else volumes[j, U0 + e]
@@ -200,29 +226,34 @@ def charge_all(volumes, walls, direction, charge, boxes):
 
 
 @compiled(allocates=False)
-def charged(volumes, walls, k, edge, t, trial, best, charge, boxes, touched):
+def charge_move(volumes, walls, k, edge, t, trial, best, charge, boxes, touched):
     """`trial` and all edges' costs were edge `edge` of volume k at `t`; given up as soon as it is not below `best`.
 
     Which edges (k, 4) the move touches goes to `touched`.
     """
     start = volumes[k, U0 + edge]
-    low, high = min(start, t) - TOUCH_M, max(start, t) + TOUCH_M
-    cross_low, cross_high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+    move_low, move_high = min(start, t) - MOVE_TOUCH_M, max(start, t) + MOVE_TOUCH_M
+    cross_low, cross_high = (
+        (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+    )
     along, cross = (0, 2) if edge < 2 else (2, 0)
     for j in range(1, len(volumes)):
         for e in range(4):
             if j == k:
                 touched[j, e] = e == edge or (e != edge ^ 1 and boxes[j, e, 0] < np.inf)
             else:
-                meets = boxes[j, e, along] <= high and boxes[j, e, along + 1] >= low
-                beside = boxes[j, e, cross] <= cross_high + TOUCH_M and boxes[j, e, cross + 1] >= cross_low - TOUCH_M
-                touched[j, e] = meets and beside
+                meets = boxes[j, e, along] <= move_high and boxes[j, e, along + 1] >= move_low
+                is_beside = (
+                    boxes[j, e, cross] <= cross_high + MOVE_TOUCH_M
+                    and boxes[j, e, cross + 1] >= cross_low - MOVE_TOUCH_M
+                )
+                touched[j, e] = meets and is_beside
             if not touched[j, e]:
                 trial += walls.evidence * charge[j, e]
     volumes[k, U0 + edge] = t
     for j in range(1, len(volumes)):
         for e in range(4):
             if trial < best and touched[j, e]:
-                trial += walls.evidence * edge_cost(volumes, walls, j, e)
+                trial += walls.evidence * price_edge(volumes, walls, j, e)
     volumes[k, U0 + edge] = start
     return trial

@@ -11,46 +11,48 @@ from dataclasses import replace
 
 import numpy as np
 
-from .agree import Agreement, agreed, hide_again
-from .box import Box, box_around
-from .cants import Known
-from .finish import Planes, found_planes
-from .regions import Site
+from .agree import Agreement, agree_planes, restore_risen_planes
+from .box import Box, enclose_boxes
+from .cants import Cache
+from .finish import Planes, read_volume_planes
+from .regions import PlanSite
 from .scene import Scene
 from .sides import Side
-from .unite import Drawn, Ends, drawn, ends_within
+from .unite import DrawnRoof, OutlineEnds, draw_roof, select_ends
 from .volumes import U0, V1
-from .whole import PLACE, Whole
-from .window import forget_settled, open_window, restore
+from .whole import PLACE_COLUMNS, Whole
+from .window import forget_digests, open_window, restore_volumes
 
 MOST_AT_ONCE = 24  # volumes that are looked at all at once, as those of a house
 GROUP = 8  # volumes of a group at most
-AROUND_M = 2.0  # m around a group that its window shows
-WINDOW_POINTS = 6000  # of a group's window at most
+GROUP_MARGIN_M = 2.0  # m around a group that its window shows
+GROUP_POINTS = 6000  # of a group's window at most
 
 # Volumes, what is seen of them, and the numbers of those that may change (None: all): the volumes changed.
 Pass = Callable[[np.ndarray, Scene, list[int] | None], np.ndarray]
 
 
-def run_in_groups(change: Pass, volumes: np.ndarray, site: Site) -> np.ndarray:
+def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarray:
     """Let a pass change the volumes: all at once where they are few, else group by group."""
     if len(volumes) <= MOST_AT_ONCE:
         return change(volumes, site.scene, None)
     whole = Whole(site.scene, site.plan, site.outline, volumes)
-    for places in [[whole.volumes[k, PLACE].tobytes() for k in group] for group in groups_of(whole)]:
+    for places in [
+        [whole.volumes[k, PLACE_COLUMNS].tobytes() for k in group] for group in group_volumes(whole)
+    ]:
         group = [k for k in map(whole.find, places) if k is not None]
-        seen = look_at(whole, group) if group else None
-        if seen is None:
+        view = open_group(whole, group) if group else None
+        if view is None:
             continue
-        scene, numbers = seen
-        found = change(whole.volumes[numbers].copy(), scene, group)
-        others = [k for k in numbers[1:] if k not in group]
-        found = restore(found.copy(), whole.volumes, others)
-        whole.replace(numbers[1:], found[1:])
-    return forget_settled(whole.volumes)
+        scene, numbers = view
+        new_rows = change(whole.volumes[numbers].copy(), scene, group)
+        unmoved = [k for k in numbers[1:] if k not in group]
+        new_rows = restore_volumes(new_rows.copy(), whole.volumes, unmoved)
+        whole.replace(numbers[1:], new_rows[1:])
+    return forget_digests(whole.volumes)
 
 
-def groups_of(whole: Whole) -> list[list[int]]:
+def group_volumes(whole: Whole) -> list[list[int]]:
     """The numbers of all volumes but the base in groups of neighbours: halved along the longer axis until small."""
     if len(whole.volumes) < 2:
         return []
@@ -71,48 +73,60 @@ def halve(numbers: np.ndarray, middles: np.ndarray) -> Iterator[list[int]]:
     yield from halve(order[len(order) // 2 :], middles)
 
 
-def window_of(whole: Whole, group: Sequence[int]) -> Box:
-    return box_around(Box(*whole.boxes[k]) for k in group).widen(AROUND_M)
+def frame_group(whole: Whole, group: Sequence[int]) -> Box:
+    return enclose_boxes(Box(*whole.boxes[k]) for k in group).widen(GROUP_MARGIN_M)
 
 
-def look_at(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | None:
+def open_group(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | None:
     """The scene around a group, and the numbers of the base and of all volumes that reach into it."""
-    box = window_of(whole, group)
-    scene = open_window(whole, box, WINDOW_POINTS)
-    return None if scene is None else (scene, [0, *whole.volumes_in(box)])
+    box = frame_group(whole, group)
+    scene = open_window(whole, box, GROUP_POINTS)
+    return None if scene is None else (scene, [0, *whole.list_volumes(box)])
 
 
-def draw_in_groups(volumes: np.ndarray, ends: Ends, site: Site, known: Known) -> tuple[Drawn, Agreement]:
+def draw_in_groups(
+    volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
+) -> tuple[DrawnRoof, Agreement]:
     """The volumes with their sides and planes, and those that agree with their neighbours equal to these.
 
-    Planes `known` of volumes seen all at once are not fitted again. Of volumes that are not looked at
+    Planes `cache` of volumes seen all at once are not fitted again. Of volumes that are not looked at
     all at once no common unknowns are known: their agreement has no members.
     """
     if len(volumes) <= MOST_AT_ONCE:
-        roof = drawn(volumes, ends, site.scene, known)
-        planes = hide_again(volumes, roof.planes, site.scene)
-        agreement = agreed(volumes, roof.sides, planes, site.scene)
+        roof = draw_roof(volumes, ends, site.scene, cache)
+        planes = restore_risen_planes(volumes, roof.planes, site.scene)
+        agreement = agree_planes(volumes, roof.sides, planes, site.scene)
         return replace(roof, planes=agreement.planes), agreement
     whole = Whole(site.scene, site.plan, site.outline, volumes)
     sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
-    planes = [found_planes(row, whole.scene) for row in volumes]
-    for group in groups_of(whole):
-        seen = look_at(whole, group)
-        if seen is None:
+    planes = [read_volume_planes(row, whole.scene) for row in volumes]
+    for group in group_volumes(whole):
+        view = open_group(whole, group)
+        if view is None:
             continue
-        scene, numbers = seen
+        scene, numbers = view
         rows = whole.volumes[numbers]
-        roof = drawn(rows, ends_within(ends, scene), scene, {})
-        held = [own if k in group else hold(own) for k, own in zip(numbers, roof.planes, strict=True)]
-        together = agreed(rows, roof.sides, held, scene).planes
+        roof = draw_roof(rows, select_ends(ends, scene), scene, {})
+        group_planes = [
+            volume_planes if k in group else fix_planes(volume_planes)
+            for k, volume_planes in zip(numbers, roof.planes, strict=True)
+        ]
+        together = agree_planes(rows, roof.sides, group_planes, scene).planes
         for k in group:
-            at = numbers.index(k)
-            sides[k], planes[k] = roof.sides[at], together[at]
-    planes = hide_again(volumes, planes, site.scene)
+            position = numbers.index(k)
+            sides[k], planes[k] = roof.sides[position], together[position]
+    planes = restore_risen_planes(volumes, planes, site.scene)
     agreement = Agreement(planes, {}, np.zeros((0, 0)), np.zeros(0))
-    return Drawn(volumes, sides, planes, sum(own.cost + own.price for own in planes)), agreement
+    return DrawnRoof(
+        volumes,
+        sides,
+        planes,
+        sum(volume_planes.cost + volume_planes.price for volume_planes in planes),
+    ), agreement
 
 
-def hold(planes: Planes) -> Planes:
+def fix_planes(planes: Planes) -> Planes:
     """The planes without unknowns: others do not change them."""
-    return replace(planes, design=np.zeros((*planes.design.shape[:2], 0)), covariance=np.zeros((0, 0)))
+    return replace(
+        planes, design=np.zeros((*planes.design.shape[:2], 0)), covariance=np.zeros((0, 0))
+    )

@@ -5,25 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from .add import (
-    COME_BACK,
-    ENOUGH,
     FEWEST_UNEXPLAINED,
-    Ground,
+    NOTHING_LEFT,
+    ROOF_IS_KNOWN,
+    GrowthGrid,
     add_volumes,
-    unexplained,
+    find_unexplained,
 )
-from .candidates import HOUSE, Effort, candidates_of, grids_of
+from .candidates import HOUSE, Effort, list_candidates, make_grids
 from .improve import improve
-from .moves import without
-from .objective import objective
-from .plan import MIN_STRUCTURE_POINTS, cells_of
+from .moves import remove_volume
+from .objective import compute_objective
+from .plan import MIN_STRUCTURE_POINTS, find_cells
 from .prices import REGROWN_UNITS
 from .scene import Scene
-from .volumes import OFFSET, SIDES, SLOPE, base_only
+from .volumes import N_SIDES, OFFSET0, SLOPE0, make_base
 
 MOST_ADDITIONS = 20  # tried for one building: a bound on time
-BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs but not below a stray point
-MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
+BASE_QUANTILE = (
+    0.02  # of the heights at which the base lies: below all roofs but not below a stray point
+)
+MOST_TYPICAL_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
 # of all moves: before a place is grown anew, where no candidate helps, at the end
 STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = 2, 2, 3
 
@@ -31,23 +33,29 @@ STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = 2, 2, 3
 def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
     """Volumes (k, COLUMNS) and their objective: grown from the base, then each taken out in turn and its place grown anew."""
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
-    base = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
-    candidates = candidates_of(scene, np.arange(scene.n), effort.planes, effort)
-    ground = ground_of(scene, candidates)
-    volumes, value = grown(base, objective(base, scene, np.inf), ground, candidates, effort)
-    return regrown(volumes, value, ground, candidates, effort)
+    base = make_base(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
+    candidates = list_candidates(scene, np.arange(scene.n), effort.planes, effort)
+    ground = prepare_growth(scene, candidates)
+    volumes, value = grow_volumes(
+        base, compute_objective(base, scene, np.inf), ground, candidates, effort
+    )
+    return regrow_volumes(volumes, value, ground, candidates, effort)
 
 
-def ground_of(scene: Scene, candidates: np.ndarray) -> Ground:
+def prepare_growth(scene: Scene, candidates: np.ndarray) -> GrowthGrid:
     """The ground that a scene and the first candidates give."""
-    grids = grids_of(scene)
-    cell_u = np.array([cells_of(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
-    cell_v = np.array([cells_of(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
-    return Ground(scene, cell_u, cell_v, typical_slopes(candidates))
+    grids = make_grids(scene)
+    cell_u = np.array([find_cells(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
+    cell_v = np.array([find_cells(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
+    return GrowthGrid(scene, cell_u, cell_v, select_typical_slopes(candidates))
 
 
-def regrown(
-    volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray, effort: Effort = HOUSE
+def regrow_volumes(
+    volumes: np.ndarray,
+    value: float,
+    ground: GrowthGrid,
+    candidates: np.ndarray,
+    effort: Effort = HOUSE,
 ) -> tuple[np.ndarray, float]:
     """The volumes with each of the first in turn taken out and what is missing grown anew, where that is clearly better.
 
@@ -56,47 +64,58 @@ def regrown(
     """
     k, scene = min(len(volumes) - 1, effort.regrown), ground.scene
     while k > 0 and len(volumes) > 2:
-        trial = without(volumes, k)
-        trial, found = improve(trial, scene, objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS)
-        trial, found = grown(trial, found, ground, candidates, effort, (len(volumes), value))
-        if found < value - REGROWN_UNITS * scene.evidence:
-            volumes, value = trial, found
+        trial = remove_volume(volumes, k)
+        trial, trial_value = improve(
+            trial, scene, compute_objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS
+        )
+        trial, trial_value = grow_volumes(
+            trial, trial_value, ground, candidates, effort, (len(volumes), value)
+        )
+        if trial_value < value - REGROWN_UNITS * scene.evidence:
+            volumes, value = trial, trial_value
         k = min(k, len(volumes)) - 1
     return volumes, value
 
 
-def grown(
+def grow_volumes(
     volumes: np.ndarray,
     value: float,
-    ground: Ground,
+    ground: GrowthGrid,
     candidates: np.ndarray,
     effort: Effort,
-    known: tuple[int, float] = (0, 0.0),
+    known_roof: tuple[int, float] = (0, 0.0),
 ) -> tuple[np.ndarray, float]:
     """The volumes with more of them added, first of the `candidates`, then of what the points left unexplained speak for, as long as
-    that pays, or until there are as many as in a `known` roof for as much."""
-    scene, left, fresh = ground.scene, MOST_ADDITIONS, False
-    while left > 0:
-        before = left
-        volumes, value, end, left = add_volumes(volumes, value, ground, candidates, left, *known)
-        if end == COME_BACK:
+    that pays, or until there are as many as in a `known_roof` roof for as much."""
+    scene, remaining, is_new = ground.scene, MOST_ADDITIONS, False
+    while remaining > 0:
+        n_before = remaining
+        volumes, value, end, remaining = add_volumes(
+            volumes, value, ground, candidates, remaining, *known_roof
+        )
+        if end == ROOF_IS_KNOWN:
             return volumes, value
-        if end == ENOUGH or (fresh and left == before - 1):
+        if end == NOTHING_LEFT or (is_new and remaining == n_before - 1):
             break
         volumes, value = improve(volumes, scene, value, ground.slopes, STUCK_ROUNDS)
-        far = unexplained(volumes, scene)
-        if len(far) < FEWEST_UNEXPLAINED:
+        unexplained_points = find_unexplained(volumes, scene)
+        if len(unexplained_points) < FEWEST_UNEXPLAINED:
             break
-        candidates, fresh = candidates_of(scene, far, effort.new_planes, effort), True
+        candidates, is_new = (
+            list_candidates(scene, unexplained_points, effort.new_planes, effort),
+            True,
+        )
     return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)
 
 
-def typical_slopes(candidates: np.ndarray) -> np.ndarray:
-    """At most MOST_SLOPES slopes (m,) of the candidates, spread over all that they have."""
-    slopes = candidates[:, SLOPE : SLOPE + SIDES][np.isfinite(candidates[:, OFFSET : OFFSET + SIDES])]
+def select_typical_slopes(candidates: np.ndarray) -> np.ndarray:
+    """At most MOST_TYPICAL_SLOPES slopes (m,) of the candidates, spread over all that they have."""
+    slopes = candidates[:, SLOPE0 : SLOPE0 + N_SIDES][
+        np.isfinite(candidates[:, OFFSET0 : OFFSET0 + N_SIDES])
+    ]
     slopes = np.unique(np.round(slopes, 2))
     return (
-        slopes[np.linspace(0, len(slopes) - 1, MOST_SLOPES).round().astype(int)]
-        if len(slopes) > MOST_SLOPES
+        slopes[np.linspace(0, len(slopes) - 1, MOST_TYPICAL_SLOPES).round().astype(int)]
+        if len(slopes) > MOST_TYPICAL_SLOPES
         else slopes
     )

@@ -13,31 +13,31 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .around import look_around
-from .moves import remove_plane, settled, without
+from .around import measure_context
+from .moves import remove_plane, remove_volume, settle_move
 from .volumes import (
     DIRECTION,
     FREE,
-    LEAN,
+    LEAN0,
     LEVEL,
-    OFFSET,
-    PLANES,
+    N_PLANES,
+    N_SIDES,
+    OFFSET0,
     REPLACES,
-    SIDES,
-    SLOPE,
+    SLOPE0,
     TIE,
     U0,
     U1,
     V0,
     V1,
-    distance_up,
+    count_planes,
     is_fixed,
-    plane_count,
+    measure_run,
 )
 
-ALIKE_M = 0.4  # m between two planes that may be one: as far as points reach from a plane, and half as far again
+SAME_HEIGHT_M = 0.4  # m between two planes that may be one: as far as points reach from a plane, and half as far again
 # m within which a volume begins beyond the side of another, or under it, where edges are hidden and lie anywhere
-BESIDE_M, UNDER_M = 0.6, 2.0
+NEIGHBOUR_GAP_M, UNDER_M = 0.6, 2.0
 MERGE_REACH_M = 2.0  # m that edges may move when one volume takes another's place
 
 
@@ -46,176 +46,200 @@ def merge_volumes(volumes, scene, value, steepest):
     """Two volumes become one over both rectangles, where neither is steeper than `steepest`."""
     k = 1
     while k < len(volumes):
-        before = len(volumes)
-        volumes, value = merge_with_others(volumes, scene, value, k, steepest)
-        k = k + 1 if len(volumes) == before else 1
+        count_before = len(volumes)
+        volumes, value = merge_volume(volumes, scene, value, k, steepest)
+        k = k + 1 if len(volumes) == count_before else 1
     return volumes, value
 
 
 @compiled
-def merge_with_others(volumes, scene, value, k, steepest):
+def merge_volume(volumes, scene, value, k, steepest):
     """Volume k and another become one over both rectangles, where neither is steeper than `steepest`."""
     for j in range(1, len(volumes)):
         if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
             continue
-        if max_slope(volumes, j, k) > steepest:
+        if find_steepest_slope(volumes, j, k) > steepest:
             continue
         trial = volumes.copy()
         for edge in range(4):
-            reach_over(trial, k, j, edge)
-        trial, found = settled_without(trial, scene, k, value, j)
-        if found < np.inf:
-            return trial, found
+            extend_edge(trial, k, j, edge)
+        trial, trial_value = settle_merger(trial, scene, k, value, j)
+        if trial_value < np.inf:
+            return trial, trial_value
     return volumes, value
 
 
 @compiled
-def reach_over(volumes, k, j, edge):
+def extend_edge(volumes, k, j, edge):
     """Have an edge of volume k lie as far out as that of volume j, in place."""
     a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
     volumes[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
 
 
 @compiled
-def settled_without(trial, scene, k, value, j):
-    """`trial` without volume j, and with volume k, which took its place, settled; what `settled` says of it."""
-    return settled_anew(without(trial, j), scene, k if k < j else k - 1, value)
+def settle_merger(trial, scene, k, value, j):
+    """`trial` without volume j, and with volume k, which took its place, settled; what `settle_move` says of it."""
+    return settle_trial(remove_volume(trial, j), scene, k if k < j else k - 1, value)
 
 
 @compiled
-def settled_anew(trial, scene, k, value):
+def settle_trial(trial, scene, k, value):
     """Settle volume k of a `trial` of which others changed, too."""
-    around = look_around(trial, scene.U, scene.V, k)
-    return settled(trial, scene, k, value, MERGE_REACH_M, around)
+    context = measure_context(trial, scene.U, scene.V, k)
+    return settle_move(trial, scene, k, value, MERGE_REACH_M, context)
 
 
 @compiled
 def join_neighbours(volumes, scene, value, k):
     """Volume k merged with another, an end taken in, those around it made one, or a plane handed to its neighbour: what helps first."""
     count, start = len(volumes), value
-    volumes, value = merge_with_others(volumes, scene, value, k, np.inf)
+    volumes, value = merge_volume(volumes, scene, value, k, np.inf)
     if len(volumes) == count:
-        volumes, value = take_in(volumes, scene, value, k)
+        volumes, value = take_end(volumes, scene, value, k)
     if len(volumes) == count:
         volumes, value = surround(volumes, scene, value, k)
-    return hand_over(volumes, scene, value, k) if value == start else (volumes, value)
+    return hand_plane(volumes, scene, value, k) if value == start else (volumes, value)
 
 
 @compiled
-def take_in(volumes, scene, value, k):
+def take_end(volumes, scene, value, k):
     """Volume k takes the one plane of a volume at its end as its own: a steep end is no roof in front of a gable."""
     for j in range(1, len(volumes)):
         if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
             continue
-        if plane_count(volumes[j]) != 1:
+        if count_planes(volumes[j]) != 1:
             continue
-        side = np.argmin(volumes[j, OFFSET : OFFSET + PLANES])
-        if side == LEVEL or volumes[k, OFFSET + side] < np.inf or plane_count(volumes[k]) < 2:
+        side = np.argmin(volumes[j, OFFSET0 : OFFSET0 + N_PLANES])
+        if side == LEVEL or volumes[k, OFFSET0 + side] < np.inf or count_planes(volumes[k]) < 2:
             continue
         trial = volumes.copy()
-        for column in (OFFSET + side, SLOPE + side, LEAN + side):
+        for column in (OFFSET0 + side, SLOPE0 + side, LEAN0 + side):
             trial[k, column] = volumes[j, column]
         trial[k, TIE] = FREE
-        reach_over(trial, k, j, side)
-        trial, found = settled_without(trial, scene, k, value, j)
-        if found < np.inf:
-            return trial, found
+        extend_edge(trial, k, j, side)
+        trial, trial_value = settle_merger(trial, scene, k, value, j)
+        if trial_value < np.inf:
+            return trial, trial_value
     return volumes, value
 
 
 @compiled
 def surround(volumes, scene, value, k):
     """The volumes that slope towards volume k on several of its sides become one that it stands on: a mansard's lower slopes, a skirt."""
-    beside = np.zeros(SIDES, np.int64)
-    for side in range(SIDES):
-        beside[side] = sloping_towards(volumes, k, side)
-    first = beside.max()
-    if first == 0 or ((beside == 0) | (beside == first)).all():
+    neighbours = np.zeros(N_SIDES, np.int64)
+    for side in range(N_SIDES):
+        neighbours[side] = find_rising_neighbour(volumes, k, side)
+    first = neighbours.max()
+    if first == 0 or ((neighbours == 0) | (neighbours == first)).all():
         return volumes, value
-    own = volumes[first].copy()
-    kept = np.ones(len(volumes), np.bool_)
-    own[OFFSET : OFFSET + PLANES], own[SLOPE : SLOPE + SIDES], own[LEAN : LEAN + SIDES] = np.inf, 0.0, 0.0
-    for side in range(SIDES):
-        j = beside[side]
-        own[U0 + side] = volumes[j if j > 0 else k, U0 + side]
+    skirt = volumes[first].copy()
+    is_kept = np.ones(len(volumes), np.bool_)
+    (
+        skirt[OFFSET0 : OFFSET0 + N_PLANES],
+        skirt[SLOPE0 : SLOPE0 + N_SIDES],
+        skirt[LEAN0 : LEAN0 + N_SIDES],
+    ) = np.inf, 0.0, 0.0
+    for side in range(N_SIDES):
+        j = neighbours[side]
+        skirt[U0 + side] = volumes[j if j > 0 else k, U0 + side]
         if j > 0:
-            kept[j] = False
-            for column in (OFFSET + side, SLOPE + side, LEAN + side):
-                own[column] = volumes[j, column]
-    own[TIE], own[REPLACES] = FREE, 0.0
+            is_kept[j] = False
+            for column in (OFFSET0 + side, SLOPE0 + side, LEAN0 + side):
+                skirt[column] = volumes[j, column]
+    skirt[TIE], skirt[REPLACES] = FREE, 0.0
     top = volumes[k : k + 1].copy()
     top[0, REPLACES] = 1.0
-    for side in range(SIDES):
-        if beside[side] > 0:
-            top[0, U0 + side] = volumes[beside[side], U0 + (side ^ 1)]
-    kept[0] = kept[k] = False
-    trial = np.concatenate((volumes[:1], own.reshape(1, -1), top, volumes[kept]))
-    trial, found = settled_anew(trial, scene, 1, value)
-    return (trial, found) if found < np.inf else (volumes, value)
+    for side in range(N_SIDES):
+        if neighbours[side] > 0:
+            top[0, U0 + side] = volumes[neighbours[side], U0 + (side ^ 1)]
+    is_kept[0] = is_kept[k] = False
+    trial = np.concatenate((volumes[:1], skirt.reshape(1, -1), top, volumes[is_kept]))
+    trial, trial_value = settle_trial(trial, scene, 1, value)
+    return (trial, trial_value) if trial_value < np.inf else (volumes, value)
 
 
 @compiled
-def hand_over(volumes, scene, value, k):
+def hand_plane(volumes, scene, value, k):
     """A plane of volume k goes to the volume that runs on in it: two slopes with a step between them are no gable with a strip beside."""
-    for side in range(SIDES):
-        j = running_on(volumes, k, side)
+    for side in range(N_SIDES):
+        j = find_continuation(volumes, k, side)
         if j == 0:
             continue
         trial = volumes.copy()
         remove_plane(trial[k], side)
-        trial[j, U0 + side], trial[k, U0 + side] = volumes[k, U0 + side], volumes[j, U0 + (side ^ 1)]
-        trial, found = settled_anew(trial, scene, k, value)
-        if found < np.inf:
-            return trial, found
+        trial[j, U0 + side], trial[k, U0 + side] = (
+            volumes[k, U0 + side],
+            volumes[j, U0 + (side ^ 1)],
+        )
+        trial, trial_value = settle_trial(trial, scene, k, value)
+        if trial_value < np.inf:
+            return trial, trial_value
     return volumes, value
 
 
 @compiled
-def running_on(volumes, k, side):
+def find_continuation(volumes, k, side):
     """The volume that begins within volume k, over all its length, and has its plane of that side, and no other, all but as high; 0
     where there is none."""
-    if volumes[k, OFFSET + side] == np.inf or plane_count(volumes[k]) < 2:
+    if volumes[k, OFFSET0 + side] == np.inf or count_planes(volumes[k]) < 2:
         return 0
     across = 2 - 2 * (side // 2)
     for j in range(1, len(volumes)):
         if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
             continue
-        if volumes[j, OFFSET + side] == np.inf:
+        if volumes[j, OFFSET0 + side] == np.inf:
             continue
-        along = np.abs(volumes[j, U0 + across : U0 + across + 2] - volumes[k, U0 + across : U0 + across + 2]).max()
-        within = volumes[k, U0 + 2 * (side // 2)] < volumes[j, U0 + (side ^ 1)] < volumes[k, U1 + 2 * (side // 2)]
-        if along < BESIDE_M and within and plane_count(volumes[j]) == 1 and is_alike(volumes, k, j, side):
+        along = np.abs(
+            volumes[j, U0 + across : U0 + across + 2] - volumes[k, U0 + across : U0 + across + 2]
+        ).max()
+        is_inside = (
+            volumes[k, U0 + 2 * (side // 2)]
+            < volumes[j, U0 + (side ^ 1)]
+            < volumes[k, U1 + 2 * (side // 2)]
+        )
+        if (
+            along < NEIGHBOUR_GAP_M
+            and is_inside
+            and count_planes(volumes[j]) == 1
+            and has_same_height(volumes, k, j, side)
+        ):
             return j
     return 0
 
 
 @compiled
-def is_alike(volumes, k, j, plane):
+def has_same_height(volumes, k, j, plane):
     """Whether a plane of two volumes is all but as high in the middle of volume k."""
     u, v = 0.5 * (volumes[k, U0] + volumes[k, U1]), 0.5 * (volumes[k, V0] + volumes[k, V1])
-    own = volumes[k, OFFSET + plane] + volumes[k, SLOPE + plane] * distance_up(volumes[k], plane, u, v)
-    other = volumes[j, OFFSET + plane] + volumes[j, SLOPE + plane] * distance_up(volumes[j], plane, u, v)
-    return abs(own - other) < ALIKE_M
+    height = volumes[k, OFFSET0 + plane] + volumes[k, SLOPE0 + plane] * measure_run(
+        volumes[k], plane, u, v
+    )
+    other_height = volumes[j, OFFSET0 + plane] + volumes[j, SLOPE0 + plane] * measure_run(
+        volumes[j], plane, u, v
+    )
+    return abs(height - other_height) < SAME_HEIGHT_M
 
 
 @compiled
-def sloping_towards(volumes, k, side):
+def find_rising_neighbour(volumes, k, side):
     """The volume that begins at a side of volume k, along half of it at least, and rises towards it; 0 where there is none."""
     across, sign = 2 - 2 * (side // 2), -1.0 if side % 2 == 0 else 1.0
-    low, high = volumes[k, U0 + across], volumes[k, U1 + across]
+    start, end = volumes[k, U0 + across], volumes[k, U1 + across]
     for j in range(1, len(volumes)):
         if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
             continue
-        if volumes[j, OFFSET + side] == np.inf:
+        if volumes[j, OFFSET0 + side] == np.inf:
             continue
-        overlap = min(high, volumes[j, U1 + across]) - max(low, volumes[j, U0 + across])
+        overlap = min(end, volumes[j, U1 + across]) - max(start, volumes[j, U0 + across])
         begins = sign * (volumes[j, U0 + (side ^ 1)] - volumes[k, U0 + side])
         ends = sign * (volumes[j, U0 + side] - volumes[k, U0 + side])
-        if -UNDER_M < begins < BESIDE_M and ends > 0.0 and overlap > 0.5 * (high - low):
+        if -UNDER_M < begins < NEIGHBOUR_GAP_M and ends > 0.0 and overlap > 0.5 * (end - start):
             return j
     return 0
 
 
 @compiled
-def max_slope(volumes, j, k):
-    return max(volumes[j, SLOPE : SLOPE + SIDES].max(), volumes[k, SLOPE : SLOPE + SIDES].max())
+def find_steepest_slope(volumes, j, k):
+    return max(
+        volumes[j, SLOPE0 : SLOPE0 + N_SIDES].max(), volumes[k, SLOPE0 : SLOPE0 + N_SIDES].max()
+    )

@@ -9,18 +9,18 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .around import look_around
+from .around import measure_context
 from .block import SETTLE_POINTS, SETTLE_REACH_M, find_in_block, search_block
-from .blocks import BLOCK_M2, HeightRaster, cheapest_cut
+from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .box import Box, clip_to_box
 from .edges import move_edges
-from .moves import refitted
+from .moves import refit_volume
 from .places import grow_at_places
 from .plan import Plan
 from .scene import Scene
-from .seams import AROUND_M, row_of, sew
-from .whole import PLACE, Whole
-from .window import change_in_window, forget_settled
+from .seams import SEAM_MARGIN_M, find_row, sew
+from .whole import PLACE_COLUMNS, Whole
+from .window import change_in_window, forget_digests
 
 LEAST_HALF_M2 = 1.0  # of outline on either side of a cut
 
@@ -29,16 +29,16 @@ def find_in_windows(plan: Plan, outline: shapely.Polygon, scene: Scene) -> np.nd
     """Find the volumes (k, COLUMNS) of a large roof, whose points and outline are those of `scene`."""
     whole = Whole(scene, plan, outline)
     if whole.area <= BLOCK_M2:  # a roof of one block is searched as a house, and keeps its base
-        return forget_settled(find_in_block(whole, whole.box)[0])
+        return forget_digests(find_in_block(whole, whole.box)[0])
     search_box(whole, HeightRaster(whole), whole.box, whole.area)
     grow_at_places(whole)
-    settle_each(whole)
-    return forget_settled(whole.volumes)
+    settle_in_windows(whole)
+    return forget_digests(whole.volumes)
 
 
 def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> None:
     """Search a box that holds so much of the outline: as one block, or in halves sewn together along the cut."""
-    cut = cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
+    cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
     halves = box.split(*cut) if cut else (box, box)
     areas = [clip_to_box(whole.outline, half).area for half in halves]
     if cut is None or min(areas) < LEAST_HALF_M2:
@@ -49,25 +49,25 @@ def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> 
     sew(whole, box, *cut)
 
 
-def settle_each(whole: Whole) -> None:
+def settle_in_windows(whole: Whole) -> None:
     """Refit every volume, and move its edges a little, on the points around it."""
-    for place in [row[PLACE].tobytes() for row in whole.volumes[1:]]:
+    for place in [row[PLACE_COLUMNS].tobytes() for row in whole.volumes[1:]]:
         k = whole.find(place)
         if k is not None:
-            settle_one(whole, k)
+            settle_volume(whole, k)
 
 
-def settle_one(whole: Whole, k: int) -> None:
+def settle_volume(whole: Whole, k: int) -> None:
     """Refit volume k, and move its edges a little, on the points around it."""
     extent = Box(*whole.boxes[k])
     if not extent.u0 <= extent.u1:
         return
 
     def settle_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-        own = row_of(rows, k)
-        rows, value = refitted(rows, scene, value, own)
-        around = look_around(rows, scene.U, scene.V, own)
-        value = move_edges(rows, scene, own, value, SETTLE_REACH_M, around)
-        return refitted(rows, scene, value, own)
+        row = find_row(rows, k)
+        rows, value = refit_volume(rows, scene, value, row)
+        context = measure_context(rows, scene.U, scene.V, row)
+        value = move_edges(rows, scene, row, value, SETTLE_REACH_M, context)
+        return refit_volume(rows, scene, value, row)
 
-    change_in_window(whole, extent.widen(AROUND_M), SETTLE_POINTS, settle_row, {k})
+    change_in_window(whole, extent.widen(SEAM_MARGIN_M), SETTLE_POINTS, settle_row, {k})

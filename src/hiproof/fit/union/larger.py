@@ -13,48 +13,51 @@ from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.contract import BACK, FRONT
 from ...primitives.family import read_member
-from .regions import area_of, besides, polygons_of
-from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, places_around, with_saw_teeth
+from .regions import exclude_parts, list_polygons, unite_outlines
+from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, lay_places, unite_saw_teeth
 
-NEAR_M, NEARLY = 0.3, 0.9  # m within which a gambrel must be as high as what it stands for, at what share of places
+GAMBREL_GAP_M, GAMBREL_SHARE = (
+    0.3,
+    0.9,
+)  # m within which a gambrel must be as high as what it stands for, at what share of places
 SKEWED = 1e-6  # rise over run along the ridge; numerically none
 LEAST_BREAK, MOST_BREAK = 0.1, 0.95  # of a gambrel's width, what lies between its breaks
 STEEPER = 0.1  # rise over run by which its lower slopes are steeper than the upper ones
 
 
-def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]:
+def combine_parts(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]:
     """`parts` with saw-teeth and gambrels in place of what they are made of, where those types are `allowed`."""
     if not allowed or "shed" in allowed:
-        parts = with_saw_teeth(parts)
+        parts = unite_saw_teeth(parts)
     if not allowed or "gambrel" in allowed:
-        parts = with_gambrels(parts)
+        parts = unite_gambrels(parts)
     return parts
 
 
-def with_gambrels(parts: list[Part]) -> list[Part]:
+def unite_gambrels(parts: list[Part]) -> list[Part]:
     """`parts` with every gable on a truncated gable's top, or between two steeper slopes, united with these."""
     for upper in parts:
-        top = top_of(upper)
+        top = read_top(upper)
         if top is None:
             continue
-        below = [part for part in parts if part is not upper]
-        for lower in [(part,) for part in below] + list(combinations(below, 2)):
-            found = gambrel_of(upper, top, lower)
-            if found is not None:
-                return with_gambrels([*besides(below, lower), found])
+        lower_parts = [part for part in parts if part is not upper]
+        for lower in [(part,) for part in lower_parts] + list(combinations(lower_parts, 2)):
+            gambrel = make_gambrel(upper, top, lower)
+            if gambrel is not None:
+                return unite_gambrels([*exclude_parts(lower_parts, lower), gambrel])
     return parts
 
 
 @dataclass(frozen=True)
-class Top:
+class GambrelTop:
     """The upper slopes of a gambrel: how far their ridge lies across it from the gable's middle (m), its height, their slope."""
 
-    at: float
+    offset: float
     ridge: float
     slope: float
 
 
-def top_of(upper: Part) -> Top | None:
+def read_top(upper: Part) -> GambrelTop | None:
     """The slopes of a gable; None where they are not alike, and of other parts."""
     if upper.type not in ("gable", "asymmetric_gable"):
         return None
@@ -68,23 +71,23 @@ def top_of(upper: Part) -> Top | None:
     if abs(rises[front] + rises[back]) > SIZE_ALIKE * slope:
         return None
     heights = planes @ np.array([*upper.translation[:2], 1.0])
-    at = float(heights[back] - heights[front]) / (2.0 * slope)
-    return Top(at, float(heights[front] + rises[front] * at), slope)
+    offset = float(heights[back] - heights[front]) / (2.0 * slope)
+    return GambrelTop(offset, float(heights[front] + rises[front] * offset), slope)
 
 
 @dataclass(frozen=True)
-class Slope:
+class GambrelSlope:
     """One lower side of a gambrel: how far the line of its eave lies across it from the upper gable's middle (m), its height, its slope."""
 
-    at: float
+    offset: float
     eave: float
     slope: float
 
 
-def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
+def list_lower_slopes(upper: Part, lower: tuple[Part, ...]) -> list[GambrelSlope]:
     """The slopes on the two sides below the gable `upper`: of a truncated gable, or of a monopitch on each side; else none."""
     across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
-    found = []
+    slopes = []
     for part in lower:
         turn = math.remainder(part.kappa - upper.kappa, 2.0 * math.pi)
         step, p = float(across @ (part.translation - upper.translation)[:2]), part.parameters
@@ -92,24 +95,32 @@ def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
             side = -1.0 if abs(turn) < TURN_ALIKE_RAD else 1.0
             if side > 0.0 and abs(abs(turn) - math.pi) > TURN_ALIKE_RAD:
                 return []
-            found.append(Slope(step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"]))
-        elif part.type == "truncated_gable" and len(lower) == 1 and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD:
+            slopes.append(
+                GambrelSlope(
+                    step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"]
+                )
+            )
+        elif (
+            part.type == "truncated_gable"
+            and len(lower) == 1
+            and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD
+        ):
             member = read_member(part.type, p, part.kappa, part.translation)
             for sign, side in ((-1.0, FRONT), (1.0, BACK)):
-                at = step + sign * 0.5 * p["width"]
-                found.append(Slope(at, member.eaves[side], member.slopes[side]))
+                offset = step + sign * 0.5 * p["width"]
+                slopes.append(GambrelSlope(offset, member.eaves[side], member.slopes[side]))
         else:
             return []
-    return sorted(found, key=lambda slope: slope.at)
+    return sorted(slopes, key=lambda slope: slope.offset)
 
 
-def gambrel_of(upper: Part, top: Top, lower: tuple[Part, ...]) -> Part | None:
+def make_gambrel(upper: Part, top: GambrelTop, lower: tuple[Part, ...]) -> Part | None:
     """The gable `upper` and the slopes on its two sides as one gambrel, None where they are none."""
-    below = slopes_below(upper, lower)
-    if len(below) != 2:
+    slopes = list_lower_slopes(upper, lower)
+    if len(slopes) != 2:
         return None
-    front, back = below
-    slope, width = 0.5 * (front.slope + back.slope), back.at - front.at
+    front, back = slopes
+    slope, width = 0.5 * (front.slope + back.slope), back.offset - front.offset
     if abs(front.slope - back.slope) > SIZE_ALIKE * slope or slope < top.slope + STEEPER:
         return None
     eave = 0.5 * (front.eave + back.eave)
@@ -125,19 +136,23 @@ def gambrel_of(upper: Part, top: Top, lower: tuple[Part, ...]) -> Part | None:
         "break_height": rise - top.slope * half_break,
     }
     across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
-    centre = upper.translation[:2] + 0.5 * (front.at + back.at) * across
+    centre = upper.translation[:2] + 0.5 * (front.offset + back.offset) * across
     shape = get("gambrel")
     planes = shape.planes_at(shape.to_theta(parameters, upper.kappa, np.array([*centre, eave])))
-    if not stands_for(planes, (upper, *lower)):
+    if not is_same_surface(planes, (upper, *lower)):
         return None
-    own = tuple(Piece(polygon, planes) for polygon in polygons_of(area_of((upper, *lower))))
-    return Part("gambrel", own, parameters, upper.kappa, np.array([*centre, eave]))
+    pieces = tuple(
+        Piece(polygon, planes) for polygon in list_polygons(unite_outlines((upper, *lower)))
+    )
+    return Part("gambrel", pieces, parameters, upper.kappa, np.array([*centre, eave]))
 
 
-def stands_for(planes: np.ndarray, parts: tuple[Part, ...]) -> bool:
+def is_same_surface(planes: np.ndarray, parts: tuple[Part, ...]) -> bool:
     """Whether the lowest of `planes` (k, 3) is all but as high as the highest of `parts` nearly everywhere on these."""
-    xy = places_around(parts)
+    xy = lay_places(parts)
     z = np.max([part.height_at(xy) for part in parts], axis=0)
-    there = np.isfinite(z)
-    own = (np.column_stack([xy[there], np.ones(there.sum())]) @ planes.T).min(axis=1)
-    return bool((np.abs(own - z[there]) < NEAR_M).sum() > NEARLY * there.sum())
+    is_covered = np.isfinite(z)
+    heights = (np.column_stack([xy[is_covered], np.ones(is_covered.sum())]) @ planes.T).min(axis=1)
+    return bool(
+        (np.abs(heights - z[is_covered]) < GAMBREL_GAP_M).sum() > GAMBREL_SHARE * is_covered.sum()
+    )

@@ -16,9 +16,9 @@ from .finish import Planes, Wall
 from .plan import Plan
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, LEVEL, SIDES
+from .volumes import DIRECTION, LEVEL, N_SIDES
 
-EACH = np.arange(SIDES)
+EACH = np.arange(N_SIDES)
 LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
 # of the half of its rectangle, by which a side that lies hidden may be moved to where its eave is level
 HIDDEN_SHARE = 0.8
@@ -31,7 +31,7 @@ RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # a plane (3, 1) changed by t
 PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it
 
 
-def part_of(
+def name_part(
     volume: np.ndarray,
     planes: Planes,
     sides: list[Side],
@@ -44,157 +44,198 @@ def part_of(
     c, s = scene.turn[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
     corners = shapely.get_coordinates(regions) - plan.frame.origin[:2]
-    at = np.column_stack([corners @ axes.T, np.ones(len(corners))])
-    rows = np.where(showing(planes.rows, at)[:, None], planes.rows, np.nan)
-    registrations = registered(planes, rows, at)
-    turn = common_lean(rows)
+    positions = np.column_stack([corners @ axes.T, np.ones(len(corners))])
+    rows = np.where(find_visible_planes(planes.rows, positions)[:, None], planes.rows, np.nan)
+    registrations = measure_registration(planes, rows, positions)
+    turn = measure_common_lean(rows)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
-    rows = turned(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]
-    sides = [moved(side, k, turn) for k, side in enumerate(sides)]
-    ends = rectangle_of(sides, corners @ axes.T)
-    known, unknown = ends_moved(sides, ends)
-    tried = np.array([ends, ends, ends, *known, *unknown]).T
-    every = np.repeat(rows[:, :, None], tried.shape[1], axis=2)
-    every[:, :, 1:3] += turned(registrations, turn)
+    rows = turn_planes(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]
+    sides = [turn_side(side, k, turn) for k, side in enumerate(sides)]
+    ends = measure_rectangle(sides, corners @ axes.T)
+    known_ends, probed_ends = list_moved_ends(sides, ends)
+    trial_ends = np.array([ends, ends, ends, *known_ends, *probed_ends]).T
+    all_rows = np.repeat(rows[:, :, None], trial_ends.shape[1], axis=2)
+    all_rows[:, :, 1:3] += turn_planes(registrations, turn)
     walls = tuple(wall._replace(facing=wall.facing - turn) for wall in planes.walls)
     hidden = [k for k, side in enumerate(sides) if side.sigma == math.inf and not side.anchored]
-    members = regular(every, tried, math.atan2(axes[0, 1], axes[0, 0]), walls, hidden)
+    members = regularise(all_rows, trial_ends, math.atan2(axes[0, 1], axes[0, 0]), walls, hidden)
     member = members.those(0)
     turns = member.quarter_turns
-    modes = np.concatenate([turned(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2)
-    told = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # of cants those that show
-    changes = changed(members, modes[told]).turn(turns)
+    modes = np.concatenate(
+        [turn_planes(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2
+    )
+    is_given = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # of cants those that show
+    changes = vary_member(members, modes[is_given]).turn(turns)
     member = replace(member.turn(turns), centre=member.centre @ axes + plan.frame.origin[:2])
-    return member.part(regions, name_among(member.name, allowed), changes, len(unknown))
+    return member.part(regions, name_among(member.name, allowed), changes, len(probed_ends))
 
 
-def registered(planes: Planes, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+def measure_registration(planes: Planes, rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """By how much (k, 3, 2) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
-    that show (`rows`) can over the corners `at` (n, 3), u, v, 1, tied to sides of the outline as they are."""
-    there = np.isfinite(rows[:, 2])
-    if not rows[there, :2].any():  # level ones stay as high
+    that show (`rows`) can over the corners `positions` (n, 3), u, v, 1, tied to sides of the outline as they are."""
+    is_present = np.isfinite(rows[:, 2])
+    if not rows[is_present, :2].any():  # level ones stay as high
         return np.zeros((len(rows), 3, 2))
-    design = (at @ planes.design[there]).reshape(there.sum() * len(at), planes.design.shape[2])
-    shifted = -REGISTERED_PLAN_M * rows[there, :2].repeat(len(at), axis=0)
+    design = (positions @ planes.design[is_present]).reshape(
+        is_present.sum() * len(positions), planes.design.shape[2]
+    )
+    shifted = -REGISTERED_PLAN_M * rows[is_present, :2].repeat(len(positions), axis=0)
     return planes.design @ np.linalg.lstsq(design, shifted, rcond=None)[0]
 
 
-def showing(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+def find_visible_planes(rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """Which planes (k,) are not everywhere above some single other one.
 
-    `at` (n, 3) are u, v, 1 of the regions' corners. Where only planes over walls show, the lowest other plane stays: a shape has one.
+    `positions` (n, 3) are u, v, 1 of the regions' corners. Where only planes over walls show, the lowest other plane stays: a shape has one.
     """
-    there = np.isfinite(rows[:, 2])
-    if there.sum() < 2:
-        return there
-    z = rows @ at.T
-    above = (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()  # [k][j]: plane k nowhere below plane j
-    for k in np.nonzero(there)[0].tolist():
-        there[k] = not any(above[k][j] for j in np.nonzero(there)[0].tolist() if j != k)
-    if not there[: LEVEL + 1].any():
-        there[np.nanargmin(z[: LEVEL + 1].mean(axis=1))] = True
-    return there
+    is_visible = np.isfinite(rows[:, 2])
+    if is_visible.sum() < 2:
+        return is_visible
+    z = rows @ positions.T
+    is_above = (
+        (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()
+    )  # [k][j]: plane k nowhere below plane j
+    for k in np.nonzero(is_visible)[0].tolist():
+        is_visible[k] = not any(
+            is_above[k][j] for j in np.nonzero(is_visible)[0].tolist() if j != k
+        )
+    if not is_visible[: LEVEL + 1].any():
+        is_visible[np.nanargmin(z[: LEVEL + 1].mean(axis=1))] = True
+    return is_visible
 
 
-def common_lean(rows: np.ndarray) -> float:
+def measure_common_lean(rows: np.ndarray) -> float:
     """The angle (rad) by which axes must turn for a pair of planes that face each other to face along them; 0 if none does."""
-    for low, high, axis in ((2, 3, 1), (0, 1, 0)):
-        gradients = [rows[k, :2] for k in (low, high) if np.isfinite(rows[k, 2])]
+    for first, second, axis in ((2, 3, 1), (0, 1, 0)):
+        gradients = [rows[k, :2] for k in (first, second) if np.isfinite(rows[k, 2])]
         if not gradients:
             continue
-        angles = [math.remainder(math.atan2(g[1], g[0]) - axis * 0.5 * math.pi, math.pi) for g in gradients]
+        angles = [
+            math.remainder(math.atan2(g[1], g[0]) - axis * 0.5 * math.pi, math.pi)
+            for g in gradients
+        ]
         if len(angles) == 1 or abs(angles[0] - angles[1]) < STRAIGHT:
             return angles[0]
     return 0.0
 
 
-def turned(rows: np.ndarray, angle: float) -> np.ndarray:
+def turn_planes(rows: np.ndarray, angle: float) -> np.ndarray:
     """Planes (k, 3), or several (k, 3, m), over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
     if angle == 0.0:
         return rows
     c, s = math.cos(angle), math.sin(angle)
-    rows = (rows.swapaxes(1, -1) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])).swapaxes(1, -1)
+    rows = (rows.swapaxes(1, -1) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])).swapaxes(
+        1, -1
+    )
     along = rows[EACH, 1 - AXIS]
     rows[EACH, 1 - AXIS] = np.where(np.abs(along) < 1e-8, 0.0, along)
     return rows
 
 
-def moved(side: Side, edge: int, angle: float) -> Side:
+def turn_side(side: Side, edge: int, angle: float) -> Side:
     """The side seen from axes turned by `angle`."""
     if angle == 0.0:
         return side
     slope = math.atan(side.lean) + (angle if edge < 2 else -angle)
     scale = math.cos(math.atan(side.lean)) / math.cos(slope)
-    return replace(side, at=side.at * scale, lean=math.tan(slope))
+    return replace(side, offset=side.offset * scale, lean=math.tan(slope))
 
 
-def rectangle_of(sides: list[Side], corners: np.ndarray) -> list[float]:
+def measure_rectangle(sides: list[Side], corners: np.ndarray) -> list[float]:
     """Lowest and highest u, lowest and highest v of the sides in their middle, no further out than the regions' `corners` (n, 2) are."""
-    least, most = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    lowest_corner, highest_corner = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     ends = []
     for axis in (0, 1):
-        low, high = sides[2 * axis], sides[2 * axis + 1]
-        middle = 0.5 * (least[1 - axis] + most[1 - axis])
-        start, end = low.at + low.lean * middle, high.at + high.lean * middle
-        start = start if low.anchored else max(start, least[axis])
-        end = end if high.anchored else min(end, most[axis])
-        ends += [least[axis], most[axis]] if end - start < 1e-3 else [start, end]
+        lower_side, upper_side = sides[2 * axis], sides[2 * axis + 1]
+        middle = 0.5 * (lowest_corner[1 - axis] + highest_corner[1 - axis])
+        start, end = (
+            lower_side.offset + lower_side.lean * middle,
+            upper_side.offset + upper_side.lean * middle,
+        )
+        start = start if lower_side.anchored else max(start, lowest_corner[axis])
+        end = end if upper_side.anchored else min(end, highest_corner[axis])
+        ends += [lowest_corner[axis], highest_corner[axis]] if end - start < 1e-3 else [start, end]
     return ends
 
 
-def ends_moved(sides: list[Side], ends: list[float]) -> tuple[list[list[float]], list[list[float]]]:
+def list_moved_ends(
+    sides: list[Side], ends: list[float]
+) -> tuple[list[list[float]], list[list[float]]]:
     """The `ends` (lowest and highest u, v) of a rectangle after each of its sides moved by its standard deviation; and after each of
     those that stand where no points tell moved a little."""
-    middle, known, unknown = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])), [], []
+    middle, known_ends, probed_ends = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])), [], []
     for k, side in enumerate(sides):
-        given = side.anchored or abs(ends[k] - side.at - side.lean * middle[1 - k // 2]) > GIVEN_M
+        is_given = (
+            side.anchored or abs(ends[k] - side.offset - side.lean * middle[1 - k // 2]) > GIVEN_M
+        )
         if side.sigma == math.inf:
-            unknown.append([*ends[:k], ends[k] + PROBE_M, *ends[k + 1 :]])
-        elif not given and side.sigma > 0.0:
-            known.append([*ends[:k], ends[k] + side.sigma, *ends[k + 1 :]])
-    return known, unknown
+            probed_ends.append([*ends[:k], ends[k] + PROBE_M, *ends[k + 1 :]])
+        elif not is_given and side.sigma > 0.0:
+            known_ends.append([*ends[:k], ends[k] + side.sigma, *ends[k + 1 :]])
+    return known_ends, probed_ends
 
 
-def regular(
-    rows: np.ndarray, ends: np.ndarray, kappa: float, walls: tuple[Wall, ...] = (), hidden: Sequence[int] = ()
+def regularise(
+    rows: np.ndarray,
+    ends: np.ndarray,
+    kappa: float,
+    walls: tuple[Wall, ...] = (),
+    hidden: Sequence[int] = (),
 ) -> Member:
     """Members over m rectangles, lowest and highest u, v `ends` (4, m), with planes `rows` (5 and those over `walls`, 3, m), which all
     have the same sides, in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are, or where a
     side lies `hidden`."""
     centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
-    there = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
-    sides, count = [k for k in there if k < SIDES], rows.shape[2]
-    eaves, slopes, leans = np.full((SIDES, count), np.inf), np.zeros((SIDES, count)), np.zeros((SIDES, count))
+    planes = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
+    sides, count = [k for k in planes if k < N_SIDES], rows.shape[2]
+    eaves, slopes, leans = (
+        np.full((N_SIDES, count), np.inf),
+        np.zeros((N_SIDES, count)),
+        np.zeros((N_SIDES, count)),
+    )
     for k in sides:
         axis = k // 2
         slopes[k] = SIGN[k] * rows[k, axis]
         leans[k] = rows[k, 1 - axis] / slopes[k]
-        eaves[k] = rows[k, 0] * centre[0] + rows[k, 1] * centre[1] + rows[k, 2] - slopes[k] * half[axis]
-    top = rows[LEVEL, 2] if LEVEL in there else np.full(count, np.inf)
+        eaves[k] = (
+            rows[k, 0] * centre[0] + rows[k, 1] * centre[1] + rows[k, 2] - slopes[k] * half[axis]
+        )
+    top = rows[LEVEL, 2] if LEVEL in planes else np.full(count, np.inf)
     if sides:
-        centre, half, eaves = level(centre, half, eaves, slopes, leans, sides, hidden)
-    return with_one_apex(
-        Member(kappa, centre, half, eaves, slopes, top, leans, cants_of(rows[LEVEL + 1 :], walls, centre))
+        centre, half, eaves = level_eaves(centre, half, eaves, slopes, leans, sides, hidden)
+    return join_apex(
+        Member(
+            kappa,
+            centre,
+            half,
+            eaves,
+            slopes,
+            top,
+            leans,
+            measure_cants(rows[LEVEL + 1 :], walls, centre),
+        )
     )
 
 
-def cants_of(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray) -> np.ndarray:
+def measure_cants(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray) -> np.ndarray:
     """The cants (4, c, m) of members about `centre` (2, m), whose planes over `walls` are `rows` (n, 3, m), NaN where one shows nowhere."""
     cants = []
     for wall, row in zip(walls, rows, strict=True):
         out = wall.offset - math.cos(wall.facing) * centre[0] - math.sin(wall.facing) * centre[1]
-        cants.append([np.full_like(out, wall.facing), out, *eave_and_slope(row, wall.facing, out, centre)])
-    shown = [cant for cant in cants if np.isfinite(cant[3]).all()]
-    return np.array(shown).reshape(-1, 4, centre.shape[1]).swapaxes(0, 1)
+        cants.append(
+            [np.full_like(out, wall.facing), out, *measure_eave(row, wall.facing, out, centre)]
+        )
+    visible_cants = [cant for cant in cants if np.isfinite(cant[3]).all()]
+    return np.array(visible_cants).reshape(-1, 4, centre.shape[1]).swapaxes(0, 1)
 
 
-def eave_and_slope(plane: np.ndarray, facing: float, out: Any, centre: np.ndarray) -> tuple[Any, Any]:
+def measure_eave(plane: np.ndarray, facing: float, out: Any, centre: np.ndarray) -> tuple[Any, Any]:
     """The height of a plane a, b, c (3, m) at a wall that lies so far `out`, facing that way, from `centre`, and by how much it rises there."""
     (a, b, z), c, s = plane, math.cos(facing), math.sin(facing)
     return a * (centre[0] + out * c) + b * (centre[1] + out * s) + z, -c * a - s * b
 
 
-def level(
+def level_eaves(
     centre: np.ndarray,
     half: np.ndarray,
     eaves: np.ndarray,
@@ -207,44 +248,53 @@ def level(
 
     Those that lie `hidden` under other parts are where nothing tells, and go there from afar, and inwards as well.
     """
-    told = [k for k in sides if k not in hidden] or sides
-    lowest, outwards, eaves = eaves[told].min(axis=0), np.zeros_like(eaves), eaves.copy()
+    given_sides = [k for k in sides if k not in hidden] or sides
+    lowest, outwards, eaves = eaves[given_sides].min(axis=0), np.zeros_like(eaves), eaves.copy()
     for k in sides:
         further = (eaves[k] - lowest) / slopes[k]
-        if k in told:
+        if k in given_sides:
             outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
         else:
             outwards[k] = np.where(np.abs(further) < HIDDEN_SHARE * half[k // 2], further, 0.0)
-    low, high = outwards[::2], outwards[1::2]
-    shift = 0.5 * (high - low)
+    low_shift, high_shift = outwards[::2], outwards[1::2]
+    shift = 0.5 * (high_shift - low_shift)
     for k in sides:
         lower = eaves[k] + slopes[k] * (leans[k] * shift[1 - k // 2] - outwards[k])
         eaves[k] = np.where(np.abs(lower - lowest) < 1e-6, lowest, lower)
-    return centre + shift, half + 0.5 * (high + low), eaves
+    return centre + shift, half + 0.5 * (high_shift + low_shift), eaves
 
 
-def changed(members: Member, changes: np.ndarray) -> Member:
+def vary_member(members: Member, changes: np.ndarray) -> Member:
     """The first of several with its planes changed by each of `changes` (5 and cants, 3, p), its sides where they are; and the others."""
     count = changes.shape[2]
-    found = members.those([0] * count + list(range(1, members.eaves.shape[1])))
+    varied = members.those([0] * count + list(range(1, members.eaves.shape[1])))
     for k in members.sides:
         axis = k // 2
         middle = members.centre[:, 0].copy()  # of the side
         middle[axis] -= SIGN[k] * members.half[axis, 0]
-        found.slopes[k, :count] += SIGN[k] * changes[k, axis]
-        found.eaves[k, :count] += changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
-    found.top[:count] += changes[LEVEL, 2]
+        varied.slopes[k, :count] += SIGN[k] * changes[k, axis]
+        varied.eaves[k, :count] += (
+            changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
+        )
+    varied.top[:count] += changes[LEVEL, 2]
     for k, plane in enumerate(changes[LEVEL + 1 :]):
         facing, out = members.cants[:2, k, 0].tolist()
-        found.cants[2:, k, :count] += eave_and_slope(plane, facing, out, members.centre[:, 0])
-    return found
+        varied.cants[2:, k, :count] += measure_eave(plane, facing, out, members.centre[:, 0])
+    return varied
 
 
-def with_one_apex(members: Member) -> Member:
+def join_apex(members: Member) -> Member:
     """Hips whose two pairs of sides meet at nearly the same height with all four meeting in one point, eaves where they are."""
     if not all(members.has) or members.has_top:
         return members
-    one, other = members.apex(0), members.apex(1)
-    near = (np.abs(one - other) <= APEX_M) & ~members.leans.any(axis=0)
-    runs = (np.stack([one, one, other, other]) - members.eaves) / members.slopes  # from each eave to the point in plan
-    return replace(members, slopes=np.where(near, (0.5 * (one + other) - members.eaves) / runs, members.slopes))
+    apex, other_apex = members.apex(0), members.apex(1)
+    is_near = (np.abs(apex - other_apex) <= APEX_M) & ~members.leans.any(axis=0)
+    runs = (
+        np.stack([apex, apex, other_apex, other_apex]) - members.eaves
+    ) / members.slopes  # from each eave to the point in plan
+    return replace(
+        members,
+        slopes=np.where(
+            is_near, (0.5 * (apex + other_apex) - members.eaves) / runs, members.slopes
+        ),
+    )

@@ -13,91 +13,97 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .around import roof_with
+from .around import compute_roof_with
 from .prices import BASE_COST
-from .steps import edge_cost, walls_of
-from .volumes import LEVEL, OFFSET, is_allowed, roof_heights, volume_cost
+from .steps import gather_walls, price_edge
+from .volumes import LEVEL, OFFSET0, compute_roof_heights, is_allowed, price_volume
 
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
 
 
 @compiled(inline="always")
-def point_cost(z_point, z_roof, dead, width):
+def compute_point_cost(z_point, z_roof, dead, width):
     r = max(abs(z_point - z_roof) - dead, 0.0) / width
     r *= r
     return r if r < 1.0 else 1.0
 
 
-def misfits(z: np.ndarray, height: np.ndarray | float, scene) -> np.ndarray:
+def compute_misfits(z: np.ndarray, height: np.ndarray | float, scene) -> np.ndarray:
     """What each point at `z` (n,) costs under a roof so high (n,)."""
     return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
 
 
 @compiled(inline="always")
-def ghost_cost(z_roof, weight, shade, low, high):
-    return weight if (z_roof < low) | (z_roof > high) else shade * (z_roof - low) / (high - low)
+def compute_cell_cost(z_roof, weight, shade, z_low, z_high):
+    return (
+        weight
+        if (z_roof < z_low) | (z_roof > z_high)
+        else shade * (z_roof - z_low) / (z_high - z_low)
+    )
 
 
 @compiled
-def costs(z, scene):
+def compute_costs(z, scene):
     """Cost (n + g,) of every point and ghost under roof heights `z` (n + g,)."""
     cost, n = np.empty(len(z)), scene.n
     for i in range(n):
-        cost[i] = point_cost(scene.z[i], z[i], scene.dead, scene.width)
-    over, weight, shade, of_ghosts = z[n:], scene.weight[n:], scene.shade[n:], cost[n:]
-    for i in range(len(over)):
-        of_ghosts[i] = ghost_cost(over[i], weight[i], shade[i], scene.low, scene.high)
+        cost[i] = compute_point_cost(scene.z[i], z[i], scene.dead, scene.width)
+    cell_heights, weight, shade, cell_costs = z[n:], scene.weight[n:], scene.shade[n:], cost[n:]
+    for i in range(len(cell_heights)):
+        cell_costs[i] = compute_cell_cost(
+            cell_heights[i], weight[i], shade[i], scene.low, scene.high
+        )
     return cost
 
 
 @compiled
-def objective(volumes, scene, limit):
+def compute_objective(volumes, scene, limit):
     """The roof's cost; infinite where a shape is not allowed, and as soon as it is known to be above `limit`."""
     for k in range(1, len(volumes)):
         if not is_allowed(volumes[k], scene.allowed):
             return np.inf
-    z, _ = roof_heights(volumes, scene.U, scene.V)
-    return cost_of_roof(volumes, scene, z, limit)
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    return compute_roof_cost(volumes, scene, z, limit)
 
 
 @compiled
-def objective_with(volumes, scene, k, around, limit):
-    """Compute what `objective` does, of a roof whose volume k alone is another than it was."""
+def compute_objective_with(volumes, scene, k, context, limit):
+    """Compute what `compute_objective` does, of a roof whose volume k alone is another than it was."""
     if k > 0 and not is_allowed(volumes[k], scene.allowed):
         return np.inf
-    z = roof_with(volumes, scene.U, scene.V, k, around)
-    return cost_of_roof(volumes, scene, z, limit)
+    z = compute_roof_with(volumes, scene.U, scene.V, k, context)
+    return compute_roof_cost(volumes, scene, z, limit)
 
 
 @compiled
-def cost_of_roof(volumes, scene, z, limit):
+def compute_roof_cost(volumes, scene, z, limit):
     """Compute the cost of a roof so high (n + g,); infinite once it is known to be above `limit`."""
-    total, bare, base = costs(z, scene).sum(), 0.0, volumes[0, OFFSET + LEVEL]
+    total, bare, base = compute_costs(z, scene).sum(), 0.0, volumes[0, OFFSET0 + LEVEL]
     for k in range(1, len(volumes)):
-        total += scene.evidence * volume_cost(volumes[k])
+        total += scene.evidence * price_volume(volumes[k])
     for i in range(scene.n, len(z)):
         if z[i] == base:
             bare += scene.weight[i]
     if bare > BASE_SHARE * scene.n:
         total += scene.evidence * BASE_COST
-    total += edges_cost(volumes, scene, limit - total)
+    total += price_edges(volumes, scene, limit - total)
     return total if total <= limit else np.inf
 
 
 @compiled
-def edges_cost(volumes, scene, limit):
+def price_edges(volumes, scene, limit):
     """What all edges cost; infinite as soon as that is known to be above `limit`."""
-    walls, total = walls_of(scene), 0.0
+    walls, total = gather_walls(scene), 0.0
     for k in range(1, len(volumes)):
         for edge in range(4):
             if total > limit:
                 return np.inf
-            total += scene.evidence * edge_cost(volumes, walls, k, edge)
+            total += scene.evidence * price_edge(volumes, walls, k, edge)
     return total
 
 
 @compiled
-def base_shows(volumes, scene):
+def is_base_visible(volumes, scene):
     """Whether a noticeable share of the outline is roofed by the base."""
-    _, top = roof_heights(volumes, scene.U, scene.V)
+    _, top = compute_roof_heights(volumes, scene.U, scene.V)
     return scene.weight[scene.n :][top[scene.n :] == 0].sum() > BASE_SHARE * scene.n

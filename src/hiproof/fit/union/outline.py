@@ -8,15 +8,18 @@ import shapely
 from ..direction import slope_direction
 from ..outline import estimate_outline
 
-SLOPES, NEIGHBOURS = 150, 9  # places at which slopes are looked at, and points around each
+SLOPE_PLACES, SLOPE_NEIGHBOURS = (
+    150,
+    9,
+)  # places at which slopes are looked at, and points around each
 SURE = 0.5  # confidence (0 to 1) from which on the direction of slopes is the outline's
 
 
-def outline_of_points(points_local: np.ndarray) -> shapely.Polygon:
+def draw_outline(points_local: np.ndarray) -> shapely.Polygon:
     """Outline around `points_local` (n, 3), mostly along the roof's slopes and across them, where it has any.
 
     Raises FitError for points that span no area.
     """
     ascending = points_local[np.argsort(points_local[:, 0], kind="stable")]
-    kappa, confidence = slope_direction(ascending, SLOPES, NEIGHBOURS)
+    kappa, confidence = slope_direction(ascending, SLOPE_PLACES, SLOPE_NEIGHBOURS)
     return estimate_outline(points_local, kappa if confidence > SURE else None)

@@ -17,48 +17,73 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.contract import Primitive
 from ...primitives.family import COMPONENTS
 from ...settings import Settings
-from .regions import area_of, besides, polygons_of
+from .regions import exclude_parts, list_polygons, unite_outlines
 
-MOST_PARTS = 3  # that one shape may take the place of
+MOST_REPLACED_PARTS = 3  # that one shape may take the place of
 RECTANGULAR = 0.9  # share of the smallest rectangle around them that the parts roof together
-FAR_M = 0.25  # points farther off are counted as this far
+MOST_DISTANCE_M = 0.25  # points farther off are counted as this far
 FARTHER_M = 0.01  # in the mean: one shape may lie so much farther from the points than several, must lie so much nearer than one
 
 
-def in_own_shapes(parts: list[Part], points: np.ndarray, settings: Settings) -> list[Part]:
+def fit_custom_shapes(parts: list[Part], points: np.ndarray, settings: Settings) -> list[Part]:
     """`parts` with one or several replaced by a part of another shape where the `points` (n, 3) say as much for it."""
-    for name in own_names(settings.fit.types):
-        for count in range(1, min(MOST_PARTS, len(parts)) + 1):
-            for chosen in combinations([part for part in parts if part.type != name], count):
-                one = as_one(CATALOGUE[name], chosen, points, settings)
-                if one is not None:
-                    return in_own_shapes([*besides(parts, chosen), one], points, settings)
+    for name in list_custom_names(settings.fit.types):
+        for count in range(1, min(MOST_REPLACED_PARTS, len(parts)) + 1):
+            for group in combinations([part for part in parts if part.type != name], count):
+                single = unite_parts(CATALOGUE[name], group, points, settings)
+                if single is not None:
+                    return fit_custom_shapes(
+                        [*exclude_parts(parts, group), single], points, settings
+                    )
     return parts
 
 
-def own_names(allowed: tuple[str, ...]) -> list[str]:
+def list_custom_names(allowed: tuple[str, ...]) -> list[str]:
     """Types with other planes than a volume has, for which nothing else is made to find them."""
-    others = [name for name, shape in CATALOGUE.items() if not shape.is_of_family and name not in COMPONENTS]
-    return [name for name in others if not allowed or name in allowed]
+    names = [
+        name
+        for name, shape in CATALOGUE.items()
+        if not shape.is_of_family and name not in COMPONENTS
+    ]
+    return [name for name in names if not allowed or name in allowed]
 
 
-def as_one(shape: Primitive, chosen: tuple[Part, ...], points: np.ndarray, settings: Settings) -> Part | None:
-    """The `chosen` parts as one of `shape` over what they roof, None where they are none."""
-    covered = polygons_of(area_of(chosen))
-    if len(covered) != 1 or covered[0].area < RECTANGULAR * shapely.minimum_rotated_rectangle(covered[0]).area:
+def unite_parts(
+    shape: Primitive, group: tuple[Part, ...], points: np.ndarray, settings: Settings
+) -> Part | None:
+    """The `group` parts as one of `shape` over what they roof, None where they are none."""
+    covered = list_polygons(unite_outlines(group))
+    if (
+        len(covered) != 1
+        or covered[0].area < RECTANGULAR * shapely.minimum_rotated_rectangle(covered[0]).area
+    ):
         return None
-    own = points[shapely.intersects_xy(covered[0], points[:, 0], points[:, 1])]
-    found = fitted(shape, own, covered[0], settings)
-    farther = FARTHER_M if len(chosen) > 1 else -FARTHER_M  # fewer parts are worth a little, another name is not
-    return None if found is None or misfit([found], own) > misfit(list(chosen), own) + farther else found
+    inside_points = points[shapely.intersects_xy(covered[0], points[:, 0], points[:, 1])]
+    part = fit_shape(shape, inside_points, covered[0], settings)
+    farther = (
+        FARTHER_M if len(group) > 1 else -FARTHER_M
+    )  # fewer parts are worth a little, another name is not
+    return (
+        None
+        if part is None
+        or measure_misfit([part], inside_points)
+        > measure_misfit(list(group), inside_points) + farther
+        else part
+    )
 
 
-def fitted(shape: Primitive, points: np.ndarray, outline: shapely.Polygon, settings: Settings) -> Part | None:
+def fit_shape(
+    shape: Primitive, points: np.ndarray, outline: shapely.Polygon, settings: Settings
+) -> Part | None:
     """A part of `shape` that roofs `outline` by its points, None where these are too few."""
     from ..single import fit_roof
 
     try:
-        fit = fit_roof(points, outline, settings.replace({"fit": {"types": [shape.name], "objective": "likelihood"}}))
+        fit = fit_roof(
+            points,
+            outline,
+            settings.replace({"fit": {"types": [shape.name], "objective": "likelihood"}}),
+        )
     except FitError:
         return None
     variant = shape.variant(fit.parameters)
@@ -67,12 +92,20 @@ def fitted(shape: Primitive, points: np.ndarray, outline: shapely.Polygon, setti
     if len(part.pieces) == 1:
         pieces = [Piece(outline, part.pieces[0].planes)]
     else:
-        cut = [(polygons_of(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)), p.planes) for p in part.pieces]
+        cut = [
+            (
+                list_polygons(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)),
+                p.planes,
+            )
+            for p in part.pieces
+        ]
         pieces = [Piece(polygon, planes) for polygons, planes in cut for polygon in polygons]
-    return Part(shape.name, tuple(pieces), part.parameters, part.kappa, part.translation, part.sigma)
+    return Part(
+        shape.name, tuple(pieces), part.parameters, part.kappa, part.translation, part.sigma
+    )
 
 
-def misfit(parts: list[Part], points: np.ndarray) -> float:
-    """Mean distance in height (m) of points (n, 3) from the highest of the parts, those far off counted as FAR_M."""
+def measure_misfit(parts: list[Part], points: np.ndarray) -> float:
+    """Mean distance in height (m) of points (n, 3) from the highest of the parts, those far off counted as MOST_DISTANCE_M."""
     z = np.max([part.height_at(points[:, :2]) for part in parts], axis=0)
-    return float(np.minimum(np.abs(points[:, 2] - z), FAR_M).mean())
+    return float(np.minimum(np.abs(points[:, 2] - z), MOST_DISTANCE_M).mean())

@@ -4,58 +4,65 @@ from __future__ import annotations
 
 import numpy as np
 
-from .add import FEWEST_UNEXPLAINED, unexplained
+from .add import FEWEST_UNEXPLAINED, find_unexplained
 from .block import BLOCK
 from .blocks import BLOCK_M2
 from .box import Box
-from .candidates import candidates_of
-from .grow import ground_of, grown
+from .candidates import list_candidates
+from .grow import grow_volumes, prepare_growth
 from .improve import improve
 from .prices import PLACE_UNITS
 from .scene import Scene
-from .seams import slopes_of
+from .seams import list_volume_slopes
 from .whole import Whole
 from .window import change_in_window
 
-SQUARE_M, AROUND = (
+COUNT_SQUARE_M, SQUARES_AROUND = (
     3.0,
     2,
 )  # m of a square in which unexplained points are counted, and squares around one that count too
-PLACES_A_BLOCK = 3.0  # tried at most, for each block's area: a bound on time, the rest stays as it is
+PLACES_A_BLOCK = (
+    3.0  # tried at most, for each block's area: a bound on time, the rest stays as it is
+)
 WINDOW_M, WINDOW_POINTS = 20.0, 1200  # m of a side of a place's window, and its points at most
 
 
 def grow_at_places(whole: Whole) -> None:
     """Grow more volumes where most points are unexplained, at each place once."""
     scene, box = whole.scene, whole.box
-    far = np.abs(whole.heights() - whole.z) > scene.dead + scene.width
-    i = ((whole.u - box.u0) / SQUARE_M).astype(int)
-    j = ((whole.v - box.v0) / SQUARE_M).astype(int)
+    is_far = np.abs(whole.compute_heights() - whole.z) > scene.dead + scene.width
+    i = ((whole.u - box.u0) / COUNT_SQUARE_M).astype(int)
+    j = ((whole.v - box.v0) / COUNT_SQUARE_M).astype(int)
     counts = np.zeros((i.max() + 1, j.max() + 1))
-    np.add.at(counts, (i[far], j[far]), 1.0)
+    np.add.at(counts, (i[is_far], j[is_far]), 1.0)
     for _ in range(max(1, round(PLACES_A_BLOCK * whole.area / BLOCK_M2))):
-        sums = sum_around(counts)
+        sums = sum_squares(counts)
         a, b = np.unravel_index(int(np.argmax(sums)), sums.shape)
         if sums[a, b] < PLACE_UNITS * scene.evidence:
             break
-        u, v = box.u0 + (a + 0.5) * SQUARE_M, box.v0 + (b + 0.5) * SQUARE_M
-        change_in_window(whole, Box(u, u, v, v).widen(0.5 * WINDOW_M), WINDOW_POINTS, grow_more)
-        counts[max(a - AROUND, 0) : a + AROUND + 1, max(b - AROUND, 0) : b + AROUND + 1] = 0.0
+        u, v = box.u0 + (a + 0.5) * COUNT_SQUARE_M, box.v0 + (b + 0.5) * COUNT_SQUARE_M
+        change_in_window(
+            whole, Box(u, u, v, v).widen(0.5 * WINDOW_M), WINDOW_POINTS, grow_in_window
+        )
+        counts[
+            max(a - SQUARES_AROUND, 0) : a + SQUARES_AROUND + 1,
+            max(b - SQUARES_AROUND, 0) : b + SQUARES_AROUND + 1,
+        ] = 0.0
 
 
-def sum_around(counts: np.ndarray) -> np.ndarray:
+def sum_squares(counts: np.ndarray) -> np.ndarray:
     """Sums (a, b) of the counts over each square and those around it."""
-    padded = np.pad(counts, AROUND)
-    steps = range(2 * AROUND + 1)
+    padded = np.pad(counts, SQUARES_AROUND)
+    steps = range(2 * SQUARES_AROUND + 1)
     rows, columns = counts.shape
     return np.sum([padded[p : p + rows, q : q + columns] for p in steps for q in steps], axis=0)
 
 
-def grow_more(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+def grow_in_window(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
     """Improve the volumes of a window, and grow more from candidates of what they leave unexplained."""
-    volumes, value = improve(volumes, scene, value, slopes_of(volumes), 1)
-    far = unexplained(volumes, scene)
-    if len(far) < FEWEST_UNEXPLAINED:
+    volumes, value = improve(volumes, scene, value, list_volume_slopes(volumes), 1)
+    unexplained_points = find_unexplained(volumes, scene)
+    if len(unexplained_points) < FEWEST_UNEXPLAINED:
         return volumes, value
-    candidates = candidates_of(scene, far, BLOCK.new_planes, BLOCK)
-    return grown(volumes, value, ground_of(scene, candidates), candidates, BLOCK)
+    candidates = list_candidates(scene, unexplained_points, BLOCK.new_planes, BLOCK)
+    return grow_volumes(volumes, value, prepare_growth(scene, candidates), candidates, BLOCK)

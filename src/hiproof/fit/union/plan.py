@@ -15,17 +15,17 @@ from ...geometry.point_in_polygon import flips
 from ...geometry.rings import ring_edges
 from ..direction import main_direction
 from ..walls import on_walls
-from .planes import Cloud, Ghosts, Grid
+from .planes import Cloud, Grid, UnobservedCells
 
 MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
 # m from the border within which returns may be a facade's; clouds of more points a square metre lose them all, sparser
 # ones those that lie on walls; m for each of these points: a bay half a metre deep must keep some of its few
-BORDER_M, BORDER_MIN_DENSITY, BORDER_M_A_POINT = 0.15, 4.0, 0.025
+FACADE_BORDER_M, FACADE_MIN_DENSITY, FACADE_M_A_POINT = 0.15, 4.0, 0.025
 LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 # m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
-MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
-GHOST_MARGIN_M = 0.3  # m beyond the range of heights that unseen roof may have
+MERGE_LINES_M, GRID_CELL_M, GRID_CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
+HEIGHT_MARGIN_M = 0.3  # m beyond the range of heights that unseen roof may have
 SHADE = 0.2  # of a point: what the highest of roofs costs for each that is missing
 
 
@@ -39,16 +39,18 @@ class Plan:
     frame: PlanFrame
     cloud: Cloud
     grid: Grid
-    ghosts: Ghosts
+    unobserved: UnobservedCells
     density: float
     border: np.ndarray
 
 
 @compiled
-def signed_depth(x, y, starts, ends):
+def measure_depth(x, y, starts, ends):
     """Distance (n,) of points to the nearest of the edges `starts`, `ends` (m, 2), negative outside (even-odd rule)."""
     inside, nearest = np.zeros(len(x), np.bool_), np.full(len(x), np.inf)
-    for e in range(len(starts)):  # one edge after the other, so that the processor takes several points at once
+    for e in range(
+        len(starts)
+    ):  # one edge after the other, so that the processor takes several points at once
         x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
         dx, dy = x1 - x0, y1 - y0
         square = max(dx * dx + dy * dy, 1e-18)
@@ -59,27 +61,37 @@ def signed_depth(x, y, starts, ends):
     return np.where(inside, np.sqrt(nearest), -np.sqrt(nearest))
 
 
-def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float, most_cells: int = MAX_CELLS) -> np.ndarray:
-    """Lay lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`, over `most_cells`."""
-    kept, end = [float(low)], float(high)
+def lay_lines(
+    lowest: float, highest: float, vertices: np.ndarray, cell: float, most_cells: int = MAX_CELLS
+) -> np.ndarray:
+    """Lay lines from `lowest` to `highest` at the footprint's `vertices`, filled up to about `cell`, over `most_cells`."""
+    corner_lines, end = [float(lowest)], float(highest)
     for x in sorted(vertices.tolist()):
-        if abs(x - kept[-1]) > MERGE_LINES_M and abs(x - end) > MERGE_LINES_M:
-            kept.append(x)
-    kept.append(end)
-    while len(kept) > most_cells:  # an outline of hundreds of vertices: give up the line closest to its neighbours
-        crowded = min(range(1, len(kept) - 1), key=lambda k: kept[k + 1] - kept[k - 1])
-        del kept[crowded]
-    gaps = [b - a for a, b in pairwise(kept)]
-    step = max(cell, (kept[-1] - kept[0]) / most_cells)
+        if abs(x - corner_lines[-1]) > MERGE_LINES_M and abs(x - end) > MERGE_LINES_M:
+            corner_lines.append(x)
+    corner_lines.append(end)
+    while (
+        len(corner_lines) > most_cells
+    ):  # an outline of hundreds of vertices: give up the line closest to its neighbours
+        crowded = min(
+            range(1, len(corner_lines) - 1), key=lambda k: corner_lines[k + 1] - corner_lines[k - 1]
+        )
+        del corner_lines[crowded]
+    gaps = [b - a for a, b in pairwise(corner_lines)]
+    step = max(cell, (corner_lines[-1] - corner_lines[0]) / most_cells)
     fill = [max(1, round(gap / step)) for gap in gaps]
     while sum(fill) > most_cells and max(fill) > 1:
         step *= 1.1
         fill = [max(1, round(gap / step)) for gap in gaps]
-    lines = [a + gap * q / count for a, gap, count in zip(kept, gaps, fill, strict=False) for q in range(count)]
-    return np.array([*lines, kept[-1]])
+    lines = [
+        a + gap * q / count
+        for a, gap, count in zip(corner_lines, gaps, fill, strict=False)
+        for q in range(count)
+    ]
+    return np.array([*lines, corner_lines[-1]])
 
 
-def cells_of(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
+def find_cells(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Which of the cells between neighbouring `lines`, ascending, each of x (n,) lies in; the first or last where beyond all."""
     return np.searchsorted(lines[1:-1], x, side="right")
 
@@ -88,10 +100,12 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     """Frame, points, grid and ghosts for `points_local` (n, 3) and `outline`; points outside the outline do not count."""
     angle = main_direction(outline)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
-    depth = signed_depth(points_local[:, 0].copy(), points_local[:, 1].copy(), *ring_edges(outline))
-    every = points_local[depth >= 0.0]
-    counts = off_facades(every, depth[depth >= 0.0], outline.area)
-    inside = every[counts]
+    depth = measure_depth(
+        points_local[:, 0].copy(), points_local[:, 1].copy(), *ring_edges(outline)
+    )
+    all_points = points_local[depth >= 0.0]
+    counts = find_roof_points(all_points, depth[depth >= 0.0], outline.area)
+    inside = all_points[counts]
     centroid = shapely.get_coordinates(outline.centroid)[0]
     middle = len(inside) // 2
     height = np.partition(inside[:, 2], middle)[middle] if len(inside) else 0.0
@@ -100,48 +114,58 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     uvz = uvz[np.lexsort(np.round(uvz.T, 6))]  # one order, whatever order the points came in
     density = len(uvz) / max(COVERED_SHARE * outline.area, 1.0)
     corners = (shapely.get_coordinates(outline.exterior)[:-1] - centroid) @ rotation.T
-    cell = max(CELL_M, CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
+    cell = max(GRID_CELL_M, GRID_CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
     (low_u, low_v), (high_u, high_v) = corners.min(axis=0), corners.max(axis=0)
-    u_lines = grid_lines(low_u, high_u, corners[:, 0], cell)
-    v_lines = grid_lines(low_v, high_v, corners[:, 1], cell)
+    u_lines = lay_lines(low_u, high_u, corners[:, 0], cell)
+    v_lines = lay_lines(low_v, high_v, corners[:, 1], cell)
     grid = Grid(u_lines, v_lines)
     u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
-    cloud = Cloud(u, v, z, cells_of(u_lines, u), cells_of(v_lines, v))
-    border = frame.to_plan(every[~counts]).T
-    return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density, border)
+    cloud = Cloud(u, v, z, find_cells(u_lines, u), find_cells(v_lines, v))
+    border = frame.to_plan(all_points[~counts]).T
+    return Plan(
+        frame, cloud, grid, lay_unobserved_cells(frame, grid, cloud, outline), density, border
+    )
 
 
-def off_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
+def find_roof_points(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
     """Which of the points (n, 3) at `depth` (n,) inside an outline are none near its border that a scanner may have had of the walls."""
     density = len(points) / area_m2
-    dense = density >= BORDER_MIN_DENSITY
-    near = depth < (min(BORDER_M, BORDER_M_A_POINT * density) if dense else BORDER_M)
-    if len(points) - near.sum() < max(LEAST_AWAY, LEAST_AWAY_SHARE * len(points)):
+    dense = density >= FACADE_MIN_DENSITY
+    is_near = depth < (
+        min(FACADE_BORDER_M, FACADE_M_A_POINT * density) if dense else FACADE_BORDER_M
+    )
+    if len(points) - is_near.sum() < max(LEAST_AWAY, LEAST_AWAY_SHARE * len(points)):
         return np.ones(len(points), bool)
     if not dense:
-        near[near] = on_walls(points[near], points, 1.0 / math.sqrt(density))
-    return ~near
+        is_near[is_near] = on_walls(points[is_near], points, 1.0 / math.sqrt(density))
+    return ~is_near
 
 
-def emptiness(cloud: Cloud, expected: np.ndarray) -> np.ndarray:
+def measure_emptiness(cloud: Cloud, expected: np.ndarray) -> np.ndarray:
     """How empty (nu, nv) cells and those beside them are of the points `expected` (nu, nv): 1 quite, 0 from half of them on."""
     rows, columns = expected.shape
     padded = np.zeros((2, rows + 2, columns + 2))
-    padded[0, 1:-1, 1:-1] = np.bincount(cloud.i * columns + cloud.j, minlength=expected.size).reshape(rows, columns)
+    padded[0, 1:-1, 1:-1] = np.bincount(
+        cloud.i * columns + cloud.j, minlength=expected.size
+    ).reshape(rows, columns)
     padded[1, 1:-1, 1:-1] = expected
     windows = [padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3)]
-    around = np.sum(windows, axis=0)
-    return np.clip(1.0 - around[0] / np.maximum(0.5 * around[1], 1e-9), 0.0, 1.0)
+    sums = np.sum(windows, axis=0)
+    return np.clip(1.0 - sums[0] / np.maximum(0.5 * sums[1], 1e-9), 0.0, 1.0)
 
 
-def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon) -> Ghosts:
+def lay_unobserved_cells(
+    frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon
+) -> UnobservedCells:
     """A ghost at the centre of every cell inside the outline, weighing as many points as its area usually holds."""
     centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in (grid.u, grid.v))
     u, v = np.repeat(centre_u, len(centre_v)), np.tile(centre_v, len(centre_u))
     xy = frame.xy_local(np.column_stack([u, v]))
-    inside = signed_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline)) > 0.0
+    inside = measure_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline)) > 0.0
     weight = np.outer(np.diff(grid.u), np.diff(grid.v)) * len(cloud.u) / outline.area
-    shade = SHADE * weight * emptiness(cloud, weight)
-    low, high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
-    u, v, weight, shade = (np.ascontiguousarray(column[inside]) for column in (u, v, weight.ravel(), shade.ravel()))
-    return Ghosts(u, v, weight, shade, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)
+    shade = SHADE * weight * measure_emptiness(cloud, weight)
+    z_low, z_high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
+    u, v, weight, shade = (
+        np.ascontiguousarray(column[inside]) for column in (u, v, weight.ravel(), shade.ravel())
+    )
+    return UnobservedCells(u, v, weight, shade, z_low - HEIGHT_MARGIN_M, z_high + HEIGHT_MARGIN_M)

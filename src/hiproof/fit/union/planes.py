@@ -16,33 +16,35 @@ from .prices import KIND_COST
 
 MAX_SLOPE = 2.5  # rise over run, 68 degrees; steeper planes are not looked for
 MIN_AXIS_SLOPE = 0.05  # rise over run, 3 degrees; a flatter plane is level
-MAX_PLANES = 5  # of one part
+PART_PLANES = 5  # of one part
 SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
 NEIGHBOUR_RADIUS_M = 2.5  # m; points further away are no neighbours
 LOCAL_POINTS = (9, 17)  # neighbours of a local plane, the point itself among them
 RIDGE_STEP_M = 0.4  # m between the ridges tried
-SAME_PLANE = 0.05  # rise over run, and m at the centre: planes nearer to each other are one
+PLANE_BIN = 0.05  # rise over run, and m at the centre: planes nearer to each other are one
 TEMPLATE_POINTS = 150  # points that templates are laid over; few do for a start
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
 Grid = namedtuple("Grid", "u v")  # grid lines, ascending
-Ghosts = namedtuple("Ghosts", "u v weight shade low high")  # cell centres inside the outline; heights a roof may take
+UnobservedCells = namedtuple(
+    "UnobservedCells", "u v weight shade low high"
+)  # cell centres inside the outline; heights a roof may take
 
 
 @compiled
-def kind_of(plane):
+def classify_plane(plane):
     """0 flat, 1 sloping along u, 2 along v, 3 free."""
     return (1 if abs(plane[0]) > 1e-9 else 0) + (2 if abs(plane[1]) > 1e-9 else 0)
 
 
 @compiled
-def truncated(residual, tau):
+def truncate_cost(residual, tau):
     q = (residual / tau) ** 2
     return q if q < 1.0 else 1.0
 
 
 @compiled
-def lower_envelope(planes, count, u, v):
+def find_lower_envelope(planes, count, u, v):
     """Height of the min of the first `count` planes and which one is active."""
     best, active = np.inf, 0
     for k in range(count):
@@ -79,15 +81,17 @@ def solve_masked(matrix, right, mask):
 
 
 @compiled
-def plane_cost(cloud, members, plane, tau):
+def sum_plane_cost(cloud, members, plane, tau):
     total = 0.0
     for i in members:
-        total += truncated(cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2], tau)
+        total += truncate_cost(
+            cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2], tau
+        )
     return total
 
 
 @compiled
-def biweight_step(cloud, members, plane, scale, mask, centre_u, centre_v):
+def step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v):
     """One re-weighted least-squares step of `plane` on `members`; False when too little weight is left."""
     matrix, right = np.zeros((3, 3)), np.zeros(3)
     for i in members:
@@ -125,9 +129,9 @@ def fit_plane(cloud, members, start, tau, evidence):
     for i in members:
         centre_u += cloud.u[i] / n
         centre_v += cloud.v[i] / n
-    start_kind = kind_of(start)
+    start_kind = classify_plane(start)
     best = start.copy()
-    best_cost = plane_cost(cloud, members, start, tau) + evidence * KIND_COST[start_kind]
+    best_cost = sum_plane_cost(cloud, members, start, tau) + evidence * KIND_COST[start_kind]
     mask = np.ones(3, np.bool_)
     for kind in range(4):
         mask[0], mask[1] = kind == 1 or kind == 3, kind >= 2
@@ -136,12 +140,12 @@ def fit_plane(cloud, members, start, tau, evidence):
             scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
             if step == 0 and kind != start_kind:
                 scale *= 2.0
-            plane, ok = biweight_step(cloud, members, plane, scale, mask, centre_u, centre_v)
+            plane, ok = step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v)
             if not ok:
                 break
         if not ok or plane[0] ** 2 + plane[1] ** 2 > MAX_SLOPE**2:
             continue
-        cost = plane_cost(cloud, members, plane, tau) + evidence * KIND_COST[kind]
+        cost = sum_plane_cost(cloud, members, plane, tau) + evidence * KIND_COST[kind]
         if cost < best_cost:
             best_cost, best = cost, plane
     return best, best_cost
@@ -151,8 +155,8 @@ def fit_plane(cloud, members, start, tau, evidence):
 def fit_symmetric_gable(cloud, members, planes, tau):
     """Two planes with one shared slope along an axis near `planes` (2, 3); False when they are no gable."""
     fitted = planes[:2].copy()
-    kind = kind_of(planes[0])
-    if (kind != 1 and kind != 2) or kind_of(planes[1]) != kind:
+    kind = classify_plane(planes[0])
+    if (kind != 1 and kind != 2) or classify_plane(planes[1]) != kind:
         return fitted, False
     k = kind - 1
     if planes[0, k] * planes[1, k] >= 0.0:
@@ -163,7 +167,7 @@ def fit_symmetric_gable(cloud, members, planes, tau):
         scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
         matrix, right = np.zeros((3, 3)), np.zeros(3)
         for i in members:
-            z, side = lower_envelope(fitted, 2, cloud.u[i], cloud.v[i])
+            z, side = find_lower_envelope(fitted, 2, cloud.u[i], cloud.v[i])
             r = (cloud.z[i] - z) / scale
             w = 1.0 - r * r
             if w <= 0.0:
@@ -184,25 +188,30 @@ def fit_symmetric_gable(cloud, members, planes, tau):
         if not ok or not MIN_AXIS_SLOPE < p[2] < MAX_SLOPE:
             return fitted, False
         fitted[:] = 0.0
-        fitted[0, k], fitted[0, 2], fitted[1, k], fitted[1, 2] = sign * p[2], p[0], -sign * p[2], p[1]
+        fitted[0, k], fitted[0, 2], fitted[1, k], fitted[1, 2] = (
+            sign * p[2],
+            p[0],
+            -sign * p[2],
+            p[1],
+        )
     return fitted, True
 
 
 @compiled
-def local_plane(cloud, nearest, count):
+def fit_local_plane(cloud, nearest, count):
     """Least-squares plane of the first `count` of `nearest`, once trimmed at twice the median residual."""
     plane, limit, ok = np.zeros(3), np.inf, True
     mask = np.ones(3, np.bool_)
     u0, v0 = cloud.u[nearest[0]], cloud.v[nearest[0]]
     residuals = np.empty(count)
     for _ in range(2):
-        matrix, right, kept = np.zeros((3, 3)), np.zeros(3), 0
+        matrix, right, n_kept = np.zeros((3, 3)), np.zeros(3), 0
         for q in range(count):
             i = nearest[q]
             x, y, z = cloud.u[i] - u0, cloud.v[i] - v0, cloud.z[i]
             if abs(z - plane[0] * x - plane[1] * y - plane[2]) > limit:
                 continue
-            kept += 1
+            n_kept += 1
             matrix[0, 0] += x * x
             matrix[0, 1] += x * y
             matrix[0, 2] += x
@@ -212,7 +221,7 @@ def local_plane(cloud, nearest, count):
             right[0] += x * z
             right[1] += y * z
             right[2] += z
-        if kept < 4:
+        if n_kept < 4:
             break
         matrix[1, 0], matrix[2, 0], matrix[2, 1] = matrix[0, 1], matrix[0, 2], matrix[1, 2]
         matrix[0, 0] += 1e-6
@@ -222,14 +231,16 @@ def local_plane(cloud, nearest, count):
             break
         for q in range(count):
             i = nearest[q]
-            residuals[q] = abs(cloud.z[i] - plane[0] * (cloud.u[i] - u0) - plane[1] * (cloud.v[i] - v0) - plane[2])
-        limit = 2.0 * median_of_few(residuals) + 1e-3
+            residuals[q] = abs(
+                cloud.z[i] - plane[0] * (cloud.u[i] - u0) - plane[1] * (cloud.v[i] - v0) - plane[2]
+            )
+        limit = 2.0 * find_median(residuals) + 1e-3
     plane[2] -= plane[0] * u0 + plane[1] * v0
     return plane, ok and plane[0] ** 2 + plane[1] ** 2 < MAX_SLOPE**2
 
 
 @compiled
-def median_of_few(values):
+def find_median(values):
     """The median of some ten `values`, which it sorts; numba's np.median takes four times as long for so few."""
     for q in range(1, len(values)):
         x, place = values[q], q
@@ -242,7 +253,7 @@ def median_of_few(values):
 
 
 @compiled
-def flat_hypotheses(z, out):
+def list_flat_planes(z, out):
     """A flat plane at every height (0.1 m apart) that some point has; returns how many."""
     steps = np.unique(np.round(z / 0.1))
     count = min(len(steps), len(out))
@@ -252,71 +263,71 @@ def flat_hypotheses(z, out):
 
 
 @compiled
-def neighbours_of(cloud, i, away, near, distance2, nearest):
-    """Points within NEIGHBOUR_RADIUS_M of point `i` into `near`, the closest of them into `nearest`, closest first.
+def find_neighbours(cloud, i, squares, near_points, distance2, nearest):
+    """Points within NEIGHBOUR_RADIUS_M of point `i` into `near_points`, the closest of them into `nearest`, closest first.
 
-    `away` (n,) and `distance2` are room for squared distances of all and of the closest. Returns how many of each.
+    `squares` (n,) and `distance2` are room for squared distances of all and of the closest. Returns how many of each.
     """
     u, v = cloud.u, cloud.v
     for q in range(len(u)):  # no branches: a processor does several points at once
-        away[q] = (u[q] - u[i]) ** 2 + (v[q] - v[i]) ** 2
-    count = kept = 0
+        squares[q] = (u[q] - u[i]) ** 2 + (v[q] - v[i]) ** 2
+    count = n_nearest = 0
     for q in range(len(u)):
-        near[count] = q
-        count += int(away[q] < NEIGHBOUR_RADIUS_M**2)
-    for q in near[:count]:
-        d2 = away[q]
-        if kept == len(nearest) and d2 >= distance2[kept - 1]:
+        near_points[count] = q
+        count += int(squares[q] < NEIGHBOUR_RADIUS_M**2)
+    for q in near_points[:count]:
+        d2 = squares[q]
+        if n_nearest == len(nearest) and d2 >= distance2[n_nearest - 1]:
             continue
-        kept = min(kept + 1, len(nearest))
-        place = kept - 1
+        n_nearest = min(n_nearest + 1, len(nearest))
+        place = n_nearest - 1
         while place > 0 and distance2[place - 1] > d2:
             distance2[place], nearest[place] = distance2[place - 1], nearest[place - 1]
             place -= 1
         distance2[place], nearest[place] = d2, q
-    return count, kept
+    return count, n_nearest
 
 
 @compiled
-def hypotheses(cloud, seeds_wanted, pairs_wanted):
+def list_hypotheses(cloud, most_seeds, most_pairs):
     """Candidate planes (m, 3): flats, local least-squares planes, and slopes along the axes through pairs of points.
 
     Seeds and partners are spread evenly (golden-ratio sequence) over the sorted points, so nothing is drawn at random.
     """
     n = len(cloud.u)
     flats = min(n, 200)
-    seeds = min(n, seeds_wanted)
-    pairs_per_seed = max(2, pairs_wanted // seeds)
+    seeds = min(n, most_seeds)
+    pairs_per_seed = max(2, most_pairs // seeds)
     out = np.zeros((flats + seeds * (2 + 2 * pairs_per_seed), 3))
-    m = flat_hypotheses(cloud.z, out[:flats])
-    near, nearest = np.empty(n, np.int64), np.empty(max(LOCAL_POINTS), np.int64)
-    away, distance2 = np.empty(n), np.empty(len(nearest))
-    draw = 0.5
+    m = list_flat_planes(cloud.z, out[:flats])
+    near_points, nearest = np.empty(n, np.int64), np.empty(max(LOCAL_POINTS), np.int64)
+    squares, distance2 = np.empty(n), np.empty(len(nearest))
+    fraction = 0.5
     for s in range(seeds):
         i = s * n // seeds
-        count, kept = neighbours_of(cloud, i, away, near, distance2, nearest)
-        for wanted in LOCAL_POINTS:
-            if min(kept, wanted) >= 5:
-                plane, ok = local_plane(cloud, nearest, min(kept, wanted))
+        count, n_nearest = find_neighbours(cloud, i, squares, near_points, distance2, nearest)
+        for size in LOCAL_POINTS:
+            if min(n_nearest, size) >= 5:
+                plane, ok = fit_local_plane(cloud, nearest, min(n_nearest, size))
                 if ok:
                     out[m] = plane
                     m += 1
         for _ in range(pairs_per_seed):
-            draw = (draw + 0.6180339887498949) % 1.0
-            m = pair_slopes(cloud, i, near[int(draw * count)], out, m)
-    return distinct(out[:m], np.mean(cloud.u), np.mean(cloud.v))
+            fraction = (fraction + 0.6180339887498949) % 1.0
+            m = append_pair_slopes(cloud, i, near_points[int(fraction * count)], out, m)
+    return select_distinct(out[:m], np.mean(cloud.u), np.mean(cloud.v))
 
 
 @compiled
-def distinct(planes, centre_u, centre_v):
-    """One of all `planes` (m, 3) whose slopes and height at the centre fall into the same bins of SAME_PLANE."""
+def select_distinct(planes, centre_u, centre_v):
+    """One of all `planes` (m, 3) whose slopes and height at the centre fall into the same bins of PLANE_BIN."""
     keys = np.empty(len(planes), np.int64)
     for q in range(len(planes)):
         a, b, c = planes[q]
         height = a * centre_u + b * centre_v + c
         keys[q] = 0
         for value in (a, b, height):
-            keys[q] = keys[q] * 100003 + np.int64(np.floor(value / SAME_PLANE + 0.5))
+            keys[q] = keys[q] * 100003 + np.int64(np.floor(value / PLANE_BIN + 0.5))
     order = np.argsort(keys, kind="mergesort")
     first = np.ones(len(planes), np.bool_)
     for q in range(1, len(planes)):
@@ -325,7 +336,7 @@ def distinct(planes, centre_u, centre_v):
 
 
 @compiled
-def pair_slopes(cloud, i, j, out, m):
+def append_pair_slopes(cloud, i, j, out, m):
     """Append the slopes along u and along v that pass points i and j, where they are far enough apart."""
     dz = cloud.z[j] - cloud.z[i]
     for axis in range(2):
@@ -339,7 +350,7 @@ def pair_slopes(cloud, i, j, out, m):
 
 
 @compiled(allocates=False)
-def reach_of_rows(gain, reach):
+def bound_rows(gain, reach):
     """Fill `reach` (nu + 1,): no rectangle within the rows from i on has a larger sum of `gain` than reach[i]."""
     reach[-1] = 0.0
     for i in range(len(gain) - 1, -1, -1):
@@ -351,14 +362,14 @@ def reach_of_rows(gain, reach):
 
 
 @compiled(allocates=False)
-def best_rectangle(gain, least, reach, column):
-    """Rectangle of cells with the largest sum of `gain` (nu, nv) above `least`: (sum, i0, i1, j0, j1), half open.
+def find_best_rectangle(gain, least_sum, reach, column):
+    """Rectangle of cells with the largest sum of `gain` (nu, nv) above `least_sum`: (sum, i0, i1, j0, j1), half open.
 
-    Kadane in 2D, without the rows that cannot bring more than what is found (`reach` of `reach_of_rows`); `column` (nv,)
-    is room to work in. Where nothing is above `least` the sum is `least` and the rectangle empty.
+    Kadane in 2D, without the rows that cannot bring more than what is found (`reach` of `bound_rows`); `column` (nv,)
+    is room to work in. Where nothing is above `least_sum` the sum is `least_sum` and the rectangle empty.
     """
     nu, nv = gain.shape
-    best, i0_best, i1_best, j0_best, j1_best = least, 0, 0, 0, 0
+    best, i0_best, i1_best, j0_best, j1_best = least_sum, 0, 0, 0, 0
     for i0 in range(nu):
         if reach[i0] <= best:
             break
@@ -383,7 +394,7 @@ def best_rectangle(gain, least, reach, column):
 
 
 @compiled(fastmath=True, allocates=False)
-def gain_by_point(cloud, planes, count, current, tau, gain):
+def fill_point_gains(cloud, planes, count, current, tau, gain):
     """Fill `gain` (n,) with the drop of cost that the min of `planes` would bring; returns the sum over those that gain."""
     a, b, c = planes[0]
     for q in range(len(gain)):
@@ -401,7 +412,7 @@ def gain_by_point(cloud, planes, count, current, tau, gain):
 
 
 @compiled(fastmath=True, allocates=False)
-def gain_by_cell(cloud, gain_of_point, gain):
+def fill_cell_gains(cloud, gain_of_point, gain):
     """Fill `gain` (nu, nv) with the sums over each cell's points; returns the sum over the cells that gain."""
     gain[:] = 0.0
     for q in range(len(gain_of_point)):
@@ -414,7 +425,7 @@ def gain_by_cell(cloud, gain_of_point, gain):
 
 
 @compiled
-def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain):
+def find_best_candidate(cloud, candidates, counts, bounds, current, tau, least_gain, gain):
     """The candidate with the best rectangle, lazily: `bounds` are upper bounds of its gain, and costs only ever fall.
 
     Ever dearer bounds are tried in turn: the sum over the points that gain, over the cells that gain, over the best run of
@@ -423,28 +434,30 @@ def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain)
     gain_of_point = np.empty(len(cloud.u))
     for m in range(len(bounds)):
         if bounds[m] == np.inf:
-            bounds[m] = gain_by_point(cloud, candidates[m], counts[m], current, tau, gain_of_point)
-    best, chosen, rectangle = least, -1, (0, 0, 0, 0)
+            bounds[m] = fill_point_gains(
+                cloud, candidates[m], counts[m], current, tau, gain_of_point
+            )
+    best, number, rectangle = least_gain, -1, (0, 0, 0, 0)
     reach, column = np.empty(len(gain) + 1), np.empty(gain.shape[1])
     for m in np.argsort(-bounds, kind="mergesort"):
         if bounds[m] <= best:
             break
-        bounds[m] = gain_by_point(cloud, candidates[m], counts[m], current, tau, gain_of_point)
+        bounds[m] = fill_point_gains(cloud, candidates[m], counts[m], current, tau, gain_of_point)
         if bounds[m] <= best:
             continue
-        bounds[m] = gain_by_cell(cloud, gain_of_point, gain)
+        bounds[m] = fill_cell_gains(cloud, gain_of_point, gain)
         if bounds[m] <= best:
             continue
-        reach_of_rows(gain, reach)
-        score, i0, i1, j0, j1 = best_rectangle(gain, best, reach, column)
+        bound_rows(gain, reach)
+        score, i0, i1, j0, j1 = find_best_rectangle(gain, best, reach, column)
         bounds[m] = min(reach[0], score)
         if score > best:
-            best, chosen, rectangle = score, m, (i0, i1, j0, j1)
-    return best, chosen, rectangle
+            best, number, rectangle = score, m, (i0, i1, j0, j1)
+    return best, number, rectangle
 
 
 @compiled
-def members_of(cloud, rectangle):
+def select_members(cloud, rectangle):
     i0, i1, j0, j1 = rectangle
     return np.nonzero((cloud.i >= i0) & (cloud.i < i1) & (cloud.j >= j0) & (cloud.j < j1))[0]
 
@@ -453,24 +466,26 @@ def members_of(cloud, rectangle):
 def lower_costs(cloud, members, planes, count, tau, current):
     """Let `current` (n,) fall to the cost under the min of `planes` for `members`."""
     for i in members:
-        z, _ = lower_envelope(planes, count, cloud.u[i], cloud.v[i])
-        current[i] = min(current[i], truncated(cloud.z[i] - z, tau))
+        z, _ = find_lower_envelope(planes, count, cloud.u[i], cloud.v[i])
+        current[i] = min(current[i], truncate_cost(cloud.z[i] - z, tau))
 
 
 @compiled
-def plane_pool(cloud, grid, candidates, tau, evidence, most):
+def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
     """Greedy pool (k, 3): the hypothesis that explains its best rectangle best, refitted there, until little is gained."""
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
     current = np.ones(len(cloud.u))
     bounds = np.full(len(candidates), np.inf)
     stacked = candidates.reshape((len(candidates), 1, 3))
     counts = np.ones(len(candidates), np.int64)
-    pool = np.zeros((most, 3))
-    for k in range(most):
-        _, m, rectangle = best_candidate(cloud, stacked, counts, bounds, current, tau, 1.5 * evidence, gain)
+    pool = np.zeros((most_planes, 3))
+    for k in range(most_planes):
+        _, m, rectangle = find_best_candidate(
+            cloud, stacked, counts, bounds, current, tau, 1.5 * evidence, gain
+        )
         if m < 0:
             return pool[:k]
-        members = members_of(cloud, rectangle)
+        members = select_members(cloud, rectangle)
         plane, _ = fit_plane(cloud, members, candidates[m], tau, evidence)
         pool[k] = plane
         lower_costs(cloud, members, plane.reshape((1, 3)), 1, tau, current)
@@ -479,14 +494,14 @@ def plane_pool(cloud, grid, candidates, tau, evidence, most):
 
 
 @compiled
-def mirrored_gables(pool, grid):
-    """Every axis-sloped plane of the pool mirrored about ridges RIDGE_STEP_M apart: candidates (m, MAX_PLANES, 3)."""
+def mirror_gables(pool, grid):
+    """Every axis-sloped plane of the pool mirrored about ridges RIDGE_STEP_M apart: candidates (m, PART_PLANES, 3)."""
     steps_u = int((grid.u[-1] - grid.u[0]) / RIDGE_STEP_M) + 2
     steps_v = int((grid.v[-1] - grid.v[0]) / RIDGE_STEP_M) + 2
-    out = np.zeros((len(pool) * (steps_u + steps_v), MAX_PLANES, 3))
+    out = np.zeros((len(pool) * (steps_u + steps_v), PART_PLANES, 3))
     m = 0
     for plane in pool:
-        kind = kind_of(plane)
+        kind = classify_plane(plane)
         if kind != 1 and kind != 2:
             continue
         lines = grid.u if kind == 1 else grid.v
@@ -504,7 +519,7 @@ def mirrored_gables(pool, grid):
 
 
 @compiled
-def symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v, out):
+def fill_symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v, out):
     """Planes of z = height - max(slope_u (|u - centre_u| - top_u), slope_v (...)) into `out`; a slope of 0 leaves its pair out."""
     k = 0
     for axis in range(2):
@@ -546,20 +561,23 @@ def fit_template(z, drop, slope, tau):
 
 
 @compiled
-def whole_roofs(cloud, grid, tau):
-    """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, MAX_PLANES, 3) and counts.
+def fit_whole_roofs(cloud, grid, tau):
+    """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, PART_PLANES, 3) and counts.
 
     Few points do for a start: at most twice TEMPLATE_POINTS of the cloud's are used.
     """
     stride = max(1, len(cloud.u) // TEMPLATE_POINTS)
     u, v, z = cloud.u[::stride].copy(), cloud.v[::stride].copy(), cloud.z[::stride].copy()
-    out, counts, m = np.zeros((64, MAX_PLANES, 3)), np.zeros(64, np.int64), 0
+    out, counts, m = np.zeros((64, PART_PLANES, 3)), np.zeros(64, np.int64), 0
     half_u, half_v = 0.5 * (grid.u[-1] - grid.u[0]), 0.5 * (grid.v[-1] - grid.v[0])
     mid_u, mid_v = grid.u[0] + half_u, grid.v[0] + half_v
     long = 0 if half_u >= half_v else 1
     for shape in range(8):
         shift = (0.0, 0.25, -0.25)[shape % 3] if shape < 6 else 0.0
-        centre_u, centre_v = mid_u + shift * half_u * (shape < 3), mid_v + shift * half_v * (shape >= 3)
+        centre_u, centre_v = (
+            mid_u + shift * half_u * (shape < 3),
+            mid_v + shift * half_v * (shape >= 3),
+        )
         away_u, away_v = np.abs(u - centre_u), np.abs(v - centre_v)
         ratio, top = 1.0, 0.0
         if shape < 3:
@@ -578,29 +596,38 @@ def whole_roofs(cloud, grid, tau):
                 continue
             slope_u = slope * ratio if shape < 3 or shape >= 6 else 0.0
             slope_v = slope if shape >= 3 else 0.0
-            counts[m] = symmetric_planes(
-                height, slope_u, top * (long == 0), centre_u, slope_v, top * (long == 1), centre_v, out[m]
+            counts[m] = fill_symmetric_planes(
+                height,
+                slope_u,
+                top * (long == 0),
+                centre_u,
+                slope_v,
+                top * (long == 1),
+                centre_v,
+                out[m],
             )
             m += 1
     return out[:m], counts[:m]
 
 
 @compiled
-def gable_pool(cloud, grid, pool, tau, evidence, most):
-    """Greedy pool of symmetric gables, pyramids and hips (k, MAX_PLANES, 3) and their counts; gables refitted."""
+def pool_gables(cloud, grid, pool, tau, evidence, most_gables):
+    """Greedy pool of symmetric gables, pyramids and hips (k, PART_PLANES, 3) and their counts; gables refitted."""
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
-    mirrored = mirrored_gables(pool, grid)
-    whole, whole_counts = whole_roofs(cloud, grid, tau)
+    mirrored = mirror_gables(pool, grid)
+    whole, whole_counts = fit_whole_roofs(cloud, grid, tau)
     candidates = np.concatenate((mirrored, whole))
     counts = np.concatenate((np.full(len(mirrored), 2, np.int64), whole_counts))
     bounds = np.full(len(candidates), np.inf)
     current = np.ones(len(cloud.u))
-    gables, gable_counts = np.zeros((most, MAX_PLANES, 3)), np.zeros(most, np.int64)
-    for k in range(most):
-        _, m, rectangle = best_candidate(cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain)
+    gables, gable_counts = np.zeros((most_gables, PART_PLANES, 3)), np.zeros(most_gables, np.int64)
+    for k in range(most_gables):
+        _, m, rectangle = find_best_candidate(
+            cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain
+        )
         if m < 0:
             return gables[:k], gable_counts[:k]
-        members = members_of(cloud, rectangle)
+        members = select_members(cloud, rectangle)
         gables[k], gable_counts[k] = candidates[m], counts[m]
         if counts[m] == 2:
             fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)

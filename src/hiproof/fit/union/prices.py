@@ -13,17 +13,19 @@ import numpy as np
 
 # The unit: as many points as a unit of structure must explain.
 
-COMMON_HOUSE_M2 = 60.0  # up to LARGE_M2, larger roofs ask more of each volume
-LARGE_M2 = 200.0  # of outline: larger roofs are searched in windows, at a price that does not grow
+COMMON_HOUSE_M2 = 60.0  # up to LARGE_ROOF_M2, larger roofs ask more of each volume
+LARGE_ROOF_M2 = (
+    200.0  # of outline: larger roofs are searched in windows, at a price that does not grow
+)
 """Area [m2] from which on the price of structure does not depend on a roof's size."""
 
-LARGE_POINTS = 1.77
+LARGE_ROOF_POINTS = 1.77
 """Points that a unit of a large roof must explain at least, times those of a house.
 
 Of many places some gain a point or two by chance. At 2 points/m2 The Hague draws too much for less.
 """
 
-DENSE, DENSER = 8.0, 0.3
+DENSE_CLOUD, DENSE_GROWTH = 8.0, 0.3
 """Density [points/m2] from which on a unit of a large roof explains a larger area, and its growth.
 
 Residuals of neighbouring points are not independent, the less so the denser the cloud
@@ -37,15 +39,15 @@ Below a half every chimney is a part, above four even wings go.
 """
 
 
-def evidence_per_unit(density: float, area_m2: float, settings) -> float:
+def compute_unit_points(density: float, area_m2: float, settings) -> float:
     """Compute the points that one unit of structure must explain.
 
     They are those of an area that grows with the roof's, and never too few.
     """
-    large = area_m2 > LARGE_M2
-    dense = max(density / DENSE, 1.0) ** DENSER
+    large = area_m2 > LARGE_ROOF_M2
+    dense = max(density / DENSE_CLOUD, 1.0) ** DENSE_GROWTH
     factor = dense if large else math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
-    points = settings.evidence_points * (LARGE_POINTS if large else 1.0)
+    points = settings.evidence_points * (LARGE_ROOF_POINTS if large else 1.0)
     share = settings.evidence_area_m2 * factor
     return float(max(points, share * density)) * DETAIL_FACTOR[settings.detail]
 

@@ -6,57 +6,57 @@ import numpy as np
 
 from ...compiled import compiled
 from .volumes import (
-    ALL,
+    ALL_EQUAL,
     DIRECTION,
     LEVEL,
-    OFFSET,
+    N_PLANES,
+    N_SIDES,
+    OFFSET0,
     OPPOSITE,
-    PLANES,
     REPLACES,
-    SIDES,
-    SLOPE,
+    SLOPE0,
     SLOPE_HIGH,
     SLOPE_LOW,
     TIE,
-    coefficients,
-    distance_up,
+    find_lowest_plane,
     is_within,
-    lowest_plane,
-    rectangle,
+    measure_run,
+    read_coefficients,
+    read_rectangle,
 )
 
-ROUNDS = 2  # of fitting and re-weighting
+FIT_ROUNDS = 2  # of fitting and re-weighting
 # points a plane must show over to be refitted, and to find its slope; m2 of their spread along it
 LEAST_WEIGHT, LEAST_SLOPE_WEIGHT, LEAST_SPREAD_M2 = 1.0, 2.0, 0.02
 
 
 @compiled
-def refit(volumes, scene, k, around):
+def refit(volumes, scene, k, context):
     """Two rounds of biweighted least squares for volume k (in place) on the points where it is the one that shows."""
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v, z = scene.U[direction, :n], scene.V[direction, :n], scene.z[:n]
-    below, above = around.below, around.above
-    ends, replaces = rectangle(volumes, k), volumes[k, REPLACES] > 0.0
+    earlier, later = context.earlier, context.later
+    ends, replaces = read_rectangle(volumes, k), volumes[k, REPLACES] > 0.0
     weights, planes = np.empty(n), np.empty(n, np.int64)
-    for turn in range(ROUNDS):
+    for turn in range(FIT_ROUNDS):
         scale = (scene.dead + scene.width) * (2.0 if turn == 0 else 1.5)
-        c = coefficients(volumes, k)
+        c = read_coefficients(volumes, k)
         for i in range(n):  # no branches: a processor does several points at once
-            h, planes[i] = lowest_plane(c, u[i], v[i])
+            h, planes[i] = find_lowest_plane(c, u[i], v[i])
             w = 1.0 - ((z[i] - h) / scale) ** 2
-            shows = is_within(ends, u[i], v[i]) & (replaces | (h > below[i])) & (h >= above[i])
+            shows = is_within(ends, u[i], v[i]) & (replaces | (h > earlier[i])) & (h >= later[i])
             weights[i] = w * w if shows & (abs(z[i] - h) < scale) else 0.0
-        solve_planes(volumes[k], sums_by_plane(volumes, k, u, v, z, weights, planes))
+        solve_planes(volumes[k], sum_by_plane(volumes, k, u, v, z, weights, planes))
 
 
 @compiled
-def sums_by_plane(volumes, k, u, v, z, weights, planes):
+def sum_by_plane(volumes, k, u, v, z, weights, planes):
     """Sums (5, PLANES) of w, w x, w z, w x x, w x z over the points that each plane of volume k is the lowest at."""
-    sums = np.zeros((5, PLANES))
+    sums = np.zeros((5, N_PLANES))
     for i in range(len(u)):
         w, plane = weights[i], planes[i]
         if w > 0.0:
-            x = distance_up(volumes[k], plane, u[i], v[i]) if plane < LEVEL else 0.0
+            x = measure_run(volumes[k], plane, u[i], v[i]) if plane < LEVEL else 0.0
             sums[0, plane] += w
             sums[1, plane] += w * x
             sums[2, plane] += w * z[i]
@@ -68,21 +68,21 @@ def sums_by_plane(volumes, k, u, v, z, weights, planes):
 @compiled
 def solve_planes(row, sums):
     """Slopes and offsets of a volume from its planes' weighted sums (5, PLANES); what has no points keeps its offset."""
-    step = SIDES if row[TIE] == ALL else 2 if row[TIE] == OPPOSITE else 1
-    for first in range(0, SIDES, step):
+    step = N_SIDES if row[TIE] == ALL_EQUAL else 2 if row[TIE] == OPPOSITE else 1
+    for first in range(0, N_SIDES, step):
         spread = product = weight = 0.0
         for k in range(first, first + step):
-            if row[OFFSET + k] < np.inf and sums[0, k] > LEAST_WEIGHT:
+            if row[OFFSET0 + k] < np.inf and sums[0, k] > LEAST_WEIGHT:
                 spread += sums[3, k] - sums[1, k] ** 2 / sums[0, k]
                 product += sums[4, k] - sums[1, k] * sums[2, k] / sums[0, k]
                 weight += sums[0, k]
         determined = weight > LEAST_SLOPE_WEIGHT and spread > LEAST_SPREAD_M2 * weight
         slope = min(max(product / spread, SLOPE_LOW), SLOPE_HIGH) if determined else -1.0
         for k in range(first, first + step):
-            if row[OFFSET + k] < np.inf:
+            if row[OFFSET0 + k] < np.inf:
                 if slope > 0.0:
-                    row[SLOPE + k] = slope
+                    row[SLOPE0 + k] = slope
                 if sums[0, k] > LEAST_WEIGHT:
-                    row[OFFSET + k] = (sums[2, k] - row[SLOPE + k] * sums[1, k]) / sums[0, k]
-    if row[OFFSET + LEVEL] < np.inf and sums[0, LEVEL] > LEAST_WEIGHT:
-        row[OFFSET + LEVEL] = sums[2, LEVEL] / sums[0, LEVEL]
+                    row[OFFSET0 + k] = (sums[2, k] - row[SLOPE0 + k] * sums[1, k]) / sums[0, k]
+    if row[OFFSET0 + LEVEL] < np.inf and sums[0, LEVEL] > LEAST_WEIGHT:
+        row[OFFSET0 + LEVEL] = sums[2, LEVEL] / sums[0, LEVEL]

@@ -8,58 +8,61 @@ from __future__ import annotations
 
 import numpy as np
 
-from .around import look_around
+from .around import measure_context
 from .edges import move_edges
-from .moves import refitted
-from .objective import costs, objective
+from .moves import refit_volume
+from .objective import compute_costs, compute_objective
 from .prices import COPY_UNITS
 from .scene import Scene, select_points
 from .volumes import (
     DIRECTION,
-    LEAN,
-    NUMBER,
-    OFFSET,
+    LEAN0,
+    N_SIDES,
+    OFFSET0,
     REPLACES,
+    ROW_NUMBER,
     SETTLED,
-    SIDES,
-    SLOPE,
+    SLOPE0,
     U0,
     U1,
     V0,
     V1,
-    roof_heights,
+    compute_roof_heights,
 )
 
-LEAST_M2, MOST_M2 = 1.0, 16.0  # of a volume that may stand in a row: a dormer, a bay, a box
-STEP_M, REACH_M = 0.2, 0.4  # m between places tried; m that the edges of a copy may move
+LEAST_COPY_M2, MOST_COPY_M2 = (
+    1.0,
+    16.0,
+)  # of a volume that may stand in a row: a dormer, a bay, a box
+COPY_STEP_M, COPY_REACH_M = 0.2, 0.4  # m between places tried; m that the edges of a copy may move
 
 
 def repeat_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """Return the volumes (k, COLUMNS) and, after them, copies of small ones where points ask."""
     for k in range(1, len(volumes)):
-        if may_be_repeated(volumes[k]):
+        if is_repeatable(volumes[k]):
             for axis in (0, 1):
                 volumes = repeat_along(volumes, k, axis, scene)
     return volumes
 
 
-def may_be_repeated(volume: np.ndarray) -> bool:
+def is_repeatable(volume: np.ndarray) -> bool:
     area = (volume[U1] - volume[U0]) * (volume[V1] - volume[V0])
-    return bool(LEAST_M2 <= area <= MOST_M2 and not volume[REPLACES])
+    return bool(LEAST_COPY_M2 <= area <= MOST_COPY_M2 and not volume[REPLACES])
 
 
 def repeat_along(volumes: np.ndarray, k: int, axis: int, scene: Scene) -> np.ndarray:
     """Add copies of volume k along an axis, the best first, until none saves enough."""
     y = (scene.V, scene.U)[axis][int(volumes[k, DIRECTION])]
-    low, high = volumes[k, V0 - 2 * axis], volumes[k, V1 - 2 * axis]
-    strip = select_points(scene, np.flatnonzero((low <= y) & (y <= high)))
+    lower, upper = volumes[k, V0 - 2 * axis], volumes[k, V1 - 2 * axis]
+    strip = select_points(scene, np.flatnonzero((lower <= y) & (y <= upper)))
     while len(strip.z) and (copy := find_copy(volumes, k, axis, strip, scene.evidence)) is not None:
         volumes = np.vstack([volumes, copy])
-        value = objective(volumes, scene, np.inf)
+        value = compute_objective(volumes, scene, np.inf)
         last = len(volumes) - 1
-        volumes, value = refitted(volumes, scene, value, last)
-        around = look_around(volumes, scene.U, scene.V, last)
-        move_edges(volumes, scene, last, value, REACH_M, around)
+        volumes, value = refit_volume(volumes, scene, value, last)
+        context = measure_context(volumes, scene.U, scene.V, last)
+        move_edges(volumes, scene, last, value, COPY_REACH_M, context)
     return volumes
 
 
@@ -71,21 +74,23 @@ def find_copy(
     `strip` holds the points and unobserved cells that a copy may reach.
     """
     x = (strip.U, strip.V)[axis][int(volumes[k, DIRECTION])]
-    low, high = volumes[k, U0 + 2 * axis : U0 + 2 * axis + 2]
-    cost = costs(roof_heights(volumes, strip.U, strip.V)[0], strip)
+    lower, upper = volumes[k, U0 + 2 * axis : U0 + 2 * axis + 2]
+    cost = compute_costs(compute_roof_heights(volumes, strip.U, strip.V)[0], strip)
     order = np.argsort(x, kind="stable")
     total, x = np.concatenate([[0.0], np.cumsum(cost[order])]), x[order]
-    back = np.arange(low - high, x[0] - low, -STEP_M)
-    steps = np.concatenate([back, np.arange(high - low, x[-1] - high, STEP_M)])
-    first, last = np.searchsorted(x, low + steps), np.searchsorted(x, high + steps, "right")
-    best, most = None, COPY_UNITS * evidence
-    for n in np.flatnonzero(total[last] - total[first] > most):
+    back = np.arange(lower - upper, x[0] - lower, -COPY_STEP_M)
+    steps = np.concatenate([back, np.arange(upper - lower, x[-1] - upper, COPY_STEP_M)])
+    first, last = np.searchsorted(x, lower + steps), np.searchsorted(x, upper + steps, "right")
+    best, most_saved = None, COPY_UNITS * evidence
+    for n in np.flatnonzero(total[last] - total[first] > most_saved):
         part = select_points(strip, np.sort(order[first[n] : last[n]]))
         copy = move_volume(volumes[k], axis, steps[n])
-        after = costs(roof_heights(np.vstack([volumes, copy]), part.U, part.V)[0], part).sum()
-        saved = total[last[n]] - total[first[n]] - after
-        if saved > most:
-            best, most = copy, saved
+        cost_after = compute_costs(
+            compute_roof_heights(np.vstack([volumes, copy]), part.U, part.V)[0], part
+        ).sum()
+        saved = total[last[n]] - total[first[n]] - cost_after
+        if saved > most_saved:
+            best, most_saved = copy, saved
     return best
 
 
@@ -93,9 +98,9 @@ def move_volume(volume: np.ndarray, axis: int, step_m: float) -> np.ndarray:
     """Return a volume moved along an axis, its planes with it."""
     moved = volume.copy()
     moved[[U0 + 2 * axis, U1 + 2 * axis]] += step_m
-    moved[[SETTLED, NUMBER]] = 0.0
-    for plane in range(SIDES):
+    moved[[SETTLED, ROW_NUMBER]] = 0.0
+    for plane in range(N_SIDES):
         sign = 1.0 if plane % 2 == 0 else -1.0
-        rise = sign if plane // 2 == axis else volume[LEAN + plane]
-        moved[OFFSET + plane] -= volume[SLOPE + plane] * rise * step_m
+        rise = sign if plane // 2 == axis else volume[LEAN0 + plane]
+        moved[OFFSET0 + plane] -= volume[SLOPE0 + plane] * rise * step_m
     return moved

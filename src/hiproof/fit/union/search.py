@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .allowed import allowed_shapes
-from .block import settle_all
+from .allowed import list_allowed_shapes
+from .block import settle_volumes
 from .groups import run_in_groups
 from .grow import grow
 from .improve import simplify
 from .large import find_in_windows
-from .objective import objective
+from .objective import compute_objective
 from .plan import Plan
-from .prices import COMMON_HOUSE_M2, LARGE_M2, evidence_per_unit
-from .regions import Site
-from .run_on import run_on
-from .scene import Scene, directions_of, scene_of, seen_through
+from .prices import COMMON_HOUSE_M2, LARGE_ROOF_M2, compute_unit_points
+from .regions import PlanSite
+from .run_on import extend_ends
+from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
 
 SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
-# What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
-LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
+# What a person would leave out of low-pitched roofs: differences up to LENIENT_DEAD_M (more on large roofs).
+LENIENT_DEAD_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
 
 
 def find_volumes(
@@ -32,32 +32,41 @@ def find_volumes(
     `settings` are those of [compound]; volumes have only shapes that parts of `types` need (any where there are none).
     """
     count = len(plan.cloud.u)
-    few = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
-    evidence = [evidence_per_unit(plan.density * share, outline.area, settings) for share in (len(few) / count, 1.0)]
-    angles = directions_of(outline, plan)
-    every = scene_of(plan, outline, angles, evidence[1], settings.tolerance_m, allowed_shapes(types))
-    if outline.area > LARGE_M2 and count > SEARCH_POINTS:  # else a house's search sees every point
-        site = Site(outline, plan, every, {})
-        volumes = run_in_groups(trim_and_run_on, find_in_windows(plan, outline, every), site)
-        return volumes, objective(volumes, every, np.inf), every
-    scene = seen_through(every, few, evidence[0])
+    numbers = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
+    evidence = [
+        compute_unit_points(plan.density * share, outline.area, settings)
+        for share in (len(numbers) / count, 1.0)
+    ]
+    angles = find_directions(outline, plan)
+    full_scene = make_scene(
+        plan, outline, angles, evidence[1], settings.tolerance_m, list_allowed_shapes(types)
+    )
+    if (
+        outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS
+    ):  # else a house's search sees every point
+        site = PlanSite(outline, plan, full_scene, {})
+        volumes = run_in_groups(trim_and_extend, find_in_windows(plan, outline, full_scene), site)
+        return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
+    scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
-    volumes, value = settle_all(volumes, every)
-    lenient = lenient_scene(scene, outline.area)
-    volumes, _ = simplify(volumes, lenient, objective(volumes, lenient, np.inf), LENIENT_SLOPE)
-    volumes, value = settle_all(volumes, every)
-    volumes, value = trim(volumes, every, value)
-    volumes, value = run_on(volumes, every, value)
-    return volumes, value, every
+    volumes, value = settle_volumes(volumes, full_scene)
+    lenient = soften_scene(scene, outline.area)
+    volumes, _ = simplify(
+        volumes, lenient, compute_objective(volumes, lenient, np.inf), LENIENT_SLOPE
+    )
+    volumes, value = settle_volumes(volumes, full_scene)
+    volumes, value = trim(volumes, full_scene, value)
+    volumes, value = extend_ends(volumes, full_scene, value)
+    return volumes, value, full_scene
 
 
-def trim_and_run_on(volumes: np.ndarray, scene: Scene, _: object = None) -> np.ndarray:
+def trim_and_extend(volumes: np.ndarray, scene: Scene, _: object = None) -> np.ndarray:
     """Draw hidden edges in, and let ends that stand out of a neighbour run on into it."""
-    volumes, value = trim(volumes, scene, objective(volumes, scene, np.inf))
-    return run_on(volumes, scene, value)[0]
+    volumes, value = trim(volumes, scene, compute_objective(volumes, scene, np.inf))
+    return extend_ends(volumes, scene, value)[0]
 
 
-def lenient_scene(scene: Scene, area_m2: float) -> Scene:
+def soften_scene(scene: Scene, area_m2: float) -> Scene:
     """The scene with a larger residual free of cost."""
-    dead = LENIENT_M + LENIENT_MORE_M * min(max((area_m2 - COMMON_HOUSE_M2) / 100.0, 0.0), 1.0)
+    dead = LENIENT_DEAD_M + LENIENT_MORE_M * min(max((area_m2 - COMMON_HOUSE_M2) / 100.0, 0.0), 1.0)
     return scene._replace(dead=dead, width=LENIENT_SOFT_M)

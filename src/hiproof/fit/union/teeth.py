@@ -18,101 +18,130 @@ from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
-from .regions import area_of, besides, polygons_of
-from .shown import with_slivers
+from .regions import exclude_parts, list_polygons, unite_outlines
+from .shown import absorb_slivers
 
 # rise over run; m; share of a size; rad: within which teeth, or the halves of a gambrel, are alike
 SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
 UNEVEN_M = 0.1  # heights of teeth, were they equally wide, that differ by more: they are not
-NEARLY, GRID_STEP_M = 0.8, 0.4  # of a tooth's area, at places so close, that a part must show as
+TOOTH_SHARE, GRID_STEP_M = (
+    0.8,
+    0.4,
+)  # of a tooth's area, at places so close, that a part must show as
 # m within which a row ends at a wall of the roof, of its length that must, and m between parts that are beside each other
 AT_WALL_M, AT_WALL, CRACK_M = 0.05, 0.5, 0.02
 
 
-def with_saw_teeth(parts: list[Part]) -> list[Part]:
+def unite_saw_teeth(parts: list[Part]) -> list[Part]:
     """`parts` with every row of equal monopitches replaced by one saw-tooth ("shed")."""
-    for row, others in rows_of(parts):
-        united = saw_tooth(row, others)
+    for row, other_parts in list_rows(parts):
+        united = make_saw_tooth(row, other_parts)
         if united is not None:
-            return with_saw_teeth(united)
+            return unite_saw_teeth(united)
     return parts
 
 
-def rows_of(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
+def list_rows(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
     """Every row of equal monopitches, in order from the lowest v to the highest, and the parts beside it."""
     teeth = [part for part in parts if is_tooth(part)]
     while teeth:
         row = [teeth.pop(0)]
         grown = True
         while grown and len(row) < max(TEETH):
-            neighbour = next((part for part in teeth if follows(row[-1], part) or follows(part, row[0])), None)
+            neighbour = next(
+                (
+                    part
+                    for part in teeth
+                    if is_next_tooth(row[-1], part) or is_next_tooth(part, row[0])
+                ),
+                None,
+            )
             grown = neighbour is not None
             if neighbour is not None:
-                teeth = besides(teeth, [neighbour])
-                row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
-        row, others = carried_on(row, besides(parts, row))
+                teeth = exclude_parts(teeth, [neighbour])
+                row = [*row, neighbour] if is_next_tooth(row[-1], neighbour) else [neighbour, *row]
+        row, other_parts = extend_row(row, exclude_parts(parts, row))
         if len(row) >= min(TEETH):
-            yield row, others
+            yield row, other_parts
 
 
-def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:
+def extend_row(row: list[Part], other_parts: list[Part]) -> tuple[list[Part], list[Part]]:
     """The row with parts of the others that show as its next tooth although they are more than that, and the others without them."""
-    parts = [*row, *others]
+    parts = [*row, *other_parts]
     for step in 1.0, -1.0:
         while len(row) < max(TEETH):
-            place = next_tooth(row, row[-1] if step > 0.0 else row[0], step)
-            part = next((p for p in as_high_amid(others, place) if shows_as(p, place, besides(parts, [p]))), None)
+            place = make_next_tooth(row, row[-1] if step > 0.0 else row[0], step)
+            part = next(
+                (
+                    p
+                    for p in select_equal_heights(other_parts, place)
+                    if is_visible_as(p, place, exclude_parts(parts, [p]))
+                ),
+                None,
+            )
             if part is None:
                 break
-            tooth = as_high(place, part)
+            tooth = raise_tooth(place, part)
             row = [*row, tooth] if step > 0.0 else [tooth, *row]
-            others = besides(others, [part])
-    return row, others
+            other_parts = exclude_parts(other_parts, [part])
+    return row, other_parts
 
 
-def next_tooth(row: list[Part], last: Part, step: float) -> Part:
+def make_next_tooth(row: list[Part], last: Part, step: float) -> Part:
     """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
-    across = step * mean_of(row, "width") * np.array([-math.sin(last.kappa), math.cos(last.kappa), 0.0])
-    return replace(last, pieces=(last.pieces[0].move(across),), translation=last.translation + across)
+    across = (
+        step
+        * average_parameter(row, "width")
+        * np.array([-math.sin(last.kappa), math.cos(last.kappa), 0.0])
+    )
+    return replace(
+        last, pieces=(last.pieces[0].move(across),), translation=last.translation + across
+    )
 
 
-def as_high_amid(parts: list[Part], tooth: Part) -> Iterator[Part]:
+def select_equal_heights(parts: list[Part], tooth: Part) -> Iterator[Part]:
     """The parts that are about as high as a `tooth` in the midst of it."""
     middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
-    wanted = tooth.height_at(middle)[0]
-    return (part for part in parts if abs(part.height_at(middle)[0] - wanted) <= HEIGHT_ALIKE_M)
+    target = tooth.height_at(middle)[0]
+    return (part for part in parts if abs(part.height_at(middle)[0] - target) <= HEIGHT_ALIKE_M)
 
 
-def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
-    """Whether what shows of a part under `others` is the `tooth`: there as high nearly everywhere, and nowhere else."""
-    xy = places_around([part])
-    z, wanted = part.height_at(xy), tooth.height_at(xy)
-    beneath = np.max([other.height_at(xy) for other in others], axis=0)
+def is_visible_as(part: Part, tooth: Part, other_parts: list[Part]) -> bool:
+    """Whether what shows of a part under `other_parts` is the `tooth`: there as high nearly everywhere, and nowhere else."""
+    xy = lay_places([part])
+    z, target = part.height_at(xy), tooth.height_at(xy)
+    beneath = np.max([other.height_at(xy) for other in other_parts], axis=0)
     shows = z > beneath + 1e-6
-    alike = np.abs(z[shows] - wanted[shows]) < HEIGHT_ALIKE_M
-    whole = alike.sum() * GRID_STEP_M**2 > NEARLY * tooth.area
-    return bool(whole and alike.sum() > NEARLY * shows.sum())
+    alike = np.abs(z[shows] - target[shows]) < HEIGHT_ALIKE_M
+    whole = alike.sum() * GRID_STEP_M**2 > TOOTH_SHARE * tooth.area
+    return bool(whole and alike.sum() > TOOTH_SHARE * shows.sum())
 
 
-def places_around(parts: Iterable[Part]) -> np.ndarray:
+def lay_places(parts: Iterable[Part]) -> np.ndarray:
     """Places (n, 2) on a grid over the box around all that parts cover."""
-    x0, y0, x1, y1 = area_of(parts).bounds
-    return np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+    x0, y0, x1, y1 = unite_outlines(parts).bounds
+    return np.stack(
+        np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1
+    ).reshape(-1, 2)
 
 
-def mean_of(row: list[Part], name: str) -> float:
+def average_parameter(row: list[Part], name: str) -> float:
     """The mean of a parameter of a row's teeth."""
     return float(np.mean([part.parameters[name] for part in row]))
 
 
-def as_high(tooth: Part, part: Part) -> Part:
+def raise_tooth(tooth: Part, part: Part) -> Part:
     """The `tooth` over what a part covers of it and near it, as high there as that part."""
     (piece,) = tooth.pieces
-    around = shapely.buffer(piece.outline, SIZE_ALIKE * tooth.parameters["width"], join_style="mitre")
-    outline = with_area(shapely.intersection(area_of([part]), around))
-    middle = shapely.get_coordinates(shapely.point_on_surface(shapely.intersection(outline, piece.outline)))
+    margin_area = shapely.buffer(
+        piece.outline, SIZE_ALIKE * tooth.parameters["width"], join_style="mitre"
+    )
+    outline = with_area(shapely.intersection(unite_outlines([part]), margin_area))
+    middle = shapely.get_coordinates(
+        shapely.point_on_surface(shapely.intersection(outline, piece.outline))
+    )
     rise = np.array([0.0, 0.0, float((part.height_at(middle) - piece.height_at(middle))[0])])
-    pieces = tuple(Piece(polygon, piece.planes + rise) for polygon in polygons_of(outline))
+    pieces = tuple(Piece(polygon, piece.planes + rise) for polygon in list_polygons(outline))
     return replace(tooth, pieces=pieces, translation=tooth.translation + rise)
 
 
@@ -120,31 +149,32 @@ def is_tooth(part: Part) -> bool:
     return part.type == "monopitch" and len(part.pieces) == 1 and "height" in part.parameters
 
 
-def follows(tooth: Part, next_tooth: Part) -> bool:
-    """Whether `next_tooth` is the like of `tooth` and lies right behind its upper edge, as high there as that was before."""
-    one, other = tooth.parameters, next_tooth.parameters
+def is_next_tooth(tooth: Part, next_tooth: Part) -> bool:
+    """Whether `make_next_tooth` is the like of `tooth` and lies right behind its upper edge, as high there as that was before."""
+    size, other_size = tooth.parameters, next_tooth.parameters
     turn = math.remainder(next_tooth.kappa - tooth.kappa, 2.0 * math.pi)
-    slopes = [p["height"] / p["width"] for p in (one, other)]
+    slopes = [p["height"] / p["width"] for p in (size, other_size)]
     same_size = all(
-        abs(one[name] - other[name]) < SIZE_ALIKE * max(one[name], other[name]) for name in ("width", "length")
+        abs(size[name] - other_size[name]) < SIZE_ALIKE * max(size[name], other_size[name])
+        for name in ("width", "length")
     )
     step = next_tooth.translation - tooth.translation
     across = np.array([-math.sin(tooth.kappa), math.cos(tooth.kappa)]) @ step[:2]
     along = np.array([math.cos(tooth.kappa), math.sin(tooth.kappa)]) @ step[:2]
-    spacing = 0.5 * (one["width"] + other["width"])
-    rise = step[2] + 0.5 * (other["height"] - one["height"]) - slopes[0] * (across - spacing)
+    spacing = 0.5 * (size["width"] + other_size["width"])
+    rise = step[2] + 0.5 * (other_size["height"] - size["height"]) - slopes[0] * (across - spacing)
     return (
         abs(turn) < TURN_ALIKE_RAD
         and abs(slopes[0] - slopes[1]) < SLOPE_ALIKE
         and same_size
         and abs(rise) < HEIGHT_ALIKE_M
         and abs(across - spacing) < SIZE_ALIKE * spacing
-        and abs(along) < SIZE_ALIKE * one["length"]
+        and abs(along) < SIZE_ALIKE * size["length"]
     )
 
 
 @dataclass(frozen=True)
-class Ground:
+class RowFrame:
     """Where a row stands: u along the teeth and v across them are `axes` (2, 2) about `origin` (2,), teeth reach from `left` to
     `right` along u, the row was seen from `first` to `last` along v, and covers `covered`; `roof` is all that is roofed, and `walls`
     its border: cracks between parts are none."""
@@ -159,43 +189,51 @@ class Ground:
     roof: shapely.Geometry
     walls: shapely.Geometry
 
-    def strip(self, foot: float, top: float) -> shapely.Polygon:
+    def make_strip(self, foot: float, top: float) -> shapely.Polygon:
         """From v = `foot` to `top` as long as the teeth; nothing where `top` is not above."""
         box = shapely.box(self.left, foot, self.right, top) if top > foot else shapely.Polygon()
         return shapely.transform(box, lambda uv: uv @ self.axes + self.origin)
 
-    def is_wall(self, at: float) -> bool:
-        """Whether the roof's outline runs along v = `at`."""
-        along = shapely.intersection(self.walls, self.strip(at - AT_WALL_M, at + AT_WALL_M))
+    def is_wall(self, place: float) -> bool:
+        """Whether the roof's outline runs along v = `place`."""
+        along = shapely.intersection(
+            self.walls, self.make_strip(place - AT_WALL_M, place + AT_WALL_M)
+        )
         return along.length > AT_WALL * (self.right - self.left)
 
 
-def ground_of(row: list[Part], others: list[Part]) -> Ground:
+def frame_row(row: list[Part], other_parts: list[Part]) -> RowFrame:
     """Where a row of teeth stands among the other parts."""
     origin, kappa = row[0].translation[:2], row[0].kappa
     axes = np.array([[math.cos(kappa), math.sin(kappa)], [-math.sin(kappa), math.cos(kappa)]])
-    covered, beside = (area_of(own) for own in (row, others))
+    covered, others_area = (unite_outlines(group) for group in (row, other_parts))
     uv = (shapely.get_coordinates(covered) - origin) @ axes.T
     (left, first), (right, last) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
-    roof = shapely.MultiPolygon(polygons_of(shapely.union(covered, beside, grid_size=OVERLAY_GRID_M)))
+    roof = shapely.MultiPolygon(
+        list_polygons(shapely.union(covered, others_area, grid_size=OVERLAY_GRID_M))
+    )
     walls = shapely.buffer(roof, CRACK_M, join_style="mitre").boundary
-    return Ground(origin, axes, left, right, first, last, covered, roof, walls)
+    return RowFrame(origin, axes, left, right, first, last, covered, roof, walls)
 
 
-def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
+def make_saw_tooth(row: list[Part], other_parts: list[Part]) -> list[Part] | None:
     """The other parts and one shed of the row; None where some of its teeth are wider than others, or their planes tell of others than
     were seen.
 
     What a tooth reaches further than it was seen it takes from the others, and leaves them what it reaches less.
     """
-    others, splinters = without_splinters(row, others)
-    ground = ground_of([*row, *splinters], others)
+    other_parts, splinters = separate_splinters(row, other_parts)
+    ground = frame_row([*row, *splinters], other_parts)
     centres = (np.array([part.translation[:2] for part in row]) - ground.origin) @ ground.axes.T
     slopes = np.array([part.parameters["height"] / part.parameters["width"] for part in row])
     heights = np.array([part.translation[2] + 0.5 * part.parameters["height"] for part in row])
-    breaks = laid_out(centres[:, 1] - heights / slopes.mean(), ground)
+    breaks = lay_out_teeth(centres[:, 1] - heights / slopes.mean(), ground)
     heights = heights + slopes * (0.5 * (breaks[:-1] + breaks[1:]) - centres[:, 1])
-    length, width, seen_wide = mean_of(row, "length"), float(breaks[-1] - breaks[0]), mean_of(row, "width")
+    length, width, seen_wide = (
+        average_parameter(row, "length"),
+        float(breaks[-1] - breaks[0]),
+        average_parameter(row, "width"),
+    )
     # planes that hardly slope tell of teeth of another width than was seen, or of less than none
     if np.ptp(heights) > UNEVEN_M or abs(width / len(row) - seen_wide) > SIZE_ALIKE * seen_wide:
         return None
@@ -205,31 +243,45 @@ def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
     translation = np.array([*centre, heights.mean() - 0.5 * rise])
     shape = get("shed").variant(parameters)
     whole = shape.part(shape.to_theta(parameters, row[0].kappa, translation))
-    shed = replace(whole, pieces=cut(whole.pieces, breaks, ground))
-    rest = shapely.difference(ground.covered, ground.strip(breaks[0], breaks[-1]), grid_size=OVERLAY_GRID_M)
-    left_over = replace(shed, pieces=tuple(Piece(polygon, shed.pieces[0].planes) for polygon in polygons_of(rest)))
+    shed = replace(whole, pieces=cut_teeth(whole.pieces, breaks, ground))
+    remainder = shapely.difference(
+        ground.covered, ground.make_strip(breaks[0], breaks[-1]), grid_size=OVERLAY_GRID_M
+    )
+    left_over = replace(
+        shed,
+        pieces=tuple(Piece(polygon, shed.pieces[0].planes) for polygon in list_polygons(remainder)),
+    )
     if not left_over.pieces:
-        return [*others, shed]
-    beside = with_slivers(others, left_over, math.inf)
+        return [*other_parts, shed]
+    absorbed = absorb_slivers(other_parts, left_over, math.inf)
     # where no other part lies beside it, the outermost teeth reach as far as the row did
-    return [*beside, shed] if beside is not None else with_slivers([*others, shed], left_over, math.inf)
+    return (
+        [*absorbed, shed]
+        if absorbed is not None
+        else absorb_slivers([*other_parts, shed], left_over, math.inf)
+    )
 
 
-def without_splinters(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:
+def separate_splinters(row: list[Part], other_parts: list[Part]) -> tuple[list[Part], list[Part]]:
     """The other parts, and those that are narrow strips between the teeth: what a scanner saw of a tooth's wall."""
-    covered = area_of(row)
+    covered = unite_outlines(row)
     narrow = SIZE_ALIKE * min(part.parameters["width"] for part in row)
-    between = shapely.buffer(shapely.buffer(covered, narrow, join_style="mitre"), -narrow, join_style="mitre")
+    closed_area = shapely.buffer(
+        shapely.buffer(covered, narrow, join_style="mitre"), -narrow, join_style="mitre"
+    )
     splinters = [
         part
-        for part in others
+        for part in other_parts
         if part.parameters.get("width", math.inf) < narrow
-        and all(shapely.intersection(between, p.outline).area > NEARLY * p.outline.area for p in part.pieces)
+        and all(
+            shapely.intersection(closed_area, p.outline).area > TOOTH_SHARE * p.outline.area
+            for p in part.pieces
+        )
     ]
-    return besides(others, splinters), splinters
+    return exclude_parts(other_parts, splinters), splinters
 
 
-def laid_out(feet: np.ndarray, ground: Ground) -> np.ndarray:
+def lay_out_teeth(feet: np.ndarray, ground: RowFrame) -> np.ndarray:
     """Where the teeth of a row begin and the last one ends (n + 1,), v in metres, all equally wide.
 
     Their planes would be at height 0 at `feet` (n,). Ends at walls are where the outline has them.
@@ -240,18 +292,29 @@ def laid_out(feet: np.ndarray, ground: Ground) -> np.ndarray:
     starts, ends = ground.is_wall(first), ground.is_wall(last)
     if starts and ends:
         width = (last - first) / count
-    low = first if starts else last - count * width if ends else 0.5 * (first + last - count * width)
-    return low + width * np.arange(count + 1)
+    start = (
+        first if starts else last - count * width if ends else 0.5 * (first + last - count * width)
+    )
+    return start + width * np.arange(count + 1)
 
 
-def cut(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: Ground) -> tuple[Piece, ...]:
+def cut_teeth(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: RowFrame) -> tuple[Piece, ...]:
     """The pieces of a saw-tooth, a tooth each, over what its row covers and reaches further."""
-    further = [ground.strip(breaks[0], ground.first), ground.strip(ground.last, breaks[-1])]
-    more = with_area(shapely.intersection(ground.roof, with_area(shapely.union_all(further, grid_size=OVERLAY_GRID_M))))
-    over = with_area(shapely.union(ground.covered, more, grid_size=OVERLAY_GRID_M))
-    strips = [ground.strip(foot, top) for foot, top in pairwise(breaks.tolist())]
+    further = [
+        ground.make_strip(breaks[0], ground.first),
+        ground.make_strip(ground.last, breaks[-1]),
+    ]
+    extension = with_area(
+        shapely.intersection(
+            ground.roof, with_area(shapely.union_all(further, grid_size=OVERLAY_GRID_M))
+        )
+    )
+    row_area = with_area(shapely.union(ground.covered, extension, grid_size=OVERLAY_GRID_M))
+    strips = [ground.make_strip(foot, top) for foot, top in pairwise(breaks.tolist())]
     return tuple(
         Piece(polygon, piece.planes)
         for strip, piece in zip(strips, pieces, strict=True)
-        for polygon in polygons_of(shapely.intersection(over, strip, grid_size=OVERLAY_GRID_M))
+        for polygon in list_polygons(
+            shapely.intersection(row_area, strip, grid_size=OVERLAY_GRID_M)
+        )
     )

@@ -14,51 +14,66 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from .cants import Known, finished, walls_of
-from .cut_corners import over_cut_corners
-from .finish import SQUARE, Planes
-from .moves import refit_each, without
-from .objective import base_shows, costs, edges_cost, objective
+from .cants import Cache, fit_planes, list_walls
+from .cut_corners import draw_over_corners
+from .finish import SQUARE_LEAN, Planes
+from .moves import refit_volumes, remove_volume
+from .objective import compute_costs, compute_objective, is_base_visible, price_edges
 from .plan import Plan
 from .prices import ALONG_AXES_UNITS, FITTING_UNITS
 from .scene import Scene
-from .sides import BESIDE_M as REACH_M
-from .sides import Lines, Side, list_lines, plan_chords, plan_edges, sides_of
+from .sides import (
+    OUTLINE_REACH_M,
+    Side,
+    SideLines,
+    choose_sides,
+    list_chords,
+    list_edges,
+    list_lines,
+)
 from .volumes import (
     DIRECTION,
-    LEAN,
+    LEAN0,
     LEVEL,
-    NUMBER,
-    OFFSET,
-    PLANES,
+    N_PLANES,
+    OFFSET0,
     REPLACES,
-    SLOPE,
+    ROW_NUMBER,
+    SLOPE0,
     U0,
     V0,
     V1,
-    distances_up,
-    roof_heights,
-    volume_cost,
+    compute_roof_heights,
+    measure_runs,
+    price_volume,
 )
 
-BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
-SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
-MOST_CUT = 2  # volumes drawn out over walls that cut corners off: a house has one bay or two
+UNITE_GAP_M, UNITE_OFFSET_M = (
+    0.4,
+    1.0,
+)  # how far apart the rectangles may lie, and their sides along the line of both
+SLOPES_ALIKE, HEIGHTS_ALIKE_M = (
+    0.15,
+    0.5,
+)  # rise over run, m: further apart, two volumes are not tried as one
+MOST_CUT_CORNERS = (
+    2  # volumes drawn out over walls that cut corners off: a house has one bay or two
+)
 
 
-class Ends(NamedTuple):
+class OutlineEnds(NamedTuple):
     """What an outline ends volumes with: its edges and chords (2, m, 2) in the first direction's axes, the lines that sides
     may take of these, by direction, and its walls (m, 2, 2). `outline` (2, n, 2) are all edges, near or not."""
 
     edges: np.ndarray
     chords: np.ndarray
-    lines: list[list[Lines]]
+    lines: list[list[SideLines]]
     walls: np.ndarray
     outline: np.ndarray
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnRoof:
     """Volumes (k, COLUMNS) with their sides and planes, and what the roof costs with these (points)."""
 
     volumes: np.ndarray
@@ -67,147 +82,183 @@ class Drawn:
     cost: float
 
 
-def united(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known, own: Collection[int] | None = None) -> Drawn:
+def unite_volumes(
+    volumes: np.ndarray,
+    ends: OutlineEnds,
+    scene: Scene,
+    cache: Cache,
+    movable: Collection[int] | None = None,
+) -> DrawnRoof:
     """The volumes along their sides, without those that do not pay once planes face as these do.
 
-    Only volumes of the numbers `own` are made one with others, or go; all where it is None. Planes
-    that are `known` in this scene are not fitted again; those found become known.
+    Only volumes of the numbers `movable` are made one with others, or go; all where it is None. Planes
+    that are `cache` in this scene are not fitted again; those found become known.
     """
-    value = objective(volumes, scene, np.inf)
-    best = with_cut_corners(drawn(volumes, ends, scene, known), ends, scene, known)
-    tried = True
-    while tried:
-        tried = False
-        for trial in fewer(best, own):
-            if bares_the_base(trial, best.volumes, scene):
+    value = compute_objective(volumes, scene, np.inf)
+    best = cover_cut_corners(draw_roof(volumes, ends, scene, cache), ends, scene, cache)
+    has_improved = True
+    while has_improved:
+        has_improved = False
+        for trial in list_reductions(best, movable):
+            if is_base_bared(trial, best.volumes, scene):
                 continue
-            trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
-            if found > value + ALONG_AXES_UNITS * scene.evidence:
+            trial, trial_value = refit_volumes(
+                trial, scene, compute_objective(trial, scene, np.inf)
+            )
+            if trial_value > value + ALONG_AXES_UNITS * scene.evidence:
                 continue
-            roof = drawn(trial, ends, scene, known)
+            roof = draw_roof(trial, ends, scene, cache)
             if roof.cost < best.cost:
-                best, value, tried = roof, found, True
+                best, value, has_improved = roof, trial_value, True
                 break
     return best
 
 
-def ends_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> Ends:
-    edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
-    return Ends(edges, chords, list_lines(edges, chords, scene.turn, edges), walls_of(outline, plan), edges)
+def gather_ends(outline: shapely.Polygon, plan: Plan, scene: Scene) -> OutlineEnds:
+    edges, chords = list_edges(outline, plan), list_chords(outline, plan)
+    return OutlineEnds(
+        edges,
+        chords,
+        list_lines(edges, chords, scene.turn, edges),
+        list_walls(outline, plan),
+        edges,
+    )
 
 
-def ends_within(ends: Ends, scene: Scene) -> Ends:
+def select_ends(ends: OutlineEnds, scene: Scene) -> OutlineEnds:
     """Those of the ends that reach into what a scene shows, or nearly."""
-    low = np.array([scene.corner_u, scene.corner_v]) - REACH_M
-    high = low + np.multiply(scene.depth.shape, scene.pitch) + 2.0 * REACH_M
+    lower = np.array([scene.corner_u, scene.corner_v]) - OUTLINE_REACH_M
+    upper = lower + np.multiply(scene.depth.shape, scene.pitch) + 2.0 * OUTLINE_REACH_M
     edges, chords, walls = (
-        lines[:, reaches(lines, low, high)] for lines in (ends.edges, ends.chords, ends.walls.swapaxes(0, 1))
+        lines[:, is_reaching(lines, lower, upper)]
+        for lines in (ends.edges, ends.chords, ends.walls.swapaxes(0, 1))
     )
     lines = list_lines(edges, chords, scene.turn, ends.outline)
-    return Ends(edges, chords, lines, walls.swapaxes(0, 1), ends.outline)
+    return OutlineEnds(edges, chords, lines, walls.swapaxes(0, 1), ends.outline)
 
 
-def reaches(lines: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Which of the lines between ends (2, m, 2) reach into the box from `low` to `high` (2,)."""
-    return ((lines.min(axis=0) < high) & (lines.max(axis=0) > low)).all(axis=1)
+def is_reaching(lines: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Which of the lines between ends (2, m, 2) reach into the box from `lower` to `upper` (2,)."""
+    return ((lines.min(axis=0) < upper) & (lines.max(axis=0) > lower)).all(axis=1)
 
 
-def with_cut_corners(roof: Drawn, ends: Ends, scene: Scene, known: Known) -> Drawn:
-    """The roof with one volume over walls that cut its corners off in place of several, where that is cheaper, at most MOST_CUT times."""
-    for _ in range(MOST_CUT):
-        before = roof
-        for trial in over_cut_corners(before.volumes, ends.walls, scene):
-            if at_least(trial, scene) > roof.cost + FITTING_UNITS * scene.evidence:
+def cover_cut_corners(roof: DrawnRoof, ends: OutlineEnds, scene: Scene, cache: Cache) -> DrawnRoof:
+    """The roof with one volume over walls that cut its corners off in place of several, where that is cheaper, at most MOST_CUT_CORNERS times."""
+    for _ in range(MOST_CUT_CORNERS):
+        roof_before = roof
+        for trial in draw_over_corners(roof_before.volumes, ends.walls, scene):
+            if bound_cost(trial, scene) > roof.cost + FITTING_UNITS * scene.evidence:
                 continue
-            if bares_the_base(trial, before.volumes, scene):
+            if is_base_bared(trial, roof_before.volumes, scene):
                 continue
-            trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
-            found = drawn(trial, ends, scene, known)
-            roof = found if found.cost < roof.cost else roof
-        if roof is before:
+            trial, _ = refit_volumes(trial, scene, compute_objective(trial, scene, np.inf))
+            trial_roof = draw_roof(trial, ends, scene, cache)
+            roof = trial_roof if trial_roof.cost < roof.cost else roof
+        if roof is roof_before:
             break
     return roof
 
 
-def bares_the_base(trial: np.ndarray, volumes: np.ndarray, scene: Scene) -> bool:
+def is_base_bared(trial: np.ndarray, volumes: np.ndarray, scene: Scene) -> bool:
     """Whether the base shows under a trial and not under the volumes that it would take the place of."""
-    return bool(base_shows(trial, scene)) and not base_shows(volumes, scene)
+    return bool(is_base_visible(trial, scene)) and not is_base_visible(volumes, scene)
 
 
-def at_least(volumes: np.ndarray, scene: Scene) -> float:
+def bound_cost(volumes: np.ndarray, scene: Scene) -> float:
     """What a roof costs whatever further planes lower it: its volumes, its edges, and the points above it."""
-    z, _ = roof_heights(volumes, scene.U, scene.V)
-    above = scene.z[: scene.n] > z[: scene.n]
-    return float(costs(z, scene)[: scene.n][above].sum()) + structure_cost(volumes, scene)
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    is_above = scene.z[: scene.n] > z[: scene.n]
+    return float(compute_costs(z, scene)[: scene.n][is_above].sum()) + price_structure(
+        volumes, scene
+    )
 
 
-def structure_cost(volumes: np.ndarray, scene: Scene) -> float:
-    return scene.evidence * sum(volume_cost(volume) for volume in volumes[1:]) + edges_cost(volumes, scene, np.inf)
+def price_structure(volumes: np.ndarray, scene: Scene) -> float:
+    return scene.evidence * sum(price_volume(volume) for volume in volumes[1:]) + price_edges(
+        volumes, scene, np.inf
+    )
 
 
-def fewer(roof: Drawn, own: Collection[int] | None) -> Iterator[np.ndarray]:
+def list_reductions(roof: DrawnRoof, movable: Collection[int] | None) -> Iterator[np.ndarray]:
     """Volumes with two that are alike made one; and without one, where sides are not square to each other."""
-    mine = [own is None or number in own for number in roof.volumes[:, NUMBER].tolist()]
+    is_movable = [
+        movable is None or number in movable for number in roof.volumes[:, ROW_NUMBER].tolist()
+    ]
     for j, k in combinations(range(1, len(roof.volumes)), 2):
-        if (mine[j] or mine[k]) and alike(roof.volumes[j], roof.volumes[k]):
+        if (is_movable[j] or is_movable[k]) and is_alike(roof.volumes[j], roof.volumes[k]):
             trial = roof.volumes.copy()
-            trial[j] = over_both(trial[j], trial[k])
-            yield without(trial, k)
-    if any(abs(side.lean) > SQUARE for own in roof.sides for side in own):
+            trial[j] = merge_rectangles(trial[j], trial[k])
+            yield remove_volume(trial, k)
+    if any(abs(side.lean) > SQUARE_LEAN for volume_sides in roof.sides for side in volume_sides):
         for k in range(len(roof.volumes) - 1, 0, -1):
-            if mine[k]:
-                yield without(roof.volumes, k)
+            if is_movable[k]:
+                yield remove_volume(roof.volumes, k)
 
 
-def drawn(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known) -> Drawn:
+def draw_roof(volumes: np.ndarray, ends: OutlineEnds, scene: Scene, cache: Cache) -> DrawnRoof:
     """The volumes with the sides, on the outline's lines where these are near, and the planes that suit them."""
     key = volumes.tobytes()
-    if key not in known:
-        sides = sides_of(volumes, ends.lines, scene)
-        planes = finished(volumes, sides, ends.walls, scene, known)
-        misfit = sum(own.cost + own.price for own in planes)
-        known[key] = Drawn(volumes, sides, planes, misfit + structure_cost(volumes, scene))
-    return known[key]
+    if key not in cache:
+        sides = choose_sides(volumes, ends.lines, scene)
+        planes = fit_planes(volumes, sides, ends.walls, scene, cache)
+        misfit = sum(volume_planes.cost + volume_planes.price for volume_planes in planes)
+        cache[key] = DrawnRoof(volumes, sides, planes, misfit + price_structure(volumes, scene))
+    return cache[key]
 
 
-def alike(one: np.ndarray, other: np.ndarray) -> bool:
+def is_alike(row: np.ndarray, other: np.ndarray) -> bool:
     """Whether two volumes lie beside each other in one line, with all but the same planes."""
-    if one[DIRECTION] != other[DIRECTION] or one[REPLACES] or other[REPLACES]:
+    if row[DIRECTION] != other[DIRECTION] or row[REPLACES] or other[REPLACES]:
         return False
-    if not in_line(one[U0 : V1 + 1].tolist(), other[U0 : V1 + 1].tolist()):
+    if not is_in_line(row[U0 : V1 + 1].tolist(), other[U0 : V1 + 1].tolist()):
         return False
-    rectangles = np.array([one[U0 : V1 + 1], other[U0 : V1 + 1]]).reshape(2, 2, 2)  # volume, axis, end
-    there = np.isfinite(one[OFFSET : OFFSET + PLANES]), np.isfinite(other[OFFSET : OFFSET + PLANES])
-    both = there[0] & there[1]
-    if both.sum() < min(there[0].sum(), there[1].sum()) or both.sum() == 0:
+    rectangles = np.array([row[U0 : V1 + 1], other[U0 : V1 + 1]]).reshape(
+        2, 2, 2
+    )  # volume, axis, end
+    is_present = (
+        np.isfinite(row[OFFSET0 : OFFSET0 + N_PLANES]),
+        np.isfinite(other[OFFSET0 : OFFSET0 + N_PLANES]),
+    )
+    is_shared = is_present[0] & is_present[1]
+    if is_shared.sum() < min(is_present[0].sum(), is_present[1].sum()) or is_shared.sum() == 0:
         return False
     middle = rectangles.mean(axis=(0, 2))
-    x = np.array([[*distances_up(row, *middle), 0.0] for row in (one, other)])
-    slopes = np.array([np.r_[row[SLOPE : SLOPE + LEVEL], 0.0] for row in (one, other)])
-    heights = np.array([one[OFFSET : OFFSET + PLANES], other[OFFSET : OFFSET + PLANES]]) + slopes * x
-    near = np.abs(heights[0, both] - heights[1, both]) < HEIGHTS_ALIKE_M
-    return bool(near.all() and (np.abs(slopes[0] - slopes[1])[both] < SLOPES_ALIKE).all())
+    x = np.array([[*measure_runs(volume, *middle), 0.0] for volume in (row, other)])
+    slopes = np.array([np.r_[volume[SLOPE0 : SLOPE0 + LEVEL], 0.0] for volume in (row, other)])
+    heights = (
+        np.array([row[OFFSET0 : OFFSET0 + N_PLANES], other[OFFSET0 : OFFSET0 + N_PLANES]])
+        + slopes * x
+    )
+    is_near = np.abs(heights[0, is_shared] - heights[1, is_shared]) < HEIGHTS_ALIKE_M
+    return bool(is_near.all() and (np.abs(slopes[0] - slopes[1])[is_shared] < SLOPES_ALIKE).all())
 
 
-def in_line(one: list[float], other: list[float]) -> bool:
+def is_in_line(rectangle: list[float], other: list[float]) -> bool:
     """Whether two rectangles (u0, u1, v0, v1) lie beside each other in one line."""
-    for low, across in ((0, 2), (2, 0)):
-        gap = max(one[low], other[low]) - min(one[low + 1], other[low + 1])
-        apart = max(abs(one[across] - other[across]), abs(one[across + 1] - other[across + 1]))
-        if gap < BESIDE_M and apart < IN_LINE_M:
+    for column, across in ((0, 2), (2, 0)):
+        gap = max(rectangle[column], other[column]) - min(rectangle[column + 1], other[column + 1])
+        offset = max(
+            abs(rectangle[across] - other[across]), abs(rectangle[across + 1] - other[across + 1])
+        )
+        if gap < UNITE_GAP_M and offset < UNITE_OFFSET_M:
             return True
     return False
 
 
-def over_both(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def merge_rectangles(volume: np.ndarray, other: np.ndarray) -> np.ndarray:
     """One volume over the rectangles of two, with the planes of either."""
-    large, small = sorted((one, other), key=lambda row: -(row[U0 + 1] - row[U0]) * (row[V0 + 1] - row[V0]))
+    large, small = sorted(
+        (volume, other), key=lambda row: -(row[U0 + 1] - row[U0]) * (row[V0 + 1] - row[V0])
+    )
     row = large.copy()
-    row[[U0, V0]] = np.minimum(one[[U0, V0]], other[[U0, V0]])
-    row[[U0 + 1, V0 + 1]] = np.maximum(one[[U0 + 1, V0 + 1]], other[[U0 + 1, V0 + 1]])
-    for place in range(PLANES):
-        if not np.isfinite(row[OFFSET + place]) and np.isfinite(small[OFFSET + place]):
-            row[OFFSET + place] = small[OFFSET + place]
+    row[[U0, V0]] = np.minimum(volume[[U0, V0]], other[[U0, V0]])
+    row[[U0 + 1, V0 + 1]] = np.maximum(volume[[U0 + 1, V0 + 1]], other[[U0 + 1, V0 + 1]])
+    for place in range(N_PLANES):
+        if not np.isfinite(row[OFFSET0 + place]) and np.isfinite(small[OFFSET0 + place]):
+            row[OFFSET0 + place] = small[OFFSET0 + place]
             if place < LEVEL:
-                row[SLOPE + place], row[LEAN + place] = small[SLOPE + place], small[LEAN + place]
+                row[SLOPE0 + place], row[LEAN0 + place] = (
+                    small[SLOPE0 + place],
+                    small[LEAN0 + place],
+                )
     return row

@@ -19,17 +19,17 @@ import shapely
 
 from ...model import Part
 from ...model.heights import find_highest
-from .agree import Agreement, fitted, null_space
-from .around import look_around, roof_everywhere
-from .drawn_plan import DrawnPlan, count_parameters, draw_plan, part_over
+from .agree import Agreement, find_null_space, fit_members
+from .around import compute_roof_everywhere, measure_context
+from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
 from .finish import Planes
-from .objective import costs, misfits
+from .objective import compute_costs, compute_misfits
 from .plan import Plan
 from .prices import CORNER_COST, PARAMETER_COST, REPAIR_UNITS
-from .regions import Site, polygons_of, regions_of
+from .regions import PlanSite, cut_regions, list_polygons
 from .repairs import Repair, find_repairs
 from .scene import Scene, select_points
-from .sides import Side, corners_of
+from .sides import Side, find_corners
 from .volumes import DIRECTION, U0, V0, V1
 
 WINDOW_M2, MARGIN_M = (
@@ -41,19 +41,24 @@ WINDOW_M2, MARGIN_M = (
 # What comes after them stays as the search left it.
 MOST_TRIALS, MOST_ROUNDS = 40, 20
 MOST_POINTS = 1500  # of a window that judge; of more every k-th
-ENDS = (0, 3), (1, 2), (0, 1), (2, 3)  # the corners of a volume in which each of its sides ends
+SIDE_ENDS = (
+    (0, 3),
+    (1, 2),
+    (0, 1),
+    (2, 3),
+)  # the corners of a volume in which each of its sides ends
 LEFT_OVER = 1e-9  # m; an equation that the others leave so little of holds by them
 ONE_LINE_M = 0.02  # sides of two volumes nearer than this are one line
 
 
-class Problem(NamedTuple):
+class WeldProblem(NamedTuple):
     """What does not change while a roof is welded.
 
     `xy` (n, 2) are its points in local coordinates, `order` (n,) their numbers by ascending x.
     """
 
     volumes: np.ndarray
-    site: Site
+    site: PlanSite
     agreement: Agreement
     base: bool
     xy: np.ndarray
@@ -72,7 +77,7 @@ class Problem(NamedTuple):
         return self.site.scene
 
 
-class State(NamedTuple):
+class RoofState(NamedTuple):
     """A roof: its sides and planes, the unknowns that its equations leave free (p, q), and what the
     points of its members cost under these, None where they have not been fitted together yet."""
 
@@ -92,7 +97,7 @@ class Window(NamedTuple):
 
     box: shapely.Polygon
     numbers: np.ndarray
-    sites: list[Site]
+    sites: list[PlanSite]
     scene: Scene
     xy: np.ndarray
     z: np.ndarray
@@ -119,95 +124,104 @@ def weld(
     volumes: np.ndarray,
     sides: list[list[Side]],
     agreement: Agreement,
-    site: Site,
+    site: PlanSite,
     base: bool,
 ) -> tuple[list[list[Side]], list[Planes], list[list[shapely.Polygon]]]:
     """Return the sides, planes and regions of all volumes with every repair that pays."""
-    problem = problem_of(volumes, agreement, site, base)
-    state = state_before(sides, problem)
-    whole = window_of(whole_box(problem), quads_of(state, problem), problem)
-    drawing = draw(state, whole, problem)
-    tried: set[tuple] = set()
+    problem = make_problem(volumes, agreement, site, base)
+    state = begin_state(sides, problem)
+    whole = make_window(make_whole_box(problem), list_quads(state, problem), problem)
+    drawing = draw_window(state, whole, problem)
+    tried_repairs: set[tuple] = set()
     for _ in range(MOST_ROUNDS):
-        better, better_drawing = after_a_round(state, drawing, whole, tried, problem)
-        if better is state:
+        next_state, better_drawing = run_round(state, drawing, whole, tried_repairs, problem)
+        if next_state is state:
             break
-        state, drawing = better, better_drawing or draw(better, whole, problem)
+        state, drawing = next_state, better_drawing or draw_window(next_state, whole, problem)
     return state.sides, state.planes, drawing.regions[0]
 
 
-def problem_of(volumes: np.ndarray, agreement: Agreement, site: Site, base: bool) -> Problem:
+def make_problem(
+    volumes: np.ndarray, agreement: Agreement, site: PlanSite, base: bool
+) -> WeldProblem:
     scene = site.scene
     points = np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]])
     xy = site.plan.frame.xy_local(points)
     order = np.argsort(xy[:, 0], kind="stable")
-    return Problem(volumes, site, agreement, base, xy, order)
+    return WeldProblem(volumes, site, agreement, base, xy, order)
 
 
-def state_before(sides: list[list[Side]], problem: Problem) -> State:
+def begin_state(sides: list[list[Side]], problem: WeldProblem) -> RoofState:
     """The roof as volumes agree on it."""
     agreement = problem.agreement
-    return State(sides, list(agreement.planes), agreement.basis, agreement.cost)
+    return RoofState(sides, list(agreement.planes), agreement.basis, agreement.cost)
 
 
-def cost_of_members(agreement: Agreement, scene: Scene) -> float:
+def compute_member_cost(agreement: Agreement, scene: Scene) -> float:
     """What the points of members cost under the equations that hold between them."""
     members = list(agreement.members.values())
-    return fitted(members, agreement.basis, agreement.start, scene).cost
+    return fit_members(members, agreement.basis, agreement.start, scene).cost
 
 
-def draw(state: State, window: Window, problem: Problem) -> Drawing:
+def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawing:
     """Draw what a window shows of a roof."""
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
-    regions = [regions_of(volumes, planes, sides, site, problem.base) for site in window.sites]
-    drawn = [part_over(own, volumes, planes, problem.plan, problem.scene) for own in regions]
-    pairs = zip(drawn, window.sites, strict=True)
+    regions = [cut_regions(volumes, planes, sides, site, problem.base) for site in window.sites]
+    parts_and_owners = [
+        make_part(site_regions, volumes, planes, problem.plan, problem.scene)
+        for site_regions in regions
+    ]
+    pairs = zip(parts_and_owners, window.sites, strict=True)
     plans = [draw_plan(part, owner, site.outline) for (part, owner), site in pairs]
-    return Drawing(regions, [part for part, _ in drawn], plans)
+    return Drawing(regions, [part for part, _ in parts_and_owners], plans)
 
 
 @dataclass
-class Comparison:
+class RepairTrial:
     """A window of a roof as it is in a `state`, with which repairs in it are compared.
 
     `plan` is that of the whole roof. The window is drawn when a repair asks for it, unless its
     drawing is `known`.
     """
 
-    state: State
+    state: RoofState
     window: Window
     plan: DrawnPlan
-    problem: Problem
+    problem: WeldProblem
     known: Drawing | None = None
 
     @cached_property
     def drawing(self) -> Drawing:
-        return self.known or draw(self.state, self.window, self.problem)
+        return self.known or draw_window(self.state, self.window, self.problem)
 
     @cached_property
-    def beyond(self) -> set[tuple[int, int]]:
-        return owners_beyond(self.plan, self.window.box)
+    def owners_beyond(self) -> set[tuple[int, int]]:
+        return list_owners_beyond(self.plan, self.window.box)
 
     @cached_property
     def price(self) -> float:
-        return price_of(self.state, self.drawing, self.beyond, self.window, self.problem)
+        return price_window(self.state, self.drawing, self.owners_beyond, self.window, self.problem)
 
-    def draw_if_cheaper(self, after: State) -> Drawing | None:
+    def draw_if_cheaper(self, state: RoofState) -> Drawing | None:
         """Draw the window after a repair; None where it costs as much or has as many corners."""
         if self.drawing.corners == math.inf:
             return None
-        trial = draw(after, self.window, self.problem)
+        trial = draw_window(state, self.window, self.problem)
         if trial.corners >= self.drawing.corners:
             return None
-        price = price_of(after, trial, self.beyond, self.window, self.problem)
+        price = price_window(state, trial, self.owners_beyond, self.window, self.problem)
         return trial if price < self.price else None
 
 
-def after_a_round(
-    state: State, drawing: Drawing, whole: Window, tried: set[tuple], problem: Problem
-) -> tuple[State, Drawing | None]:
-    """The roof with every repair that pays, of those not `tried`, one in each window.
+def run_round(
+    state: RoofState,
+    drawing: Drawing,
+    whole: Window,
+    tried_repairs: set[tuple],
+    problem: WeldProblem,
+) -> tuple[RoofState, Drawing | None]:
+    """The roof with every repair that pays, of those not `tried_repairs`, one in each window.
 
     Its drawing comes with it where it is known.
     """
@@ -215,70 +229,72 @@ def after_a_round(
     if plan is None:
         return state, drawing
     area = problem.outline.area
-    most = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
+    most_trials = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
     changed: list[shapely.Polygon] = []
     after_drawing = None
-    quads = quads_of(state, problem) if area > WINDOW_M2 else []
-    present = Comparison(state, whole, plan, problem, drawing)
+    quads = list_quads(state, problem) if area > WINDOW_M2 else []
+    present = RepairTrial(state, whole, plan, problem, drawing)
     for repair in find_repairs(plan, problem.volumes, state.sides, problem.plan, problem.scene):
-        if repair.key in tried or len(tried) >= most:
+        if repair.key in tried_repairs or len(tried_repairs) >= most_trials:
             continue
-        box = box_of(repair, state, problem) if area > WINDOW_M2 else whole.box
+        box = frame_repair(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
             continue
         if present.window.box is not box and not present.window.box.equals(box):
-            present = Comparison(state, window_of(box, quads, problem), plan, problem)
-        after = repaired(state, repair, present.window, problem)
-        if after is None:
+            present = RepairTrial(state, make_window(box, quads, problem), plan, problem)
+        repaired_state = apply_repair(state, repair, present.window, problem)
+        if repaired_state is None:
             continue
-        tried.add(repair.key)
-        trial = present.draw_if_cheaper(after)
+        tried_repairs.add(repair.key)
+        trial = present.draw_if_cheaper(repaired_state)
         if trial is not None:
-            state, after_drawing = after, trial if present.window is whole else None
+            state, after_drawing = repaired_state, trial if present.window is whole else None
             changed.append(box)
     return state, after_drawing
 
 
-def owners_beyond(drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
+def list_owners_beyond(plan_drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
     """The planes, by volume and number, that show beyond a window too."""
     x0, y0, x1, y1 = box.bounds
-    x, y = drawn.places.T
+    x, y = plan_drawn.places.T
     out = (x < x0) | (x > x1) | (y < y0) | (y > y1)
-    beside = drawn.beside[out[drawn.edges].any(axis=1)]
-    return {(k, p) for k, p in drawn.owner[np.unique(beside[beside >= 0])].tolist()}
+    planes = plan_drawn.beside[out[plan_drawn.edges].any(axis=1)]
+    return {(k, p) for k, p in plan_drawn.owner[np.unique(planes[planes >= 0])].tolist()}
 
 
-def whole_box(problem: Problem) -> shapely.Polygon:
+def make_whole_box(problem: WeldProblem) -> shapely.Polygon:
     """The window that holds all of the roof."""
     return shapely.box(*problem.outline.bounds)
 
 
-def box_of(repair: Repair, state: State, problem: Problem) -> shapely.Polygon:
+def frame_repair(repair: Repair, state: RoofState, problem: WeldProblem) -> shapely.Polygon:
     """The window of a repair: around the sides that move and the volumes whose planes change."""
     volumes, plan, scene = problem.volumes, problem.plan, problem.scene
     owners = {k for _, terms in repair.equations for _, (k, _) in terms}
-    quads = [problem.site.quad(volumes[k], state.sides[k])[0] for k in owners if k > 0]
+    quads = [problem.site.cut_quad(volumes[k], state.sides[k])[0] for k in owners if k > 0]
     places = [shapely.get_coordinates(quad) for quad in quads]
     for (k, edge), side in repair.sides.items():
         c, s = scene.turn[int(volumes[k, DIRECTION])]
-        for j, own_edge in on_one_line(state.sides, k, edge, problem):
+        for j, own_edge in list_sides_on_line(state.sides, k, edge, problem):
             for line in (state.sides[j][own_edge], side):
-                own = [line if e == own_edge else other for e, other in enumerate(state.sides[j])]
-                ends = corners_of(own)[list(ENDS[own_edge])]
+                moved_sides = [
+                    line if e == own_edge else other for e, other in enumerate(state.sides[j])
+                ]
+                ends = find_corners(moved_sides)[list(SIDE_ENDS[own_edge])]
                 places.append(plan.frame.xy_local(ends @ np.array([[c, s], [-s, c]])))
     if not places or 0 in owners:
-        return whole_box(problem)
-    low, high = (end(np.concatenate(places), axis=0) for end in (np.min, np.max))
-    return shapely.box(*(low - MARGIN_M), *(high + MARGIN_M))
+        return make_whole_box(problem)
+    lower, upper = (end(np.concatenate(places), axis=0) for end in (np.min, np.max))
+    return shapely.box(*(lower - MARGIN_M), *(upper + MARGIN_M))
 
 
-def quads_of(state: State, problem: Problem) -> list[shapely.Polygon]:
+def list_quads(state: RoofState, problem: WeldProblem) -> list[shapely.Polygon]:
     """The plans of all volumes but the base, in local coordinates."""
     pairs = zip(problem.volumes[1:], state.sides[1:], strict=True)
-    return [problem.site.quad(volume, own)[0] for volume, own in pairs]
+    return [problem.site.cut_quad(volume, volume_sides)[0] for volume, volume_sides in pairs]
 
 
-def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Problem) -> Window:
+def make_window(box: shapely.Polygon, quads: list[shapely.Polygon], problem: WeldProblem) -> Window:
     """What of the roof, whose volumes have these `quads`, lies in a box of local coordinates."""
     scene, xy, order = problem.scene, problem.xy, problem.order
     numbers = np.array([0, *(1 + np.flatnonzero(shapely.intersects(quads, box)))], int)
@@ -287,124 +303,161 @@ def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Probl
     strip = np.sort(order[first:last])
     inside = strip[(xy[strip, 1] >= y0) & (xy[strip, 1] <= y1)]
     count = min(len(inside), MOST_POINTS)
-    seen = select_points(scene, inside)
+    window_scene = select_points(scene, inside)
     judges = inside[np.arange(count) * len(inside) // max(count, 1)]
     outline = problem.outline
     if box.covers(outline):
         sites = [problem.site]
     else:
-        within = polygons_of(shapely.intersection(outline, box))
-        sites = [Site(part, problem.plan, seen, {}) for part in within]
+        polygons = list_polygons(shapely.intersection(outline, box))
+        sites = [PlanSite(part, problem.plan, window_scene, {}) for part in polygons]
     weight = len(inside) / max(count, 1)
-    return Window(box, numbers, sites, seen, xy[judges], scene.z[judges], weight)
+    return Window(box, numbers, sites, window_scene, xy[judges], scene.z[judges], weight)
 
 
-def price_of(
-    state: State, drawing: Drawing, beyond: set[tuple[int, int]], window: Window, problem: Problem
+def price_window(
+    state: RoofState,
+    drawing: Drawing,
+    other_owners: set[tuple[int, int]],
+    window: Window,
+    problem: WeldProblem,
 ) -> float:
-    """What a window of a roof costs (points), with the parameters that show in it or `beyond`;
+    """What a window of a roof costs (points), with the parameters that show in it or `other_owners`;
     infinite where no plan comes out.
     """
     scene, numbers = problem.scene, window.numbers
-    shown = set(beyond)
-    for drawn in drawing.plans:
-        if drawn is None:
+    owners = set(other_owners)
+    for plan_drawn in drawing.plans:
+        if plan_drawn is None:
             return math.inf
-        shown |= {(int(numbers[k]), p) for k, p in drawn.owner[drawn.shown].tolist()}
-    rows = np.array([state.planes[k].rows[p] for k, p in sorted(shown)])
-    turns = scene.turn[problem.volumes[[k for k, _ in sorted(shown)], DIRECTION].astype(int)]
+        owners |= {
+            (int(numbers[k]), p) for k, p in plan_drawn.owner[plan_drawn.visible_planes].tolist()
+        }
+    rows = np.array([state.planes[k].rows[p] for k, p in sorted(owners)])
+    turns = scene.turn[problem.volumes[[k for k, _ in sorted(owners)], DIRECTION].astype(int)]
     height, _ = find_highest(drawing.parts, window.xy)
-    misfit = window.weight * float(misfits(window.z, height, scene).sum())
+    misfit = window.weight * float(compute_misfits(window.z, height, scene).sum())
     units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * drawing.corners
     return misfit + scene.evidence * units
 
 
-def repaired(state: State, repair: Repair, window: Window, problem: Problem) -> State | None:
+def apply_repair(
+    state: RoofState, repair: Repair, window: Window, problem: WeldProblem
+) -> RoofState | None:
     """The roof after a repair; None where its points ask too much for it."""
-    most = REPAIR_UNITS * problem.scene.evidence
+    most_cost = REPAIR_UNITS * problem.scene.evidence
     sides, planes, basis, cost = state
     for (k, edge), side in repair.sides.items():
-        own = int(np.flatnonzero(window.numbers == k)[0])
+        position = int(np.flatnonzero(window.numbers == k)[0])
         volumes = problem.volumes[window.numbers]
-        if dearer(volumes, own, edge, sides[k][edge], side, window.scene) > most:
+        if (
+            measure_extra_cost(volumes, position, edge, sides[k][edge], side, window.scene)
+            > most_cost
+        ):
             return None
-        sides = with_line_moved(sides, k, edge, side, problem)
+        sides = move_line(sides, k, edge, side, problem)
     if not repair.equations:
-        return State(sides, planes, basis, cost)
-    found = equalised(repair, state, most, problem)
-    return None if found is None else State(sides, *found)
+        return RoofState(sides, planes, basis, cost)
+    fit = fit_repair(repair, state, most_cost, problem)
+    return None if fit is None else RoofState(sides, *fit)
 
 
-def equalised(
-    repair: Repair, state: State, most: float, problem: Problem
+def fit_repair(
+    repair: Repair, state: RoofState, most_cost: float, problem: WeldProblem
 ) -> tuple[list[Planes], np.ndarray, float] | None:
     """Planes fitted under a repair's equations too, the unknowns left free, the points' cost.
 
-    None where points cost over `most` more.
+    None where points cost over `most_cost` more.
     """
     members, start = problem.agreement.members, problem.agreement.start
     rows = []
     for place, terms in repair.equations:
         if any(k not in members for _, (k, _) in terms):
             return None
-        at = np.append((place - problem.plan.frame.origin[:2]) @ problem.plan.frame.rotation.T, 1.0)
-        rows.append(sum(weight * (at @ members[k].common[p]) for weight, (k, p) in terms))
+        position = np.append(
+            (place - problem.plan.frame.origin[:2]) @ problem.plan.frame.rotation.T, 1.0
+        )
+        rows.append(
+            sum(weight * (position @ members[k].common_design[p]) for weight, (k, p) in terms)
+        )
     equations = np.array(rows) @ state.basis
     if not np.abs(equations).max() > LEFT_OVER:
         return None
-    free = state.basis @ null_space(equations)
+    free = state.basis @ find_null_space(equations)
     if not free.shape[1]:
         return None
-    known = [replace(member, rows=state.planes[k].rows) for k, member in members.items()]
-    found = fitted(known, free, start, problem.scene)
-    before = state.cost
-    if before is None:
-        before = problem.site.once(cost_of_members, problem.agreement, problem.scene)
-    if not math.isfinite(found.cost) or found.cost > before + most:
+    current_members = [replace(member, rows=state.planes[k].rows) for k, member in members.items()]
+    fit = fit_members(current_members, free, start, problem.scene)
+    cost_before = state.cost
+    if cost_before is None:
+        cost_before = problem.site.recall(compute_member_cost, problem.agreement, problem.scene)
+    if not math.isfinite(fit.cost) or fit.cost > cost_before + most_cost:
         return None
     planes = list(state.planes)
-    for k, own in zip(members, found.rows, strict=True):
+    for k, plane_rows in zip(members, fit.rows, strict=True):
         # as well known as before: that planes meet somewhere does not say how well it is known
-        planes[k] = replace(planes[k], rows=own)
-    return planes, free, found.cost
+        planes[k] = replace(planes[k], rows=plane_rows)
+    return planes, free, fit.cost
 
 
-def with_line_moved(
-    sides: list[list[Side]], k: int, edge: int, line: Side, problem: Problem
+def move_line(
+    sides: list[list[Side]], k: int, edge: int, line: Side, problem: WeldProblem
 ) -> list[list[Side]]:
     """All sides, with those on the line of side `edge` of volume k moved onto another `line`."""
-    moved = [list(own) for own in sides]
-    for j, other in on_one_line(sides, k, edge, problem):
+    moved = [list(volume_sides) for volume_sides in sides]
+    for j, other in list_sides_on_line(sides, k, edge, problem):
         moved[j][other] = replace(line, sigma=sides[j][other].sigma)
     return moved
 
 
-def on_one_line(
-    sides: list[list[Side]], k: int, edge: int, problem: Problem
+def list_sides_on_line(
+    sides: list[list[Side]], k: int, edge: int, problem: WeldProblem
 ) -> list[tuple[int, int]]:
     """The sides, as (volume, edge), on the line of side `edge` of volume k and off the outline."""
-    at, lean, anchored = problem.site.once(lay_out_sides, sides)
-    was, directions = sides[k][edge], problem.volumes[:, DIRECTION]
-    near = (np.abs(at - was.at) < ONE_LINE_M) & (np.abs(lean - was.lean) < ONE_LINE_M) & ~anchored
-    near &= (directions == directions[k])[:, None]
-    near[0], near[:, (edge ^ 2) & 2], near[:, (edge ^ 2) | 1] = False, False, False
-    return [(j, e) for j, e in np.argwhere(near).tolist()]
+    offsets, lean, anchored = problem.site.recall(lay_out_sides, sides)
+    old_side, directions = sides[k][edge], problem.volumes[:, DIRECTION]
+    is_near = (
+        (np.abs(offsets - old_side.offset) < ONE_LINE_M)
+        & (np.abs(lean - old_side.lean) < ONE_LINE_M)
+        & ~anchored
+    )
+    is_near &= (directions == directions[k])[:, None]
+    is_near[0], is_near[:, (edge ^ 2) & 2], is_near[:, (edge ^ 2) | 1] = False, False, False
+    return [(j, e) for j, e in np.argwhere(is_near).tolist()]
 
 
 def lay_out_sides(sides: list[list[Side]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where all sides lie, how they lean, and whether they are anchored: three arrays (k, 4)."""
-    at, lean = (np.array([[getattr(side, name) for side in own] for own in sides]) for name in ("at", "lean"))
-    return at, lean, np.array([[side.anchored for side in own] for own in sides])
+    offsets, lean = (
+        np.array([[getattr(side, name) for side in volume_sides] for volume_sides in sides])
+        for name in ("offset", "lean")
+    )
+    return (
+        offsets,
+        lean,
+        np.array([[side.anchored for side in volume_sides] for volume_sides in sides]),
+    )
 
 
-def dearer(volumes: np.ndarray, k: int, edge: int, was: Side, side: Side, scene: Scene) -> float:
+def measure_extra_cost(
+    volumes: np.ndarray, k: int, edge: int, old_side: Side, side: Side, scene: Scene
+) -> float:
     """How much more the points of a `scene` cost where `edge` of volume k lies on the line `side`."""
     axis, direction, sign = edge // 2, int(volumes[k, DIRECTION]), -1.0 if edge % 2 == 0 else 1.0
     x, y = (scene.U[direction], scene.V[direction])[:: 1 if axis == 0 else -1]
-    within = (y >= volumes[k, V0 - 2 * axis]) & (y <= volumes[k, V1 - 2 * axis])
-    within &= sign * (x - volumes[k, U0 + (edge ^ 1)]) >= 0.0
-    before, after = (within & (sign * (x - line.at - line.lean * y) <= 0.0) for line in (was, side))
-    around = look_around(volumes, scene.U, scene.V, k)
-    everywhere, without = roof_everywhere(volumes, scene.U, scene.V, k, around), around.without
-    gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
-    return float(gain[after].sum() - gain[before].sum())
+    is_within = (y >= volumes[k, V0 - 2 * axis]) & (y <= volumes[k, V1 - 2 * axis])
+    is_within &= sign * (x - volumes[k, U0 + (edge ^ 1)]) >= 0.0
+    is_before, is_after = (
+        is_within & (sign * (x - line.offset - line.lean * y) <= 0.0) for line in (old_side, side)
+    )
+    context = measure_context(volumes, scene.U, scene.V, k)
+    everywhere, roof_without = (
+        compute_roof_everywhere(volumes, scene.U, scene.V, k, context),
+        context.roof_without,
+    )
+    gain = np.where(
+        everywhere != roof_without,
+        compute_costs(everywhere, scene) - compute_costs(roof_without, scene),
+        0.0,
+    )
+    return float(gain[is_after].sum() - gain[is_before].sum())

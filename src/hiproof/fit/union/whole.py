@@ -9,27 +9,27 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .box import NOWHERE, Box, box_of, clip_to_box
+from .box import NOWHERE, Box, clip_to_box, measure_box
 from .plan import Plan
 from .scene import Scene
 from .volumes import (
     DIRECTION,
     LEVEL,
-    NUMBER,
-    OFFSET,
+    OFFSET0,
     REPLACES,
+    ROW_NUMBER,
     U0,
     U1,
     V0,
     V1,
-    base_only,
-    roof_heights,
+    compute_roof_heights,
+    make_base,
 )
 
 # m by which the base lies below the lowest point of a roof searched in windows: no window moves it, and it never shows
 BELOW_ALL_M = 1.0
 # columns of a volume that say where it lies
-PLACE = slice(DIRECTION, V1 + 1)
+PLACE_COLUMNS = slice(DIRECTION, V1 + 1)
 
 
 class Whole:
@@ -39,33 +39,39 @@ class Whole:
     `volumes` (k, COLUMNS) hold their own row's number in the column NUMBER.
     """
 
-    def __init__(self, scene: Scene, plan: Plan, outline: shapely.Polygon, volumes: np.ndarray | None = None):
+    def __init__(
+        self, scene: Scene, plan: Plan, outline: shapely.Polygon, volumes: np.ndarray | None = None
+    ):
         self.scene, self.plan = scene, plan
         order = scene.order[0, 0]
         order = order[order < scene.n]
         self.order = order
         self.u, self.v, self.z = scene.U[0][order], scene.V[0][order], scene.z[order]
-        self.outline = shapely.transform(outline, lambda xy: (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T)
-        self.box, self.area = box_of(self.outline), outline.area
+        self.outline = shapely.transform(
+            outline, lambda xy: (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T
+        )
+        self.box, self.area = measure_box(self.outline), outline.area
         self.extents: dict[bytes, Box] = {}
-        self.volumes = base_only(float(self.z.min()) - BELOW_ALL_M) if volumes is None else volumes.copy()
+        self.volumes = (
+            make_base(float(self.z.min()) - BELOW_ALL_M) if volumes is None else volumes.copy()
+        )
         self.set_volumes(self.volumes)
 
     def set_volumes(self, volumes: np.ndarray) -> None:
         """Hold these volumes, each numbered by its row."""
         self.volumes = volumes
-        self.volumes[:, NUMBER] = np.arange(len(volumes))
-        self.boxes = np.array([self.extent_of(row) for row in volumes])
+        self.volumes[:, ROW_NUMBER] = np.arange(len(volumes))
+        self.boxes = np.array([self.find_extent(row) for row in volumes])
 
-    def points_in(self, box: Box) -> np.ndarray:
+    def find_points(self, box: Box) -> np.ndarray:
         """Numbers (m,) of the points in a box, among those sorted by u."""
         first, last = np.searchsorted(self.u, box.u0), np.searchsorted(self.u, box.u1, side="right")
         v = self.v[first:last]
         return first + np.flatnonzero((v >= box.v0) & (v <= box.v1))
 
-    def extent_of(self, row: np.ndarray) -> Box:
+    def find_extent(self, row: np.ndarray) -> Box:
         """The box around what lies inside the outline of a volume's rectangle."""
-        key = row[PLACE].tobytes()
+        key = row[PLACE_COLUMNS].tobytes()
         if key not in self.extents:
             self.extents[key] = self.measure_extent(row)
         return self.extents[key]
@@ -75,54 +81,60 @@ class Whole:
         if rectangle.u0 >= rectangle.u1 or rectangle.v0 >= rectangle.v1:
             return NOWHERE
         if row[DIRECTION] == 0:
-            return box_of(clip_to_box(self.outline, rectangle))
+            return measure_box(clip_to_box(self.outline, rectangle))
         c, s = self.scene.turn[int(row[DIRECTION])]
         u, v = row[[U0, U1, U1, U0]], row[[V0, V0, V1, V1]]
         turned = shapely.Polygon(np.column_stack([c * u - s * v, s * u + c * v]))
-        around = clip_to_box(self.outline, box_of(turned))
-        return box_of(shapely.intersection(shapely.make_valid(around), turned)) if not around.is_empty else NOWHERE
+        clipped = clip_to_box(self.outline, measure_box(turned))
+        return (
+            measure_box(shapely.intersection(shapely.make_valid(clipped), turned))
+            if not clipped.is_empty
+            else NOWHERE
+        )
 
-    def volumes_in(self, box: Box) -> list[int]:
+    def list_volumes(self, box: Box) -> list[int]:
         """Numbers of the volumes, but the base, that reach into a box."""
         e = self.boxes
-        there = (e[:, 0] < box.u1) & (e[:, 1] > box.u0) & (e[:, 2] < box.v1) & (e[:, 3] > box.v0)
-        return [k for k in np.flatnonzero(there).tolist() if k > 0]
+        is_reaching = (
+            (e[:, 0] < box.u1) & (e[:, 1] > box.u0) & (e[:, 2] < box.v1) & (e[:, 3] > box.v0)
+        )
+        return [k for k in np.flatnonzero(is_reaching).tolist() if k > 0]
 
-    def rows_in(self, box: Box) -> np.ndarray:
+    def select_rows(self, box: Box) -> np.ndarray:
         """The base, and the volumes that reach into a box."""
-        return self.volumes[[0, *self.volumes_in(box)]]
+        return self.volumes[[0, *self.list_volumes(box)]]
 
-    def replace(self, gone: list[int], rows: np.ndarray) -> None:
-        """Put `rows` in place of the volumes numbered `gone`.
+    def replace(self, numbers: list[int], rows: np.ndarray) -> None:
+        """Put `rows` in place of the volumes numbered `numbers`.
 
         A row keeps its place in the order by its number; a new row (number 0) follows the row before it.
         """
-        kept = np.delete(np.arange(len(self.volumes)), gone)
+        kept_numbers = np.delete(np.arange(len(self.volumes)), numbers)
         places, last = [], 0.0
-        for number in rows[:, NUMBER].tolist() if len(rows) else []:
+        for number in rows[:, ROW_NUMBER].tolist() if len(rows) else []:
             last = max(last + 1e-6, number)
             places.append(last)
-        if not gone:
+        if not numbers:
             places = [len(self.volumes) + k for k in range(len(rows))]
-        every = np.concatenate([self.volumes[kept], rows])
-        order = np.argsort(np.concatenate([kept, places]), kind="stable")
-        self.set_volumes(every[order])
+        all_rows = np.concatenate([self.volumes[kept_numbers], rows])
+        order = np.argsort(np.concatenate([kept_numbers, places]), kind="stable")
+        self.set_volumes(all_rows[order])
 
     def find(self, place: bytes) -> int | None:
-        """The number of the volume that lies at a place (the bytes of its columns PLACE); None where it is gone."""
+        """The number of the volume that lies at a place (the bytes of its columns PLACE_COLUMNS); None where it is gone."""
         for k in range(1, len(self.volumes)):
-            if self.volumes[k, PLACE].tobytes() == place:
+            if self.volumes[k, PLACE_COLUMNS].tobytes() == place:
                 return k
         return None
 
-    def heights(self) -> np.ndarray:
+    def compute_heights(self) -> np.ndarray:
         """Heights (n,) of the roof at all points, each volume asked only where it lies."""
-        z = np.full(len(self.u), self.volumes[0, OFFSET + LEVEL])
+        z = np.full(len(self.u), self.volumes[0, OFFSET0 + LEVEL])
         c, s = self.scene.turn[:, :1], self.scene.turn[:, 1:]
         for k in range(1, len(self.volumes)):
-            i = self.points_in(Box(*self.boxes[k]))
+            i = self.find_points(Box(*self.boxes[k]))
             u, v = self.u[i], self.v[i]
-            h, _ = roof_heights(self.volumes[k : k + 1], c * u + s * v, c * v - s * u)
-            there = (h > z[i]) | ((self.volumes[k, REPLACES] > 0) & np.isfinite(h))
-            z[i[there]] = h[there]
+            h, _ = compute_roof_heights(self.volumes[k : k + 1], c * u + s * v, c * v - s * u)
+            is_higher = (h > z[i]) | ((self.volumes[k, REPLACES] > 0) & np.isfinite(h))
+            z[i[is_higher]] = h[is_higher]
         return z

@@ -13,16 +13,16 @@ import numpy as np
 import shapely
 
 from . import plan as plans
-from .box import Box, box_around, clip_to_box
-from .edges import LEAST_GAIN
-from .objective import objective
+from .box import Box, clip_to_box, enclose_boxes
+from .edges import NO_GAIN
+from .objective import compute_objective
 from .planes import Cloud, Grid
-from .regions import polygons_of
-from .scene import Scene, leans_along, order_along, padded
-from .volumes import DIRECTION, NUMBER, SETTLED, U0
+from .regions import list_polygons
+from .scene import Scene, find_leans, pad_rows, sort_along
+from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0
 from .whole import Whole
 
-MOST_CELLS = 40  # cells a side of a window at most; of a larger one they are wider
+MOST_WINDOW_CELLS = 40  # cells a side of a window at most; of a larger one they are wider
 FEWEST_POINTS = 4  # a window of fewer points shows nothing
 
 Operation = Callable[[np.ndarray, Scene, float], tuple[np.ndarray, float]]
@@ -30,57 +30,73 @@ Operation = Callable[[np.ndarray, Scene, float], tuple[np.ndarray, float]]
 
 def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
     """The scene of a box, of at most so many of its points; None where it holds no roof or hardly a point."""
-    part = shapely.MultiPolygon(polygons_of(clip_to_box(whole.outline, box)))
-    every = whole.points_in(box)
-    if part.is_empty or len(every) < FEWEST_POINTS:
+    part = shapely.MultiPolygon(list_polygons(clip_to_box(whole.outline, box)))
+    numbers = whole.find_points(box)
+    if part.is_empty or len(numbers) < FEWEST_POINTS:
         return None
-    n = min(len(every), most_points)
-    few = every[np.argsort(whole.z[every], kind="stable")[np.arange(n) * len(every) // n]]
-    share, scene = n / len(every), whole.scene
-    cloud_u, cloud_v, cloud_z = whole.u[few], whole.v[few], whole.z[few]
+    n = min(len(numbers), most_points)
+    selected = numbers[
+        np.argsort(whole.z[numbers], kind="stable")[np.arange(n) * len(numbers) // n]
+    ]
+    share, scene = n / len(numbers), whole.scene
+    cloud_u, cloud_v, cloud_z = whole.u[selected], whole.v[selected], whole.z[selected]
     ring = shapely.get_coordinates(part)
     corners = np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in scene.turn])
     spacing = 1.0 / math.sqrt(n / part.area)
-    cell = max(plans.CELL_M, plans.CELL_SPACINGS * spacing)
-    lines = [plans.grid_lines(x.min(), x.max(), x, cell, MOST_CELLS) for own in corners for x in own.T]
-    cloud = Cloud(cloud_u, cloud_v, cloud_z, *map(plans.cells_of, lines[:2], (cloud_u, cloud_v)))
-    ghosts = lay_cells(whole, Grid(*lines[:2]), cloud, n / part.area)
+    cell = max(plans.GRID_CELL_M, plans.GRID_CELL_SPACINGS * spacing)
+    lines = [
+        plans.lay_lines(x.min(), x.max(), x, cell, MOST_WINDOW_CELLS)
+        for ring_corners in corners
+        for x in ring_corners.T
+    ]
+    cloud = Cloud(cloud_u, cloud_v, cloud_z, *map(plans.find_cells, lines[:2], (cloud_u, cloud_v)))
+    ghosts = lay_window_cells(whole, Grid(*lines[:2]), cloud, n / part.area)
     u, v = np.r_[cloud_u, ghosts[0]], np.r_[cloud_v, ghosts[1]]
     c, s = scene.turn[:, :1], scene.turn[:, 1:]
     U, V = c * u + s * v, c * v - s * u
-    depth, corner = depth_in(scene, box)
+    depth, corner = cut_depth_raster(scene, box)
     return scene._replace(
         U=U,
         V=V,
-        order=order_along(U, V),
+        order=sort_along(U, V),
         z=np.r_[cloud_z, np.zeros(len(ghosts[0]))],
         weight=np.r_[np.ones(n), ghosts[2]],
         shade=np.r_[np.zeros(n), ghosts[3]],
         n=n,
-        low=float(cloud_z.min()) - plans.GHOST_MARGIN_M,
-        high=float(cloud_z.max()) + plans.GHOST_MARGIN_M,
+        low=float(cloud_z.min()) - plans.HEIGHT_MARGIN_M,
+        high=float(cloud_z.max()) + plans.HEIGHT_MARGIN_M,
         depth=depth,
         corner_u=corner[0],
         corner_v=corner[1],
-        lines=padded(lines),
-        vertices=padded([sorted(set(x)) for own in np.round(corners, 3) for x in own.T.tolist()]),
+        lines=pad_rows(lines),
+        vertices=pad_rows(
+            [
+                sorted(set(x))
+                for ring_corners in np.round(corners, 3)
+                for x in ring_corners.T.tolist()
+            ]
+        ),
         corners=corners,
-        leans=padded([leans_along(own, axis) for own in corners for axis in (0, 1)]),
+        leans=pad_rows(
+            [find_leans(ring_corners, axis) for ring_corners in corners for axis in (0, 1)]
+        ),
         evidence=share * scene.evidence,
     )
 
 
-def lay_cells(whole: Whole, grid: Grid, cloud: Cloud, density: float) -> tuple[np.ndarray, ...]:
+def lay_window_cells(
+    whole: Whole, grid: Grid, cloud: Cloud, density: float
+) -> tuple[np.ndarray, ...]:
     """Unobserved cells of a window inside the outline: u, v, weight and shade (g,), as `plan.lay_ghosts` has them."""
     centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in grid)
     u, v = np.repeat(centre_u, len(centre_v)), np.tile(centre_v, len(centre_u))
     weight = np.outer(np.diff(grid.u), np.diff(grid.v)) * density
-    shade = plans.SHADE * weight * plans.emptiness(cloud, weight)
-    inside = depth_at(whole.scene, u, v) > 0.0
+    shade = plans.SHADE * weight * plans.measure_emptiness(cloud, weight)
+    inside = measure_depth_at(whole.scene, u, v) > 0.0
     return u[inside], v[inside], weight.ravel()[inside], shade.ravel()[inside]
 
 
-def depth_at(scene: Scene, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+def measure_depth_at(scene: Scene, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Depth (n,) inside the outline of places in the plan's axes, by the raster's nearest nodes."""
     i = np.round((u - scene.corner_u) / scene.pitch).astype(int)
     j = np.round((v - scene.corner_v) / scene.pitch).astype(int)
@@ -88,13 +104,16 @@ def depth_at(scene: Scene, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return scene.depth[np.clip(i, 0, rows - 1), np.clip(j, 0, columns - 1)]
 
 
-def depth_in(scene: Scene, box: Box) -> tuple[np.ndarray, tuple[float, float]]:
+def cut_depth_raster(scene: Scene, box: Box) -> tuple[np.ndarray, tuple[float, float]]:
     """The raster of depths in a box, no deeper than the box's border is near, and its corner."""
     p, low_u, low_v = scene.pitch, scene.corner_u, scene.corner_v
     i0, j0 = max(math.floor((box.u0 - low_u) / p), 0), max(math.floor((box.v0 - low_v) / p), 0)
     i1, j1 = math.ceil((box.u1 - low_u) / p) + 1, math.ceil((box.v1 - low_v) / p) + 1
     depth = scene.depth[i0:i1, j0:j1]
-    u, v = low_u + (i0 + np.arange(depth.shape[0])) * p, low_v + (j0 + np.arange(depth.shape[1])) * p
+    u, v = (
+        low_u + (i0 + np.arange(depth.shape[0])) * p,
+        low_v + (j0 + np.arange(depth.shape[1])) * p,
+    )
     border_u, border_v = np.minimum(u - box.u0, box.u1 - u), np.minimum(v - box.v0, box.v1 - v)
     depth = np.minimum(np.minimum(depth, border_u[:, None]), border_v[None, :])
     return np.ascontiguousarray(depth), (low_u + i0 * p, low_v + j0 * p)
@@ -112,75 +131,85 @@ def change_in_window(
     Volumes that reach out of the box, and those that are not `movable`, return as they were. What is found ends where the
     box does. Where it reaches beyond the box (in other directions), the objective of the larger box has to fall, too.
     """
-    numbers = whole.volumes_in(box)
+    numbers = whole.list_volumes(box)
     scene = open_window(whole, box, most_points)
     if scene is None:
         return False
-    fixed = fixed_in(whole, box, numbers, movable)
+    fixed = list_fixed_volumes(whole, box, numbers, movable)
     rows = whole.volumes[[0, *numbers]]
     rows[np.isin([0, *numbers], [0, *fixed]), SETTLED] = np.inf
-    before = objective(rows, scene, np.inf)
-    found, value = operation(rows, scene, before)
-    if value >= before - LEAST_GAIN:
+    value_before = compute_objective(rows, scene, np.inf)
+    new_rows, value = operation(rows, scene, value_before)
+    if value >= value_before - NO_GAIN:
         return False
-    found = forget_settled(restore(found, whole.volumes, fixed))
-    changed = ~np.isin(found[:, NUMBER], fixed)
+    new_rows = forget_digests(restore_volumes(new_rows, whole.volumes, fixed))
+    changed = ~np.isin(new_rows[:, ROW_NUMBER], fixed)
     changed[0] = False
-    found[changed] = end_at_border(whole, found[changed], box)
-    if objective(found, scene, before - LEAST_GAIN) == np.inf:
+    new_rows[changed] = end_at_border(whole, new_rows[changed], box)
+    if compute_objective(new_rows, scene, value_before - NO_GAIN) == np.inf:
         return False
-    extents = [whole.extent_of(row) for row in found[changed]]
-    beyond = [e for e in extents if e.u0 <= e.u1 and not box.contains(e)]
-    if beyond and not lowers_beyond(whole, box_around([box, *beyond]), numbers, found[1:], most_points):
+    extents = [whole.find_extent(row) for row in new_rows[changed]]
+    boxes_beyond = [e for e in extents if e.u0 <= e.u1 and not box.contains(e)]
+    if boxes_beyond and not is_lower_beyond(
+        whole, enclose_boxes([box, *boxes_beyond]), numbers, new_rows[1:], most_points
+    ):
         return False
-    whole.replace(numbers, found[1:])
+    whole.replace(numbers, new_rows[1:])
     return True
 
 
-def fixed_in(whole: Whole, box: Box, numbers: list[int], movable: Collection[int] | None) -> list[int]:
+def list_fixed_volumes(
+    whole: Whole, box: Box, numbers: list[int], movable: Collection[int] | None
+) -> list[int]:
     """Which of the volumes `numbers` a window may not change."""
     reach_out = [k for k in numbers if not box.contains(Box(*whole.boxes[k]))]
-    return reach_out if movable is None else sorted({*reach_out, *(k for k in numbers if k not in movable)})
+    return (
+        reach_out
+        if movable is None
+        else sorted({*reach_out, *(k for k in numbers if k not in movable)})
+    )
 
 
-def restore(found: np.ndarray, volumes: np.ndarray, fixed: list[int]) -> np.ndarray:
-    """The volumes `found` with those numbered `fixed` as they were among `volumes`, each once."""
+def restore_volumes(rows: np.ndarray, volumes: np.ndarray, fixed: list[int]) -> np.ndarray:
+    """The volumes `rows` with those numbered `fixed` as they were among `volumes`, each once."""
     for k in fixed:
-        at = np.flatnonzero(found[1:, NUMBER] == k) + 1
-        if len(at):
-            found[at[0]] = volumes[k]
-            found = np.delete(found, at[1:], axis=0)
+        matches = np.flatnonzero(rows[1:, ROW_NUMBER] == k) + 1
+        if len(matches):
+            rows[matches[0]] = volumes[k]
+            rows = np.delete(rows, matches[1:], axis=0)
         else:
-            highest = np.maximum.accumulate(found[:, NUMBER])
-            found = np.insert(found, max(int(np.searchsorted(highest, k)), 1), volumes[k], axis=0)
-    return found
+            highest = np.maximum.accumulate(rows[:, ROW_NUMBER])
+            rows = np.insert(rows, max(int(np.searchsorted(highest, k)), 1), volumes[k], axis=0)
+    return rows
 
 
 def end_at_border(whole: Whole, rows: np.ndarray, box: Box) -> np.ndarray:
     """Volumes of the first direction end where a window does, unless it ends where the outline does."""
-    own = rows[:, DIRECTION] == 0
+    is_aligned = rows[:, DIRECTION] == 0
     for side in range(4):
-        if abs(box[side] - whole.box[side]) < plans.GHOST_MARGIN_M:
+        if abs(box[side] - whole.box[side]) < plans.HEIGHT_MARGIN_M:
             continue
         limit = np.maximum if side % 2 == 0 else np.minimum
-        rows[own, U0 + side] = limit(rows[own, U0 + side], box[side])
+        rows[is_aligned, U0 + side] = limit(rows[is_aligned, U0 + side], box[side])
     return rows
 
 
-def lowers_beyond(whole: Whole, box: Box, numbers: list[int], rows: np.ndarray, most_points: int) -> bool:
+def is_lower_beyond(
+    whole: Whole, box: Box, numbers: list[int], rows: np.ndarray, most_points: int
+) -> bool:
     """Whether rows in place of the volumes `numbers` lower the objective of a larger box, too."""
     scene = open_window(whole, box, 2 * most_points)
     if scene is None:
         return False
-    kept = whole.volumes
-    before = objective(whole.rows_in(box), scene, np.inf)
+    volumes_before = whole.volumes
+    value_before = compute_objective(whole.select_rows(box), scene, np.inf)
     whole.replace(numbers, rows)
-    lower = objective(whole.rows_in(box), scene, before - LEAST_GAIN) < np.inf
-    whole.set_volumes(kept)
+    lower = compute_objective(whole.select_rows(box), scene, value_before - NO_GAIN) < np.inf
+    whole.set_volumes(volumes_before)
     return lower
 
 
-def forget_settled(volumes: np.ndarray) -> np.ndarray:
+def forget_digests(volumes: np.ndarray) -> np.ndarray:
     """The volumes without the digests of their surroundings: what a window knew of them does not hold outside it."""
     volumes = volumes.copy()
     volumes[:, SETTLED] = 0.0
