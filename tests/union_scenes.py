@@ -1,4 +1,4 @@
-"""Generated scenes and volumes for the laws of the union's search."""
+"""Generate scenes and volumes for the laws of the union's search."""
 
 import math
 
@@ -36,7 +36,10 @@ OUTLINES = (
 
 
 def draw_volume(rng, replacing=0.2):
-    """A row (COLUMNS,) with a random rectangle, some of the five planes and a random tie; its ridge above its middle."""
+    """Draw a row (COLUMNS,) with a random rectangle, planes and tie.
+
+    Its ridge lies above its middle.
+    """
     row = np.zeros(COLUMNS)
     row[DIRECTION] = rng.integers(2)
     u, v = np.sort(rng.uniform(-7.0, 7.0, (2, 2)), axis=1) + [[-0.5, 0.5]]
@@ -57,7 +60,7 @@ def draw_volume(rng, replacing=0.2):
 
 
 def draw_volumes(rng, most_volumes=5, replacing=0.2):
-    """A level base and up to `most_volumes` random volumes: rows (k, COLUMNS)."""
+    """Draw a level base and random volumes: rows (k, COLUMNS)."""
     return np.vstack(
         [
             make_base(-1.0),
@@ -67,7 +70,10 @@ def draw_volumes(rng, most_volumes=5, replacing=0.2):
 
 
 def compute_heights(volumes, U, V):
-    """Height of the roof and the volume that shows at U, V (directions, n): the definition, in plain NumPy."""
+    """Return the height of the roof and the visible volume at U, V (directions, n).
+
+    It is the definition, in plain NumPy.
+    """
     z, top = np.full(U.shape[1], -np.inf), np.zeros(U.shape[1], int)
     for k, row in enumerate(volumes):
         u, v = U[int(row[DIRECTION])], V[int(row[DIRECTION])]
@@ -91,7 +97,10 @@ def compute_heights(volumes, U, V):
 
 
 def draw_scene(rng, volumes=None, count=250, types=()):
-    """A scene in two directions of points near the roof of `volumes` (level ground without), a tenth of them astray."""
+    """Draw a scene in two directions of points near the roof of `volumes`.
+
+    Without volumes, it is level ground. A tenth of the points is astray.
+    """
     outline = OUTLINES[rng.integers(len(OUTLINES))]
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (2 * count, 2))
@@ -114,9 +123,10 @@ def draw_scene(rng, volumes=None, count=250, types=()):
 
 
 def draw_member(rng, shape, regular=False, skewed=False):
-    """A random member of the family called `shape` (or a kin of it), its ridge along its own u.
+    """Draw a member of the family called `shape` (or a kin of it).
 
-    `regular`: one eave and one slope, as most roofs have; `skewed`: planes that face a little off the axes.
+    Its ridge is along its own u. A `regular` one has one eave and one slope, as most roofs have.
+    The planes of a `skewed` one face a little off the axes.
     """
     top, sides = next(
         (has_top, sides)
@@ -143,19 +153,19 @@ def draw_member(rng, shape, regular=False, skewed=False):
 
 
 def list_corners(member):
-    """The plan (4, 2) of a member, counter-clockwise."""
+    """Return the plan (4, 2) of a member, counterclockwise."""
     c, s = math.cos(member.kappa), math.sin(member.kappa)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * member.half
     return corners @ np.array([[c, s], [-s, c]]) + member.centre
 
 
 def compute_lowest(planes, xy):
-    """Height (n,) of the min of planes (k, 3) at `xy` (n, 2)."""
+    """Return heights (n,) of the min of planes (k, 3) at `xy` (n, 2)."""
     return (xy @ planes[:, :2].T + planes[:, 2]).min(axis=1)
 
 
 def search_all_rectangles(gain):
-    """The largest sum of `gain` (nu, nv) over a rectangle of its cells, all of them tried."""
+    """Return the largest sum of `gain` (nu, nv) over all rectangles of its cells."""
     nu, nv = gain.shape
     return max(
         gain[a:b, c:d].sum()

@@ -1,4 +1,4 @@
-"""Laws of fitting a building: what is found, what it must not depend on, what is done with bad input."""
+"""Check fitting a building: results, what they do not depend on, and bad input."""
 
 import numpy as np
 import pytest
@@ -262,9 +262,8 @@ def test_uneven_teeth_stay_uneven():
         lambda x, y: 4.0 + 0.5 * (y - edges[np.searchsorted(edges, y, side="right") - 1]), hall
     )
     fit = fit_building(points, hall)
-    assert {part.type for part in fit.roof_parts} == {
-        "monopitch"
-    }  # a saw-tooth's parameters say one width
+    # A saw-tooth's parameters say one width.
+    assert {part.type for part in fit.roof_parts} == {"monopitch"}
     result = np.unique(np.round(tooth_edges(fit), 1))
     assert result == pytest.approx(edges, abs=0.11)
 

@@ -1,4 +1,7 @@
-"""What volumes have in common is equal in the model, and what they do not is not; a house that bends ends its wings on one line."""
+"""Check that what volumes have in common is equal in the model, and nothing else.
+
+A house that bends ends its wings on one line.
+"""
 
 from dataclasses import replace
 
@@ -20,7 +23,10 @@ L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 6), (6, 6), (6, 15), (0, 15)])
 
 
 def make_wings(lower):
-    """Gables along both legs of L_SHAPE, equally steep and wide, the second `lower` than the first."""
+    """Make gables along both legs of L_SHAPE, the second `lower` than the first.
+
+    They are equally steep and wide.
+    """
 
     def height(x, y):
         first = np.where(y < 6.0, 8.0 - 0.8 * np.abs(y - 3.0), -np.inf)
@@ -31,7 +37,7 @@ def make_wings(lower):
 
 
 def list_ridge_heights(fit):
-    """The heights of the highest point of every part with a ridge, ascending."""
+    """Return the heights of the highest point of every part with a ridge, ascending."""
     return sorted(
         float(part.translation[2] + part.parameters["height"])
         for part in fit.roof_parts
@@ -56,7 +62,10 @@ def test_wings_of_two_heights_keep_them(lower):
 
 
 def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
-    """Where no common fit is proper the wings keep their own planes; they took any, and pitches became negative."""
+    """Without a proper common fit, the wings keep their own planes.
+
+    They took any planes before, and pitches became negative.
+    """
     fit = fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
     lower, upper = list_ridge_heights(fit)
     assert upper - lower < 1e-4
@@ -69,11 +78,13 @@ def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
 
 
 def make_bent_house(angle_deg):
-    """The outline of a house that bends by an angle halfway along, 7 m wide, and the height of its one roof."""
+    """Make the outline and height of a house that bends by an angle halfway along.
+
+    It is 7 m wide and has one roof.
+    """
     half = np.radians(0.5 * angle_deg)
-    along = np.array(
-        [[np.cos(half), np.sin(half)], [np.cos(half), -np.sin(half)]]
-    )  # away from the bend, and back to it
+    # Away from the bend, and back to it.
+    along = np.array([[np.cos(half), np.sin(half)], [np.cos(half), -np.sin(half)]])
     across = np.array([[-np.sin(half), np.cos(half)], [np.sin(half), np.cos(half)]])
 
     def height(x, y):
@@ -115,7 +126,7 @@ def make_grid(outline):
 
 
 def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
-    """Of a church, the gable that showed over a third of the nave came out above the other's points."""
+    """Of a church, the gable over a third of the nave rose above the other's points."""
     outline = shapely.box(0.0, 0.0, 20.0, 8.0)
     points = sample_heights(lambda x, y: 5.0 + 0.0 * x, outline, 5.0, 0.02)
     plan = lay_out_plan(points, outline)

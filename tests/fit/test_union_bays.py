@@ -1,4 +1,4 @@
-"""Bays: pieces that walls cut off an outline, and level volumes where their few points ask for one."""
+"""Check bays: pieces that walls cut off an outline, and level volumes over them."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ BUMPS = {
 
 
 def scan_roof(rng, outline, height, density=5.0):
-    """Points (n, 3) spread by chance over `outline`, where the roof is `height` high."""
+    """Return points (n, 3) at random over `outline`, on a roof of this `height`."""
     lower, upper = np.array(outline.bounds[:2]), np.array(outline.bounds[2:])
     xy = rng.uniform(lower, upper, (int(density * np.prod(upper - lower)), 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
@@ -87,7 +87,7 @@ def test_returns_of_its_walls_are_no_roof_of_a_bay():
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10_000))
 def test_pieces_are_what_lines_of_walls_cut_off(seed):
-    """Each lies within the outline, is simple, and all of its border but one line is the outline's."""
+    """Each lies within the outline, is simple, and has one line inside the outline."""
     rng = np.random.default_rng(seed)
     parts = [
         box(*(lower := rng.uniform(0, 8, 2)), *(lower + rng.uniform(1, 8, 2))) for _ in range(3)

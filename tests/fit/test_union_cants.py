@@ -1,4 +1,8 @@
-"""Planes over walls that cut corners off: bays with slanted sides, eight-sided towers; none where the roof runs on over such a wall."""
+"""Check planes over walls that cut corners off.
+
+Bays with slanted sides and eight-sided towers have such planes, unless the roof continues over such
+a wall.
+"""
 
 import math
 from itertools import pairwise
@@ -22,7 +26,10 @@ CANTED_END = shapely.Polygon([(0, 0), (12, 0), (14.5, 2.5), (14.5, 5.5), (12, 8)
 
 
 def make_height(outline, slope, gable=()):
-    """Height of a roof that rises from every wall of a convex outline but those of these numbers."""
+    """Return the height of a roof that rises from the walls of a convex outline.
+
+    Those with numbers in `gable` are left out.
+    """
     ring = shapely.get_coordinates(shapely.orient_polygons(outline))
     walls = [(a, b - a) for k, (a, b) in enumerate(pairwise(ring)) if k not in gable]
 
@@ -37,7 +44,7 @@ def make_height(outline, slope, gable=()):
 
 
 def make_house(name):
-    """Outline and height of one of the houses."""
+    """Return the outline and height of one of the houses."""
     if name == "tower":
         return OCTAGON, make_height(OCTAGON, 1.0)
     return CANTED_END, make_height(CANTED_END, 0.7, gable=[5])
@@ -88,7 +95,10 @@ def test_cants_turn_with_the_points(degrees):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_bay_runs_into_the_roof_behind_it(seed):
-    """A hipped bay with slanted sides on a gabled house: two parts, the bay's planes over three of its walls and a part of the house."""
+    """A hipped bay with slanted sides on a gabled house makes two parts.
+
+    The bay's planes lie over three of its walls and a part of the house.
+    """
     bay = shapely.Polygon([(4.5, 3), (9.5, 3), (9.5, 10), (8.5, 11.5), (5.5, 11.5), (4.5, 10)])
     outline, over_bay = shapely.union(shapely.box(0, 0, 14, 9), bay), make_height(bay, 0.8)
 

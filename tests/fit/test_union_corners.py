@@ -1,4 +1,7 @@
-"""Creases end in corners, steps where hips come down to the eaves, and ridges in the roofs that they meet; not where points say otherwise."""
+"""Check that fold lines end in corners, steps at eaves, and ridges in roofs.
+
+They do not where points contradict.
+"""
 
 import numpy as np
 import pytest
@@ -12,7 +15,8 @@ from points_of_roofs import sample_heights
 
 DRAWN_M = 0.3  # a draughtsman draws no shorter edge on these roofs
 EAVE, SLOPE = 3.0, 0.8
-# rectangles (low x, low y, high x, high y) of the wings, and the sides (of west, east, south, north) on which each has a gable
+# Each wing has a rectangle (low x, low y, high x, high y), and the sides (of west, east, south and
+# north) with a gable.
 HOUSES = {
     "L of hips": (((0, 0, 14, 8), ""), ((0, 0, 7, 15), "")),
     "L of gables": (((0, 0, 14, 8), "we"), ((0, 0, 7, 15), "ns")),
@@ -24,7 +28,7 @@ HOUSES = {
 
 
 def compute_wing(x, y, rectangle, gables, eave=EAVE):
-    """Height of one wing, minus infinity beside it."""
+    """Return the height of one wing, minus infinity beside it."""
     west, south, east, north = rectangle
     inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
     is_away = {"w": x - west, "e": east - x, "s": y - south, "n": north - y}
@@ -33,13 +37,13 @@ def compute_wing(x, y, rectangle, gables, eave=EAVE):
 
 
 def make_house(name):
-    """Outline and height of one of HOUSES."""
+    """Return the outline and height of one of HOUSES."""
     outline = shapely.union_all([shapely.box(*rectangle) for rectangle, _ in HOUSES[name]])
     return outline, lambda x, y: np.max([compute_wing(x, y, *own) for own in HOUSES[name]], axis=0)
 
 
 def measure_roof_edges(fit):
-    """Lengths in plan (m,) of all edges of the solid's roof."""
+    """Return lengths in plan (m,) of all edges of the solid's roof."""
     solid = compose(Roof(fit.roof_parts, fit.outline, LocalFrame(np.zeros(3))), -3.0)
     rings = [
         solid.vertices[list(ring)][:, :2]

@@ -1,4 +1,4 @@
-"""Laws of planes that face walls which are not quite along the axes."""
+"""Check planes that face walls which are not quite along the axes."""
 
 import math
 
@@ -18,12 +18,18 @@ from union_scenes import draw_scene, draw_volumes
 
 
 def make_wedge(skew):
-    """A plan 12 m long whose two long walls are 8 m apart on the left and come closer by `skew` (tangent each)."""
+    """Make a plan 12 m long whose long walls converge by `skew` (tangent each).
+
+    They are 8 m apart on the left.
+    """
     return shapely.Polygon([(0, -4), (12, -4 + 12 * skew), (12, 4 - 12 * skew), (0, 4)])
 
 
 def scan_wedge(skew, pitch, rng, density=6.0):
-    """Points of a gable over it, each slope square to its wall from an eave 5 m high, noise 2 cm."""
+    """Return points of a gable over it, each slope square to its wall.
+
+    The eaves are 5 m high, the noise is 2 cm.
+    """
     outline = make_wedge(skew)
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))

@@ -1,4 +1,4 @@
-"""What parts are called and where their rectangles end, where no points tell."""
+"""Check parts' names, and where their rectangles end if no points determine it."""
 
 import math
 
@@ -11,7 +11,10 @@ SLOPE, EAVE = 0.8, 3.0
 
 
 def make_hip_rows(half_u, half_v):
-    """Planes (5, 3, 1) of a hip about the origin whose eaves are all at EAVE on the sides of that rectangle."""
+    """Return planes (5, 3, 1) of a hip about the origin with all eaves at EAVE.
+
+    The eaves are on the sides of the rectangle.
+    """
     rows = [(SLOPE, 0.0, EAVE + SLOPE * half_u), (-SLOPE, 0.0, EAVE + SLOPE * half_u)]
     rows += [
         (0.0, SLOPE, EAVE + SLOPE * half_v),

@@ -1,4 +1,4 @@
-"""Laws of what becomes of volumes: sides on lines of the outline, regions without gaps, larger shapes put together."""
+"""Check what becomes of volumes: sides, regions, and composite shapes."""
 
 import math
 from dataclasses import replace
@@ -40,7 +40,10 @@ from union_scenes import OUTLINES, draw_volume, list_corners
 
 
 def lay_out_scene(rng, outline, volumes=None):
-    """Plan and scene (one direction) of points at random over `outline`, on the roof of `volumes` where given."""
+    """Return plan and scene (one direction) of points at random over `outline`.
+
+    The points are on the roof of `volumes`, if these are given.
+    """
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (400, 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
@@ -52,7 +55,10 @@ def lay_out_scene(rng, outline, volumes=None):
 
 
 def draw_level_volumes(rng, count):
-    """A base and `count` volumes of one direction with level tops among others, rectangles at random."""
+    """Draw a base and `count` volumes of one direction, some with level tops.
+
+    Their rectangles are random.
+    """
     rows = [draw_volume(rng, replacing=0.3) for _ in range(count)]
     for row in rows:
         row[0] = 0.0
@@ -60,7 +66,7 @@ def draw_level_volumes(rng, count):
     return np.vstack([make_base(-1.0), *rows])
 
 
-# --- regions ---------------------------------------------------------------------------------------------------------
+# --- regions --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("base", [False, True])
@@ -78,9 +84,8 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
     united = shapely.union_all(polygons)
     assert united.difference(outline.buffer(1e-5)).area < 1e-9
-    assert shapely.buffer(
-        outline.difference(united), -1e-4
-    ).is_empty  # no gap wider than composing closes
+    # No gap wider than composing closes.
+    assert shapely.buffer(outline.difference(united), -1e-4).is_empty
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -100,11 +105,14 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     )
 
 
-# --- sides -----------------------------------------------------------------------------------------------------------
+# --- sides ----------------------------------------------------------------------------------------
 
 
 def test_a_side_lies_on_the_line_of_the_outline_that_it_all_but_follows():
-    """A front out of square by three degrees: the volume's side takes its line, the other three their own."""
+    """Of a front out of square by three degrees, the side takes its line.
+
+    The other three sides take their own lines.
+    """
     lean = math.tan(math.radians(3.0))
     outline = shapely.Polygon([(-6, -4 - 6 * lean), (6, -4 + 6 * lean), (6, 4), (-6, 4)])
     volumes = np.vstack([make_base(-5.0), make_base(2.0)])
@@ -153,7 +161,7 @@ def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
 
 
 def make_tooth(lower, upper, offset):
-    """A volume of one plane that rises towards higher v, from v = `lower` to `upper`."""
+    """Make a volume of one plane that rises from v = `lower` to `upper`."""
     row = make_base(0.0)[0]
     row[U0 : V1 + 1] = -11.0, 11.0, lower, upper
     row[OFFSET0 + LEVEL], row[OFFSET0 + 2], row[SLOPE0 + 2] = np.inf, offset, 0.26
@@ -161,7 +169,10 @@ def make_tooth(lower, upper, offset):
 
 
 def test_a_strip_by_which_what_is_hidden_ran_too_far_is_no_part():
-    """A tooth that runs on under the next one, and shows beyond it where the roof is all but as high."""
+    """A tooth continues under the next one and shows beyond it.
+
+    The roof is nearly as high there.
+    """
     outline = shapely.box(-10.0, -7.0, 10.0, 7.0)
     base, hiding = make_base(-1.6)[0], make_tooth(-4.8, -0.3, 0.93)
     _, scene = lay_out_scene(
@@ -171,13 +182,16 @@ def test_a_strip_by_which_what_is_hidden_ran_too_far_is_no_part():
     assert result[:, V0].tolist() == pytest.approx([base[V0], -0.3, -4.8])
 
 
-# --- larger shapes ---------------------------------------------------------------------------------------------------
+# --- larger shapes --------------------------------------------------------------------------------
 
 KAPPAS = [0.0, 0.7, -2.5]
 
 
 def make_teeth(count, kappa, slope=0.5, width=5.0, length=12.0, uneven=0.0):
-    """Monopitches behind one another, in no order, a part each; every second one `uneven` (m) wider than the others."""
+    """Make monopitches behind one another, in no order, a part each.
+
+    Every second one is `uneven` (m) wider than the others.
+    """
     shape, parts, v = get("monopitch"), [], 0.0
     for k in range(count):
         item = width + (uneven if k % 2 else 0.0)
@@ -219,7 +233,10 @@ def test_equal_monopitches_in_a_row_are_one_saw_tooth(count, kappa):
 
 @pytest.mark.parametrize("kappa", KAPPAS)
 def test_a_tooth_whose_lower_end_is_hidden_is_a_tooth_of_its_row(kappa):
-    """The middle one of three, which reaches under its neighbour: neither of the others follows the other."""
+    """The middle one of three reaches under its neighbour.
+
+    Neither of the others follows the other.
+    """
     parts = sorted(
         make_teeth(3, kappa),
         key=lambda part: np.array([-math.sin(kappa), math.cos(kappa)]) @ part.translation[:2],
@@ -250,7 +267,10 @@ def test_monopitches_that_face_each_other_or_differ_stay_apart():
 
 @pytest.mark.parametrize("higher", [0.22, -0.22])
 def test_two_all_but_level_roofs_at_two_heights_are_no_saw_tooth(higher):
-    """Their planes tell nothing of how wide teeth are; where no wall did either and they told of less than nothing, the fit failed."""
+    """Their planes do not determine how wide teeth are.
+
+    Without walls they implied a negative width, and the fit failed.
+    """
     first, second = sorted(
         make_teeth(2, 1.6, slope=0.033, width=3.7, length=2.8), key=lambda part: part.translation[0]
     )
@@ -280,7 +300,7 @@ def test_larger_shapes_only_where_they_are_allowed():
 
 
 def draw_gambrel_parts(rng, kappa):
-    """A gambrel as a gable on the top of a truncated gable, both over the plan of their own."""
+    """Draw a gambrel as a gable on a truncated gable's top, each over its own plan."""
     width, length, slope, upper = (
         rng.uniform(8.0, 11.0),
         rng.uniform(10.0, 16.0),
@@ -335,7 +355,7 @@ def test_a_gable_on_a_truncated_gable_is_a_gambrel(seed, kappa):
 @pytest.mark.parametrize("kappa", KAPPAS)
 @pytest.mark.parametrize(("further", "steeper"), [(1.0, 0.0), (0.0, 0.01)])
 def test_a_gable_whose_ridge_lies_off_its_middle_is_a_gambrels_top(further, steeper, kappa):
-    """Where a rectangle ends under other parts, and a hundredth of slope, say nothing of what is seen."""
+    """A rectangle's end under other parts and a hundredth of slope do not matter."""
     (lower, upper), sizes = draw_gambrel_parts(np.random.default_rng(1), kappa)
     half_break, slope = 0.5 * sizes[3], upper.parameters["height"] / (0.5 * sizes[3])
     eave = float(upper.translation[2])
@@ -397,7 +417,10 @@ def test_moments_are_the_sums_over_the_points_of_each_plane(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_least_squares_find_planes_that_explain_all_points(seed):
-    """Two planes with a slope in common, points on them exactly: the unknowns come back, and nothing is left to vary."""
+    """Two planes with a common slope and exact points give back the unknowns.
+
+    Nothing is left to vary.
+    """
     rng = np.random.default_rng(seed)
     unknowns = np.array([*rng.uniform(4.0, 6.0, 2), rng.uniform(0.3, 1.0)])
     design = np.zeros((5, 3, 3))

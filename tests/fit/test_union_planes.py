@@ -1,4 +1,4 @@
-"""The compiled search for planes and the plan's grid against slow oracles in plain Python."""
+"""Check the compiled search for planes and the plan's grid against slow oracles."""
 
 import numpy as np
 import pytest
@@ -111,7 +111,10 @@ def test_grid_lines_are_few_whatever_the_outline(vertices):
 
 
 def test_groups_of_planes_are_all_pairs_with_a_ridge_and_few_larger_ones():
-    """Two slopes that face each other, two across them and a top: each, three pairs, a hip, and all of these with the top."""
+    """Two facing slopes, two across them and a top make known groups.
+
+    These are each plane, three pairs, a hip, and all of these with the top.
+    """
     grid = Grid(np.arange(0.0, 12.5, 0.5), np.arange(0.0, 8.5, 0.5))
     slopes = [(0.7, 0.0, 3.0), (-0.7, 0.0, 11.4), (0.0, 0.7, 3.0), (0.0, -0.7, 8.6)]
     planes = np.array([*slopes, (0.0, 0.0, 5.0)])

@@ -1,4 +1,4 @@
-"""Equal dormers in a row are found from one of them, and nothing is repeated where nothing stands."""
+"""Check that equal dormers in a row are found from one, and nothing else repeats."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ WIDE_M, DORMERS = 1.6, (-9.0, -5.6, -2.2, 1.2, 4.6, 8.0)  # m: where each begins
 
 
 def make_height(dormers):
-    """The heights of a monopitch with flat dormers at its lower side."""
+    """Return the heights of a monopitch with flat dormers at its lower side."""
 
     def height(x, y):
         z = 4.0 + 0.6 * (y + 5.0)
@@ -40,9 +40,10 @@ def make_height(dormers):
 
 
 def make_volumes(base_m):
-    """The monopitch and the first dormer over a base far below, heights over `base_m`.
+    """Return the monopitch and the first dormer over a base far below.
 
-    The plan's u is y, its v is -x: the longer side of the outline lies along v.
+    Heights are over `base_m`. The plan's u is y, its v is -x: the longer side of the outline lies
+    along v.
     """
     volumes = np.repeat(make_base(-50.0), 3, axis=0)
     volumes[1, U0 : V1 + 1] = -5.0, 5.0, -12.0, 12.0

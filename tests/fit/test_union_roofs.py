@@ -1,4 +1,4 @@
-"""Laws of whole roofs: generated ones are found again, as solids too, and turn and move with their points."""
+"""Check whole roofs: generated ones are found again, and move with their points."""
 
 import math
 from functools import cache
@@ -23,15 +23,16 @@ from union_scenes import compute_lowest, draw_member, list_corners
 
 DENSITY = 8.0
 WINGED = [(kind, type) for kind in ("L", "T", "U", "cross") for type in ("gable", "hip")]
+# Slopes on some sides beside a level top are told as two parts now and then.
 SPLIT = (
     "half_mansard",
     "corner_mansard",
-)  # slopes on some sides beside a level top are told as two parts now and then
+)
 DEAD_M = 0.06  # what residuals may be without a cost: slopes that differ by less are told as equal
 
 
 def scatter(outline, rng, density=DENSITY):
-    """Places (n, 2) at random in `outline`, `density` a square metre."""
+    """Return places (n, 2) at random in `outline`, `density` a square metre."""
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
     return xy[shapely.contains_xy(outline, *xy.T)]
@@ -47,7 +48,7 @@ def compute_rmse(fit, xy, z):
 
 @cache
 def fit_member(shape, seed, regular=True):
-    """A member of the family, points on it without noise, and its fit."""
+    """Return a member of the family, points on it without noise, and its fit."""
     rng = np.random.default_rng([seed, len(shape)])
     member = draw_member(rng, shape, regular)
     outline = shapely.Polygon(list_corners(member))
@@ -58,7 +59,10 @@ def fit_member(shape, seed, regular=True):
 
 @cache
 def draw_wings(kind, type, seed):
-    """A compound of that kind of roofs of that type, the `seed`-th drawn, with points on it without noise."""
+    """Draw the `seed`-th compound of that kind with roofs of that type.
+
+    Also returns points on it without noise.
+    """
     for draw in range(1000):
         rng = np.random.default_rng([draw, len(kind), seed])
         building = random_compound(rng, kind)
@@ -75,12 +79,12 @@ def fit_wings(kind, type, seed):
 
 
 def iterate_fits():
-    """Fits of all sorts, for what holds of every one."""
+    """Yield fits of all sorts, for what holds of every one."""
     yield from (fit_member(shape, 0)[3] for shape, _ in GENERAL_SHAPES.values())
     yield from (fit_wings(kind, type, 0)[2] for kind, type in WINGED)
 
 
-# --- found again -----------------------------------------------------------------------------------------------------
+# --- found again ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -118,7 +122,7 @@ def test_the_catalogues_other_shapes_are_found_again(type):
 
 
 def is_right(building, fit):
-    """Whether a fit has the true number of parts, and types that these may be called by."""
+    """Return whether a fit has the true number of parts, with allowed types."""
     parts = building.roof.parts
     hidden = [
         has_hidden_end(part, [other for other in parts if other is not part]) for part in parts
@@ -130,7 +134,7 @@ def is_right(building, fit):
 
 
 def test_winged_roofs_are_found_again():
-    """All within the allowance, and but for one of eight exactly, as the volumes that they are."""
+    """All are within the allowance, and all but one of eight are exact."""
     fits = [fit_wings(kind, type, 0) for kind, type in WINGED]
     offsets = np.array([compute_rmse(fit, points[:, :2], points[:, 2]) for _, points, fit in fits])
     right = np.array([is_right(building, fit) for building, _, fit in fits])
@@ -156,11 +160,14 @@ def test_most_scanned_winged_roofs_are_told_as_the_two_primitives_they_are(kind)
     assert nearby >= 5
 
 
-# --- what it must not depend on --------------------------------------------------------------------------------------
+# --- what it must not depend on -------------------------------------------------------------------
 
 
 def is_same_roof(fit, other, xy, xy_other, rise=0.0):
-    """Whether two fits have the same types, and heights within a centimetre at nearly all of the same places."""
+    """Return whether two fits have the same types and heights.
+
+    Heights agree within a centimetre at nearly all places.
+    """
     gap = np.abs(measure_height(other, xy_other) - rise - measure_height(fit, xy))
     types = sorted(part.type for part in fit.roof_parts) == sorted(
         part.type for part in other.roof_parts
@@ -210,7 +217,7 @@ def test_the_answer_does_not_depend_on_the_order_of_points(kind, type):
         assert [p.outline.wkb for p in part.pieces] == [p.outline.wkb for p in twin.pieces]
 
 
-# --- what holds of every fit -----------------------------------------------------------------------------------------
+# --- what holds of every fit ----------------------------------------------------------------------
 
 
 def test_planes_follow_from_the_parameters_to_a_millimetre():
@@ -273,7 +280,10 @@ def test_errors_are_about_as_large_as_the_deviations_say(shape):
 
 
 def test_a_side_at_a_step_has_a_deviation_and_one_on_the_outline_or_hidden_has_none():
-    """A tower over half of a level roof, and a gabled wing that runs on into a house: its length is no one's to tell."""
+    """A tower stands over half of a level roof, and a wing continues into a house.
+
+    Nothing determines the wing's length.
+    """
     errors = []
     for seed in range(8):
         rng = np.random.default_rng([seed, 5])
@@ -300,7 +310,7 @@ def test_a_side_at_a_step_has_a_deviation_and_one_on_the_outline_or_hidden_has_n
     assert short.type == "gable" and "length" not in short.sigma and short.sigma["height"] < 0.05
 
 
-# --- types that are allowed ------------------------------------------------------------------------------------------
+# --- types that are allowed -----------------------------------------------------------------------
 
 LISTS = [
     ("flat",),
@@ -345,7 +355,7 @@ def test_components_and_names_belong_together():
 
 
 def test_a_tooth_with_something_more_is_a_tooth():
-    """A corner cut off by some points astray, or a rectangle that runs on beneath the next tooth, ends no saw-tooth."""
+    """A cut corner or a rectangle that continues under the next tooth ends no row."""
     outline = shapely.box(0, 0, 20, 10)
     tooth = {"width": 5.0, "length": 10.0, "height": 2.0}
     centres = [np.array([2.5 + 5.0 * k, 5.0, 6.0]) for k in range(4)]
@@ -364,7 +374,7 @@ def test_a_tooth_with_something_more_is_a_tooth():
 def test_what_shows_along_the_outline_alone_makes_no_part_and_keeps_houses_in_a_row_apart(
     kind, seed
 ):
-    """Rows whose ends are equal around a lower house, and hips that hide a volume but for a micrometre."""
+    """Rows have equal ends around a lower house, and hips hide all but a micrometre."""
     result, wanted = count_parts(kind, 5.0, seed)
     assert result == wanted
 

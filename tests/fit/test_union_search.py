@@ -1,4 +1,4 @@
-"""Laws of the union's compiled search: heights, what a roof costs, and moves that keep the books of that cost."""
+"""Check the compiled search: heights, the cost of a roof, and moves that keep it."""
 
 import numpy as np
 import pytest
@@ -89,14 +89,14 @@ SEEDS = range(12)
 
 
 def draw_case(seed, **options):
-    """A generator, random volumes, and a scene of points near the roof of some others."""
+    """Return a generator, random volumes, and a scene of points near other volumes."""
     rng = np.random.default_rng(seed)
     volumes = draw_volumes(rng)
     return rng, volumes, draw_scene(rng, draw_volumes(rng), **options)
 
 
 def compute_both_roofs(volumes, scene, k):
-    """The heights of the roof were volume k everywhere, and without it."""
+    """Return the heights of the roof with volume k everywhere, and without it."""
     context = measure_context(volumes, scene.U, scene.V, k)
     return compute_roof_everywhere(volumes, scene.U, scene.V, k, context), context.roof_without
 
@@ -105,7 +105,7 @@ def is_true(volumes, scene, value):
     return value == pytest.approx(compute_objective(volumes, scene, np.inf), rel=1e-9, abs=1e-6)
 
 
-# --- heights ---------------------------------------------------------------------------------------------------------
+# --- heights --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -205,11 +205,11 @@ def test_a_roof_united_with_itself_moved_under_it_is_itself(seed):
     assert top.max() < len(volumes)
 
 
-# --- what a roof costs -----------------------------------------------------------------------------------------------
+# --- what a roof costs ----------------------------------------------------------------------------
 
 
 def count_units(row):
-    """Units of complexity of a volume: itself, its offsets, the slopes that its tie leaves it, its leans, that it replaces."""
+    """Count the units of a volume: offsets, slopes, leans, and whether it replaces."""
     is_present = np.isfinite(row[OFFSET0 : OFFSET0 + N_PLANES])
     along, across = is_present[:2].sum(), is_present[2:N_SIDES].sum()
     slopes = {FREE: along + across, OPPOSITE: min(along, 1) + min(across, 1)}.get(
@@ -221,7 +221,7 @@ def count_units(row):
 
 
 def widen_by_touch(volumes):
-    """The volumes, all a touch larger: what meets an edge counts as beside it."""
+    """Return the volumes, all a touch larger: what meets an edge counts as beside it."""
     wide = volumes.copy()
     wide[:, [U0, U0 + 2]] -= COVER_TOUCH_M
     wide[:, [U0 + 1, V1]] += COVER_TOUCH_M
@@ -229,7 +229,10 @@ def widen_by_touch(volumes):
 
 
 def measure_beside_edge(volumes, scene, k, edge, t):
-    """Heights just inside and just outside volume k at places `t` of one of its edges, and how deep in the outline they lie."""
+    """Return heights just inside and outside volume k at places `t` of an edge.
+
+    Also returns how deep in the outline the places lie.
+    """
     row = volumes[k]
     positions = np.full(len(t), row[U0 + edge])
     item = np.stack([positions, t] if edge < 2 else [t, positions])
@@ -247,7 +250,7 @@ def measure_beside_edge(volumes, scene, k, edge, t):
 
 
 def price_edge_slowly(volumes, scene, k, edge, spacing):
-    """What shows of an edge, from samples `spacing` (m) apart at most."""
+    """Price what is visible of an edge, from samples `spacing` (m) apart at most."""
     lower, upper = volumes[k, [U0 + 2, V1]] if edge < 2 else volumes[k, [U0, U0 + 1]]
     count = max(2, int((upper - lower) / spacing) + 1)
     step = (upper - lower) / count
@@ -292,7 +295,8 @@ def test_an_edge_costs_what_shows_of_it(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_straight_recess_costs_no_more_than_one_in_steps(seed):
-    # a bay of The Hague was drawn as two recesses that overlap, for each of their sides was too short to cost anything
+    # A bay of The Hague was drawn as two recesses that overlap, because each of their sides was too
+    # short to cost anything.
     rng = np.random.default_rng(seed)
     scene = draw_scene(rng)
     (u, v), (length, depth) = rng.uniform(-3.0, -1.0, 2), rng.uniform((2.0, 1.0), (4.0, 1.4))
@@ -359,7 +363,7 @@ def test_shapes_that_are_not_allowed_cost_infinitely_much():
         assert np.isfinite(compute_objective(volumes, scene, np.inf)) == all_rows
 
 
-# --- moves -----------------------------------------------------------------------------------------------------------
+# --- moves ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -413,7 +417,10 @@ def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
 
 
 def make_volume(u, v, **planes):
-    """A row over `u` and `v` with planes by the names of their places: (slope, offset), of the level one the offset."""
+    """Make a row over `u` and `v` with planes by the names of their places.
+
+    A plane is (slope, offset).
+    """
     row = make_base(0.0)[0]
     row[U0:SLOPE0], row[OFFSET0 + LEVEL] = (*u, *v), np.inf
     for place, (slope, offset) in planes.items():
@@ -424,7 +431,10 @@ def make_volume(u, v, **planes):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_steep_end_found_by_itself_becomes_an_end_of_its_neighbour(seed):
-    """A gable over u -6 .. 6, v -4 .. 4, its ridge 2.4 m above its eaves, that ends steeply from u = 4.8."""
+    """A gable over u -6 .. 6, v -4 .. 4 ends steeply from u = 4.8.
+
+    Its ridge is 2.4 m above its eaves.
+    """
     gable = make_volume((-6.0, 6.0), (-4.0, 4.0), front=(0.6, 2.4), back=(0.6, 2.4))
     end = make_volume((4.8, 6.0), (-4.0, 4.0), right=(2.0, 12.0))
     whole = make_volume(
@@ -498,7 +508,10 @@ def test_trimming_gives_the_true_objective_and_no_volume_reaches_further_than_be
 
 
 def make_falling(lower, upper, slope, at_low):
-    """A volume whose one plane is `at_low` high at v = `lower` and changes by `slope` along v up to `upper`."""
+    """Make a volume of one plane that is `at_low` high at v = `lower`.
+
+    It changes by `slope` along v up to `upper`.
+    """
     row = make_base(np.inf)[0]
     row[V0], row[V1] = lower, upper
     plane = 2 if slope > 0.0 else 3
@@ -516,10 +529,11 @@ def test_a_volume_that_shows_again_behind_its_neighbour_is_cut_short(seed):
     true[1, V1] = step
     scene = scene._replace(z=compute_heights(true, scene.U, scene.V)[0])
     result = true.copy()
+    # The annex runs on under the house, and is higher behind it.
     result[1, V1], result[2, V1] = (
         upper,
         upper - 0.2,
-    )  # the annex runs on under the house, and is higher behind it
+    )
     result, _ = trim(result, scene, compute_objective(result, scene, np.inf))
     assert result[1, V1] == pytest.approx(step)
     assert result[2, V1] > upper - 0.1
@@ -527,7 +541,10 @@ def test_a_volume_that_shows_again_behind_its_neighbour_is_cut_short(seed):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_volume_that_shows_at_one_line_of_nodes_keeps_its_width(seed):
-    """Both its edges are near the neighbour's edge; drawn in to it they would leave a line."""
+    """Both its edges are near the neighbour's edge.
+
+    Drawn in to it they would leave a line.
+    """
     scene = draw_scene(np.random.default_rng(seed))
     _, V = list_nodes(scene)
     line = float(np.sort(V[0])[V.shape[1] // 2])
@@ -541,17 +558,20 @@ def test_a_volume_that_shows_at_one_line_of_nodes_keeps_its_width(seed):
 
 
 def make_level(lower, upper, height):
-    """A level volume from v = `lower` to v = `upper`."""
+    """Make a level volume from v = `lower` to v = `upper`."""
     row = make_base(height)[0]
     row[U0 : V1 + 1] = -8.0, 8.0, lower, upper
     return row
 
 
-# --- planes and candidates -------------------------------------------------------------------------------------------
+# --- planes and candidates ------------------------------------------------------------------------
 
 
 def draw_tied_volume(rng):
-    """A volume over all of the scene with one to four slopes, and a level top now and then."""
+    """Draw a volume over all of the scene with one to four slopes.
+
+    It has a level top now and then.
+    """
     row = make_base(np.inf)[0]
     row[U0 : V1 + 1] = -8.0, 8.0, -8.0, 8.0
     for k in rng.permutation(N_SIDES)[: rng.integers(1, N_SIDES + 1)]:
@@ -563,7 +583,7 @@ def draw_tied_volume(rng):
 
 
 def find_visible_planes(volumes, scene):
-    """Which plane (n,) of the second volume is the lowest at each point."""
+    """Return which plane (n,) of the second volume is the lowest at each point."""
     c = read_coefficients(volumes, 1)
     return [
         find_lowest_plane(c, u, v)[1]
@@ -645,7 +665,7 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
 
 
 def fill_cell_gains(scene, candidates, m, cells, cost_now, z_now, replacing, gain):
-    """All that candidate m gains, by cell."""
+    """Fill `gain` with all that candidate m gains, by cell."""
     by_place = np.empty(len(z_now))
     floor = np.full(len(z_now), -np.inf) if replacing else z_now + 1e-9
     total = fill_gains(scene, candidates, m, cost_now, floor, by_place)
@@ -735,7 +755,10 @@ def test_a_further_plane_gains_what_the_points_then_cost_less(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_the_surroundings_of_a_volume_are_what_is_near_it(seed):
-    """Moved, it or a volume that meets it changes the digest; one far away does not until it comes near."""
+    """A move of the volume or of one that meets it changes the digest.
+
+    A move of one far away does not until it comes near.
+    """
     rng = np.random.default_rng(seed)
     volumes = np.vstack([make_base(2.0), draw_volume(rng, 0.0), draw_volume(rng, 0.0)])
     volumes[1:, DIRECTION], volumes[1:, U0 : V1 + 1] = (

@@ -1,4 +1,4 @@
-"""Laws of roofs whose first volume is not the last word, of what goes unseen, and of volumes that skewed walls keep apart."""
+"""Check roofs regrown, unseen places, and volumes that skewed walls keep apart."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6),
 
 
 def make_scene_over(outline, density=4.0):
-    """The scene of level points strewn over `outline`."""
+    """Return the scene of level points scattered over `outline`."""
     rng = np.random.default_rng(0)
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
@@ -128,7 +128,10 @@ def test_houses_beside_a_higher_one_are_told_apart():
 
 
 def test_gables_at_both_walls_below_a_ridge_are_two():
-    """One under the roof from wall to wall would explain them as well; it does not stand out of the roof as a wing does."""
+    """One gable under the roof from wall to wall would explain them as well.
+
+    It does not stand out of the roof as a wing does.
+    """
     outline = shapely.box(0, 0, 14, 10)
     xy = scatter_points(outline, 8.0)
     roof = 4.0 + 1.0 * (5.0 - np.abs(xy[:, 1] - 5.0))
@@ -141,7 +144,7 @@ def test_gables_at_both_walls_below_a_ridge_are_two():
 
 @pytest.mark.parametrize("wide", [5.0, 6.0, 7.0])
 def test_a_level_roof_ends_where_a_gable_begins_whose_eaves_are_lower(wide):
-    """Along the eaves nothing but the points tells that the level roof does not run on over them."""
+    """Along the eaves only the points show that the level roof ends there."""
     outline = shapely.box(0, 0, 6.0 + wide, 10.7)
     xy = scatter_points(outline, 5.0)
     gable = 6.75 + 0.65 * (5.35 - np.abs(xy[:, 1] - 5.35))

@@ -1,4 +1,4 @@
-"""Laws of saw-teeth: their planes tell how wide they are, what a scanner saw of their walls does not, and nothing is left bare."""
+"""Check saw-teeth: their planes determine their width, and nothing is left bare."""
 
 import math
 from dataclasses import replace
@@ -20,14 +20,14 @@ SLOPE, WIDTH, LENGTH, LOW = 0.5, 5.0, 12.0, 4.0  # of every tooth; the height at
 
 
 def place_part(name, theta_p, kappa, across, z):
-    """A part of the catalogue whose rectangle's middle lies so far `across` the row."""
+    """Make a part of the catalogue whose middle lies so far `across` the row."""
     shape = get(name)
     place = np.array([-math.sin(kappa) * across + 40.0, math.cos(kappa) * across - 7.0, z])
     return shape.part(shape.to_theta(theta_p, kappa, place))
 
 
 def make_seen_tooth(number, start, end, kappa):
-    """The tooth of that number from the row's foot on, seen from `start` to `end`."""
+    """Make the tooth of that number from the row's foot on, from `start` to `end`."""
     size = {"width": end - start, "length": LENGTH, "height": SLOPE * (end - start)}
     return place_part(
         "monopitch", size, kappa, 0.5 * (start + end), LOW + SLOPE * (start - number * WIDTH)
@@ -35,7 +35,7 @@ def make_seen_tooth(number, start, end, kappa):
 
 
 def make_seen_row(count, kappa, rng):
-    """Teeth whose steps were seen up to 0.2 m from where they are, and the level annex behind the last; where that begins."""
+    """Make teeth whose steps are up to 0.2 m off, and the annex behind the last."""
     ends = WIDTH * np.arange(count + 1) + np.r_[0.0, rng.uniform(-0.2, 0.2, count)]
     teeth = [make_seen_tooth(k, *ends[k : k + 2], kappa) for k in range(count)]
     end = count * WIDTH + 6.0
@@ -74,7 +74,10 @@ def test_a_strip_between_teeth_is_no_roof_of_its_own(kappa):
 
 @pytest.mark.parametrize("kappa", [0.0, 0.7, -2.5])
 def test_a_row_with_slanted_ends_and_nothing_beside_it_is_one_saw_tooth(kappa):
-    """Its ends are no walls across it: what lies beyond the teeth's own width belongs to the outermost teeth."""
+    """Its ends are no walls across it.
+
+    What lies beyond the teeth's own width belongs to the outermost teeth.
+    """
     c, s, u = math.cos(kappa), math.sin(kappa), 0.5 * LENGTH
     rings = (
         [(-u, -0.3), (u, 0.1), (u, WIDTH), (-u, WIDTH)],

@@ -1,4 +1,4 @@
-"""Laws of what a scanner sees of walls, in clouds of few points: it makes no roof."""
+"""Check that what a scanner sees of walls makes no roof in sparse clouds."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,10 @@ from union_scenes import OUTLINES, draw_scene, draw_volumes
 
 
 def scan_hip(rng, outline, density, pitch):
-    """Points (n, 3) of a roof that rises from all of the `outline` with the same `pitch`, eaves 5 m high; and their depth (n,)."""
+    """Return points (n, 3) of a roof that rises from all of the `outline`.
+
+    It has one `pitch`, and eaves 5 m high. Also returns the points' depth (n,).
+    """
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
     depth = measure_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline))
@@ -23,7 +26,10 @@ def scan_hip(rng, outline, density, pitch):
 
 
 def scan_walls(rng, outline, count):
-    """Points (count, 3) of walls, up to 5 cm inside of the outline, more than a metre below the eaves; and their depth."""
+    """Return points (count, 3) of walls, up to 5 cm inside of the outline.
+
+    They are more than a metre below the eaves. Also returns their depth.
+    """
     ring = outline.exterior
     positions = shapely.line_interpolate_point(ring, rng.uniform(0.0, ring.length, count))
     xy = shapely.get_coordinates(positions) * 0.995
@@ -40,9 +46,8 @@ def test_sparse_roofs_keep_every_point_and_lose_those_of_their_walls(outline, se
     assert wall_depth.max() < FACADE_BORDER_M
     nearby = np.abs(walls[:, None, :2] - roof[None, depth >= FACADE_BORDER_M, :2])
     reach = WALL_REACH_SPACINGS * np.sqrt(outline.area / (len(roof) + len(walls)))
-    visible = (
-        np.hypot(nearby[..., 0], nearby[..., 1]).min(axis=1) < reach
-    )  # far from any roof point a steep roof may be
+    # Far from any roof point a steep roof may be.
+    visible = np.hypot(nearby[..., 0], nearby[..., 1]).min(axis=1) < reach
 
     all_rows = np.vstack([roof, walls])
     n_kept = all_rows[find_roof_points(all_rows, np.concatenate([depth, wall_depth]), outline.area)]

@@ -1,4 +1,4 @@
-"""Welding: a repair is kept where the roof gets cheaper, judged in a window as on the whole roof; outlines never move."""
+"""Check welding: a repair is kept if the roof gets cheaper, and outlines stay."""
 
 import importlib
 
@@ -15,7 +15,7 @@ weld = importlib.import_module("hiproof.fit.union.weld")
 
 
 def scan_compound(kind, seed):
-    """Points and outline of a simulated compound in its local frame, 5 points a square metre."""
+    """Return points and outline of a simulated compound, 5 points a square metre."""
     roof = random_compound(np.random.default_rng(seed), kind).roof
     settings = ScanSettings(density=5.0, defects=Defects.none())
     cloud = scan_solids([compose(roof, -3.0)], np.random.default_rng(seed), settings)
@@ -23,7 +23,7 @@ def scan_compound(kind, seed):
 
 
 def capture_problem(monkeypatch, kind, seed):
-    """What `weld` is called with for a compound: its problem and the roof as the search left it."""
+    """Return the arguments of `weld` for a compound: its problem and first state."""
     visible = {}
 
     def spy(volumes, sides, agreement, site, base):
@@ -39,7 +39,7 @@ def capture_problem(monkeypatch, kind, seed):
 
 
 def price_box(state, problem, box=None):
-    """Price and corners of a roof, in a window or as a whole."""
+    """Return price and corners of a roof, in a window or as a whole."""
     box = problem.outline.envelope if box is None else box
     window = weld.make_window(box, weld.list_quads(state, problem), problem)
     whole = weld.make_window(weld.make_whole_box(problem), weld.list_quads(state, problem), problem)

@@ -1,4 +1,4 @@
-"""Large roofs are searched in windows: what stands on them is found however large they are, and far parts do not matter."""
+"""Check that large roofs are searched in windows, and far parts do not matter."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from hiproof.compose import check_solid
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
-from hiproof.fit.union.box import NOWHERE
+from hiproof.fit.union.box import EMPTY_BOX
 from hiproof.fit.union.groups import draw_in_groups
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import PlanSite
@@ -25,7 +25,10 @@ BOXES = [(x, y, x + 4.0, y + 3.0) for x in (3.0, 15.0, 27.0) for y in (3.0, 15.0
 
 
 def compute_hall(x, y):
-    """A level roof of 770 m2 with six boxes of 12 m2 that stand 3 m above it."""
+    """Return the heights of a level roof of 770 m2 with six boxes of 12 m2.
+
+    The boxes stand 3 m above it.
+    """
     z = np.full(np.shape(x), 8.0)
     for x0, y0, x1, y1 in BOXES:
         z = np.where((x > x0) & (x < x1) & (y > y0) & (y < y1), 11.0, z)
@@ -106,7 +109,7 @@ def test_a_volume_without_width_lies_nowhere():
     line = whole.volumes[0].copy()
     line[U0 : V1 + 1] = 3.0, 9.0, 4.0, 4.0
     whole.set_volumes(np.vstack([whole.volumes, line]))
-    assert whole.boxes[1].tolist() == list(NOWHERE)
+    assert whole.boxes[1].tolist() == list(EMPTY_BOX)
     assert whole.list_volumes(whole.box) == []
 
 

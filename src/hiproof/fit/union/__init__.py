@@ -1,49 +1,61 @@
-"""A building's roof as a union of few parametric volumes, found by evidence and fitted to all of its points.
+"""Fit a building's roof as a union of parametric volumes.
 
-z(x, y) = max over volumes whose rectangle holds (x, y)  of  min over its at most five planes
+Structure must be worth its price in points, and all points share in the fit of the result. The roof
+is
 
-plan        the building's frame, the points that count, a grid, ghosts of unseen roof
-allowed     which shapes volumes may have
+    z(x, y) = max over volumes whose rectangle contains (x, y)  of  min over its at most five planes
+
+plan        the building's frame, the points that count, a grid, the unobserved cells
+allowed     the shapes that volumes may have
 scene       these in each of the building's directions, as the compiled search reads them
 planes      compiled: planes and gables that explain rectangles of points
-candidates  volumes of these planes, and where each would gain most
-volumes     compiled: a volume as a row of numbers, heights of the roof
-around      compiled: what the other volumes leave for one
-steps       compiled: what an edge of a volume costs that shows
+candidates  volumes made of these planes, and where each would gain most
+volumes     compiled: a volume as a row of numbers, and the heights of a roof
+around      compiled: the heights that the other volumes leave for one
+steps       compiled: the price of an edge of a volume that is visible
 prices      the table of prices: what a unit is, what structure costs, what a change must gain
-objective   compiled: what a roof costs: misfit, volumes, edges that show
-edges, refit  compiled: a volume's edges moved, its planes refitted
-moves, facings, joins, improve  compiled: structure that comes and goes: of one volume, the ways planes face, of several, all in turn
-add, grow   volumes added one by one from a level base, all improved after each; the first of them grown anew
+objective   compiled: the cost of a roof: misfit, volumes and visible edges
+edges       compiled: moves of a volume's edges
+refit       compiled: least squares for a volume's planes
+moves       compiled: moves that change one volume
+facings     compiled: moves that turn its planes
+joins       compiled: moves that change several volumes
+improve     compiled: all moves in turn
+add, grow   volumes added one by one to a level base, and the first of them grown anew
 trim        hidden edges drawn in
-run_on      ends that stand out of a neighbour by little drawn on until they lie hidden in it
+run_on      ends that stand out of a neighbour a little, moved until they are hidden in it
 search      these in order, and the simplification that a draughtsman would make
 large       roofs of more than 200 m2, searched in windows of bounded size
-box, whole, window  boxes; what windows need of a whole roof; what a search sees of a box, and how its changes return
-blocks, block, seams, places  where a roof is cut, a block searched as a house, blocks sewn together, more grown where points are unexplained
-groups      passes after the search on some neighbouring volumes after others
-slivers     planes of which a narrow strip shows
-apart       volumes that show in several places
-sides       each side on the line of the outline that it all but follows
-finish      all planes to all points, along their sides, eaves level where the points allow it
+box         upright boxes in the plan's axes
+whole       what windows need of a whole roof
+window      the scene of a box, and how changes in it return to the roof
+blocks      where a large roof is cut
+block       the search of one block as a house
+seams       the blocks joined again
+places      further growth where points are unexplained
+groups      passes after the search, on groups of neighbouring volumes
+slivers     planes of which only a narrow strip is visible
+apart       volumes that are visible in several places, split
+sides       each side on the line of the outline that it nearly follows
+finish      all planes fitted to all points, with level eaves where the points allow them
 cants       planes over walls that cut a volume's corners off
-cut_corners one volume over such walls in place of several
-unite       volumes that only skewed walls or cut corners keep apart, made one
+cut_corners one volume over such walls instead of several
+unite       volumes merged that only skewed walls or cut corners keep apart
 repeats     copies of small volumes along their axes, such as dormers in a row
 bays        level volumes over small pieces that walls cut off the outline
-members     the volumes whose planes points tell, by the unknowns of all
+members     the volumes whose planes the points determine, by the unknowns of all
 agree       planes, slopes, ridges and eaves that volumes have in common
-corners     hips and valleys that end beside a corner of the outline end in it
-drawn_plan  the plan that a roof would be drawn with: its corners, and the planes beside its edges
-repairs     what nearly meets in it and might be made to
-weld        those of them that pay: sides end in corners, low steps become fold lines
+corners     hips and valleys that end beside a corner of the outline, moved into it
+drawn_plan  the plan of the drawn roof: its corners, and the planes beside its edges
+repairs     what nearly meets in it and might be made to meet
+weld        the repairs that pay: sides that end in corners, low steps that become fold lines
 regions     where each volume roofs the outline
-names       volume -> named part of the family of roof shapes
+names       from volumes to named parts of the family of roof shapes
 teeth       rows of equal monopitches as saw-teeth
-larger      gambrels put together
-own         shapes of your own in place of neighbours
-shown       parts that show nowhere go
-clamp       no height far beyond those of the points
+larger      gambrels combined from their parts
+own         custom shapes instead of neighbouring parts
+shown       hidden parts removed
+clamp       heights limited to the range of the points
 fit         the outcome
 """
 
@@ -89,14 +101,18 @@ def fit_building(
     outline: shapely.Polygon | None = None,
     settings: Settings | None = None,
 ) -> BuildingFit:
-    """Fit the roof of one building to `points_local` (n, 3), in metres of a local frame, over `outline` (same frame).
+    """Fit the roof of one building to `points_local` (n, 3) over `outline`.
 
-    Without an outline it is estimated from the points; with one, points outside it do not count. Where `settings.fit.types`
-    names types, parts have these only, or are flat. Raises FitError where nothing can be fitted: no points inside the outline, one
-    without area, or none given and points that span no area; InputError for points of another shape.
+    Both are in metres of one local frame. Without an outline, it is estimated from the points. With
+    one, points outside it do not count. Where `settings.fit.types` names types, all parts have one
+    of these types or are flat.
 
-    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4)))
-    >>> roof = np.column_stack([x, y, np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)])
+    Raises FitError if nothing can be fitted: if no points lie inside the outline, if it has no
+    area, or if the points span no area. Raises InputError for points of another shape.
+
+    >>> x, y = np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4))
+    >>> z = np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)
+    >>> roof = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     >>> fit = fit_building(roof, shapely.box(0, 0, 12, 7))
     >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
     (['flat', 'gable'], 0.0)
@@ -109,7 +125,8 @@ def fit_building(
     plan = lay_out_plan(points_local, outline)
     if len(plan.cloud.u) == 0:
         raise FitError(
-            "expected roof points inside the outline, got none; add a cloud that covers the building"
+            "expected roof points inside the outline, got none; "
+            "add a cloud that covers the building"
         )
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
@@ -131,7 +148,7 @@ def fit_building(
     parts = [restrict_type(part, types, points_local) for part in parts]
     z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
     parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
-    if exclude_parts(parts, visible):  # new ones, which may hide others
+    if exclude_parts(parts, visible):  # new ones may hide others
         parts = keep_visible(parts, plan, scene, widest_m2=0.0)
     unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
@@ -140,7 +157,7 @@ def fit_building(
 def tidy_volumes(
     volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
 ) -> np.ndarray:
-    """The volumes without specks and slivers, those that show in several places split, those that are one united."""
+    """Drop specks and slivers, split volumes visible in several places, and unite."""
 
     def tidy(rows: np.ndarray, scene: Scene, _: list[int] | None) -> np.ndarray:
         return split_volumes(drop_slivers(drop_specks(rows, scene), scene), scene)
@@ -154,7 +171,10 @@ def tidy_volumes(
 
 
 def select_largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
-    """The largest polygon of an outline, made valid. Raises FitError for one without area."""
+    """Return the largest polygon of an outline, made valid.
+
+    Raises FitError for an outline without area.
+    """
     is_finite = math.isfinite(outline.area)
     polygons = list_polygons(shapely.make_valid(outline)) if is_finite else []
     if not polygons:
@@ -165,14 +185,17 @@ def select_largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
 
 
 def measure_unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
-    """The share of the plan's points further than `tolerance_m` from the max of the parts."""
+    """Return the share of points further than `tolerance_m` from the highest part."""
     xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
     z, _ = find_highest(parts, xy)
     return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 
 def restrict_type(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
-    """The part, or a flat one at its points' median height (n, 3) where its type is none of `types`."""
+    """Return the part, or a flat one if its type is none of `types`.
+
+    The flat part lies at the median height of its `points` (n, 3).
+    """
     if name_among(part.type, types) or part.type == "flat":
         return part
     inside = np.any(

@@ -1,4 +1,4 @@
-"""Volumes added one by one, each where it gains most, all of them improved after each. Compiled."""
+"""Add volumes one by one, and improve all after each. Compiled."""
 
 from __future__ import annotations
 
@@ -35,31 +35,33 @@ from .volumes import (
     is_fixed,
 )
 
-MOST_VOLUMES = 24  # of one building: a bound on time
-TRIED_EACH_WAY = 2  # candidates of the largest gain that are tried in earnest
-# of the highest misfit, from which on a point counts as unexplained; points worth a further volume
-UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
-# of the highest misfit, from which on points count in a roof that leaves none unexplained but costs
-# much: the base half way up a skirt lies within a quarter of a metre of it all
+MOST_VOLUMES = 24  # Most volumes of one building: a limit on time.
+TRIED_EACH_WAY = 2  # Number of candidates, those of the largest gain, that are fitted.
+UNEXPLAINED = 0.98  # Share of the highest misfit from which on a point counts as unexplained.
+FEWEST_UNEXPLAINED = 4  # Fewest unexplained points that are worth a further volume.
+# Share of the highest misfit from which on points count in a roof that leaves none unexplained but
+# costs much: the base half way up a skirt lies within a quarter of a metre of all of it.
 POORLY = 0.3
-ALONG_WALL = 1e-6  # of a lean; numerically the same
-CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
+ALONG_WALL = 1e-6  # Largest difference between two leans that are numerically equal.
+CUT_LEAST_M = 0.3  # Least length (m) by which a neighbour is cut back for a new volume.
+CUT_MOST_SHARE = 0.6  # Largest share of a neighbour that is cut back for a new volume.
 
-# How adding ends: no candidate helps; nothing is left to explain, or as much as may be was tried; a known roof has come back.
-NONE_HELPS, NOTHING_LEFT, ROOF_IS_KNOWN = 0, 1, 2
+NONE_HELPS = 0  # How adding ends: no candidate helps.
+NOTHING_LEFT = 1  # How adding ends: nothing is left to explain, or the most additions were tried.
+ROOF_IS_KNOWN = 2  # How adding ends: a known roof has come back.
 
-# What volumes grow on: the scene, in which cells (directions, n + g) of its lines along u and v the points and ghosts lie, and the slopes
-# (m,) to try for a further plane.
+# The data of growth: the scene, the cells (directions, n + g) between its lines along u and along v
+# in which points and unobserved cells lie, and the slopes (m,) to try for a further plane.
 GrowthGrid = namedtuple("GrowthGrid", "scene cell_u cell_v slopes")
 
 
 @compiled
 def add_volumes(volumes, value, ground, candidates, additions, known_count, known_value):
-    """The volumes with more of them added one by one as long as a candidate helps, at most `additions`: they, their objective, how
-    it ended, and how many may still be added.
+    """Add at most `additions` volumes, as long as a candidate helps.
 
-    It ends, too, when there are as many as in a known roof (`known_count`, 0 where there is none) for as much: nothing can be added to
-    that one, and it has come back.
+    Returns the volumes, their objective, how it ended, and how many may still be added. It also
+    ends when the roof has as many volumes as a known one (`known_count`, 0 without one) and costs
+    as much: nothing can be added to that roof.
     """
     scene = ground.scene
     while additions > 0:
@@ -84,13 +86,19 @@ def add_volumes(volumes, value, ground, candidates, additions, known_count, know
 
 @compiled
 def has_same_cost(value, known_value, scene, more_units):
-    """Whether a roof costs as much as a known one, but for the `more_units` that fitting may still gain."""
+    """Return whether a roof costs as much as a known one.
+
+    It may cost `more_units` more, which fitting may still gain.
+    """
     return -min(more_units, REGROWN_UNITS) < (value - known_value) / scene.evidence < more_units
 
 
 @compiled
 def find_unexplained(volumes, scene):
-    """Points (m,) that the roof leaves unexplained; where there are none, those that it explains poorly if that is dear."""
+    """Return the points (m,) that the roof leaves unexplained.
+
+    If there are hardly any but the roof is expensive, these are the points that it explains poorly.
+    """
     z, _ = compute_roof_heights(volumes, scene.U, scene.V)
     cost = compute_costs(z, scene)[: scene.n]
     unexplained_points = np.nonzero(cost > UNEXPLAINED)[0]
@@ -101,7 +109,10 @@ def find_unexplained(volumes, scene):
 
 @compiled
 def find_best_addition(volumes, value, ground, candidates):
-    """The volumes with the one more that lowers the objective most, and that objective; infinite where none does."""
+    """Add the volume that lowers the objective most.
+
+    Returns the volumes and their objective, which is infinite if no candidate helps.
+    """
     best, lowest, scene = volumes, np.inf, ground.scene
     if len(candidates) == 0:
         return best, lowest
@@ -137,7 +148,7 @@ def find_best_addition(volumes, value, ground, candidates):
 
 @compiled
 def has_free_plane(volume, scene):
-    """Whether a plane of the volume faces neither along an axis nor a wall."""
+    """Return whether a plane of the volume faces neither along an axis nor a wall."""
     for plane in range(N_SIDES):
         lean = abs(volume[LEAN0 + plane])
         if lean > 0.0:
@@ -149,8 +160,11 @@ def has_free_plane(volume, scene):
 
 @compiled
 def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge):
-    """The best of `best`, `lowest` in cost, and the ways of having the last of the volumes `extended` by cutting one that it overlaps back to
-    where it begins."""
+    """Cut back each volume that the last of the `extended` ones overlaps, in turn.
+
+    It is cut to where the last one begins. Returns the best roof of these and of `best`, which
+    costs `lowest`.
+    """
     last = len(extended) - 1
     for j in range(1, last):
         if is_fixed(extended, j) or extended[j, DIRECTION] != extended[last, DIRECTION]:
@@ -176,16 +190,17 @@ def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge
 
 @compiled
 def has_overlap(row, other):
-    """Whether two rectangles have more than a strip in common."""
+    """Return whether two rectangles have more than a strip in common."""
     u = min(row[U1], other[U1]) - max(row[U0], other[U0])
     return min(u, min(row[V1], other[V1]) - max(row[V0], other[V0])) > CUT_LEAST_M
 
 
 @compiled
 def settle_new(volumes, scene, value, context):
-    """Volumes whose last one is new, that one fitted and its edges moved twice; infinite where that is not below `value`.
+    """Fit the last volume, which is new, and move its edges, twice.
 
-    One that begins too far above `value` to come below it is given up.
+    Returns the volumes and their objective, which is infinite if it is not below `value`. A volume
+    that begins too far above `value` is given up.
     """
     k, trial_value = len(volumes) - 1, np.inf
     for units in NEW_UNITS, NEW_MOVED_UNITS:

@@ -1,8 +1,9 @@
-"""What volumes have in common: planes, slopes, ridges and eaves that a builder makes equal.
+"""Make equal what volumes have in common: planes, slopes, ridges and eaves.
 
-Each volume's planes are linear in a few unknowns (`finish`), so that two volumes agree is a linear equation between their
-unknowns. It holds where all volumes, fitted together under it, explain the points as well but for what it saves. The
-nearest are tried first, and what holds is kept.
+A builder makes these equal. Each volume's planes are linear in a few unknowns (`finish`), so the
+condition that two volumes agree is a linear equation between their unknowns. It is accepted if all
+volumes, fitted together under it, explain the points as well but for the parameters that it saves.
+The nearest conditions are tried first.
 """
 
 from __future__ import annotations
@@ -30,28 +31,35 @@ from .finish import (
 )
 from .members import LinearVolume, list_members, solve_unknowns
 from .objective import compute_misfits
-from .prices import CREASE_UNITS, PARAMETER_COST
+from .prices import FOLD_UNITS, PARAMETER_COST
 from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION, N_SIDES, REPLACES, U0, U1, V0, V1
 
-NEAR_M = 0.2  # heights further apart are not tried as one
-# m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
-LEVELLED_M, AGREEMENT_SIGMAS = 0.01, 2.5
-REACHED_M = 0.003  # m within which others have brought what is further apart: nobody builds such a difference
-RIDGE = 1e-9  # of the mean diagonal of the normal equations: what no point tells stays as it was
-LEVEL_FALL = 1e-9  # rise over run; numerically level
-NO_REMAINDER = 1e-6  # an equation that the others leave so little of holds by them
-# Share of the points that agreement may leave unexplained besides. Steep planes that agree below their neighbours may
-# rise above these, which only the whole roof's misfit shows: each volume's own points lie where it shows alone.
+NEAR_M = 0.2  # Heights further apart (m) are not tried as one.
+LEVELLED_M = 0.01  # Difference in height (m) within a builder's tolerance, and a swath's.
+AGREEMENT_SIGMAS = 2.5  # Larger differences must be within so many standard deviations.
+# Difference (m) that nobody builds: accepted conditions have brought two heights so near.
+REACHED_M = 0.003
+# Ridge, as a share of the mean diagonal of the normal equations. It keeps unknowns that no point
+# determines.
+RIDGE = 1e-9
+LEVEL_FALL = 1e-9  # Slope (rise over run) that is numerically level.
+NO_REMAINDER = 1e-6  # An equation of which the others leave less holds because of them.
+# Share of the points that agreement may leave unexplained besides. Steep planes that agree below
+# their neighbours may rise above these. Only the misfit of the whole roof shows that, because each
+# volume's own points lie where it is visible alone.
 MOST_WORSE_SHARE = 0.02
-# by which the points over which one volume shows may cost more under its fitted planes
-RISEN_SHARE = 0.1
+RISEN_SHARE = 0.1  # Share by which the points of one volume may cost more under its fitted planes.
 
 
 @dataclass(frozen=True)
 class CommonFit:
-    """The unknowns (p,) and their covariance (p, p), every member's rows (k, 3) and what the points cost."""
+    """The fit of all members together.
+
+    `unknowns` (p,) have this `covariance` (p, p), and are `basis` (p, q) times any. `rows` (k, 3)
+    are every member's planes, `cost` is that of the points.
+    """
 
     unknowns: np.ndarray
     covariance: np.ndarray
@@ -61,8 +69,11 @@ class CommonFit:
 
 
 class Condition(NamedTuple):
-    """An equation (m, p) that nearly holds: how far in height (m) from it, between which two members, how far it may be whatever the
-    points' deviations, and units that are spared besides its parameters."""
+    """An `equation` (m, p) that nearly holds between a `pair` of members.
+
+    `gap` is the height (m) by which it fails, `allowed` the one that is accepted whatever the
+    points' deviations. `spared` are units that it saves besides its parameters.
+    """
 
     gap: float
     pair: tuple[int, int]
@@ -72,10 +83,11 @@ class Condition(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """All volumes' planes fitted together, the members by their volume's number, and the unknowns: those that the
-    equations which hold leave free, as a basis (p, q), and where they started (p,).
+    """The planes of all volumes fitted together.
 
-    `cost` is that of the members' points, None where nothing was fitted together.
+    `members` are by their volume's number. `basis` (p, q) spans the unknowns that the accepted
+    equations leave free, and `start` (p,) is where they began. `cost` is that of the members'
+    points, None if nothing was fitted together.
     """
 
     planes: list[Planes]
@@ -88,26 +100,29 @@ class Agreement(NamedTuple):
 def agree_planes(
     volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene
 ) -> Agreement:
-    """The planes of all volumes fitted together, equal in what they have in common and at the corners of the outline."""
+    """Fit the planes of all volumes together, with what they have in common equal.
+
+    Fold lines that end beside a corner of the outline are moved into it.
+    """
     members = list_members(volumes, sides, planes, scene)
-    members_known = list(members.values())
-    if not members_known:
+    member_list = list(members.values())
+    if not member_list:
         return Agreement(planes, members, np.zeros((0, 0)), np.zeros(0))
-    start = solve_unknowns(members_known)
+    start = solve_unknowns(member_list)
     separate = Agreement(planes, members, np.eye(len(start)), start)
     at_corners = (
-        Condition(*condition, np.inf, CREASE_UNITS)
-        for condition in list_corner_equations(members_known, start, scene.corners[0])
+        Condition(*condition, np.inf, FOLD_UNITS)
+        for condition in list_corner_equations(member_list, start, scene.corners[0])
     )
     conditions = sorted(
-        (*find_likely_conditions(members_known, start), *at_corners),
+        (*find_likely_conditions(member_list, start), *at_corners),
         key=lambda condition: condition.gap,
     )
-    common = fit_conditions(members_known, start, conditions, scene) if conditions else None
+    common = fit_conditions(member_list, start, conditions, scene) if conditions else None
     if common is None:
         return separate
     agreed_planes = list(planes)
-    for k, member, rows in zip(members, members_known, common.rows, strict=True):
+    for k, member, rows in zip(members, member_list, common.rows, strict=True):
         agreed_planes[k] = replace(
             planes[k], rows=rows, design=member.full_design, covariance=common.covariance
         )
@@ -118,14 +133,17 @@ def agree_planes(
 
 
 def sum_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
-    """Sum up what all points cost (points) under `planes`, each volume within its rectangle."""
+    """Sum up what all points cost under `planes`, each volume within its rectangle."""
     return float(measure_misfits(volumes, planes, scene)[0].sum())
 
 
 def measure_misfits(
     volumes: np.ndarray, planes: list[Planes], scene: Scene
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what each point costs under `planes`, and which volume shows there: two arrays (n,)."""
+    """Return what each point costs under `planes`, and the volume visible there.
+
+    Both are arrays (n,).
+    """
     n = scene.n
     heights, top = np.full(n, -np.inf), np.zeros(n, int)
     for k, (volume, volume_planes) in enumerate(zip(volumes, planes, strict=True)):
@@ -140,10 +158,10 @@ def measure_misfits(
 
 
 def restore_risen_planes(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> list[Planes]:
-    """Return the planes, as the search found them where a volume rises above others and fits less.
+    """Return the planes, as the search left them where a volume rises above others.
 
-    Planes are fitted to the points over which their volume shows. Where it lies hidden, such as one
-    of two gables of nearly the same slopes, they may come out above the other.
+    Planes are fitted to the points over which their volume is visible. Where it is hidden, such as
+    one of two gables of nearly the same slopes, they may come out above the other and fit less.
     """
     planes = list(planes)
     search_planes = [read_volume_planes(row, scene) for row in volumes]
@@ -167,9 +185,10 @@ def restore_risen_planes(volumes: np.ndarray, planes: list[Planes], scene: Scene
 def fit_conditions(
     members: list[LinearVolume], start: np.ndarray, conditions: list[Condition], scene: Scene
 ) -> CommonFit | None:
-    """The fit under all that may hold of what is `conditions`, one after another; None where nothing does.
+    """Fit the members under as many of the `conditions` as hold, one after another.
 
-    Its covariance is what the points tell: a corner of the outline says where planes meet, not how well that is known.
+    Returns None if no condition holds. The covariance is what the points determine: a corner of the
+    outline gives the place where planes meet, but not how precise it is.
     """
     equations, point_equations, basis = (
         np.zeros((0, len(start))),
@@ -178,9 +197,8 @@ def fit_conditions(
     )
     begun = sum_at_start(members, scene)
     best = free = fit_members(members, basis, start, scene, begun)
-    if not math.isfinite(
-        free.cost
-    ):  # improper: members keep their planes until a proper fit is found
+    # With an improper fit, members keep their planes until a proper one is found.
+    if not math.isfinite(free.cost):
         rows = [member.rows for member in members]
         best = CommonFit(start, free.covariance, rows, sum_row_costs(members, rows, scene), basis)
     while conditions:
@@ -191,7 +209,7 @@ def fit_conditions(
                 or condition.gap * measure_remainder(condition, start, best) <= REACHED_M
             )
             if not is_near and not is_within_noise(condition.equation, start, free.covariance):
-                later.append(condition)  # what holds may bring it nearer
+                later.append(condition)  # accepted ones may bring it nearer
                 continue
             n_saved = int(np.linalg.matrix_rank(condition.equation @ basis, tol=NO_REMAINDER))
             if n_saved == 0:
@@ -208,21 +226,24 @@ def fit_conditions(
                 )
         conditions = later if len(equations) > n_before else []
     if len(equations) > len(point_equations):
-        as_told = fit_members(members, find_null_space(point_equations), start, scene, begun)
-        best = replace(best, covariance=as_told.covariance)
+        point_fit = fit_members(members, find_null_space(point_equations), start, scene, begun)
+        best = replace(best, covariance=point_fit.covariance)
     return best if len(equations) else None
 
 
 def compute_allowance(
     condition: Condition, n_saved: int, members: list[LinearVolume], scene: Scene
 ) -> float:
-    """What may stay unexplained where an equation holds that saves so many parameters (points)."""
+    """Return the points that an accepted condition may leave unexplained.
+
+    It saves `n_saved` parameters.
+    """
     slack = LEVEL_SLACK * sum(members[k].points.shape[1] for k in condition.pair)
     return float(scene.evidence * (PARAMETER_COST * n_saved + condition.spared) + slack)
 
 
 def measure_remainder(condition: Condition, start: np.ndarray, fit: CommonFit) -> float:
-    """What is left of how far an equation was from holding at `start`."""
+    """Return the share by which an equation still fails, of how far it did at `start`."""
     return float(
         np.abs(condition.equation @ fit.unknowns).max()
         / max(np.abs(condition.equation @ start).max(), NO_REMAINDER)
@@ -230,14 +251,17 @@ def measure_remainder(condition: Condition, start: np.ndarray, fit: CommonFit) -
 
 
 def is_within_noise(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray) -> bool:
-    """Whether `equation` (m, p) is no further from holding than the points leave open."""
+    """Return whether `equation` (m, p) fails by no more than the points leave open."""
     sigma = np.sqrt(np.maximum(((equation @ covariance) * equation).sum(axis=1), 0.0))
     return bool((np.abs(equation @ unknowns) < AGREEMENT_SIGMAS * sigma).all())
 
 
 class VisiblePlane(NamedTuple):
-    """A plane of a member that its points show: its number, its coefficients a, b, c (3,) in the first direction's axes and by
-    all unknowns (3, p) there, and u, v, 1 (3, n) of its points."""
+    """A plane of a member on which points lie.
+
+    `coefficients` a, b, c (3,) are in the first direction's axes, and `equation` (3, p) gives them
+    by all unknowns. `places` (3, n) are u, v, 1 of its points.
+    """
 
     number: int
     coefficients: np.ndarray
@@ -246,7 +270,10 @@ class VisiblePlane(NamedTuple):
 
 
 class Dimension(NamedTuple):
-    """A height or a slope of a member: its value, by all unknowns (p,), and what it is multiplied with to be a height (m)."""
+    """A height or a slope of a member, by all unknowns (p,).
+
+    `reach` (m) times it is a height.
+    """
 
     value: float
     equation: np.ndarray
@@ -254,7 +281,7 @@ class Dimension(NamedTuple):
 
 
 def find_likely_conditions(members: list[LinearVolume], start: np.ndarray) -> Iterator[Condition]:
-    """What nearly holds between members at the unknowns `start`."""
+    """Yield the conditions that nearly hold between members at the unknowns `start`."""
     planes = [list_visible_planes(member, start) for member in members]
     measures = [
         [
@@ -290,7 +317,10 @@ def list_visible_planes(member: LinearVolume, start: np.ndarray) -> list[Visible
 
 
 def measure_plane_gap(plane: VisiblePlane, other: VisiblePlane) -> float:
-    """How far apart (m) two planes are at most where their points are; infinite where they are not near at the first of these."""
+    """Return how far apart (m) two planes are at most where their points are.
+
+    The gap is infinite where they are not near at the first of these.
+    """
     difference = plane.coefficients - other.coefficients
     if max(abs(float(difference @ item.places[:, 0])) for item in (plane, other)) >= NEAR_M:
         return np.inf
@@ -298,7 +328,11 @@ def measure_plane_gap(plane: VisiblePlane, other: VisiblePlane) -> float:
 
 
 def equate_planes(plane: VisiblePlane, other: VisiblePlane) -> np.ndarray:
-    """That two planes are one (2, p): as high in the middle of their points and as steep; which way each faces is known before."""
+    """Return the equation (2, p) by which two planes are one.
+
+    They are as high in the middle of their points, and as steep. The way that each faces is known
+    before.
+    """
     difference = plane.equation - other.equation
     middle = 0.5 * (plane.places.mean(axis=1) + other.places.mean(axis=1))
     a, b, _ = plane.coefficients + other.coefficients
@@ -307,7 +341,10 @@ def equate_planes(plane: VisiblePlane, other: VisiblePlane) -> np.ndarray:
 
 
 def list_slopes(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
-    """The slopes of a member's inclined planes; half of how far their points reach along the fall makes them heights."""
+    """Yield the slopes of a member's inclined planes.
+
+    Half of the length of their points along the fall makes them heights.
+    """
     for p, numbers in member.visible.items():
         if p < N_SIDES:
             along = member.points[p // 2, numbers]
@@ -318,7 +355,7 @@ def list_slopes(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
 
 
 def list_ridges(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
-    """The heights of a member's ridges, as they change from `start`."""
+    """Yield the heights of a member's ridges, as they change from `start`."""
     for p, q in ((0, 1), (2, 3)):
         if p in member.visible and q in member.visible:
             axis, rows = p // 2, member.full_design[[p, q]] @ start
@@ -337,7 +374,7 @@ def list_ridges(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
 
 
 def list_eaves(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
-    """The heights of a member's eaves on the outline."""
+    """Yield the heights of a member's eaves on the outline."""
     for p in member.visible:
         if p < N_SIDES and member.sides[p].anchored:
             equation = (
@@ -347,14 +384,20 @@ def list_eaves(member: LinearVolume, start: np.ndarray) -> Iterator[Dimension]:
 
 
 def find_null_space(equations: np.ndarray) -> np.ndarray:
-    """An orthonormal basis (p, q) of all unknowns of which `equations` (m, p) are zero."""
+    """Return an orthonormal basis (p, q) of the unknowns that solve `equations`.
+
+    These are (m, p), and zero for each of those unknowns.
+    """
     _, values, rows = np.linalg.svd(equations)
     return rows[int((values > NO_REMAINDER).sum()) :].T
 
 
 class NormalSums(NamedTuple):
-    """Normal equations of all members' unknowns (p, p) and (p,), and of their points: the sum of
-    the weights, and of the weighted squares of what is left."""
+    """The normal equations of all members' unknowns.
+
+    `normal` (p, p) and `right` (p,) are their two sides, `weight` is the sum of the points'
+    weights, and `misfit` that of their weighted squared residuals.
+    """
 
     normal: np.ndarray
     right: np.ndarray
@@ -363,14 +406,14 @@ class NormalSums(NamedTuple):
 
 
 def sum_at_start(members: list[LinearVolume], scene: Scene) -> NormalSums:
-    """The sums in the first round of a fit, which starts from the members' planes."""
+    """Return the sums in the first round of a fit, from the members' own planes."""
     return sum_equations(
         members, [member.rows for member in members], 2.0 * (scene.dead + scene.width)
     )
 
 
 def sum_equations(members: list[LinearVolume], rows: list[np.ndarray], reach: float) -> NormalSums:
-    """The sums over points within `reach` (m) of the members' planes `rows`."""
+    """Return the sums over points within `reach` (m) of the members' planes `rows`."""
     size = members[0].full_design.shape[2]
     normal, right, total, misfit = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
     for member, planes in zip(members, rows, strict=True):
@@ -390,9 +433,10 @@ def fit_members(
     scene: Scene,
     begun: NormalSums | None = None,
 ) -> CommonFit:
-    """All planes by biweighted least squares, over unknowns (p,) that are `basis` (p, q) times any.
+    """Fit all planes by biweighted least squares.
 
-    `begun` are the sums at first, where these are known.
+    The unknowns (p,) are `basis` (p, q) times any. `begun` are the sums of the first round, if
+    these are known.
     """
     designs, rows = (
         np.concatenate([member.full_design for member in members]),
@@ -420,7 +464,7 @@ def fit_members(
 
 
 def sum_row_costs(members: list[LinearVolume], rows: list[np.ndarray], scene: Scene) -> float:
-    """What the points of members cost under their planes `rows` (k, 3)."""
+    """Sum up what the points of members cost under their planes `rows` (k, 3)."""
     pairs = zip(members, rows, strict=True)
     return float(
         sum(

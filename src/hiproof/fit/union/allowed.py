@@ -1,7 +1,7 @@
-"""Which shapes volumes may have, so that they become parts of the types that are asked for.
+"""List the shapes that volumes may have to become parts of the requested types.
 
-It stands by itself because compiled code belongs to the sources that its file's imports lead to: the search compiles nothing
-for a new roof shape.
+This is a file of its own because compiled code belongs to the sources that its file imports: a new
+roof shape compiles nothing of the search again.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ from ...primitives.family import COMPONENTS, GENERAL_SHAPES, KIN
 
 
 def list_components(name: str) -> tuple[str, ...]:
-    """What a type that no volume has by itself may be put together from: any shape where nothing is said of it."""
+    """List the types that a type without a volume of its own is combined from.
+
+    It is any shape if nothing else is declared.
+    """
     return (
         ()
         if CATALOGUE[name].is_of_family
@@ -22,7 +25,10 @@ def list_components(name: str) -> tuple[str, ...]:
 
 
 def list_allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
-    """Which shapes (2, 3, 3, 2) volumes may have to become parts of these `types` (all where there are none)."""
+    """Return which shapes (2, 3, 3, 2) volumes may have to become parts of `types`.
+
+    All are allowed if there are no types.
+    """
     allowed = np.zeros((2, 3, 3, 2), bool)
     names = {part for name in types or CATALOGUE for part in (name, *list_components(name))} | {
         "flat"

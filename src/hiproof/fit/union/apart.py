@@ -1,7 +1,8 @@
-"""Volumes that show in several places told apart: houses of one height on both sides of another, dormers on both slopes.
+"""Split volumes that are visible in several places.
 
-One long volume under what stands between explains them as well, and more cheaply; a person sees two, where each pays by itself. A wing
-that crosses the main roof stays one: it stands out of it on both sides.
+They are houses of one height on both sides of another, or dormers on both slopes. One long volume
+under what stands between them explains them as well and more cheaply, but a person sees two, if
+each pays by itself. A wing that crosses the main roof stays one: it stands out of it on both sides.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
 from .trim import COVER_M, find_runs
 from .volumes import DIRECTION, LEVEL, OFFSET0, U0, U1, V0, V1, compute_roof_heights
 
-LEAST_SHOWN_M2 = 1.0  # of each of the places in which a volume shows
-ROW_DEPTH_M = 0.5  # what stands in a row is as deep as its neighbours
-STRIP_M = 0.8  # narrower than dormers are
-# m within which an edge of another volume is taken for that at which one ends; m inside the outline at which it must show
-NEAR_EDGE_M, END_DEPTH_M = 0.5, 0.4
+LEAST_SHOWN_M2 = 1.0  # Least area (m2) of each of the places in which a volume is visible.
+ROW_DEPTH_M = 0.5  # Difference in depth (m) within which volumes of a row are equally deep.
+STRIP_M = 0.8  # A volume narrower than this (m) is a strip: dormers are wider.
+NEAR_EDGE_M = 0.5  # An edge of another volume within this distance (m) is where a volume ends.
+END_DEPTH_M = 0.4  # Depth (m) inside the outline at which a volume's end must be visible.
 
 
 def split_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """The volumes with each that shows in several places of a row, or of a roof that it stands out of, as several."""
+    """Split each volume that is visible in several places of a row or under a roof."""
     U, V = list_nodes(scene, VISIBLE_DEPTH_M)
     heights, top = compute_roof_heights(volumes, U, V)
     for k in range(len(volumes) - 1, 0, -1):
@@ -38,7 +39,10 @@ def split_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
 
 
 def drop_strips(volumes: np.ndarray, first: int, count: int, scene: Scene) -> np.ndarray:
-    """The volumes without those of the `count` from `first` on that are strips, and do not pay: one ran too far beyond what hides it."""
+    """Drop those of `count` volumes from `first` on that are strips and do not pay.
+
+    Their volume ran too far beyond what hides it.
+    """
     value = compute_objective(volumes, scene, np.inf)
     for k in range(first + count - 1, first - 1, -1):
         wide = volumes[k, [U1, V1]] - volumes[k, [U0, V0]]
@@ -58,11 +62,15 @@ def find_pieces(
     top: np.ndarray,
     scene: Scene,
 ) -> np.ndarray:
-    """Volume k cut along an axis where others hide it: (m, COLUMNS); none where it is one. `top` (n,) is what shows at U, V."""
+    """Cut volume k along an axis where others hide it.
+
+    Returns the pieces (m, COLUMNS), none if it stays one. `top` (n,) are the volumes visible at U,
+    V.
+    """
     row = volumes[k]
     column, cross = U0 + 2 * axis, U0 + 2 * (1 - axis)
     if np.isfinite(row[[OFFSET0 + LEVEL, OFFSET0 + 2 * axis, OFFSET0 + 2 * axis + 1]]).all():
-        return volumes[:0]  # what stands on a top between two slopes is the upper part of a gambrel
+        return volumes[:0]  # on a top between two slopes stands the upper part of a gambrel
     x, y = (U, V)[axis][int(row[DIRECTION])], (U, V)[1 - axis][int(row[DIRECTION])]
     visible = x[top == k]
     starts, ends, counts = (
@@ -98,12 +106,12 @@ def find_pieces(
 
 
 def insert_pieces(volumes: np.ndarray, k: int, pieces: np.ndarray) -> np.ndarray:
-    """The volumes with `pieces` (m, COLUMNS) in place of volume k."""
+    """Return the volumes with `pieces` (m, COLUMNS) instead of volume k."""
     return np.concatenate([volumes[:k], pieces, volumes[k + 1 :]])
 
 
 def is_each_worthwhile(volumes: np.ndarray, first: int, count: int, scene: Scene) -> bool:
-    """Whether each of the `count` volumes from `first` on pays as one of its own."""
+    """Return whether each of the `count` volumes from `first` on pays by itself."""
     value = compute_objective(volumes, scene, np.inf)
     return all(
         compute_objective(remove_volume(volumes, first + n), scene, value) == np.inf
@@ -112,7 +120,10 @@ def is_each_worthwhile(volumes: np.ndarray, first: int, count: int, scene: Scene
 
 
 def is_in_row(row: np.ndarray, covers: np.ndarray, cross: int, y: np.ndarray) -> bool:
-    """Whether what hides a volume lies along its direction and is no deeper where the outline is: at places `y` (n,) across it."""
+    """Return whether the volumes that hide another lie in a row with it.
+
+    They have its direction and are no deeper where the outline is: at places `y` (n,) across it.
+    """
     (start, end), ends = (
         row[cross : cross + 2],
         np.clip(covers[:, cross : cross + 2], y.min(), y.max()),
@@ -122,12 +133,12 @@ def is_in_row(row: np.ndarray, covers: np.ndarray, cross: int, y: np.ndarray) ->
 
 
 def is_aligned(row: np.ndarray, covers: np.ndarray) -> np.ndarray:
-    """Which of `covers` (n,) have the volume's direction; the base has none."""
+    """Return which of `covers` (n,) have the volume's direction; the base has none."""
     return (covers[:, DIRECTION] == row[DIRECTION]) & (covers[:, U0] > -1e3)
 
 
 def has_ends_inside(row: np.ndarray, column: int, cross: int, scene: Scene) -> bool:
-    """Whether both ends of a volume along an axis lie inside the outline."""
+    """Return whether both ends of a volume along an axis lie inside the outline."""
     middle = 0.5 * (row[cross] + row[cross + 1])
     c, s = scene.turn[int(row[DIRECTION])]
     for end in (row[column], row[column + 1]):
@@ -141,7 +152,10 @@ def has_ends_inside(row: np.ndarray, column: int, cross: int, scene: Scene) -> b
 
 
 def is_under_one_roof(row: np.ndarray, covers: np.ndarray, column: int) -> bool:
-    """Whether one roof hides the middle of a volume along an axis and reaches as far: a wing that crosses it would stand out."""
+    """Return whether one roof hides the middle of a volume and reaches as far.
+
+    A wing that crosses it would stand out.
+    """
     reach = (covers[:, column] < row[column] + ROW_DEPTH_M) & (
         covers[:, column + 1] > row[column + 1] - ROW_DEPTH_M
     )
@@ -151,7 +165,10 @@ def is_under_one_roof(row: np.ndarray, covers: np.ndarray, column: int) -> bool:
 def find_near_edge(
     covers: np.ndarray, row: np.ndarray, column: int, seen_to: float, margin: float
 ) -> float:
-    """The edge of one of `covers` near the end of what shows, or a place as far `margin` it as hidden edges reach."""
+    """Return the edge of one of `covers` near the end of what is visible.
+
+    Without one, it is a place as far `margin` beyond that end as hidden edges reach.
+    """
     edges = covers[covers[:, DIRECTION] == row[DIRECTION]][:, [column, column + 1]].ravel()
     near_edges = edges[np.abs(edges - seen_to) < NEAR_EDGE_M]
     return (

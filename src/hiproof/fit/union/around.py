@@ -1,8 +1,8 @@
-"""What the other volumes of a roof leave for one of them. Compiled.
+"""Compute what the other volumes of a roof leave for one of them. Compiled.
 
-A roof goes over its volumes in order: each shows where it is higher than those before it, or where
-it replaces them. So the roof with any form of volume k follows from three heights at each place,
-which depend on the others only. Moves that change volume k alone look around once.
+A roof is built from its volumes in order. Each is visible where it is higher than those before it,
+or where it replaces them. So the roof with any form of volume k follows from three heights at each
+place, which depend on the others only. Moves that change volume k alone compute this context once.
 """
 
 from __future__ import annotations
@@ -15,15 +15,19 @@ from ...compiled import compiled
 from .volumes import DIRECTION, REPLACES, find_lowest, is_within, read_coefficients, read_rectangle
 
 Context = namedtuple("Context", "earlier later roof_without")
-"""Heights (n,) around volume k at n places: it shows where it is higher than those `below` and as
-high as those `above`, which are infinite where a later one replaces it. `without` it the roof is so
-high.
+"""The heights (n,) that the other volumes leave for volume k at n places.
+
+It is visible where it is above those `earlier` and no lower than those `later`, which are infinite
+where one of them replaces it. `roof_without` is the height of the roof without it.
 """
 
 
 @compiled
 def measure_context(volumes, U, V, k):
-    """Return what the others leave for volume k at U, V (directions, n), for a new one after all."""
+    """Return what the others leave for volume k at U, V (directions, n).
+
+    A new volume comes after all.
+    """
     n = U.shape[1]
     earlier, later, roof_without = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, -np.inf)
     for j in range(len(volumes)):
@@ -85,6 +89,6 @@ def compute_roof_everywhere(volumes, U, V, k, context):
 
 @compiled
 def is_visible_at(volumes, k, context, i, h, u, v):
-    """Return whether volume k, so high at place i, shows there."""
+    """Return whether volume k, at height h at place i, is visible there."""
     is_inside = is_within(read_rectangle(volumes, k), u, v) & (h >= context.later[i])
     return is_inside & ((volumes[k, REPLACES] > 0.0) | (h > context.earlier[i]))

@@ -1,7 +1,9 @@
-"""Bays: small pieces, all but rectangles, that the lines of an outline's own walls cut off. A person expects a roof of its own there.
+"""Add level volumes over bays: near-rectangles that walls cut off an outline.
 
-A bay has few points, many of them next to its walls, where points do not count otherwise, and on a large roof so few are worth
-no volume. But its corners are drawn in any case. So each is asked by itself, by all its points, what a level volume would gain.
+A person expects a roof of its own there. A bay has few points, and many of them lie next to its
+walls, where points do not count otherwise. On a large roof so few points are worth no volume, but
+the corners of the bay are drawn in any case. Each bay is therefore tested by itself, with all its
+points.
 """
 
 from __future__ import annotations
@@ -34,20 +36,28 @@ from .volumes import (
     is_allowed,
 )
 
-# m2 of a bay, and its share of the outline at most: what is larger has points enough for the search; m of its narrower side
-LEAST_BAY_M2, MOST_BAY_M2, MOST_BAY_SHARE, LEAST_BAY_WIDTH_M = 0.25, 12.0, 0.34, 0.3
-# of a bay's area: so much of the outline lies at most within the rectangle around it; of that: so much is the bay at least, which a bay window
-# fills to 0.7 and a wedge beside a wall that bends to a half; how many times as long as wide it is at most
-FILLED, FULL, SLENDER = 1.25, 0.6, 10.0
-SAME_BAY_M = 0.1  # rectangles whose sides all lie nearer are one bay's
-FEWEST_BAY_POINTS = 2  # points that the roof leaves unexplained and the level volume explains
-LEAST_TURN = 1e-9  # of two walls, by their directions: numerically parallel
-NEAREST = 1e-3  # of a wall's length from its end: the line begins there
-SAME_CORNER_M = 1e-6  # numerically one place
+LEAST_BAY_M2 = 0.25  # Smallest area (m2) of a bay.
+MOST_BAY_M2 = 12.0  # Largest area (m2) of a bay: the search has enough points for a larger one.
+MOST_BAY_SHARE = 0.34  # Largest share of the outline that a bay has.
+LEAST_BAY_WIDTH_M = 0.3  # Smallest width (m) of a bay.
+FILLED = 1.25  # The rectangle around a bay covers at most this much of the outline, in bays' areas.
+# Share of its rectangle that a bay covers at least. A bay window covers 0.7, and a wedge beside a
+# wall that bends covers a half.
+FULL = 0.6
+SLENDER = 10.0  # Largest ratio of a bay's length and width.
+SAME_BAY_M = 0.1  # Rectangles whose sides all lie nearer (m) belong to one bay.
+# Fewest points that the roof leaves unexplained and the level volume explains.
+FEWEST_BAY_POINTS = 2
+LEAST_TURN = 1e-9  # Sine of the angle between two walls below which they are numerically parallel.
+NEAREST = 1e-3  # A line begins beyond this share of a wall's length from the wall's end.
+EQUAL_CORNER_M = 1e-6  # Distance (m) within which two places are numerically one.
 
 
 class BuildingPoints(NamedTuple):
-    """All points of a building: U, V (directions, n) and z (n,), ascending, those next to the border among them."""
+    """All points of a building, those next to the border included.
+
+    U, V (directions, n) and z (n,) ascend by z.
+    """
 
     U: np.ndarray
     V: np.ndarray
@@ -57,7 +67,10 @@ class BuildingPoints(NamedTuple):
 def add_bays(
     volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, unit: float
 ) -> np.ndarray:
-    """The volumes with a level one in each bay of `outline` where that explains more than a `unit` (points) costs."""
+    """Add a level volume in each bay of `outline` where it is worth its price.
+
+    `unit` are the points that one unit of structure must explain.
+    """
     remaining = list_bay_rectangles(outline, plan, scene)
     if not remaining:
         return volumes
@@ -86,7 +99,10 @@ def gather_points(plan: Plan, scene: Scene) -> BuildingPoints:
 def fit_level_volume(
     bay: np.ndarray, volumes: np.ndarray, points: BuildingPoints, scene: Scene, unit: float
 ) -> tuple[float, np.ndarray]:
-    """What a level volume over a bay's rectangle gains at the height that most of its points have (points), and that volume."""
+    """Fit a level volume over a bay, at the height that most of its points have.
+
+    Returns what it gains (points), and the volume.
+    """
     row, direction = np.zeros(COLUMNS), int(bay[0])
     u, v = points.U[direction], points.V[direction]
     is_inside = (u >= bay[1]) & (u <= bay[2]) & (v >= bay[3]) & (v <= bay[4])
@@ -98,7 +114,7 @@ def fit_level_volume(
     current = compute_misfits(z, roof, scene)
     narrow = min(bay[2] - bay[1], bay[4] - bay[3])
     if narrow < 2.0 * THICK_M or not is_base_visible(volumes, scene):
-        # what little there is of the base is drawn as the roof beside
+        # The little that is visible of the base is drawn as the roof beside it.
         neighbour_z, _ = compute_roof_heights(widen_volumes(volumes, narrow), *coordinates)
         current = np.where(top > 0, current, compute_misfits(z, neighbour_z, scene))
     reach = scene.dead + scene.width
@@ -120,7 +136,7 @@ def fit_level_volume(
 
 
 def widen_volumes(volumes: np.ndarray, by_m: float) -> np.ndarray:
-    """The volumes, without the base, so far beyond their edges."""
+    """Move the edges of all volumes but the base out by `by_m`."""
     wider = volumes[1:].copy()
     wider[:, [U0, V0]] -= by_m
     wider[:, [U1, V1]] += by_m
@@ -128,7 +144,7 @@ def widen_volumes(volumes: np.ndarray, by_m: float) -> np.ndarray:
 
 
 def list_bay_rectangles(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[np.ndarray]:
-    """The bays' rectangles, each once: direction and u0, u1, v0, v1 in its axes."""
+    """List the bays' rectangles, each once: direction and u0, u1, v0, v1 in its axes."""
     rectangles: list[np.ndarray] = []
     for piece in list_small_pieces(outline):
         bay = fit_bay_rectangle(piece, outline, plan, scene)
@@ -142,7 +158,11 @@ def list_bay_rectangles(outline: shapely.Polygon, plan: Plan, scene: Scene) -> l
 def fit_bay_rectangle(
     ring: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene
 ) -> np.ndarray | None:
-    """Around a piece's ring (m, 2) in the direction in which it holds least of the outline besides; None where that is too much."""
+    """Fit a rectangle around a piece's ring (m, 2).
+
+    It has the direction in which it covers least of the outline besides. Returns None where that is
+    too much.
+    """
     local_ring, area = (
         (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T,
         0.5 * float(cross_vectors(ring, shift_corners(ring)).sum()),
@@ -169,7 +189,10 @@ def fit_bay_rectangle(
 
 
 def list_small_pieces(outline: shapely.Polygon) -> list[np.ndarray]:
-    """Rings (m, 2), counterclockwise, of what is small of the pieces that walls cut off, drawn on from corners that point inwards."""
+    """List the small pieces that lines of walls cut off an outline.
+
+    The lines carry walls on from corners that point inwards. The rings (m, 2) are counterclockwise.
+    """
     ring = counterclockwise(outline.exterior)[:-1]
     next_edges = shift_corners(ring) - ring
     previous_edges = np.concatenate([next_edges[-1:], next_edges[:-1]])
@@ -203,15 +226,22 @@ def list_small_pieces(outline: shapely.Polygon) -> list[np.ndarray]:
 
 
 def close_ring(corners: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """The `corners` (m, 2) and a `place` after them, where that is none of the two beside it: a line may end at a corner."""
+    """Append a `place` to `corners` (m, 2), unless it is the first or last of them.
+
+    A line may end at a corner.
+    """
     distance = np.abs(corners[[0, -1]] - place).max(axis=1).min()
-    return np.vstack([corners, place]) if distance > SAME_CORNER_M else corners
+    return np.vstack([corners, place]) if distance > EQUAL_CORNER_M else corners
 
 
 def measure_areas(
     ring: np.ndarray, firsts: np.ndarray, lasts: np.ndarray, places: np.ndarray
 ) -> np.ndarray:
-    """Areas (k,) of what a ring's (n, 2) corners from `firsts` on to `lasts` (k,) enclose with `places` (k, 2)."""
+    """Return the areas (k,) of a ring's corners from `firsts` to `lasts` and `places`.
+
+    The ring is (n, 2), `firsts` and `lasts` (k,) are numbers of corners, and `places` (k, 2) close
+    each area.
+    """
     twice = np.vstack([ring, ring])
     sums = np.r_[0.0, np.cumsum(cross_vectors(twice[:-1], twice[1:]))]
     firsts = firsts % len(ring)
@@ -225,7 +255,7 @@ def measure_areas(
 
 
 def shift_corners(ring: np.ndarray) -> np.ndarray:
-    """The corner after each of a ring's (n, 2)."""
+    """Return the corner after each of a ring's (n, 2)."""
     return np.concatenate([ring[1:], ring[:1]])
 
 
@@ -236,8 +266,11 @@ def cross_vectors(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def find_first_crossings(
     ring: np.ndarray, corners: np.ndarray, ways: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The edges (k,) of a ring (n, 2), by their numbers, at which lines from its `corners` (k,) along `ways` (k, 2) leave it first, and
-    the places (k, 2); without any it is the corner itself."""
+    """Find where lines from corners of a ring (n, 2) leave it first.
+
+    The lines begin at `corners` (k,) and run along `ways` (k, 2). Returns the numbers of the edges
+    (k,) that they cross and the places (k, 2). A line without a crossing ends at its corner.
+    """
     edges, offsets = shift_corners(ring) - ring, ring - ring[corners, None]
     turn = cross_vectors(ways[:, None], edges)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""One block of a large roof searched as a house, and its volumes added to the roof."""
+"""Search one block of a large roof as a house, and add its volumes to the roof."""
 
 from __future__ import annotations
 
@@ -14,19 +14,22 @@ from .volumes import U0, V1, compute_roof_heights
 from .whole import Whole
 from .window import end_at_border, forget_digests, open_window
 
-# A block's points: those that structure is looked for in, and those that settle it. 2.7 and 5 per square metre of the
-# largest block; with a house's 600 points dormers and annexes of blocks stay unseen.
-BLOCK_POINTS, SETTLE_POINTS = 1600, 3000
-SETTLE_REACH_M = 0.7  # m that edges may move when more points settle them
-# Growing more than one volume anew gains nothing there and costs a quarter of the time (Vienna's even places @5).
+# Points of a block in which structure is searched: 2.7 per square metre of the largest block. With
+# a house's 600 points, dormers and annexes of blocks stay unseen.
+BLOCK_POINTS = 1600
+# Points of a block that settle its structure: 5 per square metre of the largest block.
+SETTLE_POINTS = 3000
+SETTLE_REACH_M = 0.7  # Distance (m) that edges may move when more points settle them.
+# Growing more than one volume anew gains nothing in blocks and costs a quarter of the time
+# (Vienna's even places at 5 points/m2).
 BLOCK = Effort(
     pool_points=1200, seeds=200, pairs=400, planes=30, new_planes=16, gables=10, regrown=1
 )
-BARE_SHARE = 0.01  # of a block: its base becomes a level volume where more of it shows
+BARE_BLOCK_SHARE = 0.01  # Share of a block above which a visible base becomes a level volume.
 
 
 def search_block(whole: Whole, box: Box) -> None:
-    """Add the volumes of a block to the roof; none where it holds hardly a point."""
+    """Add the volumes of a block to the roof, none if it holds hardly a point."""
     volumes, settling = find_in_block(whole, box)
     if settling is None:
         return
@@ -39,7 +42,10 @@ def search_block(whole: Whole, box: Box) -> None:
 
 
 def find_in_block(whole: Whole, box: Box) -> tuple[np.ndarray, Scene | None]:
-    """The volumes of a block by itself, its own base first, and the scene that settled them; None for hardly a point."""
+    """Find the volumes of a block by itself, its own base first.
+
+    Also returns the scene that settled them, None for hardly a point.
+    """
     scene, settling = open_window(whole, box, BLOCK_POINTS), open_window(whole, box, SETTLE_POINTS)
     if scene is None or settling is None:
         return whole.volumes, None
@@ -55,7 +61,7 @@ def settle_volumes(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float
 
 
 def is_base_bare(volumes: np.ndarray, scene: Scene) -> bool:
-    """Whether more than a sliver of the base shows."""
+    """Return whether more than a sliver of the base is visible."""
     _, top = compute_roof_heights(volumes, scene.U, scene.V)
     cells = scene.weight[scene.n :][top[scene.n :] == 0].sum()
-    return bool(max(cells, 0.5 * (top[: scene.n] == 0).sum()) > BARE_SHARE * scene.n)
+    return bool(max(cells, 0.5 * (top[: scene.n] == 0).sum()) > BARE_BLOCK_SHARE * scene.n)

@@ -1,6 +1,7 @@
-"""Where a large roof is cut into blocks that are each searched as a house: along steps, and where it is narrow.
+"""Cut a large roof into blocks that are each searched as a house.
 
-A cut costs the length over which the roof runs on across it unbroken, and more the less it halves the roof.
+Cuts follow steps and narrow places. A cut costs the length over which the roof continues across it,
+and more the less it halves the roof.
 """
 
 from __future__ import annotations
@@ -12,26 +13,25 @@ import numpy as np
 from .box import Box
 from .whole import Whole
 
-# Outline in a block at most (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth (17 of 20
-# right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges in place of 83.2.
+# Largest area of outline in a block (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth
+# (17 of 20 right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges instead of 83.2.
 BLOCK_M2 = 600.0
-HEIGHT_CELL_M, HEIGHT_CELL_SPACINGS = (
-    0.6,
-    1.2,
-)  # m of a cell of the heights that cuts look at, and spacings of points
-LEAST_STEP_M, CHEAPEST_STEP_M, OVER_STEP = (
-    0.3,
-    1.0,
-    0.1,
-)  # a step that counts; one that makes a cut as cheap as it gets
-FIXED_M = 1.0  # metres that each cut costs besides
-LEAST_HALF_SHARE = 0.25  # of a box's roof on either side of a cut
-UNEVEN = 2.0  # how much dearer a cut is the less it halves the roof
-FEWEST_CUT_CELLS = 8  # along an axis; a shorter one is not cut
+HEIGHT_CELL_M = 0.6  # Size (m) of a cell of the heights that cuts consider.
+HEIGHT_CELL_SPACINGS = 1.2  # The cell's size in spacings of points, where these are larger.
+LEAST_STEP_M = 0.3  # Lowest step (m) that makes a cut cheaper.
+CHEAPEST_STEP_M = 1.0  # Lowest step (m) at which a cut is as cheap as it gets.
+OVER_STEP = 0.1  # Share of a cut's price that remains at such a step.
+FIXED_M = 1.0  # Price (m) of each cut besides.
+LEAST_HALF_SHARE = 0.25  # Least share of a box's roof on either side of a cut.
+UNEVEN = 2.0  # Factor of the price of a cut that does not halve the roof.
+FEWEST_CUT_CELLS = 8  # A box with fewer cells along an axis is not cut.
 
 
 class HeightRaster:
-    """Median heights `z` (a, b) of a roof's points by cell, NaN where there are none, from the corner of its box on."""
+    """Median heights `z` (a, b) of a roof's points by cell, from its box's corner on.
+
+    Cells without points are NaN.
+    """
 
     def __init__(self, whole: Whole):
         self.box = whole.box
@@ -47,7 +47,7 @@ class HeightRaster:
         self.z.ravel()[cell[order[first]]] = whole.z[order[(first + last - 1) // 2]]
 
     def select_box(self, box: Box) -> tuple[np.ndarray, tuple[int, int]]:
-        """The heights in a box, and the first row and column of them."""
+        """Return the heights in a box, and their first row and column."""
         i0, j0 = int((box.u0 - self.box.u0) / self.pitch), int((box.v0 - self.box.v0) / self.pitch)
         i1 = math.ceil((box.u1 - self.box.u0) / self.pitch)
         j1 = math.ceil((box.v1 - self.box.v0) / self.pitch)
@@ -55,7 +55,7 @@ class HeightRaster:
 
 
 def find_cheapest_cut(raster: HeightRaster, box: Box) -> tuple[int, float] | None:
-    """Axis and place (m) of the cheapest cut of a box; None where it cannot be cut."""
+    """Return axis and place (m) of the cheapest cut of a box, None if it has none."""
     heights, first = raster.select_box(box)
     best, cheapest = None, math.inf
     for axis, z in enumerate((heights, heights.T)):
@@ -70,7 +70,10 @@ def find_cheapest_cut(raster: HeightRaster, box: Box) -> tuple[int, float] | Non
 
 
 def price_cuts(z: np.ndarray, pitch: float) -> np.ndarray:
-    """What a cut before each of the rows of heights z (a, b) costs (m), infinite where it leaves too little on one side."""
+    """Return the price (m) of a cut before each of the rows of heights z (a, b).
+
+    It is infinite where the cut leaves too little on one side.
+    """
     is_seen = np.isfinite(z)
     shares = np.cumsum(is_seen.sum(axis=1)) / max(is_seen.sum(), 1)
     costs = np.full(len(z), np.inf)

@@ -1,4 +1,7 @@
-"""Volumes worth trying: the planes and gables that explain rectangles of points, and where each would gain most."""
+"""Find volumes worth trying, and where each would gain most.
+
+They are made of the planes and gables that explain rectangles of points.
+"""
 
 from __future__ import annotations
 
@@ -40,25 +43,24 @@ from .volumes import (
     read_coefficients,
 )
 
-ALONG_AXIS = 0.12  # a plane that leans so little off an axis or a wall is taken along it
-RIDGE_INSIDE_M = 0.4  # m that a ridge lies inside the rectangle; nearer to an edge it is a slope
-MOST_TOPS, MOST_PAIRS = (
-    2,
-    3,
-)  # level tops and pairs of slopes, strongest first, that make hips and mansards
-SAME_SLOPE = 1e-6  # rise over run; numerically equal
-WRONG_COVER = 0.02  # of a point: what covering one without explaining it costs
-LEAST_ABOVE_M = 1e-9  # m by which a volume has to be the higher one: numerically none
-NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
+ALONG_AXIS = 0.12  # A plane that leans less off an axis or a wall is turned along it.
+RIDGE_INSIDE_M = 0.4  # Least distance (m) of a ridge from the edges of its rectangle.
+MOST_TOPS = 2  # Most level tops that make hips and mansards, strongest first.
+MOST_PAIRS = 3  # Most pairs of slopes that make hips and mansards, strongest first.
+SAME_SLOPE = 1e-6  # Slopes (rise over run) that differ less are numerically equal.
+WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
+LEAST_ABOVE_M = 1e-9  # Height (m) by which a volume must be above the roof: numerically none.
+NEW_EDGES = 0.5  # Least price (units) of the edges of a new volume.
 
 
 class Effort(NamedTuple):
-    """How many candidates are looked for: limits on time, beyond which structure that explains less stays unseen.
+    """How many candidates are searched: limits on time.
 
-    `pool_points` are those that candidates are found among, `seeds` those that planes are fitted around, `pairs` those
-    of points whose planes are tried. At most `planes` are kept of all points, `new_planes` of those that a roof leaves
-    unexplained, and `gables` of those that explain most. So many volumes, those that grew first, are grown anew: of 40
-    that were better anew none had grown later.
+    Structure that explains less stays unseen beyond them. `pool_points` are the points among which
+    candidates are found, `seeds` those around which planes are fitted, and `pairs` the pairs of
+    points whose planes are tried. At most `planes` are kept of all points, `new_planes` of those
+    that a roof leaves unexplained, and `gables` of those that explain most. The first `regrown`
+    volumes are grown anew: of 40 that were better anew, none had grown later.
     """
 
     pool_points: int
@@ -76,7 +78,10 @@ HOUSE = Effort(pool_points=500, seeds=100, pairs=200, planes=16, new_planes=10, 
 def list_candidates(
     scene: Scene, members: np.ndarray, most_planes: int, effort: Effort = HOUSE
 ) -> np.ndarray:
-    """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
+    """List volumes (m, COLUMNS) without rectangles that points suggest.
+
+    They have allowed shapes, in every direction. The points are `members` (k,).
+    """
     grids = enumerate(make_grids(scene))
     return np.concatenate(
         [
@@ -87,15 +92,18 @@ def list_candidates(
 
 
 def make_grids(scene: Scene) -> list[Grid]:
-    """The cells between the scene's lines, for each direction."""
+    """Return the cells between the scene's lines, for each direction."""
     return [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
 
 
 def list_candidates_along(
     scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int, effort: Effort
 ) -> np.ndarray:
-    """Those (m, COLUMNS) in one direction: of every plane of the pool, along an axis if need be, the gables, all pairs that form a
-    ridge, and larger groups of these."""
+    """List the candidates (m, COLUMNS) in one direction.
+
+    They are made of every plane of the pool, turned along an axis if necessary, of gables, of all
+    pairs that form a ridge, and of larger groups of these.
+    """
     count = min(len(members), effort.pool_points)
     numbers = members[np.arange(count) * len(members) // count]
     u, v, z = (
@@ -122,10 +130,10 @@ def list_candidates_along(
 
 @compiled
 def turn_to_walls(pool, middle, leans):
-    """Each plane of the pool (m, 3) facing along an axis, and square to the walls that lean by `leans` (2, n), where it very nearly does;
-    as it is where it does neither.
+    """Turn planes to the axis or the wall that they very nearly face.
 
-    It is turned about the points' `middle`.
+    Each plane of the pool (m, 3) faces along an axis, and square to the walls that lean by `leans`
+    (2, n), if it nearly does. Otherwise it stays as it is. It turns about the points' `middle`.
     """
     turned_planes, m = np.empty((len(pool) * (1 + leans.shape[1]), 3)), 0
     for plane in pool:
@@ -148,8 +156,12 @@ def turn_to_walls(pool, middle, leans):
 
 @compiled
 def group_planes(planes, gables, counts, grid):
-    """Groups of planes (g, PLANES, 3) that may be volumes, and their sizes (g,): each plane, the `gables` of `counts` planes, all pairs
-    that form a ridge; hips of two pairs across each other, and pairs and hips with a level top, of the strongest few."""
+    """Return groups of planes (g, N_PLANES, 3) that may be volumes, and their sizes.
+
+    These are each plane, the `gables` of `counts` planes, and all pairs that form a ridge. The
+    strongest pairs also make hips of two pairs across each other, and pairs and hips with a level
+    top.
+    """
     n = len(planes)
     most_groups = (
         n
@@ -193,7 +205,10 @@ def group_planes(planes, gables, counts, grid):
 
 @compiled
 def select_strongest(groups, sizes, first, last, axis):
-    """The first MOST_PAIRS of the groups from `first` to `last` that are two planes facing along an axis."""
+    """Return the first MOST_PAIRS pairs of planes that face along an axis.
+
+    They are numbers of groups from `first` to `last`.
+    """
     numbers, m = np.empty(MOST_PAIRS, np.int64), 0
     for q in range(first, last):
         if m < MOST_PAIRS and sizes[q] == 2 and find_axis(groups[q, 0]) == axis:
@@ -204,7 +219,7 @@ def select_strongest(groups, sizes, first, last, axis):
 
 @compiled
 def make_volumes(direction, groups, sizes, allowed):
-    """Volumes (m, COLUMNS) of those groups of planes that are `allowed` shapes."""
+    """Return volumes (m, COLUMNS) of the groups of planes that are `allowed` shapes."""
     volumes, m = np.empty((len(groups), COLUMNS)), 0
     for q in range(len(groups)):
         volume, is_one = make_volume(direction, groups[q, : sizes[q]], allowed)
@@ -216,13 +231,16 @@ def make_volumes(direction, groups, sizes, allowed):
 
 @compiled
 def find_axis(plane):
-    """The axis that an inclined plane faces most nearly along; -1 for a level one."""
+    """Return the axis that an inclined plane most nearly faces, -1 for a level one."""
     return int(abs(plane[1]) > abs(plane[0])) if classify_plane(plane) else -1
 
 
 @compiled
 def has_ridge(plane, other, u, v):
-    """Whether two planes fall away from a ridge inside the plan, whose grid lines are `u`, `v`."""
+    """Return whether two planes fall away from a ridge inside the plan.
+
+    The plan's grid lines are `u`, `v`.
+    """
     axis = find_axis(plane)
     if axis < 0 or find_axis(other) != axis or plane[axis] * other[axis] >= 0.0:
         return False
@@ -237,8 +255,10 @@ def has_ridge(plane, other, u, v):
 
 @compiled
 def make_volume(direction, planes, allowed):
-    """A volume of planes (m, 3), and whether it is one of the `allowed` shapes, if need be with opposite slopes equal; it is none
-    where two planes face the same way."""
+    """Make a volume of planes (m, 3), and return whether its shape is `allowed`.
+
+    If necessary, opposite slopes become equal. It is no volume where two planes face the same way.
+    """
     volume = np.zeros(COLUMNS)
     volume[DIRECTION], volume[OFFSET0 : OFFSET0 + N_PLANES] = direction, np.inf
     for plane in planes:
@@ -259,7 +279,7 @@ def make_volume(direction, planes, allowed):
 
 @compiled
 def find_tie(volume):
-    """The tightest tie that holds of a volume's slopes."""
+    """Return the tightest tie that holds between a volume's slopes."""
     offset, slope = volume[OFFSET0 : OFFSET0 + N_SIDES], volume[SLOPE0 : SLOPE0 + N_SIDES]
     flattest, steepest, count = np.inf, -np.inf, 0
     for k in range(N_SIDES):
@@ -279,10 +299,12 @@ def find_tie(volume):
 
 @compiled
 def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, replacing):
-    """For each candidate the rectangle of cells (m, 4) in which it gains most, and that gain (m,) less its price.
+    """Find, for each candidate, the rectangle of cells (m, 4) in which it gains most.
 
-    `cell_u`, `cell_v` (directions, n + g) are the cells of points and ghosts between the scene's lines. Joining the max a candidate only counts where it is above the roof `z_now`; `replacing` it counts everywhere. Candidates that
-    cannot come near the best found are left out (minus infinity).
+    Also returns that gain (m,) less the candidate's price. `cell_u`, `cell_v` (directions, n + g)
+    are the cells of points and unobserved cells between the scene's lines. A candidate counts where
+    it is above the roof `z_now`, and everywhere if it is `replacing`. Candidates that cannot come
+    near the best are left out (minus infinity).
     """
     gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
     floor, gain = (
@@ -316,10 +338,10 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
 
 @compiled
 def fill_gains(scene, candidates, m, cost_now, floor, gain):
-    """Fill `gain` (n + g,) with what candidate m saves at points and ghosts where it is higher than `floor` (n + g,); returns the sum
-    over those that gain.
+    """Fill `gain` (n + g,) with what candidate m saves where it is above `floor`.
 
-    Loops without branches over arrays of their own: a processor does several places at once.
+    Returns the sum over the points and unobserved cells that gain. The loops have no branches and
+    use arrays of their own, so a processor computes several places at once.
     """
     direction, n, c = int(candidates[m, DIRECTION]), scene.n, read_coefficients(candidates, m)
     u, v, z = scene.U[direction], scene.V[direction], scene.z

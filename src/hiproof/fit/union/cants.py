@@ -1,8 +1,10 @@
-"""Walls that cut a corner of a volume off: planes over these too, as a bay with slanted sides or an eight-sided tower has them.
+"""Add planes over walls that cut a corner of a volume off.
 
-A volume's own planes face along its axes or a little off them. Where another wall of the outline ends it, a further plane that
-rises square from this wall is tried: through the point in which others meet and from their eaves' height, or with a slope or an eave of
-its own, each fitted together with all planes of the volume to its points. It stays where that explains more than its parameters cost.
+A bay with slanted sides and an eight-sided tower have such planes. A volume's own planes face along
+its axes or a little off them. Where another wall of the outline ends the volume, a further plane
+that rises square from this wall is tried. It starts at the eaves of the others and passes through
+the point in which they meet, or has a slope or an eave of its own. It is fitted together with all
+planes of the volume, and stays if it explains more than its parameters cost.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ from ...geometry.rings import counterclockwise
 from ...primitives.cants import MOST_CANTS
 from .finish import (
     FLATTEST,
+    OutlineWall,
     Planes,
-    Wall,
     find_visible_points,
     fit_volume_planes,
     is_proper,
@@ -36,37 +38,41 @@ from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION, LEVEL, N_SIDES
 
-SHORTEST_WALL_M = 0.6  # of a wall
-FEWEST_INCLINED = (
-    2  # planes of a volume with cants: one slope alone is cut off by walls and runs on
-)
-OFF_RAD = math.radians(12.0)  # by which it faces another way than each of the volume's sides
-INSIDE_WALL_M = 0.1  # m inside the wall, in its middle, where the volume must be
-MEETING_GAP_M, MEETING_DEPTH_M = (
-    0.1,
-    0.5,
-)  # points in which planes meet are one within; they lie so far before the wall at least
-MEET_M = 0.05  # m by which the roof may be lower than the point in which three planes meet
-START_SLOPES = (0.5, 0.8, 1.2)  # rise over run to begin with, besides those of the volume's planes
+SHORTEST_WALL_M = 0.6  # Shortest length (m) of a wall with a plane.
+# Fewest planes of a volume with cants. A single slope is cut off by walls and continues.
+FEWEST_INCLINED = 2
+OFF_RAD = math.radians(12.0)  # Least angle (rad) between a wall and each of the volume's sides.
+INSIDE_WALL_M = 0.1  # The volume must reach to this distance (m) from the middle of the wall.
+MEETING_GAP_M = 0.1  # Places nearer (m) in which planes meet are one.
+MEETING_DEPTH_M = 0.5  # Least depth (m) of such a place inside the wall.
+MEET_M = 0.05  # The roof may be lower by this (m) than the point in which three planes meet.
+# Slopes (rise over run) to begin with, besides those of the volume's planes.
+START_SLOPES = (0.5, 0.8, 1.2)
 
 
 class PlaneForm(NamedTuple):
-    """A further plane as linear in p unknowns of all (3, p), the last `more` of which are its own."""
+    """A further plane as linear in all p unknowns: `design` (3, p).
+
+    The last `n_own` unknowns are its own.
+    """
 
     design: np.ndarray
     n_own: int
 
 
 # Planes and roofs by all that they depend on in one scene: planes by their volume, its sides, and
-# the points over which it shows, roofs by their volumes.
+# the points over which it is visible, roofs by their volumes.
 Cache = dict[Any, Any]
 
 
 def fit_planes(
     volumes: np.ndarray, sides: list[list[Side]], walls: np.ndarray, scene: Scene, cache: Cache
 ) -> list[Planes]:
-    """The planes of every volume, in its direction's axes, over its sides and over those of the outline's `walls` (m, 2, 2) that cut
-    its corners off; those `cache` are not fitted again, those found become known."""
+    """Fit the planes of every volume, in its direction's axes.
+
+    They rise over its sides and over those of the outline's `walls` (m, 2, 2) that cut its corners
+    off. Planes in the `cache` are not fitted again.
+    """
     planes = []
     for volume, volume_sides, members in zip(
         volumes, sides, find_visible_points(volumes, scene), strict=True
@@ -87,14 +93,20 @@ def fit_planes(
 
 
 def list_walls(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
-    """Starts and ends (m, 2, 2) of the outline's outer walls, the inside to the left, in the first direction's axes."""
+    """Return starts and ends (m, 2, 2) of the outline's outer walls.
+
+    The inside is to their left. They are in the first direction's axes.
+    """
     ring = (counterclockwise(outline.exterior) - plan.frame.origin[:2]) @ plan.frame.rotation.T
     ends = np.stack([ring[:-1], ring[1:]], axis=1)
     return ends[np.hypot(*(ends[:, 1] - ends[:, 0]).T) > SHORTEST_WALL_M]
 
 
 def orient_walls(walls: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The middles (m, 2) of `walls` (m, 2, 2) in the axes of the direction at `turn`, and which way they look out (m, 2)."""
+    """Return the middles (m, 2) of `walls` and the way that they face outwards (m, 2).
+
+    The walls are (m, 2, 2), and the result is in the axes of the direction at `turn`.
+    """
     c, s = turn
     ends = walls @ np.array([[c, -s], [s, c]])
     ways = ends[:, 1] - ends[:, 0]
@@ -103,8 +115,14 @@ def orient_walls(walls: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.nd
     ]
 
 
-def select_cutting_walls(walls: np.ndarray, sides: list[Side], turn: np.ndarray) -> list[Wall]:
-    """Those of the `walls` (m, 2, 2) that end a volume and face another way than its sides, in its own axes at `turn`."""
+def select_cutting_walls(
+    walls: np.ndarray, sides: list[Side], turn: np.ndarray
+) -> list[OutlineWall]:
+    """Select the `walls` (m, 2, 2) that cut a volume's corners off.
+
+    They end the volume and face another way than its sides. They are returned in its own axes, at
+    `turn`.
+    """
     middle, outwards = orient_walls(walls, turn)
     facing = np.arctan2(outwards[:, 1], outwards[:, 0])
     angles = np.abs(
@@ -116,21 +134,24 @@ def select_cutting_walls(walls: np.ndarray, sides: list[Side], turn: np.ndarray)
     if len(numbers) > MOST_CANTS:  # of a round wall
         return []
     return [
-        Wall(float(f), float(x))
+        OutlineWall(float(f), float(x))
         for f, x in zip(facing[numbers], (outwards * middle).sum(axis=1)[numbers], strict=True)
     ]
 
 
 def measure_facings(sides: list[Side]) -> np.ndarray:
-    """The directions (4,) in which the sides look (rad)."""
+    """Return the directions (4,) in which the sides face (rad)."""
     left, right, front, back = (math.atan(side.lean) for side in sides)
     return np.array([math.pi - left, -right, -0.5 * math.pi + front, 0.5 * math.pi + back])
 
 
 def add_cants(
-    planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene
+    planes: Planes, walls: list[OutlineWall], sides: list[Side], points: np.ndarray, scene: Scene
 ) -> Planes:
-    """The planes with one over each of the `walls` that pays, the best first; `points` (3, m) are the volume's."""
+    """Add a plane over each of the `walls` where it pays, the best first.
+
+    `points` (3, m) are the volume's.
+    """
     remaining = list(walls)
     while remaining and len(planes.walls) < MOST_CANTS:
         if bound_gain(planes, points, scene) <= scene.evidence * PARAMETER_COST:
@@ -150,9 +171,9 @@ def price_planes(planes: Planes) -> float:
 
 
 def add_one_cant(
-    planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene
+    planes: Planes, walls: list[OutlineWall], sides: list[Side], points: np.ndarray, scene: Scene
 ) -> Iterator[Planes]:
-    """The planes with one more over one of the `walls`, in every way."""
+    """Yield the planes with one more over one of the `walls`, in every form."""
     places = find_meeting_places(planes, sides)
     for wall in walls:
         start = find_start_plane(wall, planes, points, scene)
@@ -163,13 +184,19 @@ def add_one_cant(
 
 
 def bound_gain(planes: Planes, points: np.ndarray, scene: Scene) -> float:
-    """What the points (3, m) below the planes cost: no more can further planes gain."""
+    """Return what the points (3, m) below the planes cost.
+
+    Further planes cannot gain more.
+    """
     z = np.nanmin(planes.rows @ np.vstack([points[:2], np.ones(points.shape[1])]), axis=0)
     return float(compute_misfits(points[2], np.maximum(z, points[2]), scene).sum())
 
 
-def list_forms(wall: Wall, planes: Planes, places: list[np.ndarray]) -> Iterator[PlaneForm]:
-    """Ways for a plane to rise from `wall`, through one of the `places` in which others meet or free, the more regular ones first."""
+def list_forms(wall: OutlineWall, planes: Planes, places: list[np.ndarray]) -> Iterator[PlaneForm]:
+    """Yield forms of a plane over `wall`, the more regular ones first.
+
+    It passes through one of the `places` in which others meet, or is free.
+    """
     count, depth = planes.design.shape[2], wall.depth
     unit_rows, eave = np.eye(count + 2), find_level_eave(planes)
     eaves = [unit_rows[count + 1]] if eave is None else [unit_rows[eave], unit_rows[count + 1]]
@@ -190,7 +217,10 @@ def list_forms(wall: Wall, planes: Planes, places: list[np.ndarray]) -> Iterator
 
 
 def trim_form(design: np.ndarray, count: int) -> PlaneForm:
-    """The way by all unknowns and only those of the two further ones after `count` that it has."""
+    """Return the form with those unknowns only that it has.
+
+    It may have two further ones after `count`.
+    """
     is_used = design[:, count:].any(axis=0)
     return PlaneForm(
         np.hstack([design[:, :count], design[:, count:][:, is_used]]), int(is_used.sum())
@@ -198,13 +228,13 @@ def trim_form(design: np.ndarray, count: int) -> PlaneForm:
 
 
 def find_level_eave(planes: Planes) -> int | None:
-    """The unknown that is the height of all level eaves; None where there are none."""
+    """Return the unknown that is the height of all level eaves, None without any."""
     shared = (planes.design[:N_SIDES, 2] == 1.0).sum(axis=0)
     return int(shared.argmax()) if shared.max() > 1 else None
 
 
 def find_meeting_places(planes: Planes, sides: list[Side]) -> list[np.ndarray]:
-    """Where (2,) three or more of the inclined planes meet on the roof."""
+    """Return where (2,) three or more of the inclined planes meet on the roof."""
     numbers = [k for k in np.flatnonzero(np.isfinite(planes.rows[:, 2])).tolist() if k != LEVEL]
     meeting_points: list[np.ndarray] = []
     for triple in combinations(numbers, 3):
@@ -222,7 +252,10 @@ def find_meeting_places(planes: Planes, sides: list[Side]) -> list[np.ndarray]:
 
 
 def express_height(planes: Planes, place: np.ndarray) -> np.ndarray:
-    """The roof's height (p,) at a place in which planes meet, by their unknowns: the mean of theirs."""
+    """Return the roof's height (p,) where planes meet, by their unknowns.
+
+    It is the mean of their heights.
+    """
     position = np.array([*place, 1.0])
     heights = planes.rows @ position
     meet = np.flatnonzero(heights < np.nanmin(heights) + MEET_M)
@@ -230,9 +263,14 @@ def express_height(planes: Planes, place: np.ndarray) -> np.ndarray:
 
 
 def fit_with_cant(
-    planes: Planes, wall: Wall, form: PlaneForm, start: np.ndarray, points: np.ndarray, scene: Scene
+    planes: Planes,
+    wall: OutlineWall,
+    form: PlaneForm,
+    start: np.ndarray,
+    points: np.ndarray,
+    scene: Scene,
 ) -> Planes:
-    """All planes of a volume fitted with one more over `wall`, from `start` (3,) on."""
+    """Fit all planes of a volume with one more over `wall`, from `start` (3,) on."""
     count, _, width = planes.design.shape
     design = np.zeros((count + 1, 3, width + form.n_own))
     design[:count, :, :width], design[count] = planes.design, form.design
@@ -243,7 +281,10 @@ def fit_with_cant(
 
 
 def compute_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
-    """What so large `shares` of the values (n,) lie below: between two of these, on a line."""
+    """Return the levels below which these `shares` of the values (n,) lie.
+
+    Levels between two values are interpolated.
+    """
     ordered, levels = np.sort(values).tolist(), []
     for share in shares:
         k, remainder = divmod((len(ordered) - 1) * share, 1.0)
@@ -255,8 +296,13 @@ def compute_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[flo
     return levels
 
 
-def find_start_plane(wall: Wall, planes: Planes, points: np.ndarray, scene: Scene) -> np.ndarray:
-    """The plane (3,) over `wall` that explains most of `points` (3, m), of some slopes and heights."""
+def find_start_plane(
+    wall: OutlineWall, planes: Planes, points: np.ndarray, scene: Scene
+) -> np.ndarray:
+    """Find the plane (3,) over `wall` that explains most of `points` (3, m).
+
+    Some slopes and heights are tried.
+    """
     inclined = planes.rows[np.isfinite(planes.rows[:, 2])][:, :2]
     slopes = {round(x, 2) for x in np.hypot(*inclined.T).tolist() if x > FLATTEST} | set(
         START_SLOPES

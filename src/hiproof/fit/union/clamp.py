@@ -1,4 +1,7 @@
-"""No roof leaves the range of its points' heights by much: what would is cut off and becomes a level part."""
+"""Limit roofs to the range of their points' heights.
+
+What lies far beyond becomes a level part.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,20 @@ from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part, Piece
 from .regions import list_polygons
 
-CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
-NO_AREA = shapely.Polygon()  # what no place of a piece is beyond
-LEAST_EXCESS_M2 = 0.1  # of a piece beyond; less is the tip of a corner and no part
-MISSED_SPACINGS = 0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner
+# Limit (m) beyond the lowest and highest point: ridges are often not hit, eaves not seen.
+CLAMP_M = 0.4
+NO_AREA = shapely.Polygon()  # The area where no place of a piece exceeds a limit.
+LEAST_EXCESS_M2 = 0.1  # Least area (m2) beyond a limit. Less is the tip of a corner and no part.
+# Distance of a tip or corner from the nearest point, in spacings of points: half the diagonal
+# between four of them.
+MISSED_SPACINGS = 0.7
 
 
 def clamp_parts(parts: list[Part], z_low: float, z_high: float, spacing: float) -> list[Part]:
-    """`parts` within `z_low` and `z_high` but for what points `spacing` (m) apart miss, and level parts in place of what lies beyond."""
+    """Limit `parts` to `z_low` and `z_high`, and add level parts instead of the rest.
+
+    They may exceed the limits by what points `spacing` (m) apart miss.
+    """
     new_parts = []
     for part in parts:
         steepest = max(float(np.hypot(*piece.planes[:, :2].T).max()) for piece in part.pieces)
@@ -28,8 +37,11 @@ def clamp_parts(parts: list[Part], z_low: float, z_high: float, spacing: float) 
 
 
 def clamp_part(part: Part, z_low: float, z_high: float, missed: float = 0.0) -> list[Part]:
-    """The part where it is between `z_low` and `z_high`, and a level part where it is below or above; itself where it is neither, or falls below
-    `z_low` by no more than what points may have `missed` (m) of an eave."""
+    """Return the part between `z_low` and `z_high`, and level parts below and above.
+
+    It stays as it is where it exceeds neither, or falls below `z_low` by no more than what points
+    may have `missed` (m) of an eave.
+    """
     kept_pieces, beneath, overhead = [], [], []
     for piece in part.pieces:
         sunken, risen = find_excess(piece, z_low - missed, z_high)
@@ -56,7 +68,10 @@ def clamp_part(part: Part, z_low: float, z_high: float, missed: float = 0.0) -> 
 def find_excess(
     piece: Piece, z_low: float, z_high: float
 ) -> tuple[shapely.Geometry, shapely.Geometry]:
-    """Where a piece is below `z_low`, which one of its planes is there, and where above `z_high`, as all of them are."""
+    """Return where a piece is below `z_low`, and where above `z_high`.
+
+    One plane is enough to be below, all must be above.
+    """
     z, sunken, risen = compute_corner_heights(piece), NO_AREA, NO_AREA
     if z.min() < z_low:
         rings = [
@@ -81,12 +96,12 @@ def find_excess(
 
 
 def compute_corner_heights(piece: Piece) -> np.ndarray:
-    """Heights (n, k) of a piece's k planes at the corners of its outline."""
+    """Return heights (n, k) of a piece's k planes at the corners of its outline."""
     return shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
 
 
 def make_level_part(polygons: list[shapely.Polygon], z: float) -> Part:
-    """A flat part over `polygons` at height `z`."""
+    """Make a flat part over `polygons` at height `z`."""
     x0, y0, x1, y1 = shapely.total_bounds(np.array(polygons, object))
     plane = np.array([[0.0, 0.0, z]])
     size = {"width": float(y1 - y0), "length": float(x1 - x0)}
@@ -100,7 +115,7 @@ def make_level_part(polygons: list[shapely.Polygon], z: float) -> Part:
 
 
 def draw_box(polygon: shapely.Polygon) -> list[tuple[float, float]]:
-    """The corners of a box that `polygon` lies in the midst of."""
+    """Return the corners of a box around `polygon` with a margin."""
     x0, y0, x1, y1 = polygon.bounds
     return [(x0 - 1.0, y0 - 1.0), (x1 + 1.0, y0 - 1.0), (x1 + 1.0, y1 + 1.0), (x0 - 1.0, y1 + 1.0)]
 
@@ -108,7 +123,7 @@ def draw_box(polygon: shapely.Polygon) -> list[tuple[float, float]]:
 def clip_ring(
     ring: list[tuple[float, float]], a: float, b: float, c: float
 ) -> list[tuple[float, float]]:
-    """The part of a convex ring, or of none, where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
+    """Clip a convex ring to where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
     signed = [a * x + b * y + c for x, y in ring]
     vertices = []
     for k, (vertex, z) in enumerate(zip(ring, signed, strict=True)):

@@ -1,7 +1,9 @@
-"""Hips and valleys that end beside a corner of the outline, or beside a step's end at a wall, end in it.
+"""Let hips and valleys that end beside a corner of the outline end in it.
 
-Points lie some centimetres beside their place and walls a decimetre beside theirs, so that planes meet a little off the corner that a
-draughtsman draws. That they meet there is a linear equation between their unknowns, one of those that `agree` asks the points about.
+The same holds for a step's end at a wall. Points lie some centimetres beside their true place, and
+walls a decimetre beside theirs, so planes meet a little off the corner that a draughtsman draws.
+The condition that they meet there is a linear equation between their unknowns, which `agree` tests
+against the points.
 """
 
 from __future__ import annotations
@@ -17,20 +19,22 @@ from .members import LinearVolume, compute_heights_at, evaluate_rows
 from .sides import CORNER_SIDES, find_corners
 from .volumes import LEVEL
 
-# m by plan and by height within which a crease is asked to end in a corner: clouds lie a decimetre
-# beside their outlines
+# Distance (m) in plan and in height within which a fold line is tried to end in a corner: clouds
+# lie a decimetre beside their outlines.
 NEAR_M = 0.2
-ENDS_IN_CORNER_M = 0.01  # one that ends so near does
-CORNER_REACH_M = 0.4  # a volume that ends so near a corner is drawn on to it
-LEAST_BREAK = 0.1  # rise over run; planes less apart have no crease to speak of
-FROM_CORNER_M, ON_ROOF_M = (
-    0.6,
-    0.02,
-)  # where beside the corner a crease must be on the roof, and how nearly
+ENDS_IN_CORNER_M = 0.01  # A fold line that ends so near (m) ends in the corner.
+CORNER_REACH_M = 0.4  # A volume that ends so near (m) a corner reaches it.
+LEAST_BREAK = 0.1  # Planes whose gradients (rise over run) differ less have no clear fold line.
+FROM_CORNER_M = 0.6  # Distance (m) from the corner at which a fold line must be on the roof.
+ON_ROOF_M = 0.02  # Height (m) within which it must be on the roof.
 
 
 class CornerPlane(NamedTuple):
-    """A member's plane at a corner: whose, which, its height there and a, b, c (3,) in the first direction's axes."""
+    """A plane of a member at a corner.
+
+    It has the member's number, its own, its height there, and a, b, c (3,) in the first direction's
+    axes.
+    """
 
     member: int
     number: int
@@ -41,8 +45,12 @@ class CornerPlane(NamedTuple):
 def list_corner_equations(
     members: list[LinearVolume], start: np.ndarray, ring: np.ndarray
 ) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
-    """Equations (1, p) between planes that meet beside a corner, of the outline's `ring` (c, 2) or where a step ends at it, at the
-    unknowns `start` (p,): how far apart in height (m) they are there, and between which two members."""
+    """Yield equations (1, p) between planes that meet beside a corner.
+
+    Corners are those of the outline's `ring` (c, 2), and places where a step ends at it. Each comes
+    with how far apart in height (m) the planes are there at the unknowns `start` (p,), and with the
+    two members.
+    """
     rows = evaluate_rows(members, start)
     corners = np.vstack([ring, *(list_own_corners(member, ring) for member in members)])
     for corner, planes in zip(corners, list_planes_at(members, rows, corners), strict=True):
@@ -57,7 +65,10 @@ def list_corner_equations(
 
 
 def list_own_corners(member: LinearVolume, ring: np.ndarray) -> np.ndarray:
-    """The places (m, 2) besides the `ring`'s corners where a member's sides meet, one of which lies on the outline."""
+    """Return the places (m, 2) where a member's sides meet on the outline.
+
+    The `ring`'s corners are left out.
+    """
     c, s = member.turn
     corners = find_corners(member.sides) @ np.array([[c, s], [-s, c]])
     anchored = [member.sides[k].anchored or member.sides[j].anchored for k, j in CORNER_SIDES]
@@ -68,7 +79,10 @@ def list_own_corners(member: LinearVolume, ring: np.ndarray) -> np.ndarray:
 def list_planes_at(
     members: list[LinearVolume], rows: np.ndarray, corners: np.ndarray
 ) -> list[list[CornerPlane]]:
-    """By corner (c, 2), the planes that points show of the members that reach it, no lower or higher there than NEAR_M from the roof."""
+    """List, by corner (c, 2), the planes with points of the members that reach it.
+
+    They are within NEAR_M of the roof's height there.
+    """
     plane_heights = rows @ np.column_stack([corners, np.ones(len(corners))]).T
     heights = compute_heights_at(members, rows, corners, CORNER_REACH_M)
     is_near = (heights > heights.max(axis=0) - NEAR_M)[:, None] & (
@@ -84,9 +98,10 @@ def list_planes_at(
 
 
 def is_near_miss(plane: CornerPlane, other: CornerPlane) -> bool:
-    """Whether the crease of two planes lies beside the corner at which they were looked at, but not at it.
+    """Return whether the fold line of two planes lies beside their corner, not at it.
 
-    The slopes of one volume and the level plane of another cross along an eave, which ends in no corner.
+    The slopes of one volume and the level plane of another cross along an eave, which ends in no
+    corner.
     """
     if plane.member != other.member and LEVEL in (plane.number, other.number):
         return False
@@ -98,7 +113,7 @@ def is_near_miss(plane: CornerPlane, other: CornerPlane) -> bool:
 
 
 def measure_break(plane: CornerPlane, other: CornerPlane) -> float:
-    """By how much (rise over run) two planes fall differently."""
+    """Return by how much (rise over run) the gradients of two planes differ."""
     a, b, _ = (plane.coefficients - other.coefficients).tolist()
     return math.hypot(a, b)
 
@@ -110,7 +125,7 @@ def is_fold_line(
     members: list[LinearVolume],
     rows: np.ndarray,
 ) -> bool:
-    """Whether two planes meet on the roof, a step from the corner on either side along their crease."""
+    """Return whether two planes meet on the roof, a step off the corner."""
     across = (plane.coefficients - other.coefficients)[:2] / measure_break(plane, other)
     foot = corner - across * (plane.height - other.height) / measure_break(plane, other)
     places = foot + np.array([[-FROM_CORNER_M], [FROM_CORNER_M]]) * np.array(

@@ -1,7 +1,8 @@
-"""One volume over walls that cut its corners off, in place of several.
+"""Draw one volume over walls that cut its corners off, instead of several.
 
-The search has no planes over such walls: it covers a bay with slanted sides, or an eight-sided tower, with several volumes, some of them
-turned. So each volume is tried as it would be if it reached over these walls, by itself.
+The search has no planes over such walls. It covers a bay with slanted sides, or an eight-sided
+tower, with several volumes, some of them turned. Each volume is therefore tried alone as it would
+be if it reached over these walls.
 """
 
 from __future__ import annotations
@@ -17,16 +18,22 @@ from .finish import find_visible_points
 from .scene import Scene
 from .volumes import DIRECTION, N_SIDES, OFFSET0, REPLACES, SLOPE0, U0, U1, V0, V1, is_allowed
 
-# m by which a volume may be drawn out to a corner of the outline, at how many places a side, and how far beside the volume these may be
-FURTHEST_M, MOST_STEPS, CORNER_MARGIN_M = 6.0, 2, 0.3
-LEAST_M = 0.1  # nearer, a corner is where the volume ends
-MOST_ASLANT = 8  # walls of an outline that face along no axis of its main direction: with more its walls are round
-WITHIN = 0.8  # of a volume's points, from which on it stands within another
+FURTHEST_M = 6.0  # Furthest (m) that a volume is drawn out to a corner of the outline.
+MOST_STEPS = 2  # Most corners to which each side is drawn out.
+CORNER_MARGIN_M = 0.3  # Distance (m) that these corners may lie beside the volume.
+LEAST_OUT_M = 0.1  # A corner that is nearer (m) is where the volume ends.
+# Most walls that face along no axis of the outline's main direction. With more, its walls are
+# round.
+MOST_ASLANT = 8
+WITHIN = 0.8  # Share of a volume's points from which on it lies within another.
 
 
 def draw_over_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> Iterator[np.ndarray]:
-    """The volumes with one of them drawn out over `walls` (m, 2, 2) that cut its corners off, as far as a corner of the outline on one
-    side or none, and without those over these walls that then stand within it."""
+    """Yield the volumes with one of them drawn over `walls` that cut its corners off.
+
+    The walls are (m, 2, 2). The volume reaches as far as a corner of the outline on one side, or
+    stays as wide. Volumes over these walls that then lie within it are dropped.
+    """
     places, aslant = place_inside_walls(walls, scene)
     if not 0 < aslant[0].sum() <= MOST_ASLANT:
         return
@@ -60,8 +67,11 @@ def draw_over_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> I
 
 
 def place_inside_walls(walls: np.ndarray, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Places (directions, m, 2) just inside the middles of `walls` (m, 2, 2), in every direction's axes, and which walls (directions, m)
-    face along no axis there."""
+    """Return places (directions, m, 2) just inside the middles of `walls` (m, 2, 2).
+
+    They are in every direction's axes. Also returns which walls (directions, m) face along no axis
+    there.
+    """
     orientations = [orient_walls(walls, turn) for turn in scene.turn]
     places = np.array([middle - INSIDE_WALL_M * outwards for middle, outwards in orientations])
     angles = quarter_gap(
@@ -71,18 +81,21 @@ def place_inside_walls(walls: np.ndarray, scene: Scene) -> tuple[np.ndarray, np.
 
 
 def is_in_rectangle(places: np.ndarray, row: np.ndarray) -> np.ndarray:
-    """Which places (n, 2) lie in a volume's rectangle."""
+    """Return which places (n, 2) lie in a volume's rectangle."""
     u, v = places.T
     return (u >= row[U0]) & (u <= row[U1]) & (v >= row[V0]) & (v <= row[V1])
 
 
 def count_inclined_planes(row: np.ndarray) -> int:
-    """How many inclined planes a volume has."""
+    """Count the inclined planes of a volume."""
     return int(np.isfinite(row[OFFSET0 : OFFSET0 + N_SIDES]).sum())
 
 
 def extend_to_corners(row: np.ndarray, corners: np.ndarray) -> Iterator[np.ndarray]:
-    """The volume drawn out on one side to corners (c, 2) of the outline, in its own axes, with a plane from there as steep as its others."""
+    """Yield the volume drawn out on one side to corners (c, 2) of the outline.
+
+    The corners are in its own axes. A plane rises from there, as steep as its others.
+    """
     for edge in range(N_SIDES):
         axis, sign = edge // 2, 1.0 if edge % 2 else -1.0
         lower, upper = row[V0 - 2 * axis], row[V1 - 2 * axis]
@@ -90,16 +103,18 @@ def extend_to_corners(row: np.ndarray, corners: np.ndarray) -> Iterator[np.ndarr
             corners[:, 1 - axis] < upper + CORNER_MARGIN_M
         )
         out = sign * (corners[is_beside, axis] - row[U0 + edge])
-        for step in np.unique(np.round(out[(out > LEAST_M) & (out < FURTHEST_M)], 1)).tolist()[
-            -MOST_STEPS:
-        ]:
+        steps = np.unique(np.round(out[(out > LEAST_OUT_M) & (out < FURTHEST_M)], 1)).tolist()
+        for step in steps[-MOST_STEPS:]:
             trial = row.copy()
             trial[U0 + edge] += sign * step
             yield add_plane(trial, edge)
 
 
 def add_plane(row: np.ndarray, edge: int) -> np.ndarray:
-    """The volume with a plane from the side `edge`, which rises as its others do from as high, where it has none there."""
+    """Add a plane from the side `edge`, if the volume has none there.
+
+    It is as steep as its others, and its eave as high.
+    """
     planes = [k for k in range(N_SIDES) if np.isfinite(row[OFFSET0 + k])]
     if edge not in planes:
         distances = row[[U0, U1, V0, V1]] * (1.0, -1.0, 1.0, -1.0)

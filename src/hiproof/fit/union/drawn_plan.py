@@ -1,4 +1,4 @@
-"""The plan that a roof under construction would be drawn with: places, edges, corners, planes."""
+"""Draw the plan of a roof under construction: places, edges, corners and planes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from .plan import Plan
 from .scene import Scene
 from .volumes import DIRECTION
 
-STRAIGHT_CORNER_M = 0.02  # m; a corner nearer to the line between its two neighbours is none
-PLAN_REACH_M = 0.0012  # m; as a solid's plan is arranged at the first attempt
-EQUAL_PLANE = 1e-5  # rise over run, and m: planes and slopes nearer to each other are one
+STRAIGHT_CORNER_M = 0.02  # A corner nearer (m) to the line between its two neighbours is none.
+PLAN_REACH_M = 0.0012  # Reach (m) as in the first attempt to arrange a solid's plan.
+EQUAL_PLANE = 1e-5  # Planes and slopes nearer to each other (m, rise over run) are one.
 
 
 @dataclass(frozen=True)
 class DrawnPlan:
     """A roof's plan in local coordinates.
 
-    `places` (m, 2) are its vertices; `edges` (e, 2) their numbers and `beside` (e, 2) the numbers
-    of the planes left and right of each, -1 outside. `planes` (p, 3) give heights of local x, y, 1;
-    `owner` (p, 2) says whose plane that is: the volume's number, and the plane's in it. `corners`
-    counts the roof's corners at all levels, straight ones left out.
+    `places` (m, 2) are its vertices. `edges` (e, 2) are their numbers, and `beside` (e, 2) the
+    numbers of the planes left and right of each, -1 outside. `planes` (p, 3) give heights of local
+    x, y, 1. `owner` (p, 2) are the numbers of a plane's volume and of the plane in it. `corners` is
+    the number of the roof's corners at all levels, without straight ones.
     """
 
     places: np.ndarray
@@ -43,12 +43,15 @@ class DrawnPlan:
 
     @property
     def visible_planes(self) -> np.ndarray:
-        """The numbers of the planes that show."""
+        """The numbers of the visible planes."""
         return np.unique(self.beside[self.beside >= 0])
 
     @property
     def gaps(self) -> np.ndarray:
-        """How far apart (m) the planes beside each edge are at its ends (e, 2), or infinite."""
+        """How far apart (m) the planes beside each edge are at its ends (e, 2).
+
+        It is infinite at the outline.
+        """
         left, right = self.planes[self.beside.T]
         at = np.ones((len(self.edges), 2, 3))
         at[..., :2] = self.places[self.edges]
@@ -64,7 +67,10 @@ def make_part(
     plan: Plan,
     scene: Scene,
 ) -> tuple[Part, list[tuple[int, int]]]:
-    """All volumes over their `regions` as one part, and whose its planes are: volume, plane."""
+    """Return all volumes over their `regions` as one part, and its planes' owners.
+
+    An owner is a volume's number and a plane's.
+    """
     pieces, owner = [], []
     for k, polygons in enumerate(regions):
         if polygons:
@@ -79,7 +85,7 @@ def make_part(
 def draw_plan(
     part: Part, owner: list[tuple[int, int]], outline: shapely.Polygon
 ) -> DrawnPlan | None:
-    """Draw a part whose planes have these owners; None where its pieces make no plan."""
+    """Draw a part whose planes have these owners, None if its pieces make no plan."""
     roof = Roof((part,), outline, LocalFrame(np.zeros(3)))
     options = ComposeSettings()
     try:
@@ -91,7 +97,7 @@ def draw_plan(
 
 
 def make_drawn_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan | None:
-    """The plan of `cells`, in metres; None where a plane is in it that no volume owns."""
+    """Make the plan of `cells`, in metres, None if no volume owns one of its planes."""
     split = split_at_crossings(
         cells.xy, cells.edges, cells.side, grid_planes, PLAN_REACH_M / GRID_M
     )
@@ -108,7 +114,7 @@ def make_drawn_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnP
 
 
 def count_corners(ends: np.ndarray, vertices: np.ndarray) -> int:
-    """Count the vertices (n, 3) at the `ends` (m, 2) of edges that are not straight between two."""
+    """Count the vertices (n, 3) at the `ends` (m, 2) of edges that bend an edge."""
     starts, other = ends[ends[:, 0] != ends[:, 1]].T
     size = len(vertices)
     pairs = np.unique(np.minimum(starts, other) * size + np.maximum(starts, other))
@@ -127,7 +133,7 @@ def count_corners(ends: np.ndarray, vertices: np.ndarray) -> int:
 
 
 def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
-    """Count planes (k, 3), those that are one once only, and their slopes other than level.
+    """Count planes (k, 3) that differ, and their slopes other than level.
 
     `turns` (k, 2) are cosine and sine of the direction in whose axes each is given.
     """
@@ -142,7 +148,10 @@ def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
 
 
 def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
-    """Planes (k, 3) of local x, y, 1 from those in axes turned by `turn` from the plan's."""
+    """Return planes (k, 3) of local x, y, 1 from those in axes turned from the plan's.
+
+    `turn` has cosine and sine of the angle.
+    """
     c, s = turn
     gradients = rows[:, :2] @ np.array([[c, s], [-s, c]]) @ plan.frame.rotation
     return np.column_stack([gradients, rows[:, 2] - gradients @ plan.frame.origin[:2]])

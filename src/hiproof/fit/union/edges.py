@@ -1,7 +1,7 @@
-"""The edges of a volume's rectangle: each moved to where the objective is lowest. Compiled.
+"""Move the edges of rectangles to where the objective is lowest. Compiled.
 
-How the misfit depends on one edge is a running sum over the points in order of their distance; only the steps that a move can
-change are charged anew, and only where the rest leaves room for a gain.
+The misfit depends on one edge as a running sum over the points in order of their distance. Only the
+steps that a move can change are charged anew, and only where the misfit leaves room for a gain.
 """
 
 from __future__ import annotations
@@ -25,26 +25,28 @@ from .volumes import (
     price_volume,
 )
 
-MIN_SIDE_M = 0.8  # m; a narrower volume is no part of a roof but a gutter or a parapet
-BETWEEN_M = 0.4  # how far an edge may go to a place midway between points,
-SMALL_REACH_M = (
-    1.0  # once it is settled to within this: in the search it would rather stay on a line
-)
-BEYOND_OUTLINE_M = 0.6  # an edge outside the outline by so much does not show
-VERTEX_REACH_M = 1.5  # m within which corners of the outline are places to put an edge
-SMALL_STEPS, SMALL_STEP_M = (
-    4,
-    0.1,
-)  # steps tried to either side of where an edge lies, and m of a step
-MOVE_TOUCH_M = 0.04  # m within which two volumes count as touching
-EQUAL_PLACE_M = 1e-3  # places nearer than this are one: of corners of the outline and grid lines at them the corner, which comes first
-NO_GAIN = 1e-6  # of the objective; numerically none
-EVERYWHERE = 60.0  # m: no edge is further from where it may go
+MIN_SIDE_M = 0.8  # A narrower volume (m) is no part of a roof but a gutter or a parapet.
+BETWEEN_M = 0.4  # Distance (m) that an edge may move to a place midway between points.
+# It does so only within this reach (m): in the search, an edge should stay on a line.
+SMALL_REACH_M = 1.0
+BEYOND_OUTLINE_M = 0.6  # An edge so far (m) outside the outline is not visible.
+VERTEX_REACH_M = 1.5  # Corners of the outline within this distance (m) are places for an edge.
+SMALL_STEPS = 4  # Steps tried to either side of an edge.
+SMALL_STEP_M = 0.1  # Length of such a step (m).
+MOVE_TOUCH_M = 0.04  # Distance (m) within which two volumes touch.
+# Places nearer than this (m) are one. Of a corner of the outline and a grid line at it, the corner
+# comes first.
+EQUAL_PLACE_M = 1e-3
+NO_GAIN = 1e-6  # Change of the objective that is numerically none.
+EVERYWHERE = 60.0  # Reach (m) beyond which no place for an edge lies.
 
 
 @compiled
 def move_edges(volumes, scene, k, value, reach, context):
-    """Move each edge of volume k (in place) by at most `reach` to the place of the lowest objective; returns that."""
+    """Move each edge of volume k to its best place within `reach`, in place.
+
+    Returns the objective.
+    """
     everywhere, roof_without = (
         compute_roof_everywhere(volumes, scene.U, scene.V, k, context),
         context.roof_without,
@@ -76,9 +78,8 @@ def move_edges(volumes, scene, k, value, reach, context):
             find_place_between(distance, gains, sign, start) if reach < SMALL_REACH_M else start
         )
         best, best_place = value - NO_GAIN, start
-        bounds = np.full(
-            m + 1, np.inf
-        )  # what the roof costs at each place before its edges are charged
+        # The bounds are the cost of the roof at each place before its edges are charged.
+        bounds = np.full(m + 1, np.inf)
         for q in range(m + 1):
             t = places[q]
             if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
@@ -109,8 +110,11 @@ def move_edges(volumes, scene, k, value, reach, context):
 
 @compiled
 def sum_outward(volumes, scene, k, edge, gain, bare):
-    """Points and ghosts that an edge of volume k passes on its way out from the opposite one, in that order: their distances along
-    the way, ascending, and the sums of `gain` and of `bare` up to each."""
+    """Sum up what an edge of volume k gains on its way out from the opposite one.
+
+    Returns the distances of the points and unobserved cells that it passes, ascending, and the sums
+    of `gain` and of `bare` up to each.
+    """
     direction = int(volumes[k, DIRECTION])
     u, v, order = scene.U[direction], scene.V[direction], scene.order[direction, edge // 2]
     x, across = (u, v) if edge < 2 else (v, u)
@@ -144,9 +148,10 @@ def sum_outward(volumes, scene, k, edge, gain, bare):
 
 @compiled
 def find_place_between(distance, gains, sign, start):
-    """The place near an edge's `start`, midway between two points, where the misfit is lowest.
+    """Return the place near `start`, midway between two points, of the lowest misfit.
 
-    `distance` (m,) of the points along the edge's way out, ascending, and `gains` (m,), the misfit up to each of them.
+    `distance` (m,) are the points' distances along the edge's way out, ascending, and `gains` (m,)
+    is the misfit up to each of them.
     """
     first = np.searchsorted(distance, sign * start - BETWEEN_M)
     last = np.searchsorted(distance, sign * start + BETWEEN_M)
@@ -159,12 +164,15 @@ def find_place_between(distance, gains, sign, start):
 
 @compiled
 def list_edge_places(volumes, scene, k, edge):
-    """Where an edge may go: corners of the outline, grid lines, small steps, other volumes' edges and ridges, outside."""
+    """List the places for an edge, and count them.
+
+    They are corners of the outline, grid lines, small steps, other volumes' edges and ridges, and a
+    place outside.
+    """
     direction, axis, start = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     lines, vertices = scene.lines[direction, axis], scene.vertices[direction, axis]
-    places = np.empty(
-        len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2
-    )  # one is the caller's
+    # One place is for the caller.
+    places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2)
     m, last = 0, lines[0]
     for x in vertices:
         if abs(x - start) < VERTEX_REACH_M:
@@ -194,7 +202,7 @@ def list_edge_places(volumes, scene, k, edge):
 
 @compiled
 def is_repeated(places, q):
-    """Whether the q-th place is one of those before it."""
+    """Return whether the q-th place is one of those before it."""
     for p in range(q):
         if abs(places[p] - places[q]) < EQUAL_PLACE_M:
             return True
@@ -203,8 +211,11 @@ def is_repeated(places, q):
 
 @compiled(allocates=False)
 def charge_edges(volumes, walls, direction, charge, boxes):
-    """Fill `charge` (k, 4) with the cost of every edge, and `boxes` (k, 4, 4) with its bounds in the axes of `direction`, none where it
-    lies outside the outline."""
+    """Fill `charge` (k, 4) with the price of every edge, and `boxes` (k, 4, 4).
+
+    Boxes are the edges' bounds in the axes of `direction`, empty where an edge lies outside the
+    outline.
+    """
     c, s = walls.turn[direction, 0], walls.turn[direction, 1]
     charge[:] = 0.0
     for j in range(1, len(volumes)):
@@ -215,7 +226,7 @@ def charge_edges(volumes, walls, direction, charge, boxes):
             boxes[j, e, 0] = boxes[j, e, 2] = np.inf
             boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
             if not locate_line(walls, other, e // 2, volumes[j, U0 + e])[0]:
-                continue  # it shows nowhere, whatever moves beside it
+                continue  # it is never visible, whatever moves beside it
             charge[j, e] = price_edge(volumes, walls, j, e)
             for end in range(2):
                 a = volumes[j, U0 + e] if e < 2 else volumes[j, U0 + end]
@@ -227,9 +238,10 @@ def charge_edges(volumes, walls, direction, charge, boxes):
 
 @compiled(allocates=False)
 def charge_move(volumes, walls, k, edge, t, trial, best, charge, boxes, touched):
-    """`trial` and all edges' costs were edge `edge` of volume k at `t`; given up as soon as it is not below `best`.
+    """Add the price of all edges to `trial`, with edge `edge` of volume k at `t`.
 
-    Which edges (k, 4) the move touches goes to `touched`.
+    It stops as soon as the sum is not below `best`. `touched` is room for which edges (k, 4) the
+    move touches.
     """
     start = volumes[k, U0 + edge]
     move_low, move_high = min(start, t) - MOVE_TOUCH_M, max(start, t) + MOVE_TOUCH_M

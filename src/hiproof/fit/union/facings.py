@@ -1,7 +1,7 @@
-"""Moves that turn planes: square to walls that are not quite along the axes, or freely as their points say. Compiled.
+"""Turn planes square to walls, or freely as their points suggest. Compiled.
 
-All functions take volumes (k, COLUMNS) and the objective's value, and return the better of what they got and what they found.
-What is `around` volume k they leave as it is.
+All functions take volumes (k, COLUMNS) and the objective's value, and return the better of these
+and of what they find. The `context` of volume k does not change.
 """
 
 from __future__ import annotations
@@ -28,15 +28,16 @@ from .volumes import (
     read_coefficients,
 )
 
-# turns of a plane towards what its points say; most of a turn, as rise over run along its edge
-MOST_TURNS, MOST_TURN = 4, 0.45
+MOST_TURNS = 4  # Turns of a plane towards what its points suggest.
+MOST_TURN = 0.45  # Largest turn, as rise over run along the plane's edge.
 
 
 @compiled
 def face_walls(volumes, scene, value, k, context):
-    """The two planes along each axis of volume k face along it or square to walls, each to one of `scene.leans`, or freely.
+    """Turn the two planes along each axis of volume k, each to the axis or a wall.
 
-    Where all walls are along the axes no other way is looked for.
+    Walls are those of `scene.leans`. Planes may also turn freely. Nothing else is tried if all
+    walls are along the axes.
     """
     for axis in range(2):
         walls = scene.leans[int(volumes[k, DIRECTION]), axis]
@@ -72,7 +73,10 @@ def face_walls(volumes, scene, value, k, context):
 
 @compiled
 def face_freely(volumes, scene, value, k, axis, context):
-    """The two planes along an axis of volume k face as their points say, where that is clearly better than any wall."""
+    """Turn the two planes along an axis of volume k as their points suggest.
+
+    They turn if that is clearly better than any wall.
+    """
     trial, limit = volumes.copy(), value - FREE_UNITS * scene.evidence
     for _ in range(MOST_TURNS):
         turns, middles = measure_turns(trial, scene, k, context)
@@ -88,13 +92,16 @@ def face_freely(volumes, scene, value, k, axis, context):
 
 @compiled
 def measure_turns(volumes, scene, k, context):
-    """By how much the lean of each inclined plane (4,) of volume k has to change for the points that it explains, and u, v (4, 2)
-    in the middle of these; in that of its rectangle where there are none."""
+    """Return how much the lean of each inclined plane (4,) of volume k should change.
+
+    It is that of the points that the plane explains. Also returns u, v (4, 2) in the middle of
+    these, or of the rectangle without points.
+    """
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v, c = scene.U[direction], scene.V[direction], read_coefficients(volumes, k)
-    sums = np.zeros(
-        (N_SIDES, 6)
-    )  # of 1, u, v, what is left, and of y^2 and what is left times y, y along the plane's eave
+    # These are sums of 1, u, v, the residual, y^2 and the residual times y. y runs along the
+    # plane's eave.
+    sums = np.zeros((N_SIDES, 6))
     for i in range(n):
         h, plane = find_lowest_plane(c, u[i], v[i])
         residual = scene.z[i] - h
@@ -124,7 +131,10 @@ def measure_turns(volumes, scene, k, context):
 
 @compiled
 def turn_plane(row, plane, lean, middle):
-    """Make a plane of a volume lean by `lean`, in place, as high at `middle` (u, v) as it was; one that is not there stays so."""
+    """Make a plane of a volume lean by `lean`, in place, as high at `middle`.
+
+    A plane that is absent stays absent.
+    """
     if row[OFFSET0 + plane] == np.inf:
         return
     across = middle[1] if plane < 2 else middle[0]

@@ -1,8 +1,9 @@
-"""The planes of every volume fitted to all points over which it shows, along its sides and as regular as the points allow.
+"""Fit the planes of every volume to all points over which it is visible.
 
-Each inclined plane is z = c + s d, with d the distance from the line of its side. Two choices are made by what the points say:
-which way the planes face (along the volume's axes, or square to the sides, which seldom are quite at right angles), and whether
-the eaves on the outline are at one height. Everything is linear in c and s, so each choice is one re-weighted least squares.
+Each inclined plane is z = c + s d, with d the distance from the line of its side. Two choices are
+made by the points: which way the planes face (along the volume's axes, or square to the sides,
+which seldom are quite at right angles), and whether the eaves on the outline are at one height.
+Everything is linear in c and s, so each choice is one re-weighted least squares.
 """
 
 from __future__ import annotations
@@ -32,48 +33,54 @@ from .volumes import (
     compute_roof_heights,
 )
 
-ROUNDS = 3  # of fitting and re-weighting
-FEWEST_FITTED_POINTS = 6  # points; with fewer a volume's planes stay as the search found them
-FACING_GAIN = (
-    0.1  # units: planes face other than along the axes only where that explains so much more
-)
-LEVEL_SLACK = 0.004  # of the points: what level eaves, or what volumes agree in, may leave unexplained besides the parameters saved
-RISE_SIGN = (1.0, -1.0, 1.0, -1.0)  # the plane from the left rises to +u, from the right to -u, ...
-FLATTEST = 0.02  # rise over run; a flatter plane does not tell which way it faces
-SQUARE_LEAN = 1e-3  # a side that leans less is square to the others
+ROUNDS = 3  # Rounds of fitting and re-weighting.
+FEWEST_FITTED_POINTS = 6  # With fewer points, a volume's planes stay as the search left them.
+# Planes face other than along the axes only if that explains so much more (units).
+FACING_GAIN = 0.1
+# Share of the points that level eaves, or what volumes agree in, may leave unexplained besides the
+# parameters saved.
+LEVEL_SLACK = 0.004
+# The plane from the left rises to +u, the one from the right to -u, and so on.
+RISE_SIGN = (1.0, -1.0, 1.0, -1.0)
+FLATTEST = 0.02  # A flatter plane (rise over run) has no clear direction.
+SQUARE_LEAN = 1e-3  # A side that leans less is square to the others.
 
 
-class Wall(NamedTuple):
-    """A wall of the outline in a volume's axes: the way it looks out (rad), and how far out that way from the origin it lies (m)."""
+class OutlineWall(NamedTuple):
+    """A wall of the outline in a volume's axes.
+
+    `facing` is the way that it faces outwards (rad), and `offset` how far out that way from the
+    origin it lies (m).
+    """
 
     facing: float
     offset: float
 
     @property
     def depth(self) -> np.ndarray:
-        """How deep inside of it places lie: what u, v, 1 are multiplied with (3,)."""
+        """The factors (3,) of u, v, 1 that give the depth of a place inside the wall."""
         return np.array([-math.cos(self.facing), -math.sin(self.facing), self.offset])
 
 
 @dataclass(frozen=True)
 class Planes:
-    """A volume's planes by place (left, right, front, back, top, over each of `walls`): z = a u + b v + c as rows (k, 3), NaN where it
-    has none.
+    """A volume's planes by place: left, right, front, back, top, over each of `walls`.
 
-    `cost` is that of their points, `price` that of the parameters of those over walls. They are `design` (k, 3, p) times p unknowns with
-    this `covariance` (p, p).
+    `rows` (k, 3) are a, b, c of z = a u + b v + c, NaN where it has none. `cost` is that of their
+    points, `price` that of the parameters of those over walls. The rows are `design` (k, 3, p)
+    times p unknowns with this `covariance` (p, p).
     """
 
     rows: np.ndarray
     cost: float
     design: np.ndarray
     covariance: np.ndarray
-    walls: tuple[Wall, ...] = ()
+    walls: tuple[OutlineWall, ...] = ()
     price: float = 0.0
 
     @property
     def inclined(self) -> int:
-        """How many planes rise from sides."""
+        """The number of planes that rise from sides."""
         return int(np.isfinite(self.rows[:LEVEL, 2]).sum())
 
     @property
@@ -84,7 +91,7 @@ class Planes:
 
 
 def find_visible_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
-    """The points (m,) over which each volume shows, by their numbers."""
+    """Return the numbers of the points (m,) over which each volume is visible."""
     n = scene.n
     _, top = compute_roof_heights(
         volumes, np.ascontiguousarray(scene.U[:, :n]), np.ascontiguousarray(scene.V[:, :n])
@@ -93,7 +100,7 @@ def find_visible_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
 
 
 def take_points(volume: np.ndarray, members: np.ndarray, scene: Scene) -> np.ndarray:
-    """The points `members` (m,) in a volume's own axes: u, v, z (3, m)."""
+    """Return the points `members` (m,) in a volume's own axes: u, v, z (3, m)."""
     direction = int(volume[DIRECTION])
     return np.array([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
 
@@ -101,7 +108,7 @@ def take_points(volume: np.ndarray, members: np.ndarray, scene: Scene) -> np.nda
 def fit_volume_planes(
     volume: np.ndarray, sides: list[Side], scene: Scene, members: np.ndarray
 ) -> Planes:
-    """One volume's planes from the points `members` (m,) over which it shows."""
+    """Fit one volume's planes to the points `members` (m,) over which it is visible."""
     numbers = np.flatnonzero(volume[OFFSET0 : OFFSET0 + LEVEL + 1] < np.inf).tolist()
     points = take_points(volume, members, scene)
     start = read_planes(volume, numbers, points, scene)
@@ -136,7 +143,7 @@ def fit_volume_planes(
 
 
 def design_pyramid(sides: list[Side], leans: tuple[float, ...]) -> np.ndarray:
-    """The four planes (5, 3, 2) of a pyramid over the sides as linear in its eave's height and its rise."""
+    """Return the design (5, 3, 2) of a pyramid over the sides: eave's height and rise."""
     design = np.zeros((5, 3, 2))
     for k in range(N_SIDES):
         half = 0.5 * (sides[k | 1].offset - sides[k & 2].offset)
@@ -148,7 +155,7 @@ def design_pyramid(sides: list[Side], leans: tuple[float, ...]) -> np.ndarray:
 
 
 def read_planes(volume: np.ndarray, numbers: list[int], points: np.ndarray, scene: Scene) -> Planes:
-    """The planes that the search left, along the axes, over their `points` (3, m)."""
+    """Return the planes that the search left, along the axes, over `points` (3, m)."""
     rows = np.full((N_SIDES + 1, 3), np.nan)
     for k in numbers:
         rows[k] = (0.0, 0.0, volume[OFFSET0 + k])
@@ -160,7 +167,7 @@ def read_planes(volume: np.ndarray, numbers: list[int], points: np.ndarray, scen
 
 
 def read_volume_planes(volume: np.ndarray, scene: Scene) -> Planes:
-    """The planes of a volume as the search left them."""
+    """Return the planes of a volume as the search left them."""
     numbers = np.flatnonzero(np.isfinite(volume[OFFSET0 : OFFSET0 + LEVEL + 1])).tolist()
     return read_planes(volume, numbers, np.zeros((3, 0)), scene)
 
@@ -168,8 +175,11 @@ def read_volume_planes(volume: np.ndarray, scene: Scene) -> Planes:
 def list_facings(
     found_leans: np.ndarray, sides: list[Side], numbers: list[int], pair: int
 ) -> list[tuple[float, float]]:
-    """Ways (2 leans each) for planes `pair` and the next to face other than along the axis: as `found_leans` (4,), square to their
-    sides or both to one of them. A plane that is not `numbers` has no lean."""
+    """List ways for planes `pair` and the next to face other than along the axis.
+
+    A way has two leans: as `found_leans` (4,), square to their sides, or both square to one of
+    them. A plane that is not among `numbers` has no lean.
+    """
     lean, other = (
         0.0 if abs(side.lean) < SQUARE_LEAN else side.lean for side in sides[pair : pair + 2]
     )
@@ -188,7 +198,7 @@ def list_facings(
 def square_leans(
     sides: list[Side], anchored: tuple[int, ...], facing: tuple[float, ...]
 ) -> tuple[float, ...]:
-    """The leans with those of the `anchored` sides square to their own lines."""
+    """Return the leans with those of the `anchored` sides square to their own lines."""
     leans = list(facing)
     for k in anchored:
         lean = 0.0 if abs(sides[k].lean) < SQUARE_LEAN else sides[k].lean
@@ -203,7 +213,11 @@ def design_planes(
     numbers: list[int],
     level: tuple[int, ...],
 ) -> np.ndarray:
-    """The planes (5, 3, p) as linear in p unknowns: an offset each, one for all sides that are `level`; slopes as tied."""
+    """Return the design (5, 3, p) of a volume's planes.
+
+    Its p unknowns are an offset for each plane, one offset for all sides that are `level`, and the
+    slopes, tied as the volume's.
+    """
     groups = group_slopes(volume)
     offsets = [place for place in numbers if place not in level]
     slopes = list(dict.fromkeys(groups[place] for place in numbers if place < LEVEL))
@@ -221,14 +235,17 @@ def design_planes(
 
 
 def group_slopes(volume: np.ndarray) -> list[int]:
-    """Which slopes are one under the volume's tie."""
+    """Return which slopes are equal under the volume's tie."""
     if volume[TIE] == ALL_EQUAL:
         return [0, 0, 0, 0]
     return [0, 0, 2, 2] if volume[TIE] == OPPOSITE else [0, 1, 2, 3]
 
 
 def fit_design(start: Planes, design: np.ndarray, points: np.ndarray, scene: Scene) -> Planes:
-    """The planes of `design` (5, 3, p) by biweighted least squares from `start` on `points` (3, m); `start` where they are improper."""
+    """Fit the planes of `design` (5, 3, p) to `points` (3, m) from `start`.
+
+    Returns `start` if they are improper.
+    """
     rows, covariance, cost = solve_least_squares(
         start.rows, design, points, scene.dead, scene.width
     )
@@ -237,7 +254,11 @@ def fit_design(start: Planes, design: np.ndarray, points: np.ndarray, scene: Sce
 
 @compiled
 def solve_least_squares(rows, design, points, dead, width):
-    """Rows (5, 3), the unknowns' covariance (p, p) and the points' cost; unknowns that no point determines stay as they were."""
+    """Solve biweighted least squares for planes, a few rounds from `rows`.
+
+    Returns rows (5, 3), the unknowns' covariance (p, p) and the points' cost. Unknowns that no
+    point determines stay as they were.
+    """
     unity, is_present = np.zeros((len(rows), 3, 3)), np.isfinite(rows[:, 2])
     for k in range(len(rows)):
         for i in range(3):
@@ -262,7 +283,10 @@ def solve_least_squares(rows, design, points, dead, width):
 
 @compiled
 def form_normal_equations(design, moments, products, is_present):
-    """The matrix (p, p) and right side (p,) of least squares for planes (5, 3) that are `design` (5, 3, p) times p unknowns."""
+    """Return the matrix (p, p) and right side (p,) of least squares for planes (5, 3).
+
+    The planes are `design` (5, 3, p) times p unknowns.
+    """
     size = design.shape[2]
     matrix, right = np.zeros((size, size)), np.zeros(size)
     for k in range(len(design)):
@@ -280,7 +304,10 @@ def form_normal_equations(design, moments, products, is_present):
 
 @compiled
 def invert_matrix(matrix, ridge):
-    """The inverse of a symmetric matrix (p, p) with no negative eigenvalue, `ridge` added along its diagonal (Gauss and Jordan)."""
+    """Invert a symmetric matrix (p, p), none of whose eigenvalues is negative.
+
+    It uses the method of Gauss and Jordan. `ridge` is added along the diagonal.
+    """
     size = len(matrix)
     rows, inverse = matrix + ridge * np.eye(size), np.eye(size)
     for k in range(size):
@@ -299,7 +326,7 @@ def invert_matrix(matrix, ridge):
 
 @compiled
 def multiply(matrix, vector):
-    """Matrix (m, p) times vector (p,), without a library of linear algebra to load."""
+    """Multiply a matrix (m, p) and a vector (p,), without a library to load."""
     product = np.zeros(len(matrix))
     for i in range(len(matrix)):
         for j in range(len(vector)):
@@ -309,7 +336,10 @@ def multiply(matrix, vector):
 
 @compiled
 def find_lowest_row(rows, u, v):
-    """Height at u, v of the lowest of planes (5, 3), NaN where there is none, and its index."""
+    """Return the height at u, v of the lowest of planes (5, 3), and its index.
+
+    Planes that are absent are NaN.
+    """
     best, plane = np.inf, 0
     for k in range(len(rows)):
         h = rows[k, 0] * u + rows[k, 1] * v + rows[k, 2]
@@ -320,10 +350,10 @@ def find_lowest_row(rows, u, v):
 
 @compiled
 def sum_moments(rows, points, scale):
-    """Of `points` (3, m) about the planes (5, 3), each with a biweight of that scale and with the plane that is lowest there:
+    """Sum up the moments of `points` (3, m) about the lowest of the planes (5, 3).
 
-    sums (5, 3, 3) of the products of u, v, 1, and (5, 3) of these with z; the sum of the weights, and of the weighted squares
-    of what is left.
+    Each has a biweight of that scale. Returns sums (5, 3, 3) of the products of u, v, 1, and (5, 3)
+    of these with z, the sum of the weights, and that of the weighted squared residuals.
     """
     moments, products = np.zeros((len(rows), 3, 3)), np.zeros((len(rows), 3))
     total = misfit = 0.0
@@ -346,7 +376,7 @@ def sum_moments(rows, points, scale):
 
 @compiled
 def sum_point_costs(rows, points, dead, width):
-    """What `points` (3, m) cost under the planes (5, 3)."""
+    """Sum up what `points` (3, m) cost under the planes (5, 3)."""
     total = 0.0
     for i in range(points.shape[1]):
         h, _ = find_lowest_row(rows, points[0, i], points[1, i])
@@ -354,8 +384,11 @@ def sum_point_costs(rows, points, dead, width):
     return total
 
 
-def is_proper(rows: np.ndarray, walls: tuple[Wall, ...] = ()) -> bool:
-    """Whether every inclined plane rises from its own side or wall, neither too flat nor too steep."""
+def is_proper(rows: np.ndarray, walls: tuple[OutlineWall, ...] = ()) -> bool:
+    """Return whether every inclined plane rises from its own side or wall.
+
+    It is neither too flat nor too steep.
+    """
     left, right, front, back = rows[:N_SIDES, :2].tolist()
     slopes = [left[0], -right[0], front[1], -back[1]]
     if walls:
@@ -363,6 +396,6 @@ def is_proper(rows: np.ndarray, walls: tuple[Wall, ...] = ()) -> bool:
     return all(FLATTEST < slope < SLOPE_HIGH for slope in slopes if math.isfinite(slope))
 
 
-def measure_slopes(walls: tuple[Wall, ...], rows: np.ndarray) -> list[float]:
-    """By how much planes (c, 3) rise from their walls."""
+def measure_slopes(walls: tuple[OutlineWall, ...], rows: np.ndarray) -> list[float]:
+    """Return by how much planes (c, 3) rise from their walls."""
     return [float(row[:2] @ wall.depth[:2]) for wall, row in zip(walls, rows, strict=True)]

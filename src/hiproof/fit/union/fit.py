@@ -1,4 +1,4 @@
-"""The outcome of fitting a building."""
+"""Describe the outcome of fitting a building."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from ...model import Part
 
 @dataclass(frozen=True)
 class BuildingFit:
-    """Outcome of `fit_building`, in the frame of the points given.
+    """The outcome of `fit_building`, in the frame of the given points.
 
-    `roof_parts` cover `outline` and may overlap: the roof is their max. `objective` is in points (see the package), `points_used`
-    the points inside the outline that counted, `unexplained` the share of them further than the tolerance from the roof.
+    `roof_parts` cover `outline` and may overlap: the roof is their max. `objective` is in points,
+    `points_used` is the number of points inside the outline that counted, and `unexplained` the
+    share of them further than the tolerance from the roof.
     """
 
     roof_parts: tuple[Part, ...]

@@ -1,7 +1,7 @@
-"""Passes after the search on a large roof: on some neighbouring volumes after others, seen with what lies around them.
+"""Run the passes after the search on groups of volumes of a large roof.
 
-A pass over all volumes at once costs their number times all points. In a window around a few of them it costs what a
-house costs. What does not belong to the group returns as it was.
+A pass over all volumes at once costs their number times all points. In a window around a few of
+them it costs as much as on a house. What does not belong to the group returns as it was.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from .scene import Scene
 from .sides import Side
 from .unite import DrawnRoof, OutlineEnds, draw_roof, select_ends
 from .volumes import U0, V1
-from .whole import PLACE_COLUMNS, Whole
+from .whole import POSITION, Whole
 from .window import forget_digests, open_window, restore_volumes
 
-MOST_AT_ONCE = 24  # volumes that are looked at all at once, as those of a house
-GROUP = 8  # volumes of a group at most
-GROUP_MARGIN_M = 2.0  # m around a group that its window shows
-GROUP_POINTS = 6000  # of a group's window at most
+MOST_AT_ONCE = 24  # Most volumes that are changed all at once, as those of a house.
+GROUP = 8  # Most volumes of a group.
+GROUP_MARGIN_M = 2.0  # Distance (m) around a group that its window shows.
+GROUP_POINTS = 6000  # Most points of a group's window.
 
-# Volumes, what is seen of them, and the numbers of those that may change (None: all): the volumes changed.
+# A change of volumes in a scene. It takes the numbers of those that may change (None: all).
 Pass = Callable[[np.ndarray, Scene, list[int] | None], np.ndarray]
 
 
 def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarray:
-    """Let a pass change the volumes: all at once where they are few, else group by group."""
+    """Let a pass change the volumes: all at once if they are few, else group by group."""
     if len(volumes) <= MOST_AT_ONCE:
         return change(volumes, site.scene, None)
     whole = Whole(site.scene, site.plan, site.outline, volumes)
     for places in [
-        [whole.volumes[k, PLACE_COLUMNS].tobytes() for k in group] for group in group_volumes(whole)
+        [whole.volumes[k, POSITION].tobytes() for k in group] for group in group_volumes(whole)
     ]:
         group = [k for k in map(whole.find, places) if k is not None]
         view = open_group(whole, group) if group else None
@@ -53,12 +53,12 @@ def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarr
 
 
 def group_volumes(whole: Whole) -> list[list[int]]:
-    """The numbers of all volumes but the base in groups of neighbours: halved along the longer axis until small."""
+    """Group the numbers of all volumes but the base: halved along the longer axis."""
     if len(whole.volumes) < 2:
         return []
     shows = whole.boxes[:, 0] <= whole.boxes[:, 1]
     shows[0] = False
-    boxes = np.where(shows[:, None], whole.boxes, 0.0)  # NOWHERE has no middle
+    boxes = np.where(shows[:, None], whole.boxes, 0.0)  # EMPTY_BOX has no middle
     middles = 0.5 * (boxes[:, [0, 2]] + boxes[:, [1, 3]])
     return list(halve(np.flatnonzero(shows), middles))
 
@@ -78,7 +78,10 @@ def frame_group(whole: Whole, group: Sequence[int]) -> Box:
 
 
 def open_group(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | None:
-    """The scene around a group, and the numbers of the base and of all volumes that reach into it."""
+    """Return the scene around a group, and the numbers of the volumes in it.
+
+    The base is among them.
+    """
     box = frame_group(whole, group)
     scene = open_window(whole, box, GROUP_POINTS)
     return None if scene is None else (scene, [0, *whole.list_volumes(box)])
@@ -87,10 +90,10 @@ def open_group(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | 
 def draw_in_groups(
     volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
 ) -> tuple[DrawnRoof, Agreement]:
-    """The volumes with their sides and planes, and those that agree with their neighbours equal to these.
+    """Draw the volumes with sides and planes, equal where they agree with neighbours.
 
-    Planes `cache` of volumes seen all at once are not fitted again. Of volumes that are not looked at
-    all at once no common unknowns are known: their agreement has no members.
+    Planes in the `cache` are not fitted again if all volumes are drawn at once. Otherwise there are
+    no common unknowns: the agreement has no members.
     """
     if len(volumes) <= MOST_AT_ONCE:
         roof = draw_roof(volumes, ends, site.scene, cache)
@@ -126,7 +129,7 @@ def draw_in_groups(
 
 
 def fix_planes(planes: Planes) -> Planes:
-    """The planes without unknowns: others do not change them."""
+    """Return the planes without unknowns, so that others do not change them."""
     return replace(
         planes, design=np.zeros((*planes.design.shape[:2], 0)), covariance=np.zeros((0, 0))
     )

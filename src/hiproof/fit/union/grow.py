@@ -1,4 +1,8 @@
-"""From the base to a roof: volumes added where they gain most, and the first of them taken out in turn and their places grown anew."""
+"""Grow a roof from its base.
+
+Volumes are added where they gain most. Then the first of them are taken out in turn, and their
+places are grown anew.
+"""
 
 from __future__ import annotations
 
@@ -21,17 +25,21 @@ from .prices import REGROWN_UNITS
 from .scene import Scene
 from .volumes import N_SIDES, OFFSET0, SLOPE0, make_base
 
-MOST_ADDITIONS = 20  # tried for one building: a bound on time
-BASE_QUANTILE = (
-    0.02  # of the heights at which the base lies: below all roofs but not below a stray point
-)
-MOST_TYPICAL_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
-# of all moves: before a place is grown anew, where no candidate helps, at the end
-STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = 2, 2, 3
+MOST_ADDITIONS = 20  # Most additions tried for one building: a limit on time.
+# Quantile of the heights at which the base lies: below all roofs but not below a stray point.
+BASE_QUANTILE = 0.02
+# Most slopes tried for new ends and ties. They cover those of the candidates.
+MOST_TYPICAL_SLOPES = 5
+STARTING_ROUNDS = 2  # Rounds of all moves before a place is grown anew.
+STUCK_ROUNDS = 2  # Rounds of all moves when no candidate helps.
+FINAL_ROUNDS = 3  # Rounds of all moves at the end.
 
 
 def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
-    """Volumes (k, COLUMNS) and their objective: grown from the base, then each taken out in turn and its place grown anew."""
+    """Grow volumes (k, COLUMNS) from the base, and regrow the first of them.
+
+    Also returns their objective.
+    """
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
     base = make_base(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
     candidates = list_candidates(scene, np.arange(scene.n), effort.planes, effort)
@@ -43,7 +51,7 @@ def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
 
 
 def prepare_growth(scene: Scene, candidates: np.ndarray) -> GrowthGrid:
-    """The ground that a scene and the first candidates give."""
+    """Return the growth grid of a scene and its first candidates."""
     grids = make_grids(scene)
     cell_u = np.array([find_cells(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
     cell_v = np.array([find_cells(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
@@ -57,10 +65,11 @@ def regrow_volumes(
     candidates: np.ndarray,
     effort: Effort = HOUSE,
 ) -> tuple[np.ndarray, float]:
-    """The volumes with each of the first in turn taken out and what is missing grown anew, where that is clearly better.
+    """Take out each of the first volumes in turn, and grow anew what is missing.
 
-    The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
-    volume over both. Without it the others take the places that are theirs.
+    A change is kept if it is clearly better. The volume that gains most by itself comes first, and
+    what follows fits in around it: two hips of one pitch begin as one volume over both. Without it,
+    the others take their own places.
     """
     k, scene = min(len(volumes) - 1, effort.regrown), ground.scene
     while k > 0 and len(volumes) > 2:
@@ -85,8 +94,11 @@ def grow_volumes(
     effort: Effort,
     known_roof: tuple[int, float] = (0, 0.0),
 ) -> tuple[np.ndarray, float]:
-    """The volumes with more of them added, first of the `candidates`, then of what the points left unexplained speak for, as long as
-    that pays, or until there are as many as in a `known_roof` roof for as much."""
+    """Add volumes as long as that pays, and improve them.
+
+    They are first those of the `candidates`, then those that the unexplained points suggest. It
+    ends when the roof has as many volumes as `known_roof` and costs as much.
+    """
     scene, remaining, is_new = ground.scene, MOST_ADDITIONS, False
     while remaining > 0:
         n_before = remaining
@@ -109,7 +121,7 @@ def grow_volumes(
 
 
 def select_typical_slopes(candidates: np.ndarray) -> np.ndarray:
-    """At most MOST_TYPICAL_SLOPES slopes (m,) of the candidates, spread over all that they have."""
+    """Select at most MOST_TYPICAL_SLOPES slopes (m,), spread over the candidates' own."""
     slopes = candidates[:, SLOPE0 : SLOPE0 + N_SIDES][
         np.isfinite(candidates[:, OFFSET0 : OFFSET0 + N_SIDES])
     ]

@@ -1,4 +1,4 @@
-"""All moves in turn as long as they lower the objective, and the simplification under a more tolerant one. Compiled."""
+"""Make all moves in turn while they lower the objective, and simplify. Compiled."""
 
 from __future__ import annotations
 
@@ -26,17 +26,19 @@ from .objective import compute_objective
 from .prices import BEGIN_SHARE, BEGIN_UNITS
 from .volumes import DIRECTION, LEVEL, N_SIDES, OFFSET0, SETTLED, SLOPE0, U0, U1, V0, V1, is_fixed
 
-DIGEST_REACH_M = 0.5  # volumes nearer than this take part in each other's surroundings
-DIGEST_STEP = 0.02  # of metres and of slopes: changes smaller than this are none
-# of a digest: an odd number that spreads bits well, the bits that a float64 holds, and m above which all heights are one
-DIGEST_FACTOR, DIGEST_BITS, HIGH_ABOVE = 6_364_136_223_846_793_005, (1 << 52) - 1, 1e5
+DIGEST_REACH_M = 0.5  # Volumes nearer than this (m) belong to each other's surroundings.
+DIGEST_STEP = 0.02  # Smaller changes of metres and of slopes are none.
+DIGEST_FACTOR = 6_364_136_223_846_793_005  # An odd number that spreads bits well.
+DIGEST_BITS = (1 << 52) - 1  # The bits that a float64 holds exactly.
+HIGH_ABOVE = 1e5  # All larger heights (m) are one.
 
 
 @compiled
 def improve(volumes, scene, value, slopes, rounds):
-    """All moves in turn, for at most `rounds` rounds or until one brings next to nothing.
+    """Make all moves in turn, for at most `rounds` rounds.
 
-    A volume that no move changed is left alone until something around it is another.
+    It ends earlier if a round brings next to nothing. A volume that no move changed is left alone
+    until something around it changes.
     """
     for _ in range(rounds):
         value_before = value
@@ -64,14 +66,14 @@ def improve(volumes, scene, value, slopes, rounds):
 
 @compiled
 def change_structure(volumes, scene, value, k, slopes):
-    """All moves that change the planes of volume k, or join it to its neighbours."""
+    """Make all moves that change the planes of volume k or join it to its neighbours."""
     volumes, value = change_planes(volumes, scene, value, k, slopes)
     return join_neighbours(volumes, scene, value, k)
 
 
 @compiled
 def change_planes(volumes, scene, value, k, slopes):
-    """All moves that change which planes volume k has, how they are tied and where they face."""
+    """Make all moves that change which planes volume k has, their ties and facings."""
     context = measure_context(volumes, scene.U, scene.V, k)
     volumes, value = drop_planes(volumes, scene, value, k, np.inf, context)
     volumes, value = flatten(volumes, scene, value, k, context)
@@ -82,7 +84,7 @@ def change_planes(volumes, scene, value, k, slopes):
 
 @compiled
 def drop_base(volumes, scene, value):
-    """The base below everything, where the volumes can cover the outline by themselves."""
+    """Lower the base below everything, if the volumes can cover the outline alone."""
     if volumes[0, OFFSET0 + LEVEL] <= scene.low - 0.6 or not is_unsettled(volumes, 0):
         return volumes, value
     volumes[0, SETTLED] = digest_surroundings(volumes, 0)
@@ -96,13 +98,17 @@ def drop_base(volumes, scene, value):
 
 @compiled
 def is_unsettled(volumes, k):
-    """Whether volume k may change, and it or what is around it did since no move helped there."""
+    """Return whether volume k may change, and its surroundings did since the last try."""
     return not is_fixed(volumes, k) and volumes[k, SETTLED] != digest_surroundings(volumes, k)
 
 
 @compiled
 def digest_surroundings(volumes, k):
-    """A digest of volume k, of those whose rectangles meet its own or lie in another direction, and of the base's height."""
+    """Compute a digest of volume k and of what may meet it.
+
+    These are the base's height, and volumes whose rectangles meet its own or that have another
+    direction.
+    """
     total = math.floor(volumes[0, OFFSET0 + LEVEL] / DIGEST_STEP)
     for j in range(1, len(volumes)):
         if volumes[j, DIRECTION] == volumes[k, DIRECTION] and (
@@ -123,7 +129,10 @@ def digest_surroundings(volumes, k):
 
 @compiled
 def simplify(volumes, scene, value, steepest):
-    """Volumes and planes no steeper than `steepest` that do not pay under `scene` (a more tolerant one) go or are merged."""
+    """Drop or merge volumes and planes that do not pay under `scene`.
+
+    The scene is a more tolerant one. Planes steeper than `steepest` stay.
+    """
     for _ in range(4):
         value_before = value
         k = 1

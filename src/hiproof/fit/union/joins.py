@@ -1,11 +1,12 @@
-"""Moves of several volumes at once, each taken where it lowers the objective. Compiled.
+"""Change several volumes at once, where that lowers the objective. Compiled.
 
     merge       one volume over the rectangles of two
-    take in     a volume of one plane becomes an end of its neighbour
+    take end    a volume of one plane becomes an end of its neighbour
     surround    slopes around a volume become one that it stands on
-    hand over   a plane goes to the volume that runs on in it
+    hand plane  a plane goes to the volume that continues it
 
-All functions take volumes (k, COLUMNS) and the objective's value, and return the better of what they got and what they found.
+All functions take volumes (k, COLUMNS) and the objective's value, and return the better of these
+and of what they find.
 """
 
 from __future__ import annotations
@@ -35,15 +36,19 @@ from .volumes import (
     measure_run,
 )
 
-SAME_HEIGHT_M = 0.4  # m between two planes that may be one: as far as points reach from a plane, and half as far again
-# m within which a volume begins beyond the side of another, or under it, where edges are hidden and lie anywhere
-NEIGHBOUR_GAP_M, UNDER_M = 0.6, 2.0
-MERGE_REACH_M = 2.0  # m that edges may move when one volume takes another's place
+# Height (m) between two planes that may be one: as far as points reach from a plane, and half as
+# far again.
+SAME_HEIGHT_M = 0.4
+NEIGHBOUR_GAP_M = 0.6  # A volume begins at the side of another within this distance (m) beyond it.
+# A volume begins at the side of another within this distance (m) under it, where edges are hidden
+# and lie anywhere.
+UNDER_M = 2.0
+MERGE_REACH_M = 2.0  # Distance (m) that edges may move when one volume takes another's place.
 
 
 @compiled
 def merge_volumes(volumes, scene, value, steepest):
-    """Two volumes become one over both rectangles, where neither is steeper than `steepest`."""
+    """Merge pairs of volumes over both rectangles, if neither is above `steepest`."""
     k = 1
     while k < len(volumes):
         count_before = len(volumes)
@@ -54,7 +59,10 @@ def merge_volumes(volumes, scene, value, steepest):
 
 @compiled
 def merge_volume(volumes, scene, value, k, steepest):
-    """Volume k and another become one over both rectangles, where neither is steeper than `steepest`."""
+    """Merge volume k with another over both rectangles.
+
+    Neither may be steeper than `steepest`.
+    """
     for j in range(1, len(volumes)):
         if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
             continue
@@ -71,14 +79,14 @@ def merge_volume(volumes, scene, value, k, steepest):
 
 @compiled
 def extend_edge(volumes, k, j, edge):
-    """Have an edge of volume k lie as far out as that of volume j, in place."""
+    """Move an edge of volume k as far out as that of volume j, in place."""
     a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
     volumes[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
 
 
 @compiled
 def settle_merger(trial, scene, k, value, j):
-    """`trial` without volume j, and with volume k, which took its place, settled; what `settle_move` says of it."""
+    """Settle volume k of `trial` without volume j, whose place it takes."""
     return settle_trial(remove_volume(trial, j), scene, k if k < j else k - 1, value)
 
 
@@ -91,7 +99,10 @@ def settle_trial(trial, scene, k, value):
 
 @compiled
 def join_neighbours(volumes, scene, value, k):
-    """Volume k merged with another, an end taken in, those around it made one, or a plane handed to its neighbour: what helps first."""
+    """Merge volume k, take in an end, surround it, or hand over a plane.
+
+    The first of these that helps is kept.
+    """
     count, start = len(volumes), value
     volumes, value = merge_volume(volumes, scene, value, k, np.inf)
     if len(volumes) == count:
@@ -103,7 +114,10 @@ def join_neighbours(volumes, scene, value, k):
 
 @compiled
 def take_end(volumes, scene, value, k):
-    """Volume k takes the one plane of a volume at its end as its own: a steep end is no roof in front of a gable."""
+    """Let volume k take the one plane of a volume at its end as its own.
+
+    A steep end is no roof in front of a gable.
+    """
     for j in range(1, len(volumes)):
         if j == k or is_fixed(volumes, j) or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
             continue
@@ -125,7 +139,10 @@ def take_end(volumes, scene, value, k):
 
 @compiled
 def surround(volumes, scene, value, k):
-    """The volumes that slope towards volume k on several of its sides become one that it stands on: a mansard's lower slopes, a skirt."""
+    """Let volumes that slope towards volume k on several sides become one under it.
+
+    Such are the lower slopes of a mansard, or a skirt.
+    """
     neighbours = np.zeros(N_SIDES, np.int64)
     for side in range(N_SIDES):
         neighbours[side] = find_rising_neighbour(volumes, k, side)
@@ -160,7 +177,10 @@ def surround(volumes, scene, value, k):
 
 @compiled
 def hand_plane(volumes, scene, value, k):
-    """A plane of volume k goes to the volume that runs on in it: two slopes with a step between them are no gable with a strip beside."""
+    """Hand a plane of volume k to the volume that continues it.
+
+    Two slopes with a step between them are no gable with a strip beside it.
+    """
     for side in range(N_SIDES):
         j = find_continuation(volumes, k, side)
         if j == 0:
@@ -179,8 +199,11 @@ def hand_plane(volumes, scene, value, k):
 
 @compiled
 def find_continuation(volumes, k, side):
-    """The volume that begins within volume k, over all its length, and has its plane of that side, and no other, all but as high; 0
-    where there is none."""
+    """Find the volume that begins within volume k and continues its plane of one side.
+
+    It reaches over all its length, has no other plane, and lies nearly as high. Returns 0 without
+    one.
+    """
     if volumes[k, OFFSET0 + side] == np.inf or count_planes(volumes[k]) < 2:
         return 0
     across = 2 - 2 * (side // 2)
@@ -209,7 +232,7 @@ def find_continuation(volumes, k, side):
 
 @compiled
 def has_same_height(volumes, k, j, plane):
-    """Whether a plane of two volumes is all but as high in the middle of volume k."""
+    """Return whether a plane of two volumes is nearly as high in volume k's middle."""
     u, v = 0.5 * (volumes[k, U0] + volumes[k, U1]), 0.5 * (volumes[k, V0] + volumes[k, V1])
     height = volumes[k, OFFSET0 + plane] + volumes[k, SLOPE0 + plane] * measure_run(
         volumes[k], plane, u, v
@@ -222,7 +245,10 @@ def has_same_height(volumes, k, j, plane):
 
 @compiled
 def find_rising_neighbour(volumes, k, side):
-    """The volume that begins at a side of volume k, along half of it at least, and rises towards it; 0 where there is none."""
+    """Find the volume that begins at a side of volume k and rises towards it.
+
+    It reaches along half of the side at least. Returns 0 without one.
+    """
     across, sign = 2 - 2 * (side // 2), -1.0 if side % 2 == 0 else 1.0
     start, end = volumes[k, U0 + across], volumes[k, U1 + across]
     for j in range(1, len(volumes)):

@@ -1,7 +1,8 @@
-"""A large roof searched in windows: blocks as houses, sewn together, more grown where points are unexplained, all settled.
+"""Search a large roof in windows.
 
-The cost follows the roof's area. No limit depends on the whole roof; those that remain bound the time of one window,
-and beyond them finer structure stays unseen there.
+Blocks are searched as houses and sewn together, more is grown where points are unexplained, and all
+is settled. The time follows the roof's area. No limit depends on the whole roof. The remaining
+limits bound the time of one window, and finer structure stays unseen beyond them.
 """
 
 from __future__ import annotations
@@ -19,14 +20,17 @@ from .places import grow_at_places
 from .plan import Plan
 from .scene import Scene
 from .seams import SEAM_MARGIN_M, find_row, sew
-from .whole import PLACE_COLUMNS, Whole
+from .whole import POSITION, Whole
 from .window import change_in_window, forget_digests
 
-LEAST_HALF_M2 = 1.0  # of outline on either side of a cut
+LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
 
 
 def find_in_windows(plan: Plan, outline: shapely.Polygon, scene: Scene) -> np.ndarray:
-    """Find the volumes (k, COLUMNS) of a large roof, whose points and outline are those of `scene`."""
+    """Find the volumes (k, COLUMNS) of a large roof.
+
+    Its points and outline are those of `scene`.
+    """
     whole = Whole(scene, plan, outline)
     if whole.area <= BLOCK_M2:  # a roof of one block is searched as a house, and keeps its base
         return forget_digests(find_in_block(whole, whole.box)[0])
@@ -37,7 +41,10 @@ def find_in_windows(plan: Plan, outline: shapely.Polygon, scene: Scene) -> np.nd
 
 
 def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> None:
-    """Search a box that holds so much of the outline: as one block, or in halves sewn together along the cut."""
+    """Search a box that holds so much of the outline.
+
+    It is one block, or halves sewn together along the cut.
+    """
     cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
     halves = box.split(*cut) if cut else (box, box)
     areas = [clip_to_box(whole.outline, half).area for half in halves]
@@ -51,7 +58,7 @@ def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> 
 
 def settle_in_windows(whole: Whole) -> None:
     """Refit every volume, and move its edges a little, on the points around it."""
-    for place in [row[PLACE_COLUMNS].tobytes() for row in whole.volumes[1:]]:
+    for place in [row[POSITION].tobytes() for row in whole.volumes[1:]]:
         k = whole.find(place)
         if k is not None:
             settle_volume(whole, k)

@@ -1,5 +1,8 @@
-"""Shapes of more than five planes, put together from parts: a row of equal monopitches is a saw-tooth (teeth.py), a gable on a
-truncated gable's top is a gambrel."""
+"""Combine parts into shapes of more than five planes.
+
+A row of equal monopitches is a saw-tooth (teeth.py). A gable on a truncated gable's top is a
+gambrel.
+"""
 
 from __future__ import annotations
 
@@ -16,17 +19,17 @@ from ...primitives.family import read_member
 from .regions import exclude_parts, list_polygons, unite_outlines
 from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, lay_places, unite_saw_teeth
 
-GAMBREL_GAP_M, GAMBREL_SHARE = (
-    0.3,
-    0.9,
-)  # m within which a gambrel must be as high as what it stands for, at what share of places
-SKEWED = 1e-6  # rise over run along the ridge; numerically none
-LEAST_BREAK, MOST_BREAK = 0.1, 0.95  # of a gambrel's width, what lies between its breaks
-STEEPER = 0.1  # rise over run by which its lower slopes are steeper than the upper ones
+# Difference (m) in height allowed between a gambrel and the parts that it replaces.
+GAMBREL_GAP_M = 0.3
+GAMBREL_SHARE = 0.9  # Share of places at which it must hold.
+SKEWED = 1e-6  # Slope (rise over run) along the ridge that is numerically none.
+LEAST_BREAK = 0.1  # Smallest share of a gambrel's width between its breaks.
+MOST_BREAK = 0.95  # Largest share of a gambrel's width between its breaks.
+STEEPER = 0.1  # Difference (rise over run) of its lower and upper slopes.
 
 
 def combine_parts(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]:
-    """`parts` with saw-teeth and gambrels in place of what they are made of, where those types are `allowed`."""
+    """Combine `parts` into saw-teeth and gambrels, if those types are `allowed`."""
     if not allowed or "shed" in allowed:
         parts = unite_saw_teeth(parts)
     if not allowed or "gambrel" in allowed:
@@ -35,7 +38,10 @@ def combine_parts(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part
 
 
 def unite_gambrels(parts: list[Part]) -> list[Part]:
-    """`parts` with every gable on a truncated gable's top, or between two steeper slopes, united with these."""
+    """Unite every gable with the steeper slopes under it.
+
+    These are a truncated gable below its top, or two slopes beside it.
+    """
     for upper in parts:
         top = read_top(upper)
         if top is None:
@@ -50,7 +56,10 @@ def unite_gambrels(parts: list[Part]) -> list[Part]:
 
 @dataclass(frozen=True)
 class GambrelTop:
-    """The upper slopes of a gambrel: how far their ridge lies across it from the gable's middle (m), its height, their slope."""
+    """The upper slopes of a gambrel.
+
+    `offset` is how far across it their ridge lies from the gable's middle (m), `ridge` its height.
+    """
 
     offset: float
     ridge: float
@@ -58,7 +67,7 @@ class GambrelTop:
 
 
 def read_top(upper: Part) -> GambrelTop | None:
-    """The slopes of a gable; None where they are not alike, and of other parts."""
+    """Return the slopes of a gable, None if they are not alike, and for other parts."""
     if upper.type not in ("gable", "asymmetric_gable"):
         return None
     along = np.array([math.cos(upper.kappa), math.sin(upper.kappa)])
@@ -77,7 +86,11 @@ def read_top(upper: Part) -> GambrelTop | None:
 
 @dataclass(frozen=True)
 class GambrelSlope:
-    """One lower side of a gambrel: how far the line of its eave lies across it from the upper gable's middle (m), its height, its slope."""
+    """One lower side of a gambrel.
+
+    `offset` is how far across it the line of its eave lies from the upper gable's middle (m),
+    `eave` its height.
+    """
 
     offset: float
     eave: float
@@ -85,7 +98,10 @@ class GambrelSlope:
 
 
 def list_lower_slopes(upper: Part, lower: tuple[Part, ...]) -> list[GambrelSlope]:
-    """The slopes on the two sides below the gable `upper`: of a truncated gable, or of a monopitch on each side; else none."""
+    """List the slopes on the two sides below the gable `upper`.
+
+    They are those of a truncated gable, or of a monopitch on each side.
+    """
     across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
     slopes = []
     for part in lower:
@@ -115,7 +131,10 @@ def list_lower_slopes(upper: Part, lower: tuple[Part, ...]) -> list[GambrelSlope
 
 
 def make_gambrel(upper: Part, top: GambrelTop, lower: tuple[Part, ...]) -> Part | None:
-    """The gable `upper` and the slopes on its two sides as one gambrel, None where they are none."""
+    """Make one gambrel of the gable `upper` and the slopes on its two sides.
+
+    Returns None if they are none.
+    """
     slopes = list_lower_slopes(upper, lower)
     if len(slopes) != 2:
         return None
@@ -148,7 +167,11 @@ def make_gambrel(upper: Part, top: GambrelTop, lower: tuple[Part, ...]) -> Part 
 
 
 def is_same_surface(planes: np.ndarray, parts: tuple[Part, ...]) -> bool:
-    """Whether the lowest of `planes` (k, 3) is all but as high as the highest of `parts` nearly everywhere on these."""
+    """Return whether `planes` (k, 3) have nearly the heights of `parts`.
+
+    They have them nearly everywhere: the lowest of the planes is compared with the highest of the
+    parts, where these are.
+    """
     xy = lay_places(parts)
     z = np.max([part.height_at(xy) for part in parts], axis=0)
     is_covered = np.isfinite(z)

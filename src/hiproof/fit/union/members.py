@@ -1,4 +1,4 @@
-"""The volumes of a roof whose planes points tell, each linear in the unknowns of all."""
+"""List the volumes whose planes points determine, by the unknowns of all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .finish import FEWEST_FITTED_POINTS, Planes, Wall, find_visible_points, take_points
+from .finish import FEWEST_FITTED_POINTS, OutlineWall, Planes, find_visible_points, take_points
 from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION
@@ -17,10 +17,10 @@ class LinearVolume:
     """A volume as one of several.
 
     `rows` (k, 3) are its planes in its own axes: `design` (k, 3, q) times its own unknowns, which
-    are those from number `first` on of all p. `own` (k, 3, p) gives them by all unknowns, `common`
-    (k, 3, p) so in the first direction's axes. `points` (3, n) are its points in its own axes,
-    `places` (3, n) u, v, 1 of them in the first direction's. `seen` are the numbers of its planes
-    on which any lie, with the numbers of those.
+    are those from number `first` on of all p. `full_design` (k, 3, p) gives them by all unknowns,
+    `common_design` (k, 3, p) does in the first direction's axes. `points` (3, n) are its points in
+    its own axes, and `places` (3, n) their u, v, 1 in the first direction's. `visible` are the
+    numbers of its planes on which any points lie, with the numbers of those.
     """
 
     rows: np.ndarray
@@ -32,14 +32,14 @@ class LinearVolume:
     places: np.ndarray
     visible: dict[int, np.ndarray]
     sides: list[Side]
-    walls: tuple[Wall, ...]
+    walls: tuple[OutlineWall, ...]
     turn: np.ndarray
 
 
 def list_members(
     volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene
 ) -> dict[int, LinearVolume]:
-    """The volumes whose planes points tell, by their number."""
+    """Return the volumes whose planes points determine, by their number."""
     visible = find_visible_points(volumes, scene)
     free = [
         k
@@ -74,7 +74,10 @@ def list_members(
 
 
 def find_lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.ndarray]:
-    """The planes (5, 3) that are the lowest at any of `points` (3, n), by their numbers: at which, by theirs."""
+    """Find which planes (5, 3) are the lowest at any of `points` (3, n).
+
+    Returns the numbers of these points by those of the planes.
+    """
     planes = np.flatnonzero(np.isfinite(rows[:, 2])).tolist()
     z = rows[planes] @ np.array([points[0], points[1], np.ones(points.shape[1])])
     lowest = z.argmin(axis=0)
@@ -83,7 +86,7 @@ def find_lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.nda
 
 
 def solve_unknowns(members: list[LinearVolume]) -> np.ndarray:
-    """The unknowns (p,) that give the members' rows."""
+    """Return the unknowns (p,) that give the members' rows."""
     present = [np.isfinite(member.rows) for member in members]
     design = np.concatenate(
         [member.full_design[is_known] for member, is_known in zip(members, present, strict=True)]
@@ -95,7 +98,10 @@ def solve_unknowns(members: list[LinearVolume]) -> np.ndarray:
 
 
 def evaluate_rows(members: list[LinearVolume], unknowns: np.ndarray) -> np.ndarray:
-    """The members' planes (m, k, 3) in the first direction's axes where the unknowns (p,) are these; NaN where there is none."""
+    """Return the members' planes (m, k, 3) under the unknowns (p,).
+
+    They are in the first direction's axes, NaN where a plane is absent.
+    """
     rows = np.full((len(members), max(len(member.rows) for member in members), 3), np.nan)
     for member_rows, member in zip(rows, members, strict=True):
         member_rows[: len(member.rows)] = np.where(
@@ -107,9 +113,10 @@ def evaluate_rows(members: list[LinearVolume], unknowns: np.ndarray) -> np.ndarr
 def compute_heights_at(
     members: list[LinearVolume], rows: np.ndarray, places: np.ndarray, reach_m: float = 0.0
 ) -> np.ndarray:
-    """Heights (m, n) of the members, whose planes are `rows` (m, k, 3), at `places` (n, 2), u, v of the first direction's axes.
+    """Return the heights (m, n) of the members at `places` (n, 2).
 
-    Minus infinity of those that end more than `reach_m` before it.
+    Their planes are `rows` (m, k, 3), places are u, v of the first direction's axes. A member that
+    ends more than `reach_m` before a place is at minus infinity there.
     """
     positions = np.column_stack([places, np.ones(len(places))]).T
     inside = np.array([is_inside_member(member, places, reach_m) for member in members])
@@ -117,13 +124,19 @@ def compute_heights_at(
 
 
 def is_inside_member(member: LinearVolume, places: np.ndarray, reach_m: float) -> np.ndarray:
-    """Which of `places` (n, 2), u, v of the first direction's axes, lie inside a member's sides, or so near them."""
+    """Return which `places` (n, 2) lie inside a member's sides, or `reach_m` off them.
+
+    Places are u, v of the first direction's axes.
+    """
     c, s = member.turn
     return is_inside_sides(places @ np.array([[c, -s], [s, c]]), member.sides, reach_m)
 
 
 def is_inside_sides(places: np.ndarray, sides: list[Side], reach_m: float = 0.0) -> np.ndarray:
-    """Which of `places` (n, 2), u, v of their volume's axes, lie inside its sides, or so near them."""
+    """Return which `places` (n, 2) lie inside sides, or `reach_m` off them.
+
+    Places are u, v of the axes of the sides' volume.
+    """
     (left, right, front, back), (u, v) = sides, places.T
     across_u = (left.offset + left.lean * v - u < reach_m) & (
         u - right.offset - right.lean * v < reach_m

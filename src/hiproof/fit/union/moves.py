@@ -1,15 +1,16 @@
-"""Moves that change one volume's structure, each taken where it lowers the objective. Compiled.
+"""Change one volume's structure where that lowers the objective. Compiled.
 
     refit one volume, move its edges      after every other move
-    drop a volume, a plane                what does not pay goes
+    drop a volume, a plane                what does not pay is dropped
     flatten                               slopes next to level become a level top
     tie, untie                            equal slopes
     let it join again                     a volume that replaces becomes part of the max
     add an end, a level top               a gable becomes a hip, a hip a mansard
 
-All functions take volumes (k, COLUMNS) and the objective's value, and return the better of what they got and what they found.
-Those of volume k alone take what is `around` it, which they leave as it is.
-Which ways planes face is facings.py, several volumes at once joins.py, all moves in turn improve.py.
+All functions take volumes (k, COLUMNS) and the objective's value, and return the better of these
+and of what they find. Those of volume k alone take its `context`, which does not change. Moves that
+turn planes are in facings.py, moves of several volumes in joins.py, and all moves in turn in
+improve.py.
 """
 
 from __future__ import annotations
@@ -47,18 +48,19 @@ from .volumes import (
     read_rectangle,
 )
 
-MOST_TRIED_SLOPES, SLOPES_APART = (
-    9,
-    0.02,
-)  # slopes a plane is tried at, and rise over run between two of them
-END_SEEDS = 16  # points through which a new plane is tried
-POINTS_AT_ONCE = 64  # points between two looks at whether a new plane can still do
-ALMOST_LEVEL = 0.15  # rise over run; below it a plane may as well be level
+MOST_TRIED_SLOPES = 9  # Most slopes at which a plane is tried.
+SLOPES_APART = 0.02  # Least difference (rise over run) between two of them.
+END_SEEDS = 16  # Points through which a new plane is tried.
+POINTS_AT_ONCE = 64  # Points between two checks whether a new plane can still be the best.
+ALMOST_LEVEL = 0.15  # A flatter plane (rise over run) may as well be level.
 
 
 @compiled
 def settle_move(trial, scene, k, value, reach, context):
-    """`trial` with volume k refitted, its edges moved and refitted, and its objective, infinite where that is above `value`."""
+    """Refit volume k of `trial`, move its edges, and refit it again.
+
+    Also returns the objective, infinite if it is not below `value`.
+    """
     refit(trial, scene, k, context)
     limit = value + BEGIN_UNITS * scene.evidence + BEGIN_SHARE * scene.n
     trial_value = compute_objective_with(trial, scene, k, context, limit)
@@ -75,13 +77,13 @@ def settle_move(trial, scene, k, value, reach, context):
 
 @compiled
 def remove_volume(volumes, k):
-    """The volumes but for the k-th."""
+    """Return the volumes without the k-th."""
     return np.concatenate((volumes[:k], volumes[k + 1 :]))
 
 
 @compiled
 def refit_volumes(volumes, scene, value):
-    """Every volume refitted once, where that helps."""
+    """Refit every volume once, where that helps."""
     for k in range(len(volumes)):
         if is_fixed(volumes, k):
             continue
@@ -91,7 +93,7 @@ def refit_volumes(volumes, scene, value):
 
 @compiled
 def refit_volume(volumes, scene, value, k):
-    """Volume k refitted, where that helps."""
+    """Refit volume k, if that helps."""
     trial, context = volumes.copy(), measure_context(volumes, scene.U, scene.V, k)
     refit(trial, scene, k, context)
     trial_value = compute_objective_with(trial, scene, k, context, value)
@@ -100,7 +102,7 @@ def refit_volume(volumes, scene, value, k):
 
 @compiled
 def move_all_edges(volumes, scene, value, reach):
-    """The edges of every volume moved, in place."""
+    """Move the edges of every volume, in place."""
     for k in range(1, len(volumes)):
         context = measure_context(volumes, scene.U, scene.V, k)
         value = move_edges(volumes, scene, k, value, reach, context)
@@ -109,7 +111,7 @@ def move_all_edges(volumes, scene, value, reach):
 
 @compiled
 def drop_volumes(volumes, scene, value):
-    """Volumes that do not pay go."""
+    """Drop volumes that do not pay."""
     k = 1
     while k < len(volumes):
         trial, trial_value = volumes, np.inf
@@ -125,7 +127,7 @@ def drop_volumes(volumes, scene, value):
 
 @compiled
 def drop_planes(volumes, scene, value, k, steepest, context):
-    """Planes of volume k no steeper than `steepest` that do not pay go."""
+    """Drop planes of volume k no steeper than `steepest` that do not pay."""
     for plane in range(N_PLANES):
         if volumes[k, OFFSET0 + plane] == np.inf or count_planes(volumes[k]) < 2:
             continue
@@ -149,7 +151,7 @@ def remove_plane(row, plane):
 
 @compiled
 def flatten(volumes, scene, value, k, context):
-    """The all but level planes of volume k become one level top."""
+    """Replace the nearly level planes of volume k by one level top."""
     flat = (volumes[k, OFFSET0 : OFFSET0 + N_SIDES] < np.inf) & (
         volumes[k, SLOPE0 : SLOPE0 + N_SIDES] < ALMOST_LEVEL
     )
@@ -171,7 +173,7 @@ def flatten(volumes, scene, value, k, context):
 
 @compiled
 def change_ties(volumes, scene, value, k, context):
-    """Other slopes of volume k equal; and it may join the max instead of replacing what it covers."""
+    """Tie other slopes of volume k, and let it join the max instead of replacing."""
     if volumes[k, REPLACES] > 0.0:
         trial = volumes.copy()
         trial[k, REPLACES] = 0.0
@@ -194,7 +196,10 @@ def change_ties(volumes, scene, value, k, context):
 
 @compiled
 def add_planes(volumes, scene, value, k, slopes, context):
-    """A further plane for volume k: an end, a side or a level top; its rectangle may reach beyond the outline there."""
+    """Add planes to volume k: an end, a side or a level top.
+
+    Its rectangle may reach beyond the outline there.
+    """
     z_now = compute_roof_with(volumes, scene.U, scene.V, k, context)
     everywhere = compute_roof_everywhere(volumes, scene.U, scene.V, k, context)
     for plane in range(N_PLANES):
@@ -243,7 +248,7 @@ def add_planes(volumes, scene, value, k, slopes, context):
 
 @compiled
 def place_outside(scene, direction, edge):
-    """A place outside the outline for an edge."""
+    """Return a place outside the outline for an edge."""
     lines = scene.lines[direction, edge // 2]
     if edge % 2 == 0:
         return lines[0] - BEYOND_OUTLINE_M
@@ -256,7 +261,7 @@ def place_outside(scene, direction, edge):
 
 @compiled
 def list_trial_slopes(row, plane, slopes):
-    """The slopes that the volume has and `slopes`, distinct; none for a level plane."""
+    """Return distinct slopes of the volume and of `slopes`, none for a level plane."""
     trial_slopes = np.zeros(MOST_TRIED_SLOPES)
     if plane == LEVEL:
         return trial_slopes[:1]
@@ -276,9 +281,10 @@ def list_trial_slopes(row, plane, slopes):
 
 @compiled
 def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath, least_gain):
-    """The plane in place `plane` of volume k that lowers the misfit most, by more than `least_gain`: (gain, slope, offset).
+    """Find the plane in place `plane` of volume k that lowers the misfit most.
 
-    It goes through one of the points that lie well below the volume.
+    It lowers it by more than `least_gain`, and passes through one of the points well below the
+    volume. Returns gain, slope and offset.
     """
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v = scene.U[direction], scene.V[direction]
@@ -295,7 +301,7 @@ def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath
     for i in range(n):
         inside = is_within(ends, u[i], v[i])
         h = find_lowest(c, u[i], v[i])
-        if not inside or everywhere[i] != h:  # or something else shows there
+        if not inside or everywhere[i] != h:  # or another volume is visible there
             continue
         t = 0.0 if plane == LEVEL else u[i] if plane < 2 else v[i]
         z[m], x[m], own_heights[m] = z_points[i], -t if plane % 2 == 1 else t, h
@@ -333,7 +339,10 @@ def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath
 
 @compiled(fastmath={"reassoc", "nsz"})
 def sum_plane_misfit(slope, offset, z, x, own_heights, floors, dead, width):
-    """What the first POINTS_AT_ONCE of points z cost under a volume `own_heights` high there that is given a further plane, but nowhere below `floors`."""
+    """Sum up the cost of the first POINTS_AT_ONCE points z with a further plane.
+
+    The volume is `own_heights` high without it, and the roof nowhere below `floors`.
+    """
     total = 0.0
     for p in range(min(POINTS_AT_ONCE, len(z))):
         h = max(min(own_heights[p], offset + slope * x[p]), floors[p])

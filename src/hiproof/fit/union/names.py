@@ -1,4 +1,4 @@
-"""From volumes to named parts: each a member of the family of roof shapes."""
+"""Name volumes as parts: each is a member of the family of roof shapes."""
 
 from __future__ import annotations
 
@@ -12,23 +12,26 @@ import shapely
 
 from ...model import Part
 from ...primitives.family import AXIS, SIGN, Member, name_among
-from .finish import Planes, Wall
+from .finish import OutlineWall, Planes
 from .plan import Plan
 from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION, LEVEL, N_SIDES
 
 EACH = np.arange(N_SIDES)
-LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
-# of the half of its rectangle, by which a side that lies hidden may be moved to where its eave is level
+LEVEL_EAVE_M = 0.5  # An eave that would be level with its side so little (m) further out is level.
+# Share of the half of its rectangle by which a hidden side may move to where its eave is level.
 HIDDEN_SHARE = 0.8
-APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
-STRAIGHT = 1e-9  # rad; numerically the same direction
-GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
-# standard deviations of a swath's place and height, which no point of a building tells: roofs lie beside their outline by the former
-REGISTERED_PLAN_M, REGISTERED_M = 0.03, 0.01
-RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # a plane (3, 1) changed by the latter
-PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it
+APEX_M = 0.15  # A hip whose pairs of sides meet at heights so near each other (m) is a pyramid.
+STRAIGHT = 1e-9  # Directions (rad) that differ less are numerically the same.
+GIVEN_M = 1e-3  # A rectangle's end further (m) from its side lies on the outline that cuts it off.
+# Standard deviation (m) of a swath's place in plan, which no point of a building determines: roofs
+# lie so far beside their outline.
+REGISTERED_PLAN_M = 0.03
+# Standard deviation (m) of a swath's height, which no point of a building determines.
+REGISTERED_M = 0.01
+RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # A plane (3, 1) changed by the latter.
+PROBE_M = 0.01  # Distance (m) that an end is moved to see which parameters depend on it.
 
 
 def name_part(
@@ -40,7 +43,10 @@ def name_part(
     scene: Scene,
     allowed: tuple[str, ...] = (),
 ) -> Part:
-    """The volume over its `regions` (local coordinates) as a part of the family, called as `allowed` has it where that can be."""
+    """Name the volume over its `regions` (local coordinates) as a part of the family.
+
+    It has a name of `allowed` types if possible.
+    """
     c, s = scene.turn[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
     corners = shapely.get_coordinates(regions) - plan.frame.origin[:2]
@@ -64,17 +70,21 @@ def name_part(
     modes = np.concatenate(
         [turn_planes(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2
     )
-    is_given = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # of cants those that show
+    is_given = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # visible cants only
     changes = vary_member(members, modes[is_given]).turn(turns)
     member = replace(member.turn(turns), centre=member.centre @ axes + plan.frame.origin[:2])
     return member.part(regions, name_among(member.name, allowed), changes, len(probed_ends))
 
 
 def measure_registration(planes: Planes, rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """By how much (k, 3, 2) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
-    that show (`rows`) can over the corners `positions` (n, 3), u, v, 1, tied to sides of the outline as they are."""
+    """Return by how much (k, 3, 2) planes change if their swath lies off.
+
+    It is off by a standard deviation along u or along v. The visible planes (`rows`) are tied to
+    sides of the outline, and move over the corners `positions` (n, 3), u, v, 1, as far as these
+    ties allow.
+    """
     is_present = np.isfinite(rows[:, 2])
-    if not rows[is_present, :2].any():  # level ones stay as high
+    if not rows[is_present, :2].any():  # level planes do not change
         return np.zeros((len(rows), 3, 2))
     design = (positions @ planes.design[is_present]).reshape(
         is_present.sum() * len(positions), planes.design.shape[2]
@@ -84,17 +94,17 @@ def measure_registration(planes: Planes, rows: np.ndarray, positions: np.ndarray
 
 
 def find_visible_planes(rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Which planes (k,) are not everywhere above some single other one.
+    """Return which planes (k,) are not everywhere above some single other one.
 
-    `positions` (n, 3) are u, v, 1 of the regions' corners. Where only planes over walls show, the lowest other plane stays: a shape has one.
+    `positions` (n, 3) are u, v, 1 of the regions' corners. If only planes over walls are visible,
+    the lowest other plane stays: a shape has one.
     """
     is_visible = np.isfinite(rows[:, 2])
     if is_visible.sum() < 2:
         return is_visible
     z = rows @ positions.T
-    is_above = (
-        (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()
-    )  # [k][j]: plane k nowhere below plane j
+    # In [k][j], plane k is nowhere below plane j.
+    is_above = (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()
     for k in np.nonzero(is_visible)[0].tolist():
         is_visible[k] = not any(
             is_above[k][j] for j in np.nonzero(is_visible)[0].tolist() if j != k
@@ -105,7 +115,10 @@ def find_visible_planes(rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
 
 def measure_common_lean(rows: np.ndarray) -> float:
-    """The angle (rad) by which axes must turn for a pair of planes that face each other to face along them; 0 if none does."""
+    """Return the angle (rad) by which axes must turn for planes to face along them.
+
+    These are a pair of planes that face each other. It is 0 if there is no such pair.
+    """
     for first, second, axis in ((2, 3, 1), (0, 1, 0)):
         gradients = [rows[k, :2] for k in (first, second) if np.isfinite(rows[k, 2])]
         if not gradients:
@@ -120,7 +133,10 @@ def measure_common_lean(rows: np.ndarray) -> float:
 
 
 def turn_planes(rows: np.ndarray, angle: float) -> np.ndarray:
-    """Planes (k, 3), or several (k, 3, m), over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
+    """Return planes (k, 3), or several (k, 3, m), over axes turned by `angle`.
+
+    A plane that then nearly faces along an axis does so exactly.
+    """
     if angle == 0.0:
         return rows
     c, s = math.cos(angle), math.sin(angle)
@@ -133,7 +149,7 @@ def turn_planes(rows: np.ndarray, angle: float) -> np.ndarray:
 
 
 def turn_side(side: Side, edge: int, angle: float) -> Side:
-    """The side seen from axes turned by `angle`."""
+    """Return the side in axes turned by `angle`."""
     if angle == 0.0:
         return side
     slope = math.atan(side.lean) + (angle if edge < 2 else -angle)
@@ -142,7 +158,10 @@ def turn_side(side: Side, edge: int, angle: float) -> Side:
 
 
 def measure_rectangle(sides: list[Side], corners: np.ndarray) -> list[float]:
-    """Lowest and highest u, lowest and highest v of the sides in their middle, no further out than the regions' `corners` (n, 2) are."""
+    """Return the lowest and highest u and v of the sides in their middle.
+
+    They lie no further out than the regions' `corners` (n, 2).
+    """
     lowest_corner, highest_corner = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     ends = []
     for axis in (0, 1):
@@ -161,8 +180,11 @@ def measure_rectangle(sides: list[Side], corners: np.ndarray) -> list[float]:
 def list_moved_ends(
     sides: list[Side], ends: list[float]
 ) -> tuple[list[list[float]], list[list[float]]]:
-    """The `ends` (lowest and highest u, v) of a rectangle after each of its sides moved by its standard deviation; and after each of
-    those that stand where no points tell moved a little."""
+    """List the `ends` of a rectangle after moves of its sides.
+
+    These are the lowest and highest u, v. The first list has each side moved by its standard
+    deviation, the second each side that no points determine, moved a little.
+    """
     middle, known_ends, probed_ends = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])), [], []
     for k, side in enumerate(sides):
         is_given = (
@@ -179,12 +201,15 @@ def regularise(
     rows: np.ndarray,
     ends: np.ndarray,
     kappa: float,
-    walls: tuple[Wall, ...] = (),
+    walls: tuple[OutlineWall, ...] = (),
     hidden: Sequence[int] = (),
 ) -> Member:
-    """Members over m rectangles, lowest and highest u, v `ends` (4, m), with planes `rows` (5 and those over `walls`, 3, m), which all
-    have the same sides, in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are, or where a
-    side lies `hidden`."""
+    """Make members over m rectangles with common eaves and apex where these are near.
+
+    `ends` (4, m) are the lowest and highest u, v, and `rows` (5 and those over `walls`, 3, m) the
+    planes, which all have the same sides. The first axis is at `kappa`. A side that lies `hidden`
+    takes the eave of the others, too.
+    """
     centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
     planes = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
     sides, count = [k for k in planes if k < N_SIDES], rows.shape[2]
@@ -217,8 +242,13 @@ def regularise(
     )
 
 
-def measure_cants(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray) -> np.ndarray:
-    """The cants (4, c, m) of members about `centre` (2, m), whose planes over `walls` are `rows` (n, 3, m), NaN where one shows nowhere."""
+def measure_cants(
+    rows: np.ndarray, walls: tuple[OutlineWall, ...], centre: np.ndarray
+) -> np.ndarray:
+    """Return the cants (4, c, m) of members about `centre` (2, m).
+
+    Their planes over `walls` are `rows` (n, 3, m), NaN where one is not visible.
+    """
     cants = []
     for wall, row in zip(walls, rows, strict=True):
         out = wall.offset - math.cos(wall.facing) * centre[0] - math.sin(wall.facing) * centre[1]
@@ -230,7 +260,10 @@ def measure_cants(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray)
 
 
 def measure_eave(plane: np.ndarray, facing: float, out: Any, centre: np.ndarray) -> tuple[Any, Any]:
-    """The height of a plane a, b, c (3, m) at a wall that lies so far `out`, facing that way, from `centre`, and by how much it rises there."""
+    """Return the height of a plane a, b, c (3, m) at a wall, and its slope there.
+
+    The wall lies so far `out` from `centre`, and faces that way.
+    """
     (a, b, z), c, s = plane, math.cos(facing), math.sin(facing)
     return a * (centre[0] + out * c) + b * (centre[1] + out * s) + z, -c * a - s * b
 
@@ -244,9 +277,10 @@ def level_eaves(
     sides: list[int],
     hidden: Sequence[int] = (),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres and halves (2, m) and eaves (4, m) of members with `sides` moved out to the lowest eave's height where that is near.
+    """Move `sides` out to the lowest eave's height, where that is near.
 
-    Those that lie `hidden` under other parts are where nothing tells, and go there from afar, and inwards as well.
+    Returns centres and halves (2, m) and eaves (4, m) of the members. Sides that lie `hidden` under
+    other parts have no known place, and move from far, and inwards as well.
     """
     given_sides = [k for k in sides if k not in hidden] or sides
     lowest, outwards, eaves = eaves[given_sides].min(axis=0), np.zeros_like(eaves), eaves.copy()
@@ -265,12 +299,15 @@ def level_eaves(
 
 
 def vary_member(members: Member, changes: np.ndarray) -> Member:
-    """The first of several with its planes changed by each of `changes` (5 and cants, 3, p), its sides where they are; and the others."""
+    """Change the first of several members by each of `changes` (5 and cants, 3, p).
+
+    Its sides stay. The other members follow unchanged.
+    """
     count = changes.shape[2]
     varied = members.those([0] * count + list(range(1, members.eaves.shape[1])))
     for k in members.sides:
         axis = k // 2
-        middle = members.centre[:, 0].copy()  # of the side
+        middle = members.centre[:, 0].copy()  # becomes that of the side
         middle[axis] -= SIGN[k] * members.half[axis, 0]
         varied.slopes[k, :count] += SIGN[k] * changes[k, axis]
         varied.eaves[k, :count] += (
@@ -284,14 +321,16 @@ def vary_member(members: Member, changes: np.ndarray) -> Member:
 
 
 def join_apex(members: Member) -> Member:
-    """Hips whose two pairs of sides meet at nearly the same height with all four meeting in one point, eaves where they are."""
+    """Let the four planes of a hip meet in one point, if two pairs nearly do.
+
+    The eaves stay.
+    """
     if not all(members.has) or members.has_top:
         return members
     apex, other_apex = members.apex(0), members.apex(1)
     is_near = (np.abs(apex - other_apex) <= APEX_M) & ~members.leans.any(axis=0)
-    runs = (
-        np.stack([apex, apex, other_apex, other_apex]) - members.eaves
-    ) / members.slopes  # from each eave to the point in plan
+    # A run is the distance from an eave to the point in plan.
+    runs = (np.stack([apex, apex, other_apex, other_apex]) - members.eaves) / members.slopes
     return replace(
         members,
         slopes=np.where(

@@ -1,11 +1,11 @@
-"""What a roof costs, in points: its misfit, its volumes, and every step between them that shows. Compiled.
+"""Compute a roof's cost in points: misfit, volumes, visible steps. Compiled.
 
     sum over points of min((max(|dz| - dead, 0) / width)^2, 1)
-    + sum over ghosts (places without points) of their weight, where the roof leaves the points' range of heights,
+    + sum over unobserved cells of their weight, where the roof leaves the points' range of heights,
       and a little where it is high although no point was seen around: what is hidden is lower
-    + evidence * (volumes + offsets + slopes + edges that show)
+    + evidence * (volumes + offsets + slopes + visible edges)
 
-What edges cost is steps.py.
+The price of edges is in steps.py.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .prices import BASE_COST
 from .steps import gather_walls, price_edge
 from .volumes import LEVEL, OFFSET0, compute_roof_heights, is_allowed, price_volume
 
-BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
+BASE_SHARE = 0.01  # The base costs nothing if it is visible on less of the outline's area.
 
 
 @compiled(inline="always")
@@ -29,7 +29,7 @@ def compute_point_cost(z_point, z_roof, dead, width):
 
 
 def compute_misfits(z: np.ndarray, height: np.ndarray | float, scene) -> np.ndarray:
-    """What each point at `z` (n,) costs under a roof so high (n,)."""
+    """Return what each point at `z` (n,) costs under a roof at `height` (n,)."""
     return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
 
 
@@ -44,7 +44,10 @@ def compute_cell_cost(z_roof, weight, shade, z_low, z_high):
 
 @compiled
 def compute_costs(z, scene):
-    """Cost (n + g,) of every point and ghost under roof heights `z` (n + g,)."""
+    """Return the cost (n + g,) of every point and cell under roof heights `z`.
+
+    The heights are (n + g,).
+    """
     cost, n = np.empty(len(z)), scene.n
     for i in range(n):
         cost[i] = compute_point_cost(scene.z[i], z[i], scene.dead, scene.width)
@@ -58,7 +61,10 @@ def compute_costs(z, scene):
 
 @compiled
 def compute_objective(volumes, scene, limit):
-    """The roof's cost; infinite where a shape is not allowed, and as soon as it is known to be above `limit`."""
+    """Compute the roof's cost.
+
+    It is infinite if a shape is not allowed, and once it is known to exceed `limit`.
+    """
     for k in range(1, len(volumes)):
         if not is_allowed(volumes[k], scene.allowed):
             return np.inf
@@ -68,7 +74,7 @@ def compute_objective(volumes, scene, limit):
 
 @compiled
 def compute_objective_with(volumes, scene, k, context, limit):
-    """Compute what `compute_objective` does, of a roof whose volume k alone is another than it was."""
+    """Compute the objective of a roof of which volume k alone changed."""
     if k > 0 and not is_allowed(volumes[k], scene.allowed):
         return np.inf
     z = compute_roof_with(volumes, scene.U, scene.V, k, context)
@@ -77,7 +83,10 @@ def compute_objective_with(volumes, scene, k, context, limit):
 
 @compiled
 def compute_roof_cost(volumes, scene, z, limit):
-    """Compute the cost of a roof so high (n + g,); infinite once it is known to be above `limit`."""
+    """Compute the cost of a roof with heights `z` (n + g,).
+
+    It is infinite once it is known to exceed `limit`.
+    """
     total, bare, base = compute_costs(z, scene).sum(), 0.0, volumes[0, OFFSET0 + LEVEL]
     for k in range(1, len(volumes)):
         total += scene.evidence * price_volume(volumes[k])
@@ -92,7 +101,7 @@ def compute_roof_cost(volumes, scene, z, limit):
 
 @compiled
 def price_edges(volumes, scene, limit):
-    """What all edges cost; infinite as soon as that is known to be above `limit`."""
+    """Sum up the price of all edges; infinite once it is known to exceed `limit`."""
     walls, total = gather_walls(scene), 0.0
     for k in range(1, len(volumes)):
         for edge in range(4):
@@ -104,6 +113,6 @@ def price_edges(volumes, scene, limit):
 
 @compiled
 def is_base_visible(volumes, scene):
-    """Whether a noticeable share of the outline is roofed by the base."""
+    """Return whether the base roofs a noticeable share of the outline."""
     _, top = compute_roof_heights(volumes, scene.U, scene.V)
     return scene.weight[scene.n :][top[scene.n :] == 0].sum() > BASE_SHARE * scene.n

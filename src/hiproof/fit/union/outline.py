@@ -1,4 +1,4 @@
-"""The outline of a building that comes without one."""
+"""Estimate the outline of a building that comes without one."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ import shapely
 from ..direction import slope_direction
 from ..outline import estimate_outline
 
-SLOPE_PLACES, SLOPE_NEIGHBOURS = (
-    150,
-    9,
-)  # places at which slopes are looked at, and points around each
-SURE = 0.5  # confidence (0 to 1) from which on the direction of slopes is the outline's
+SLOPE_PLACES = 150  # Places at which slopes are measured.
+SLOPE_NEIGHBOURS = 9  # Points around each of these places.
+SURE = 0.5  # Confidence (0 to 1) from which on the direction of slopes is the outline's.
 
 
 def draw_outline(points_local: np.ndarray) -> shapely.Polygon:
-    """Outline around `points_local` (n, 3), mostly along the roof's slopes and across them, where it has any.
+    """Draw an outline around `points_local` (n, 3).
 
-    Raises FitError for points that span no area.
+    It mostly follows the roof's slopes and runs across them, if it has any. Raises FitError for
+    points that span no area.
     """
     ascending = points_local[np.argsort(points_local[:, 0], kind="stable")]
     kappa, confidence = slope_direction(ascending, SLOPE_PLACES, SLOPE_NEIGHBOURS)

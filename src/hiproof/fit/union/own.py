@@ -1,6 +1,7 @@
-"""Shapes of the catalogue that are neither of the family nor put together in `larger`: one part or neighbours that are one of them by their points.
+"""Fit custom shapes instead of parts, where points suggest it.
 
-None of the shapes that come with the package is such a one; a shape of your own may be.
+A custom shape is one of the catalogue that is neither of the family nor combined in `larger`. The
+package has none, but you may add one.
 """
 
 from __future__ import annotations
@@ -19,14 +20,19 @@ from ...primitives.family import COMPONENTS
 from ...settings import Settings
 from .regions import exclude_parts, list_polygons, unite_outlines
 
-MOST_REPLACED_PARTS = 3  # that one shape may take the place of
-RECTANGULAR = 0.9  # share of the smallest rectangle around them that the parts roof together
-MOST_DISTANCE_M = 0.25  # points farther off are counted as this far
-FARTHER_M = 0.01  # in the mean: one shape may lie so much farther from the points than several, must lie so much nearer than one
+MOST_REPLACED_PARTS = 3  # Most parts that one shape replaces.
+RECTANGULAR = 0.9  # Share of the smallest rectangle around them that the parts roof together.
+MOST_DISTANCE_M = 0.25  # Points further off (m) count as this far.
+# One shape may lie so much further (m, in the mean) from the points than several parts, and must
+# lie so much nearer than one.
+FARTHER_M = 0.01
 
 
 def fit_custom_shapes(parts: list[Part], points: np.ndarray, settings: Settings) -> list[Part]:
-    """`parts` with one or several replaced by a part of another shape where the `points` (n, 3) say as much for it."""
+    """Replace one or several `parts` by a custom shape that fits the points as well.
+
+    The points are (n, 3).
+    """
     for name in list_custom_names(settings.fit.types):
         for count in range(1, min(MOST_REPLACED_PARTS, len(parts)) + 1):
             for group in combinations([part for part in parts if part.type != name], count):
@@ -39,7 +45,7 @@ def fit_custom_shapes(parts: list[Part], points: np.ndarray, settings: Settings)
 
 
 def list_custom_names(allowed: tuple[str, ...]) -> list[str]:
-    """Types with other planes than a volume has, for which nothing else is made to find them."""
+    """List types with other planes than a volume has, that nothing else finds."""
     names = [
         name
         for name, shape in CATALOGUE.items()
@@ -51,7 +57,7 @@ def list_custom_names(allowed: tuple[str, ...]) -> list[str]:
 def unite_parts(
     shape: Primitive, group: tuple[Part, ...], points: np.ndarray, settings: Settings
 ) -> Part | None:
-    """The `group` parts as one of `shape` over what they roof, None where they are none."""
+    """Fit one `shape` over what a `group` of parts roofs, None if it does not fit."""
     covered = list_polygons(unite_outlines(group))
     if (
         len(covered) != 1
@@ -60,9 +66,8 @@ def unite_parts(
         return None
     inside_points = points[shapely.intersects_xy(covered[0], points[:, 0], points[:, 1])]
     part = fit_shape(shape, inside_points, covered[0], settings)
-    farther = (
-        FARTHER_M if len(group) > 1 else -FARTHER_M
-    )  # fewer parts are worth a little, another name is not
+    # Fewer parts are worth a little more misfit, another name is not.
+    farther = FARTHER_M if len(group) > 1 else -FARTHER_M
     return (
         None
         if part is None
@@ -75,7 +80,7 @@ def unite_parts(
 def fit_shape(
     shape: Primitive, points: np.ndarray, outline: shapely.Polygon, settings: Settings
 ) -> Part | None:
-    """A part of `shape` that roofs `outline` by its points, None where these are too few."""
+    """Fit a part of `shape` that roofs `outline`, None if there are too few points."""
     from ..single import fit_roof
 
     try:
@@ -106,6 +111,9 @@ def fit_shape(
 
 
 def measure_misfit(parts: list[Part], points: np.ndarray) -> float:
-    """Mean distance in height (m) of points (n, 3) from the highest of the parts, those far off counted as MOST_DISTANCE_M."""
+    """Return the mean distance in height (m) of points (n, 3) from the highest part.
+
+    Distances count up to MOST_DISTANCE_M.
+    """
     z = np.max([part.height_at(points[:, :2]) for part in parts], axis=0)
     return float(np.minimum(np.abs(points[:, 2] - z), MOST_DISTANCE_M).mean())

@@ -1,4 +1,4 @@
-"""More is grown at the places of a large roof where most of its points are still unexplained."""
+"""Grow more at the places of a large roof where most points are still unexplained."""
 
 from __future__ import annotations
 
@@ -17,14 +17,11 @@ from .seams import list_volume_slopes
 from .whole import Whole
 from .window import change_in_window
 
-COUNT_SQUARE_M, SQUARES_AROUND = (
-    3.0,
-    2,
-)  # m of a square in which unexplained points are counted, and squares around one that count too
-PLACES_A_BLOCK = (
-    3.0  # tried at most, for each block's area: a bound on time, the rest stays as it is
-)
-WINDOW_M, WINDOW_POINTS = 20.0, 1200  # m of a side of a place's window, and its points at most
+COUNT_SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are counted.
+SQUARES_AROUND = 2  # Squares around one that count, too.
+PLACES_A_BLOCK = 3.0  # Most places tried for each block's area: a limit on time.
+WINDOW_M = 20.0  # Size (m) of a place's window.
+WINDOW_POINTS = 1200  # Most points of a place's window.
 
 
 def grow_at_places(whole: Whole) -> None:
@@ -51,7 +48,7 @@ def grow_at_places(whole: Whole) -> None:
 
 
 def sum_squares(counts: np.ndarray) -> np.ndarray:
-    """Sums (a, b) of the counts over each square and those around it."""
+    """Sum up the counts (a, b) over each square and those around it."""
     padded = np.pad(counts, SQUARES_AROUND)
     steps = range(2 * SQUARES_AROUND + 1)
     rows, columns = counts.shape
@@ -59,7 +56,7 @@ def sum_squares(counts: np.ndarray) -> np.ndarray:
 
 
 def grow_in_window(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-    """Improve the volumes of a window, and grow more from candidates of what they leave unexplained."""
+    """Improve the volumes of a window, and grow more where points are unexplained."""
     volumes, value = improve(volumes, scene, value, list_volume_slopes(volumes), 1)
     unexplained_points = find_unexplained(volumes, scene)
     if len(unexplained_points) < FEWEST_UNEXPLAINED:

@@ -1,4 +1,7 @@
-"""The plan of one building: its own frame, the points that count, the grid of cells, the ghosts of unseen roof."""
+"""Lay out the plan of one building.
+
+It has a frame of its own, the points that count, a grid of cells, and the unobserved cells.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +20,30 @@ from ..direction import main_direction
 from ..walls import on_walls
 from .planes import Cloud, Grid, UnobservedCells
 
-MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
-# m from the border within which returns may be a facade's; clouds of more points a square metre lose them all, sparser
-# ones those that lie on walls; m for each of these points: a bay half a metre deep must keep some of its few
-FACADE_BORDER_M, FACADE_MIN_DENSITY, FACADE_M_A_POINT = 0.15, 4.0, 0.025
-LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
-COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
-# m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
-MERGE_LINES_M, GRID_CELL_M, GRID_CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
-HEIGHT_MARGIN_M = 0.3  # m beyond the range of heights that unseen roof may have
-SHADE = 0.2  # of a point: what the highest of roofs costs for each that is missing
+MIN_STRUCTURE_POINTS = 4  # With fewer points, a building is one level block at their median.
+FACADE_BORDER_M = 0.15  # Distance (m) from the border within which returns may be a facade's.
+# Density (points/m2) from which on a cloud loses all points so near the border. Sparser clouds lose
+# those that lie on walls.
+FACADE_MIN_DENSITY = 4.0
+# Distance (m) for each of these points: a bay half a metre deep must keep some of its few.
+FACADE_M_A_POINT = 0.025
+LEAST_AWAY = 8  # With fewer points further in, none is lost.
+LEAST_AWAY_SHARE = 0.5  # With a smaller share of points further in, none is lost.
+COVERED_SHARE = 0.8  # Share of the outline that points usually cover.
+MERGE_LINES_M = 0.2  # Lines of the grid that are nearer (m) are one.
+GRID_CELL_M = 0.5  # Size (m) of a cell.
+GRID_CELL_SPACINGS = 0.6  # Size of a cell in spacings of points, where these are larger.
+MAX_CELLS = 22  # Most cells a side.
+HEIGHT_MARGIN_M = 0.3  # Distance (m) beyond the range of heights that an unobserved roof may have.
+SHADE = 0.2  # Price (points) of the highest of roofs for each missing point.
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything the search needs of one building; `density` in points per square metre of covered outline.
+    """Everything that the search needs of one building.
 
-    `border` (3, m): u, v, z of points next to the outline that do not count, for a scanner may have had them of the walls.
+    `density` is in points per square metre of covered outline. `border` (3, m) are u, v, z of
+    points next to the outline that do not count: they may be of the walls.
     """
 
     frame: PlanFrame
@@ -46,11 +56,13 @@ class Plan:
 
 @compiled
 def measure_depth(x, y, starts, ends):
-    """Distance (n,) of points to the nearest of the edges `starts`, `ends` (m, 2), negative outside (even-odd rule)."""
+    """Return the distance (n,) of points to the nearest of the edges.
+
+    These go from `starts` to `ends` (m, 2). The distance is negative outside (even-odd rule).
+    """
     inside, nearest = np.zeros(len(x), np.bool_), np.full(len(x), np.inf)
-    for e in range(
-        len(starts)
-    ):  # one edge after the other, so that the processor takes several points at once
+    # Edges follow each other, so that the processor computes several points at once.
+    for e in range(len(starts)):
         x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
         dx, dy = x1 - x0, y1 - y0
         square = max(dx * dx + dy * dy, 1e-18)
@@ -64,15 +76,17 @@ def measure_depth(x, y, starts, ends):
 def lay_lines(
     lowest: float, highest: float, vertices: np.ndarray, cell: float, most_cells: int = MAX_CELLS
 ) -> np.ndarray:
-    """Lay lines from `lowest` to `highest` at the footprint's `vertices`, filled up to about `cell`, over `most_cells`."""
+    """Lay at most `most_cells` cells' lines from `lowest` to `highest`.
+
+    They lie at the footprint's `vertices`, and about `cell` apart between these.
+    """
     corner_lines, end = [float(lowest)], float(highest)
     for x in sorted(vertices.tolist()):
         if abs(x - corner_lines[-1]) > MERGE_LINES_M and abs(x - end) > MERGE_LINES_M:
             corner_lines.append(x)
     corner_lines.append(end)
-    while (
-        len(corner_lines) > most_cells
-    ):  # an outline of hundreds of vertices: give up the line closest to its neighbours
+    # If an outline has hundreds of vertices, drop the line closest to its neighbours.
+    while len(corner_lines) > most_cells:
         crowded = min(
             range(1, len(corner_lines) - 1), key=lambda k: corner_lines[k + 1] - corner_lines[k - 1]
         )
@@ -92,12 +106,18 @@ def lay_lines(
 
 
 def find_cells(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Which of the cells between neighbouring `lines`, ascending, each of x (n,) lies in; the first or last where beyond all."""
+    """Return which of the cells between neighbouring `lines` each of x (n,) lies in.
+
+    The lines ascend. It is the first or last cell for a place beyond all.
+    """
     return np.searchsorted(lines[1:-1], x, side="right")
 
 
 def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
-    """Frame, points, grid and ghosts for `points_local` (n, 3) and `outline`; points outside the outline do not count."""
+    """Lay out frame, points, grid and unobserved cells for `points_local` (n, 3).
+
+    Points outside `outline` do not count.
+    """
     angle = main_direction(outline)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     depth = measure_depth(
@@ -111,7 +131,7 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     height = np.partition(inside[:, 2], middle)[middle] if len(inside) else 0.0
     frame = PlanFrame(np.array([*centroid, height]), rotation)
     uvz = frame.to_plan(inside)
-    uvz = uvz[np.lexsort(np.round(uvz.T, 6))]  # one order, whatever order the points came in
+    uvz = uvz[np.lexsort(np.round(uvz.T, 6))]  # independent of the points' order
     density = len(uvz) / max(COVERED_SHARE * outline.area, 1.0)
     corners = (shapely.get_coordinates(outline.exterior)[:-1] - centroid) @ rotation.T
     cell = max(GRID_CELL_M, GRID_CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
@@ -128,7 +148,10 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
 
 
 def find_roof_points(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
-    """Which of the points (n, 3) at `depth` (n,) inside an outline are none near its border that a scanner may have had of the walls."""
+    """Return which points (n, 3) are of the roof, at `depth` (n,) inside an outline.
+
+    Those near its border may be of the walls.
+    """
     density = len(points) / area_m2
     dense = density >= FACADE_MIN_DENSITY
     is_near = depth < (
@@ -142,7 +165,10 @@ def find_roof_points(points: np.ndarray, depth: np.ndarray, area_m2: float) -> n
 
 
 def measure_emptiness(cloud: Cloud, expected: np.ndarray) -> np.ndarray:
-    """How empty (nu, nv) cells and those beside them are of the points `expected` (nu, nv): 1 quite, 0 from half of them on."""
+    """Return how empty (nu, nv) cells and their neighbours are of `expected` points.
+
+    It is 1 without any, and 0 from half of the expected (nu, nv) on.
+    """
     rows, columns = expected.shape
     padded = np.zeros((2, rows + 2, columns + 2))
     padded[0, 1:-1, 1:-1] = np.bincount(
@@ -157,7 +183,10 @@ def measure_emptiness(cloud: Cloud, expected: np.ndarray) -> np.ndarray:
 def lay_unobserved_cells(
     frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon
 ) -> UnobservedCells:
-    """A ghost at the centre of every cell inside the outline, weighing as many points as its area usually holds."""
+    """Lay a cell's centre inside the outline in every cell of the grid.
+
+    It weighs as many points as its area usually holds.
+    """
     centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in (grid.u, grid.v))
     u, v = np.repeat(centre_u, len(centre_v)), np.tile(centre_v, len(centre_u))
     xy = frame.xy_local(np.column_stack([u, v]))

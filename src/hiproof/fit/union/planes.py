@@ -1,8 +1,9 @@
-"""Compiled search for the planes of a roof.
+"""Search for the planes of a roof. Compiled.
 
-Everything runs in the building's frame: u, v (m) along its two main directions, z (m) about the median height. A plane is
-(a, b, c) with z = a u + b v + c. The cost of a point is min((dz / tau)^2, 1): evidence is counted in points, and a point
-that no plane explains costs one. Complexity is charged in the same currency, `evidence` points a unit.
+Everything is in the building's frame: u, v (m) along its two main directions, z (m) about the
+median height. A plane is (a, b, c) with z = a u + b v + c. The cost of a point is min((dz / tau)^2,
+1): evidence is counted in points, and a point that no plane explains costs one. Complexity has a
+price in the same currency, `evidence` points a unit.
 """
 
 from __future__ import annotations
@@ -14,26 +15,26 @@ import numpy as np
 from ...compiled import compiled
 from .prices import KIND_COST
 
-MAX_SLOPE = 2.5  # rise over run, 68 degrees; steeper planes are not looked for
-MIN_AXIS_SLOPE = 0.05  # rise over run, 3 degrees; a flatter plane is level
-PART_PLANES = 5  # of one part
-SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
-NEIGHBOUR_RADIUS_M = 2.5  # m; points further away are no neighbours
-LOCAL_POINTS = (9, 17)  # neighbours of a local plane, the point itself among them
-RIDGE_STEP_M = 0.4  # m between the ridges tried
-PLANE_BIN = 0.05  # rise over run, and m at the centre: planes nearer to each other are one
-TEMPLATE_POINTS = 150  # points that templates are laid over; few do for a start
+MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.
+MIN_AXIS_SLOPE = 0.05  # A flatter plane (rise over run), 3 degrees, is level.
+PART_PLANES = 5  # Most planes of one part.
+# Ridge that keeps the slope of a plane determined when its points lie on a line.
+SLOPE_RIDGE = 2e-4
+NEIGHBOUR_RADIUS_M = 2.5  # Points further away (m) are no neighbours.
+LOCAL_POINTS = (9, 17)  # Numbers of points of a local plane.
+RIDGE_STEP_M = 0.4  # Distance (m) between the ridges tried.
+PLANE_BIN = 0.05  # Planes nearer to each other (rise over run, and m at the centre) are one.
+TEMPLATE_POINTS = 150  # Points that templates are fitted to: few are enough for a start.
 
-Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
-Grid = namedtuple("Grid", "u v")  # grid lines, ascending
-UnobservedCells = namedtuple(
-    "UnobservedCells", "u v weight shade low high"
-)  # cell centres inside the outline; heights a roof may take
+Cloud = namedtuple("Cloud", "u v z i j")  # Points (n,) and the grid cell of each.
+Grid = namedtuple("Grid", "u v")  # Grid lines, ascending.
+# Centres of cells inside the outline, and the heights that a roof may have.
+UnobservedCells = namedtuple("UnobservedCells", "u v weight shade low high")
 
 
 @compiled
 def classify_plane(plane):
-    """0 flat, 1 sloping along u, 2 along v, 3 free."""
+    """Return 0 for a level plane, 1 for one sloping along u, 2 along v, and 3 freely."""
     return (1 if abs(plane[0]) > 1e-9 else 0) + (2 if abs(plane[1]) > 1e-9 else 0)
 
 
@@ -45,7 +46,7 @@ def truncate_cost(residual, tau):
 
 @compiled
 def find_lower_envelope(planes, count, u, v):
-    """Height of the min of the first `count` planes and which one is active."""
+    """Return the height of the lowest of the first `count` planes, and its index."""
     best, active = np.inf, 0
     for k in range(count):
         z = planes[k, 0] * u + planes[k, 1] * v + planes[k, 2]
@@ -56,7 +57,10 @@ def find_lower_envelope(planes, count, u, v):
 
 @compiled
 def solve_masked(matrix, right, mask):
-    """Solve the symmetric 3 x 3 system for the unknowns in `mask`, the others zero; False when it is singular."""
+    """Solve the symmetric 3 x 3 system for the unknowns in `mask`, the others zero.
+
+    Also returns False if it is singular.
+    """
     a, b, x = matrix.copy(), right.copy(), np.zeros(3)
     for i in range(3):
         if not mask[i]:
@@ -92,7 +96,10 @@ def sum_plane_cost(cloud, members, plane, tau):
 
 @compiled
 def step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v):
-    """One re-weighted least-squares step of `plane` on `members`; False when too little weight is left."""
+    """Make one re-weighted least-squares step of `plane` on `members`.
+
+    Also returns False if too little weight is left.
+    """
     matrix, right = np.zeros((3, 3)), np.zeros(3)
     for i in members:
         r = (cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2]) / scale
@@ -123,7 +130,10 @@ def step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v):
 
 @compiled
 def fit_plane(cloud, members, start, tau, evidence):
-    """Best of flat, two axis slopes and a free plane near `start`, by truncated cost plus complexity."""
+    """Fit the best of a level, two axis-sloped and a free plane near `start`.
+
+    It has the lowest truncated cost plus complexity.
+    """
     n = len(members)
     centre_u, centre_v = 0.0, 0.0
     for i in members:
@@ -153,7 +163,10 @@ def fit_plane(cloud, members, start, tau, evidence):
 
 @compiled
 def fit_symmetric_gable(cloud, members, planes, tau):
-    """Two planes with one shared slope along an axis near `planes` (2, 3); False when they are no gable."""
+    """Fit two planes with one shared slope along an axis near `planes` (2, 3).
+
+    Also returns False if they are no gable.
+    """
     fitted = planes[:2].copy()
     kind = classify_plane(planes[0])
     if (kind != 1 and kind != 2) or classify_plane(planes[1]) != kind:
@@ -199,7 +212,10 @@ def fit_symmetric_gable(cloud, members, planes, tau):
 
 @compiled
 def fit_local_plane(cloud, nearest, count):
-    """Least-squares plane of the first `count` of `nearest`, once trimmed at twice the median residual."""
+    """Fit a plane to the first `count` of `nearest` by least squares.
+
+    Points are trimmed once, at twice the median residual.
+    """
     plane, limit, ok = np.zeros(3), np.inf, True
     mask = np.ones(3, np.bool_)
     u0, v0 = cloud.u[nearest[0]], cloud.v[nearest[0]]
@@ -241,7 +257,10 @@ def fit_local_plane(cloud, nearest, count):
 
 @compiled
 def find_median(values):
-    """The median of some ten `values`, which it sorts; numba's np.median takes four times as long for so few."""
+    """Return the median of some ten `values`, which it sorts.
+
+    Numba's np.median takes four times as long for so few.
+    """
     for q in range(1, len(values)):
         x, place = values[q], q
         while place > 0 and values[place - 1] > x:
@@ -254,7 +273,7 @@ def find_median(values):
 
 @compiled
 def list_flat_planes(z, out):
-    """A flat plane at every height (0.1 m apart) that some point has; returns how many."""
+    """List a level plane at every height (0.1 m apart) of a point, and count them."""
     steps = np.unique(np.round(z / 0.1))
     count = min(len(steps), len(out))
     for q in range(count):
@@ -264,9 +283,10 @@ def list_flat_planes(z, out):
 
 @compiled
 def find_neighbours(cloud, i, squares, near_points, distance2, nearest):
-    """Points within NEIGHBOUR_RADIUS_M of point `i` into `near_points`, the closest of them into `nearest`, closest first.
+    """Find the points within NEIGHBOUR_RADIUS_M of point `i`, and the closest of them.
 
-    `squares` (n,) and `distance2` are room for squared distances of all and of the closest. Returns how many of each.
+    They go into `near_points` and `nearest`, closest first. `squares` (n,) and `distance2` are room
+    for squared distances of all and of the closest. Returns how many of each.
     """
     u, v = cloud.u, cloud.v
     for q in range(len(u)):  # no branches: a processor does several points at once
@@ -290,9 +310,10 @@ def find_neighbours(cloud, i, squares, near_points, distance2, nearest):
 
 @compiled
 def list_hypotheses(cloud, most_seeds, most_pairs):
-    """Candidate planes (m, 3): flats, local least-squares planes, and slopes along the axes through pairs of points.
+    """List candidate planes (m, 3): level, local, and through pairs of points.
 
-    Seeds and partners are spread evenly (golden-ratio sequence) over the sorted points, so nothing is drawn at random.
+    The last slope along the axes. Seeds and partners are spread evenly (golden-ratio sequence) over
+    the sorted points, so nothing is random.
     """
     n = len(cloud.u)
     flats = min(n, 200)
@@ -320,7 +341,10 @@ def list_hypotheses(cloud, most_seeds, most_pairs):
 
 @compiled
 def select_distinct(planes, centre_u, centre_v):
-    """One of all `planes` (m, 3) whose slopes and height at the centre fall into the same bins of PLANE_BIN."""
+    """Select one of all `planes` (m, 3) in the same bins of PLANE_BIN.
+
+    Bins are those of slopes and of height at the centre.
+    """
     keys = np.empty(len(planes), np.int64)
     for q in range(len(planes)):
         a, b, c = planes[q]
@@ -337,7 +361,10 @@ def select_distinct(planes, centre_u, centre_v):
 
 @compiled
 def append_pair_slopes(cloud, i, j, out, m):
-    """Append the slopes along u and along v that pass points i and j, where they are far enough apart."""
+    """Append the planes along u and along v through points i and j.
+
+    The points must be far enough apart.
+    """
     dz = cloud.z[j] - cloud.z[i]
     for axis in range(2):
         x = cloud.u if axis == 0 else cloud.v
@@ -351,7 +378,10 @@ def append_pair_slopes(cloud, i, j, out, m):
 
 @compiled(allocates=False)
 def bound_rows(gain, reach):
-    """Fill `reach` (nu + 1,): no rectangle within the rows from i on has a larger sum of `gain` than reach[i]."""
+    """Fill `reach` (nu + 1,) with bounds of the sums of `gain` from each row on.
+
+    No rectangle within the rows from i on has a larger sum than reach[i].
+    """
     reach[-1] = 0.0
     for i in range(len(gain) - 1, -1, -1):
         best_run = running = 0.0
@@ -363,10 +393,11 @@ def bound_rows(gain, reach):
 
 @compiled(allocates=False)
 def find_best_rectangle(gain, least_sum, reach, column):
-    """Rectangle of cells with the largest sum of `gain` (nu, nv) above `least_sum`: (sum, i0, i1, j0, j1), half open.
+    """Find the rectangle of cells with the largest sum of `gain` above `least_sum`.
 
-    Kadane in 2D, without the rows that cannot bring more than what is found (`reach` of `bound_rows`); `column` (nv,)
-    is room to work in. Where nothing is above `least_sum` the sum is `least_sum` and the rectangle empty.
+    Returns sum, i0, i1, j0, j1, half open. It is Kadane's method in 2D, without rows that cannot
+    bring more than the best (`reach` of `bound_rows`). `column` (nv,) is room to work in. If
+    nothing is above `least_sum`, that is the sum and the rectangle is empty.
     """
     nu, nv = gain.shape
     best, i0_best, i1_best, j0_best, j1_best = least_sum, 0, 0, 0, 0
@@ -395,7 +426,10 @@ def find_best_rectangle(gain, least_sum, reach, column):
 
 @compiled(fastmath=True, allocates=False)
 def fill_point_gains(cloud, planes, count, current, tau, gain):
-    """Fill `gain` (n,) with the drop of cost that the min of `planes` would bring; returns the sum over those that gain."""
+    """Fill `gain` (n,) with the drop of cost under the min of `planes`.
+
+    Returns the sum over the points that gain.
+    """
     a, b, c = planes[0]
     for q in range(len(gain)):
         gain[q] = a * cloud.u[q] + b * cloud.v[q] + c
@@ -413,7 +447,10 @@ def fill_point_gains(cloud, planes, count, current, tau, gain):
 
 @compiled(fastmath=True, allocates=False)
 def fill_cell_gains(cloud, gain_of_point, gain):
-    """Fill `gain` (nu, nv) with the sums over each cell's points; returns the sum over the cells that gain."""
+    """Fill `gain` (nu, nv) with the sums over each cell's points.
+
+    Returns the sum over the cells that gain.
+    """
     gain[:] = 0.0
     for q in range(len(gain_of_point)):
         gain[cloud.i[q], cloud.j[q]] += gain_of_point[q]
@@ -426,10 +463,12 @@ def fill_cell_gains(cloud, gain_of_point, gain):
 
 @compiled
 def find_best_candidate(cloud, candidates, counts, bounds, current, tau, least_gain, gain):
-    """The candidate with the best rectangle, lazily: `bounds` are upper bounds of its gain, and costs only ever fall.
+    """Find the candidate with the best rectangle.
 
-    Ever dearer bounds are tried in turn: the sum over the points that gain, over the cells that gain, over the best run of
-    every row. Returns (gain, candidate or -1, i0, i1, j0, j1) and tightens `bounds` (in place).
+    `bounds` are upper bounds of each candidate's gain, and costs only ever fall. Ever dearer bounds
+    are tried in turn: the sum over the points that gain, over the cells that gain, and over the
+    best run of every row. Returns gain, candidate or -1, and its rectangle, and tightens `bounds`
+    in place.
     """
     gain_of_point = np.empty(len(cloud.u))
     for m in range(len(bounds)):
@@ -464,7 +503,7 @@ def select_members(cloud, rectangle):
 
 @compiled
 def lower_costs(cloud, members, planes, count, tau, current):
-    """Let `current` (n,) fall to the cost under the min of `planes` for `members`."""
+    """Lower `current` (n,) to the cost under the min of `planes` for `members`."""
     for i in members:
         z, _ = find_lower_envelope(planes, count, cloud.u[i], cloud.v[i])
         current[i] = min(current[i], truncate_cost(cloud.z[i] - z, tau))
@@ -472,7 +511,10 @@ def lower_costs(cloud, members, planes, count, tau, current):
 
 @compiled
 def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
-    """Greedy pool (k, 3): the hypothesis that explains its best rectangle best, refitted there, until little is gained."""
+    """Pool planes (k, 3) greedily, each refitted over its best rectangle.
+
+    It ends when little is gained.
+    """
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
     current = np.ones(len(cloud.u))
     bounds = np.full(len(candidates), np.inf)
@@ -495,7 +537,10 @@ def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
 
 @compiled
 def mirror_gables(pool, grid):
-    """Every axis-sloped plane of the pool mirrored about ridges RIDGE_STEP_M apart: candidates (m, PART_PLANES, 3)."""
+    """Mirror every axis-sloped plane of the pool about ridges RIDGE_STEP_M apart.
+
+    Returns candidates (m, PART_PLANES, 3).
+    """
     steps_u = int((grid.u[-1] - grid.u[0]) / RIDGE_STEP_M) + 2
     steps_v = int((grid.v[-1] - grid.v[0]) / RIDGE_STEP_M) + 2
     out = np.zeros((len(pool) * (steps_u + steps_v), PART_PLANES, 3))
@@ -520,7 +565,11 @@ def mirror_gables(pool, grid):
 
 @compiled
 def fill_symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v, out):
-    """Planes of z = height - max(slope_u (|u - centre_u| - top_u), slope_v (...)) into `out`; a slope of 0 leaves its pair out."""
+    """Fill `out` with planes of a roof symmetric about its centre, and count them.
+
+    It is z = height - max(slope_u (|u - centre_u| - top_u), slope_v (...)). A slope of 0 leaves its
+    pair out.
+    """
     k = 0
     for axis in range(2):
         slope, top, centre = (slope_u, top_u, centre_u) if axis == 0 else (slope_v, top_v, centre_v)
@@ -535,7 +584,10 @@ def fill_symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, cent
 
 @compiled
 def fit_template(z, drop, slope, tau):
-    """Robust (height, slope) of z = height - slope * drop (n,), from a start slope; the slope is 0 where it fails."""
+    """Fit height and slope of z = height - slope * drop (n,) robustly.
+
+    It begins with a start slope. The slope is 0 if it fails.
+    """
     height = np.median(z + slope * drop)
     for step in range(5):
         scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
@@ -562,9 +614,10 @@ def fit_template(z, drop, slope, tau):
 
 @compiled
 def fit_whole_roofs(cloud, grid, tau):
-    """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, PART_PLANES, 3) and counts.
+    """Fit gables, a pyramid and a hip over the whole plan from several start slopes.
 
-    Few points do for a start: at most twice TEMPLATE_POINTS of the cloud's are used.
+    Returns candidates (m, PART_PLANES, 3) and counts. Few points are enough: at most twice
+    TEMPLATE_POINTS of the cloud's are used.
     """
     stride = max(1, len(cloud.u) // TEMPLATE_POINTS)
     u, v, z = cloud.u[::stride].copy(), cloud.v[::stride].copy(), cloud.z[::stride].copy()
@@ -612,7 +665,10 @@ def fit_whole_roofs(cloud, grid, tau):
 
 @compiled
 def pool_gables(cloud, grid, pool, tau, evidence, most_gables):
-    """Greedy pool of symmetric gables, pyramids and hips (k, PART_PLANES, 3) and their counts; gables refitted."""
+    """Pool symmetric gables, pyramids and hips (k, PART_PLANES, 3) greedily.
+
+    Also returns their counts of planes. Gables are refitted.
+    """
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
     mirrored = mirror_gables(pool, grid)
     whole, whole_counts = fit_whole_roofs(cloud, grid, tau)

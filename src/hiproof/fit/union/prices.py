@@ -1,7 +1,8 @@
-"""The table of prices: what a unit is, what structure costs, and what a change must gain.
+"""Define the table of prices.
 
-A roof costs its points' misfit and units of evidence for its structure. Every decision of the
-search and after it compares such costs; only here is it written what they are.
+It has what a unit is, what structure costs, and what a change must gain. A roof costs its points'
+misfit and units of evidence for its structure. Every decision of the search and after it compares
+such costs, and all of them are here.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ import numpy as np
 
 # The unit: as many points as a unit of structure must explain.
 
-COMMON_HOUSE_M2 = 60.0  # up to LARGE_ROOF_M2, larger roofs ask more of each volume
-LARGE_ROOF_M2 = (
-    200.0  # of outline: larger roofs are searched in windows, at a price that does not grow
-)
-"""Area [m2] from which on the price of structure does not depend on a roof's size."""
+COMMON_HOUSE_M2 = 60.0  # Larger roofs, up to LARGE_ROOF_M2, ask more of each volume.
+LARGE_ROOF_M2 = 200.0
+"""Area (m2) from which on the price of structure does not depend on a roof's size.
+
+Larger roofs are searched in windows.
+"""
 
 LARGE_ROOF_POINTS = 1.77
 """Points that a unit of a large roof must explain at least, times those of a house.
@@ -55,11 +57,11 @@ def compute_unit_points(density: float, area_m2: float, settings) -> float:
 # What structure costs, in units.
 
 PART_COST, PARAMETER_COST = 0.5, 0.45  # a volume, and each of its offsets and its own slopes
-REPLACING_COST, BASE_COST = 0.5, 0.95  # that a volume replaces what it covers; a base that shows
+REPLACING_COST, BASE_COST = 0.5, 0.95  # a volume that replaces others; a visible base
 LEANING_COST = 0.1  # each plane that leans: the wall says how, but which wall is a choice
 
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
-"""What an edge costs that shows: a fixed sum, more by the metre, more by the metre of low steps
+"""The price of a visible edge: a fixed sum, more by the metre, more by the metre of low steps
 (lower than `low_step`, in metres), more in line with no corner, less where it ends in one.
 """
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # in this order
@@ -90,8 +92,8 @@ Vienna's even places: 82.0, 81.9, 81.8 % at 1, 2 and 3 units, 81.7 without copie
 
 # What a change may cost that a draughtsman would make, in units.
 
-SLIVER_UNITS = 3.0  # leaving out a plane that shows as a narrow strip
-CREASE_UNITS = 2.0  # a crease that ends in a corner of the outline: nobody draws the short edge
+SLIVER_UNITS = 3.0  # dropping a plane of which a narrow strip is visible
+FOLD_UNITS = 2.0  # a fold line that ends in a corner: nobody draws the short edge
 SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
 
 # How far above the best a change may begin and still become the best, in units.

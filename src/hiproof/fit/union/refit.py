@@ -1,4 +1,7 @@
-"""A volume's planes refitted to the points over which it shows, its slopes tied as it says. Compiled."""
+"""Refit a volume's planes to the points over which it is visible. Compiled.
+
+Its slopes are tied as it says.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +28,18 @@ from .volumes import (
     read_rectangle,
 )
 
-FIT_ROUNDS = 2  # of fitting and re-weighting
-# points a plane must show over to be refitted, and to find its slope; m2 of their spread along it
-LEAST_WEIGHT, LEAST_SLOPE_WEIGHT, LEAST_SPREAD_M2 = 1.0, 2.0, 0.02
+FIT_ROUNDS = 2  # Rounds of fitting and re-weighting.
+LEAST_WEIGHT = 1.0  # Least weight (points) of a plane that is refitted.
+LEAST_SLOPE_WEIGHT = 2.0  # Least weight (points) of planes whose slope is refitted.
+LEAST_SPREAD_M2 = 0.02  # Least variance (m2) of such points along the slope.
 
 
 @compiled
 def refit(volumes, scene, k, context):
-    """Two rounds of biweighted least squares for volume k (in place) on the points where it is the one that shows."""
+    """Refit volume k, in place, by two rounds of biweighted least squares.
+
+    It is fitted to the points where it is the visible volume.
+    """
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v, z = scene.U[direction, :n], scene.V[direction, :n], scene.z[:n]
     earlier, later = context.earlier, context.later
@@ -51,7 +58,10 @@ def refit(volumes, scene, k, context):
 
 @compiled
 def sum_by_plane(volumes, k, u, v, z, weights, planes):
-    """Sums (5, PLANES) of w, w x, w z, w x x, w x z over the points that each plane of volume k is the lowest at."""
+    """Sum up w, w x, w z, w x x, w x z over the points of each plane of volume k.
+
+    These are the points where the plane is the lowest. The sums are (5, N_PLANES).
+    """
     sums = np.zeros((5, N_PLANES))
     for i in range(len(u)):
         w, plane = weights[i], planes[i]
@@ -67,7 +77,10 @@ def sum_by_plane(volumes, k, u, v, z, weights, planes):
 
 @compiled
 def solve_planes(row, sums):
-    """Slopes and offsets of a volume from its planes' weighted sums (5, PLANES); what has no points keeps its offset."""
+    """Solve for a volume's slopes and offsets from its planes' sums (5, N_PLANES).
+
+    A plane without points keeps its offset.
+    """
     step = N_SIDES if row[TIE] == ALL_EQUAL else 2 if row[TIE] == OPPOSITE else 1
     for first in range(0, N_SIDES, step):
         spread = product = weight = 0.0

@@ -1,4 +1,7 @@
-"""Where each volume roofs the outline: inside its four sides, less what a later one replaces."""
+"""Cut the outline into the regions that volumes roof.
+
+A region lies inside a volume's four sides, without what a later volume replaces.
+"""
 
 from __future__ import annotations
 
@@ -20,60 +23,62 @@ from .prices import SHAPE_UNITS
 from .scene import Scene
 from .sides import Side, find_corners
 from .volumes import DIRECTION, LEVEL, OFFSET0, REPLACES, U0, V1
-from .whole import PLACE_COLUMNS
+from .whole import POSITION
 
-# a gap may be the base's where a disc of this radius fits, and is not where it is smaller than that
-THICK_M, THICK_M2 = 0.25, 0.19
-SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
-# of the base apart from the rest of it, from which on that is a part; of what lies between, that is roofed where it runs on
-PLACE_M2, ROOFED_SHARE = 1.0, 0.5
-OVERLAY_GAP_M = 1e-5  # further apart, rounding to the grid of overlays lets no polygons touch
-FAR_M = 1e4  # m beyond all of an outline
-TURN_M2 = 1e-6  # of the parallelogram that two sides of a volume span; numerically none below
+THICK_M = 0.25  # A gap may be the base's if a disc of this radius (m) fits in.
+THICK_M2 = 0.19  # A smaller gap (m2) is not the base's.
+SHOWS_M = 0.25  # The base is visible within a volume where it is higher by more (m).
+PLACE_M2 = 1.0  # Least area (m2) of the base, apart from the rest of it, that is a part.
+ROOFED_SHARE = 0.5  # Share between two places that is roofed if the roof continues.
+# Polygons further apart (m) do not touch after rounding to the grid of overlays.
+OVERLAY_GAP_M = 1e-5
+FAR_M = 1e4  # A distance (m) beyond all of an outline.
+TURN_M2 = 1e-6  # Least area (m2) of the parallelogram that two sides span: numerically none below.
 
 
 class PlanSite(NamedTuple):
-    """What volumes are cut to: an outline (local coordinates), or the part of one in a window.
+    """What volumes are cut to: an outline in local coordinates, or a part of one.
 
-    Overlays are `known` once they were made: of a roof that changes in one place, most stay.
+    Overlays are kept in `cache`: of a roof that changes in one place, most stay.
     """
 
     outline: shapely.Polygon
     plan: Plan
     scene: Scene
-    known: dict
+    cache: dict
 
     def recall(self, find: Callable[..., Any], *arguments: Any) -> Any:
-        """What `find` makes of these very objects, found the first time that it is asked for."""
+        """Return what `find` makes of these very objects, computed once."""
         key = find, *map(id, arguments)
-        if key not in self.known:
-            self.known[key] = (
+        if key not in self.cache:
+            # The cache holds the objects, so that no other object takes their numbers.
+            self.cache[key] = (
                 find(*arguments),
                 arguments,
-            )  # no other object takes the number of one that is held
-        return self.known[key][0]
+            )
+        return self.cache[key][0]
 
     def cut_quad(
         self, volume: np.ndarray, sides: list[Side]
     ) -> tuple[shapely.Polygon, shapely.Geometry]:
-        """A volume's plan, and what of it lies inside the outline."""
-        key = volume[PLACE_COLUMNS].tobytes(), *sides
-        if key not in self.known:
+        """Return a volume's plan, and the part of it inside the outline."""
+        key = volume[POSITION].tobytes(), *sides
+        if key not in self.cache:
             quad = draw_quad(volume, sides, self.plan, self.scene)
-            self.known[key] = (
+            self.cache[key] = (
                 quad,
                 shapely.intersection(quad, self.outline, grid_size=OVERLAY_GRID_M),
             )
-        return self.known[key]
+        return self.cache[key]
 
     def find_rest(self, quads: list[shapely.Polygon]) -> list[shapely.Polygon]:
-        """What of the outline lies in no quad."""
+        """Return the part of the outline that lies in no quad."""
         return self.recall(subtract_quads, self.outline, *quads)
 
     def cut_out(
         self, polygons: list[shapely.Polygon], hole: shapely.Polygon
     ) -> list[shapely.Polygon]:
-        """What is left of the polygons without the `hole`."""
+        """Return the polygons without the `hole`."""
         return [
             remainder
             for polygon in polygons
@@ -84,10 +89,10 @@ class PlanSite(NamedTuple):
 def cut_regions(
     volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: PlanSite, base: bool
 ) -> list[list[shapely.Polygon]]:
-    """For each volume the polygons (local coordinates) of the site's outline that it may roof.
+    """Return, for each volume, the polygons of the site's outline that it may roof.
 
-    They overlap, as volumes do. What a later volume replaces is cut out. With `base`, what no other
-    covers is the base's, and what rises through others.
+    They are in local coordinates, and overlap as volumes do. What a later volume replaces is cut
+    out. With `base`, the base has what no other volume covers, and what rises through others.
     """
     cut = [
         site.cut_quad(volume, volume_sides)
@@ -112,7 +117,10 @@ def cut_regions(
 def list_part_polygons(
     regions: list[list[shapely.Polygon]], outline: shapely.Polygon, plan: Plan
 ) -> Iterator[tuple[int, list[shapely.Polygon]]]:
-    """Which volume roofs which polygons, each to be one part: what lies apart of the base are several, such as two wings."""
+    """Yield which volume roofs which polygons, each to be one part.
+
+    Places of the base that lie apart, such as two wings, are several parts.
+    """
     places: list[list[shapely.Polygon]] = []
     for polygon in sorted(
         list_polygons(shapely.union_all(regions[0], grid_size=OVERLAY_GRID_M)),
@@ -135,7 +143,10 @@ def list_part_polygons(
 def is_continuous(
     polygon: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polygon, plan: Plan
 ) -> bool:
-    """Whether a roof may run on from one place to another under what stands between: no yard, nor a house in a row with them."""
+    """Return whether a roof may continue between two places under what stands there.
+
+    Neither a yard nor a house in a row with them stands there.
+    """
     joint = with_area(shapely.union(polygon, other, grid_size=OVERLAY_GRID_M))
     gap = shapely.difference(shapely.convex_hull(joint), joint)
     if shapely.intersection(gap, outline).area <= ROOFED_SHARE * gap.area:
@@ -159,7 +170,10 @@ def is_continuous(
 
 
 def draw_quad(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> shapely.Polygon:
-    """A volume's plan in local coordinates: inside its sides, or its rectangle where these cross within it."""
+    """Draw a volume's plan in local coordinates, inside its sides.
+
+    It is its rectangle where the sides cross within it.
+    """
     c, s = scene.turn[int(volume[DIRECTION])]
     for quad_sides in (sides, [Side(float(x)) for x in volume[U0 : V1 + 1]]):
         ring = plan.frame.xy_local(find_corners(quad_sides) @ np.array([[c, s], [-s, c]]))
@@ -170,7 +184,7 @@ def draw_quad(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -
 
 
 def is_convex(ring: list[list[float]]) -> bool:
-    """Whether four corners clearly turn to the left one after another."""
+    """Return whether four corners clearly turn to the left one after another."""
     ways = [(x - u, y - v) for (u, v), (x, y) in pairwise([*ring, ring[0]])]
     turns = [a * d - b * c for (a, b), (c, d) in pairwise([*ways, ways[0]])]
     return min(turns) > TURN_M2
@@ -179,7 +193,10 @@ def is_convex(ring: list[list[float]]) -> bool:
 def is_base_above(
     base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, site: PlanSite
 ) -> bool:
-    """Whether the level base is noticeably above the volume somewhere over its region, and no worse for the points there."""
+    """Return whether the level base is noticeably above the volume over its region.
+
+    It must be no worse for the points there.
+    """
     corners = shapely.get_coordinates(region)
     if (
         not len(corners)
@@ -197,7 +214,7 @@ def is_base_above(
 
 
 def select_points_in(region: shapely.Geometry, site: PlanSite) -> tuple[np.ndarray, np.ndarray]:
-    """The points inside a region: local x, y (n, 2) and the plan's z (n,)."""
+    """Return the points inside a region: local x, y (n, 2) and the plan's z (n,)."""
     _, plan, scene, _ = site
     xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
     inside = shapely.contains_xy(region, xy[:, 0], xy[:, 1])
@@ -207,7 +224,7 @@ def select_points_in(region: shapely.Geometry, site: PlanSite) -> tuple[np.ndarr
 def compute_volume_heights(
     volume: np.ndarray, planes: Planes, xy: np.ndarray, site: PlanSite
 ) -> np.ndarray:
-    """Heights (n,) of a volume, in the plan's z, at local `xy` (n, 2)."""
+    """Return heights (n,) of a volume, in the plan's z, at local `xy` (n, 2)."""
     _, plan, scene, _ = site
     c, s = scene.turn[int(volume[DIRECTION])]
     uv = (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
@@ -221,7 +238,7 @@ def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
 
 
 def subtract_hole(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shapely.Polygon]:
-    """What is left of a polygon without a hole."""
+    """Return a polygon without a hole."""
     if not shapely.dwithin(polygon, hole, OVERLAY_GAP_M):
         return [polygon]
     if polygon.area < hole.area and shapely.contains_properly(hole, polygon):
@@ -230,13 +247,16 @@ def subtract_hole(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shape
 
 
 def subtract_quads(outline: shapely.Polygon, *quads: shapely.Polygon) -> list[shapely.Polygon]:
-    """What of an outline lies in no quad."""
+    """Return the part of an outline that lies in no quad."""
     covered_area = with_area(shapely.union_all(quads, grid_size=OVERLAY_GRID_M))
     return subtract_hole(outline, covered_area)
 
 
 def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
-    """What parts cover together, without the lines to which slivers shrink on the grid."""
+    """Return what parts cover together.
+
+    Lines to which slivers shrink on the grid are left out.
+    """
     return with_area(
         shapely.union_all(
             [piece.outline for part in parts for piece in part.pieces], grid_size=OVERLAY_GRID_M
@@ -245,7 +265,7 @@ def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
 
 
 def exclude_parts(parts: Iterable[Part], excluded: Iterable[Part]) -> list[Part]:
-    """The parts that are none of `excluded`."""
+    """Return the parts that are none of `excluded`."""
     return [part for part in parts if not any(part is item for item in excluded)]
 
 
@@ -256,7 +276,10 @@ def fill_gaps(
     quads: list[shapely.Polygon],
     site: PlanSite,
 ) -> list[list]:
-    """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
+    """Give every rest of the outline to the volume beside it, or to the base.
+
+    The base has it if points say so.
+    """
     for gap in site.find_rest(quads):
         wide_gap = site.recall(widen_gap, gap)
         k, q = find_neighbour(
@@ -274,14 +297,14 @@ def fill_gaps(
 
 
 def widen_gap(gap: shapely.Polygon) -> shapely.Polygon:
-    """The `gap` a millimetre wider."""
+    """Return the `gap` a millimetre wider."""
     return shapely.buffer(gap, 1e-3, quad_segs=1)
 
 
 def merge_inside(
     polygon: shapely.Polygon, wide_gap: shapely.Polygon, outline: shapely.Polygon
 ) -> list[shapely.Polygon]:
-    """What two polygons cover together of an outline."""
+    """Return what two polygons cover together of an outline."""
     wider = with_area(shapely.union_all([polygon, wide_gap], grid_size=OVERLAY_GRID_M))
     return list_polygons(shapely.intersection(wider, outline, grid_size=OVERLAY_GRID_M))
 
@@ -295,7 +318,10 @@ def find_neighbour(
     polygons: list[list[shapely.Polygon]],
     area: Callable[..., float] = measure_shared_area,
 ) -> tuple[int, int]:
-    """The two indices of that of the `polygons` which shares most `area` with `wide_gap`, or zeros."""
+    """Return the two indices of the one of `polygons` that shares most `area`.
+
+    It shares it with `wide_gap`. Without any, these are zeros.
+    """
     places = [(k, q) for k, group in enumerate(polygons) for q in range(len(group))]
     if not places:
         return 0, 0
@@ -310,7 +336,7 @@ def find_neighbour(
 
 
 def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
-    """Whether the polygons cover a gap together, but for a millimetre."""
+    """Return whether the polygons cover a gap together, but for a millimetre."""
     if any(shapely.covers(polygon, gap) for polygon in polygons):
         return True
     return bool(
@@ -321,7 +347,10 @@ def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
 def is_base_gap(
     gap: shapely.Polygon, base: np.ndarray, volume: np.ndarray, planes: Planes, site: PlanSite
 ) -> bool:
-    """Whether a gap is wide enough to be drawn and its points lie on the base rather than on its neighbour continued."""
+    """Return whether a gap is wide enough to be drawn and its points lie on the base.
+
+    The alternative is its neighbour, continued.
+    """
     if gap.area < THICK_M2 or shapely.buffer(gap, -THICK_M).is_empty:
         return False
     xy, z = select_points_in(gap, site)

@@ -1,4 +1,7 @@
-"""What nearly meets in a roof's plan: sides beside a place, planes with a low step between them."""
+"""Find what nearly meets in a roof's plan.
+
+These are sides beside a place, and planes with a low step between them.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +16,22 @@ from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION, N_SIDES
 
-REPAIR_REACH_M = (
-    1.0  # m that a side may be moved by to end in a corner, or to lie where its planes meet
-)
-LOW_STEP_M, NO_STEP_M = 0.4, 2e-3  # m; a step so low may be a fold line, and one below is none
-LEAST_BREAK = 0.1  # rise over run; planes less apart have no fold line, but may be one
-MOST_REPAIR_LEAN = 0.5  # of a line that a side may take
-ON_M = 0.004  # m; a place so near a line lies on it: crossings are set aside by a millimetre
+# Distance (m) that a side may move to end in a corner, or to lie where its planes meet.
+REPAIR_REACH_M = 1.0
+LOW_STEP_M = 0.4  # A step so low (m) may be a fold line.
+NO_STEP_M = 2e-3  # A lower step (m) is none.
+# Planes whose gradients (rise over run) differ less have no fold line, but may be one.
+LEAST_BREAK = 0.1
+MOST_REPAIR_LEAN = 0.5  # Largest lean of a line that a side may take.
+ON_M = 0.004  # A place so near a line (m) lies on it: crossings are set aside by a millimetre.
 
 
 @dataclass(frozen=True)
 class Repair:
-    """What is to be moved and by how much (m): sides, as {(volume, edge): line}, or planes.
+    """What is to be moved and by how much (m): sides or planes.
 
-    An equation is a place (2,) in local coordinates and pairs of weights and owners of planes: the
-    sum of their heights there, so weighted, is zero.
+    Sides are {(volume, edge): line}. An equation is a place (2,) in local coordinates and pairs of
+    weights and owners of planes: the sum of their heights there, so weighted, is zero.
     """
 
     size: float
@@ -36,7 +40,7 @@ class Repair:
 
     @property
     def key(self) -> tuple:
-        """What tells a repair from others that were tried."""
+        """The values that distinguish a repair from others that were tried."""
         lines = [
             (*which, round(side.offset, 2), round(side.lean, 2))
             for which, side in self.sides.items()
@@ -52,7 +56,7 @@ def find_repairs(
     plan: Plan,
     scene: Scene,
 ) -> list[Repair]:
-    """Find everything in `plan_drawn` that might be made to meet, the nearest first."""
+    """Find everything in the drawn plan that might be made to meet, the nearest first."""
     gaps = plan_drawn.gaps
     repairs = list(list_low_steps(plan_drawn, gaps))
     owners = np.where(plan_drawn.beside >= 0, plan_drawn.owner[plan_drawn.beside, 0], -1)
@@ -70,7 +74,7 @@ def find_repairs(
 
 
 def transform_places(xy: np.ndarray, direction: int, plan: Plan, scene: Scene) -> np.ndarray:
-    """Local places (n, 2) in the axes of a direction."""
+    """Return local places (n, 2) in the axes of a direction."""
     c, s = scene.turn[direction]
     return (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
 
@@ -83,10 +87,10 @@ def list_side_moves(
     key: tuple[int, int],
     side: Side,
 ) -> Iterator[Repair]:
-    """Yield moves of one side, that of (volume, edge), where it shows on edges of its `is_own` (e,).
+    """Yield moves of one side where it is visible on edges of its own.
 
-    It may move parallel to a place nearby, to one at each end, or to the line where its planes
-    meet.
+    `key` is (volume, edge), and `is_own` (e,) are the volume's edges. The side may move parallel to
+    a place nearby, to one at each end, or to the line where its planes meet.
     """
     edge = key[1]
     x, y = places[:, edge // 2], places[:, 1 - edge // 2]
@@ -127,10 +131,10 @@ def list_side_moves(
 def find_fold_line(
     plan_drawn: DrawnPlan, places: np.ndarray, e: int, edge: int
 ) -> tuple[float, float] | None:
-    """The line on which the planes beside edge `e` of the plan meet, in a volume's axes.
+    """Find the line on which the planes beside edge `e` of the plan meet.
 
-    It is x = at + lean y with x across the volume's side `edge`; None where there is none to speak
-    of.
+    It is x = at + lean y in a volume's axes, with x across its side `edge`. Returns None without a
+    clear line.
     """
     left, right = plan_drawn.planes[plan_drawn.beside[e]]
     positions = np.column_stack([plan_drawn.places, np.ones(len(places))])
@@ -144,7 +148,7 @@ def find_fold_line(
 
 
 def list_low_steps(plan_drawn: DrawnPlan, gaps: np.ndarray) -> Iterator[Repair]:
-    """Yield, for two planes with a low step between, that they meet along it or are one."""
+    """Yield repairs of low steps: two planes meet along the step, or are one."""
     highest = gaps.max(axis=1)
     low_edges = np.flatnonzero(is_low_step(gaps))
     pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
@@ -164,13 +168,16 @@ def list_low_steps(plan_drawn: DrawnPlan, gaps: np.ndarray) -> Iterator[Repair]:
 
 
 def is_low_step(gaps: np.ndarray) -> np.ndarray:
-    """Which edges (e,) are low steps, by how far apart their planes are at their ends (e, 2)."""
+    """Return which edges (e,) are low steps.
+
+    `gaps` (e, 2) are how far apart their planes are at their ends.
+    """
     return (gaps.max(axis=1) > NO_STEP_M) & (gaps.max(axis=1) < LOW_STEP_M)
 
 
 def equate_heights(
     plan_drawn: DrawnPlan, plane: int, other: int
 ) -> tuple[tuple[float, tuple[int, int]], ...]:
-    """The terms of an equation: two planes have the same height."""
+    """Return the terms of an equation by which two planes have the same height."""
     owners = plan_drawn.owner[[plane, other]].tolist()
     return (1.0, (owners[0][0], owners[0][1])), (-1.0, (owners[1][0], owners[1][1]))

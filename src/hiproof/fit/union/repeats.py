@@ -1,7 +1,7 @@
-"""Repeat what was found once: equal dormers stand in rows, and one more costs little but its place.
+"""Repeat volumes found once: equal dormers stand in rows.
 
-The search pays for every volume in full, so that of a row of small dormers it finds only those
-with points enough. A copy of one found is moved along its axes, and added where points ask for it.
+The search pays for every volume in full, so of a row of small dormers it finds only those with
+enough points. A copy of one of them is moved along its axes, and added where points suggest it.
 """
 
 from __future__ import annotations
@@ -30,15 +30,17 @@ from .volumes import (
     compute_roof_heights,
 )
 
-LEAST_COPY_M2, MOST_COPY_M2 = (
-    1.0,
-    16.0,
-)  # of a volume that may stand in a row: a dormer, a bay, a box
-COPY_STEP_M, COPY_REACH_M = 0.2, 0.4  # m between places tried; m that the edges of a copy may move
+LEAST_COPY_M2 = 1.0  # Smallest volume (m2) that may stand in a row.
+MOST_COPY_M2 = 16.0  # Largest volume (m2) that may stand in a row: a dormer, a bay, a box.
+COPY_STEP_M = 0.2  # Distance (m) between the places tried.
+COPY_REACH_M = 0.4  # Distance (m) that the edges of a copy may move.
 
 
 def repeat_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """Return the volumes (k, COLUMNS) and, after them, copies of small ones where points ask."""
+    """Return the volumes (k, COLUMNS) and, after them, copies of small ones.
+
+    Copies are added where points suggest them.
+    """
     for k in range(1, len(volumes)):
         if is_repeatable(volumes[k]):
             for axis in (0, 1):
@@ -52,7 +54,7 @@ def is_repeatable(volume: np.ndarray) -> bool:
 
 
 def repeat_along(volumes: np.ndarray, k: int, axis: int, scene: Scene) -> np.ndarray:
-    """Add copies of volume k along an axis, the best first, until none saves enough."""
+    """Add copies of volume k along an axis, the best first, while one saves enough."""
     y = (scene.V, scene.U)[axis][int(volumes[k, DIRECTION])]
     lower, upper = volumes[k, V0 - 2 * axis], volumes[k, V1 - 2 * axis]
     strip = select_points(scene, np.flatnonzero((lower <= y) & (y <= upper)))
@@ -69,9 +71,10 @@ def repeat_along(volumes: np.ndarray, k: int, axis: int, scene: Scene) -> np.nda
 def find_copy(
     volumes: np.ndarray, k: int, axis: int, strip: Scene, evidence: float
 ) -> np.ndarray | None:
-    """Return the copy of volume k along an axis that saves most, None where none saves enough.
+    """Return the copy of volume k along an axis that saves most.
 
-    `strip` holds the points and unobserved cells that a copy may reach.
+    Returns None if none saves enough. `strip` holds the points and unobserved cells that a copy may
+    reach.
     """
     x = (strip.U, strip.V)[axis][int(volumes[k, DIRECTION])]
     lower, upper = volumes[k, U0 + 2 * axis : U0 + 2 * axis + 2]
@@ -95,7 +98,7 @@ def find_copy(
 
 
 def move_volume(volume: np.ndarray, axis: int, step_m: float) -> np.ndarray:
-    """Return a volume moved along an axis, its planes with it."""
+    """Return a volume moved along an axis, with its planes."""
     moved = volume.copy()
     moved[[U0 + 2 * axis, U1 + 2 * axis]] += step_m
     moved[[SETTLED, ROW_NUMBER]] = 0.0

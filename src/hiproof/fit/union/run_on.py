@@ -1,7 +1,8 @@
-"""Volumes that end a little short of where they die in a neighbour, or a little beyond, end there: a wing's ridge ends in the roof it meets.
+"""Move ends of volumes that stop short of a neighbour, or beyond.
 
-What stands out of the neighbour at such an end is a small triangle, narrower than the places at which the search looks at edges lie
-apart, and no points tell.
+A wing's ridge ends in the roof that it meets. What stands out of the neighbour at such an end is a
+small triangle. It is narrower than the distance of the places at which the search samples edges,
+and no points lie on it.
 """
 
 from __future__ import annotations
@@ -28,22 +29,23 @@ from .volumes import (
     compute_roof_heights,
 )
 
-END_SAMPLE_M, MOST_END_SAMPLES = (
-    0.1,
-    400,
-)  # m between the places at which an end is looked at, and how many at most
-LOWEST_END_M, HIGHEST_END_M, WIDEST_END_M = (
-    0.01,
-    0.6,
-    1.2,
-)  # an end that stands out; by more, in height or along the edge, it is meant
-END_STEP_M, FARTHEST_END_M = 0.1, 1.5  # m by which it is moved on, and how far at most
-COVER_M = 0.25  # m to either side that it lies hidden then: planes are fitted once more
-BESIDE_EDGE_M = 0.001  # m from the edge, on either side
+END_SAMPLE_M = 0.1  # Distance (m) between the places at which an end is sampled.
+MOST_END_SAMPLES = 400  # Most such places.
+LOWEST_END_M = 0.01  # An end that stands out by less (m) does not.
+HIGHEST_END_M = 0.6  # An end that is higher (m) is intended.
+WIDEST_END_M = 1.2  # An end that is wider (m) along the edge is intended.
+END_STEP_M = 0.1  # Distance (m) by which an end is moved on.
+FARTHEST_END_M = 1.5  # Furthest (m) that it is moved.
+# Distance (m) to either side within which it is hidden then: planes are fitted once more.
+COVER_M = 0.25
+BESIDE_EDGE_M = 0.001  # Distance (m) of samples from the edge, on either side.
 
 
 def extend_ends(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-    """The volumes with ends that stand out a little moved to where they lie hidden, where that costs less than a step; the objective."""
+    """Move ends that stand out a little to where they are hidden.
+
+    They move if that costs less than a step. Also returns the objective.
+    """
     for k in range(1, len(volumes)):
         for edge in range(N_SIDES):
             places, highest = measure_protrusion(volumes, k, edge, scene)
@@ -59,15 +61,20 @@ def extend_ends(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.nda
 
 
 def list_end_moves(volumes: np.ndarray, k: int, edge: int, scene: Scene) -> Iterator[np.ndarray]:
-    """The volumes with other ends of volume k, the best first: safely hidden, as a neighbour's, or just hidden."""
+    """Yield the volumes with other ends of volume k, the best first.
+
+    An end is safely hidden, as a neighbour's, or just hidden.
+    """
     yield from hide_end(volumes, k, edge, scene, COVER_M)
     yield from share_neighbour_plane(volumes, k, edge)
     yield from hide_end(volumes, k, edge, scene, 0.0)
 
 
 def share_neighbour_plane(volumes: np.ndarray, k: int, edge: int) -> Iterator[np.ndarray]:
-    """The volumes with volume k sloping at an edge as one does that lies around it there, and ending where that does: a hip goes through
-    both."""
+    """Yield the volumes with volume k ending like a neighbour around it.
+
+    It slopes at this edge as the neighbour does: a hip goes through both.
+    """
     outwards = 1.0 if edge % 2 else -1.0
     for other in volumes[1:]:
         further = outwards * (other[U0 + edge] - volumes[k, U0 + edge]) > 0.0
@@ -86,8 +93,11 @@ def share_neighbour_plane(volumes: np.ndarray, k: int, edge: int) -> Iterator[np
 def hide_end(
     volumes: np.ndarray, k: int, edge: int, scene: Scene, cover_m: float
 ) -> Iterator[np.ndarray]:
-    """The volumes with an edge of volume k moved, no further than it must be, to where it is below the others, and `cover_m` to either
-    side; none where it never is."""
+    """Yield the volumes with an edge of volume k moved to where it is hidden.
+
+    It is below the others there. It moves no further than necessary, and is below for `cover_m` to
+    either side. Yields nothing if it never is.
+    """
     lower, upper = volumes[k, U0 + (edge & 2)], volumes[k, U0 + (edge | 1)]
     for step, sign in product(range(1, round(FARTHEST_END_M / END_STEP_M) + 1), (1.0, -1.0)):
         trial, target = volumes.copy(), volumes[k, U0 + edge] + sign * step * END_STEP_M
@@ -106,7 +116,10 @@ def hide_end(
 
 @compiled
 def measure_protrusion(volumes, k, edge, scene):
-    """At how many places along an edge of volume k, inside the outline, it stands out there, and by how much (m) at most."""
+    """Count the places along an edge of volume k at which it stands out.
+
+    They are inside the outline. Also returns by how much (m) it stands out at most.
+    """
     axis, across = edge // 2, V0 - 2 * (edge // 2)
     outwards = BESIDE_EDGE_M if edge % 2 else -BESIDE_EDGE_M
     start, length = volumes[k, across], volumes[k, across + 1] - volumes[k, across]
@@ -139,7 +152,10 @@ def measure_protrusion(volumes, k, edge, scene):
 
 @compiled
 def is_deep_inside(u, v, scene):
-    """Whether a place in the first direction's axes lies so far inside the outline that steps show there."""
+    """Return whether a place lies so deep inside the outline that steps are visible.
+
+    It is in the first direction's axes.
+    """
     i, j = round((u - scene.corner_u) / scene.pitch), round((v - scene.corner_v) / scene.pitch)
     rows, columns = scene.depth.shape
     return 0 <= i < rows and 0 <= j < columns and scene.depth[i, j] >= STEP_DEPTH_M

@@ -1,4 +1,8 @@
-"""What the search sees of one building: its points in each of its directions, unseen roof, lines, and the outline."""
+"""Describe one building as the search sees it.
+
+A scene holds the points in each of the building's directions, unobserved cells, lines and the
+outline.
+"""
 
 from __future__ import annotations
 
@@ -14,47 +18,55 @@ from ..direction import measure_support, quarter_gap
 from .plan import Plan, lay_lines, measure_depth, ring_edges
 from .prices import EDGE_PRICES
 
-MOST_WALL_DIRECTIONS = 2  # of a building that volumes may follow along walls, the main one first
-APART_RAD, NEAR_RAD = (
-    math.radians(7.0),
-    math.radians(3.0),
-)  # directions differ by more; edges support one within
-LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for a further direction
-# m inside the outline from which on a roof shows: nearer, an edge that ends a hair early shows what lies below
+# Most directions along walls that volumes of a building may follow, the main one first.
+MOST_WALL_DIRECTIONS = 2
+APART_RAD = math.radians(7.0)  # Directions differ by more (rad).
+NEAR_RAD = math.radians(3.0)  # Edges within this angle (rad) support a direction.
+LEAST_SUPPORT_M = 4.0  # Least length (m) of edges for a further direction.
+LEAST_SUPPORT_SHARE = 0.06  # Least share of the outline's edges for a further direction.
+# Depth (m) inside the outline from which on a roof is visible. Nearer, an edge that ends a little
+# early reveals what lies below.
 VISIBLE_DEPTH_M = 0.1
-DEPTH_CELL_M, MOST_DEPTH_CELLS = (
-    0.2,
-    400,
-)  # m of a cell of the outline's depth, and cells a side at most
-MOST_WALL_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
-    0.6,
-    0.035,
-    3,
-    2.0,
-)  # walls that planes may face besides those along the axes
+DEPTH_CELL_M = 0.2  # Size (m) of a cell of the outline's depth.
+MOST_DEPTH_CELLS = 400  # Most cells a side of the raster of depth.
+MOST_WALL_LEAN = 0.6  # Largest lean of walls that planes may face besides those along the axes.
+LEANS_APART = 0.035  # Least difference of two such leans.
+MOST_LEANS = 3  # Most such leans.
+WALL_M = 2.0  # Shortest length (m) of such a wall.
 
-# U, V (directions, n + g): the points, then the ghosts of unseen roof; z, weight (n + g); n: how many points.
-# shade (n + g): what the highest of roofs costs over a ghost without points around it, for walls hide only what is lower.
-# low, high: heights a roof may take over a ghost. turn (directions, 2): cosine and sine of each from the first.
-# depth (a, b): signed depth inside the outline on a raster from (corner_u, corner_v) every `pitch` metres, first direction.
-# lines, vertices: places an edge may move to, by direction and axis, infinite where there are no more.
-# evidence: points a unit of structure must explain; dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
-# allowed (2, 3, 3, 2): which shapes a volume may have, see `volumes.is_allowed`.
-# corners (directions, c, 2): the outline's vertices.
-# leans (directions, 2, m): of walls that are not quite along an axis, x = at + lean y; infinite where there are no more.
-# edge_prices: units for an edge that shows, a metre of it, a metre of it lower than low_step (m), if in line with no corner,
-# and off for each end at a corner.
 Scene = namedtuple(
     "Scene",
-    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
+    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners "
+    "leans evidence dead width edge_prices allowed",
 )
+"""A building as the search sees it.
+
+- U, V (directions, n + g): the points, then the unobserved cells.
+- order (directions, 2, n + g): their numbers, ascending along each axis.
+- z, weight (n + g,): the points' heights, and the points that a place stands for.
+- shade (n + g,): the price of the highest of roofs over an unobserved cell without points around
+  it, for walls hide only what is lower.
+- n: the number of points.
+- low, high: the heights that a roof may have over an unobserved cell.
+- turn (directions, 2): cosine and sine of each direction from the first.
+- depth (a, b): signed depth inside the outline on a raster of the first direction, which begins at
+  (corner_u, corner_v) with a node every `pitch` metres.
+- lines, vertices: places for an edge, by direction and axis, padded with infinity.
+- corners (directions, c, 2): the outline's vertices.
+- leans (directions, 2, m): of walls not quite along an axis, x = offset + lean y, padded.
+- evidence: the points that a unit of structure must explain.
+- dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
+- edge_prices: see `prices.EdgePrices`.
+- allowed (2, 3, 3, 2): the shapes that a volume may have, see `volumes.is_allowed`.
+"""
 
 
 def find_directions(outline: shapely.Polygon, plan: Plan) -> list[float]:
-    """Angles (rad) of the building's directions from the plan's own, which comes first: those its outline's edges have.
+    """Find the angles (rad) of the building's directions from the plan's own.
 
-    Between two of them comes a third: where a house bends, its wings end on one line, square to neither, and from there their planes
-    lean to either side.
+    They are those of the outline's edges, and the plan's own comes first. Between two of them comes
+    a third: where a house bends, its wings end on one line, square to neither, and their planes
+    lean to either side from there.
     """
     step = np.diff(shapely.get_coordinates(outline.exterior), axis=0) @ plan.frame.rotation.T
     length, angle = (
@@ -88,9 +100,12 @@ def make_scene(
     tolerance_m: float,
     allowed: np.ndarray,
 ) -> Scene:
-    """The building as the search sees it; a point further than `tolerance_m` from the roof counts as unexplained."""
-    cloud, ghosts = plan.cloud, plan.unobserved
-    u, v = np.r_[cloud.u, ghosts.u], np.r_[cloud.v, ghosts.v]
+    """Make the scene of a building.
+
+    A point further than `tolerance_m` from the roof counts as unexplained.
+    """
+    cloud, unobserved = plan.cloud, plan.unobserved
+    u, v = np.r_[cloud.u, unobserved.u], np.r_[cloud.v, unobserved.v]
     turn = np.array([[math.cos(a), math.sin(a)] for a in angles])
     depth, corner, pitch = make_depth_raster(plan, outline)
     ring = (
@@ -103,12 +118,12 @@ def make_scene(
         U,
         V,
         sort_along(U, V),
-        np.r_[cloud.z, np.zeros(len(ghosts.u))],
-        np.r_[np.ones(len(cloud.u)), ghosts.weight],
-        np.r_[np.zeros(len(cloud.u)), ghosts.shade],
+        np.r_[cloud.z, np.zeros(len(unobserved.u))],
+        np.r_[np.ones(len(cloud.u)), unobserved.weight],
+        np.r_[np.zeros(len(cloud.u)), unobserved.shade],
         len(cloud.u),
-        float(ghosts.low),
-        float(ghosts.high),
+        float(unobserved.low),
+        float(unobserved.high),
         turn,
         depth,
         float(corner[0]),
@@ -127,7 +142,10 @@ def make_scene(
 
 
 def thin_scene(scene: Scene, numbers: np.ndarray, evidence: float) -> Scene:
-    """The scene with only the points `numbers` (m,), ghosts weighing as many of them; what the outline gives is shared."""
+    """Return the scene with only the points `numbers` (m,).
+
+    Unobserved cells weigh as many of them. What comes from the outline is shared.
+    """
     if len(numbers) == scene.n:
         return scene._replace(evidence=evidence)
     thinned = select_points(scene, np.r_[numbers, scene.n : len(scene.z)])
@@ -140,7 +158,10 @@ def thin_scene(scene: Scene, numbers: np.ndarray, evidence: float) -> Scene:
 
 
 def select_points(scene: Scene, numbers: np.ndarray) -> Scene:
-    """The scene of some of its points and ghosts, by ascending `numbers` (m,); `order` stays the whole's."""
+    """Return the scene of some of its points and cells, by ascending `numbers` (m,).
+
+    `order` stays that of the whole.
+    """
     return scene._replace(
         U=scene.U.take(numbers, axis=1),
         V=scene.V.take(numbers, axis=1),
@@ -152,16 +173,22 @@ def select_points(scene: Scene, numbers: np.ndarray) -> Scene:
 
 
 def sort_along(U: np.ndarray, V: np.ndarray) -> np.ndarray:
-    """The points' numbers in ascending order along each axis of each direction: (directions, 2, n)."""
+    """Return the points' numbers in ascending order along each axis of each direction.
+
+    They are (directions, 2, n).
+    """
     return np.argsort(np.stack([U, V], axis=1), axis=2, kind="stable")
 
 
-DEAD_M = 0.03  # residuals that cost nothing
-LEAST_RAMP_M = 0.02  # over how much more they grow to a whole point, at least
+DEAD_M = 0.03  # Residual (m) that costs nothing.
+LEAST_RAMP_M = 0.02  # Least difference (m) over which larger residuals grow to the cost of a point.
 
 
 def make_depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray, float]:
-    """Signed depth inside the outline on a raster of the first direction, its lowest corner (2,) and its pitch (m)."""
+    """Make a raster of signed depth inside the outline, in the first direction.
+
+    Also returns its lowest corner (2,) and its pitch (m).
+    """
     ring = (
         shapely.get_coordinates(outline.exterior) - plan.frame.origin[:2]
     ) @ plan.frame.rotation.T
@@ -174,7 +201,7 @@ def make_depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray,
 
 
 def list_nodes(scene: Scene, least_depth: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """The raster's nodes at least so deep inside the outline, in every direction: U, V (directions, n)."""
+    """Return the raster's nodes that deep inside the outline: U, V (directions, n)."""
     i, j = np.nonzero(scene.depth >= least_depth)
     u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
     c, s = scene.turn[:, :1], scene.turn[:, 1:]
@@ -182,7 +209,10 @@ def list_nodes(scene: Scene, least_depth: float = 0.0) -> tuple[np.ndarray, np.n
 
 
 def make_lines(plan: Plan, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Grid lines and vertex lines (directions, 2, m) of an outline's `corners` (directions, c, 2), ascending, padded with infinity."""
+    """Return grid lines and vertex lines (directions, 2, m) of an outline.
+
+    Its `corners` are (directions, c, 2). Lines ascend, padded with infinity.
+    """
     cell = median(np.diff(plan.grid.u).tolist())
     lines = [plan.grid.u, plan.grid.v]
     lines += [
@@ -194,7 +224,10 @@ def make_lines(plan: Plan, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def find_leans(ring: np.ndarray, axis: int) -> list[float]:
-    """Leans of those of a ring's (n, 2) edges that are nearly but not quite along an axis' lines, the longest first."""
+    """Find the leans of a ring's (n, 2) edges that are nearly along an axis' lines.
+
+    Edges quite along it do not count. The longest comes first.
+    """
     step = np.concatenate([ring[1:], ring[:1]]) - ring
     length, across, along = np.hypot(step[:, 0], step[:, 1]), step[:, axis], step[:, 1 - axis]
     walls = np.nonzero((np.abs(across) < MOST_WALL_LEAN * np.abs(along)) & (length > WALL_M))[0]
@@ -206,7 +239,7 @@ def find_leans(ring: np.ndarray, axis: int) -> list[float]:
 
 
 def pad_rows(rows: Sequence[Sequence[float] | np.ndarray]) -> np.ndarray:
-    """Rows of several lengths, two a direction, as (directions, 2, m), filled up with infinity."""
+    """Pad rows of several lengths, two a direction, with infinity: (directions, 2, m)."""
     filled = np.full((len(rows), max(1, *map(len, rows))), np.inf)
     for row, values in zip(filled, rows, strict=True):
         row[: len(values)] = values

@@ -1,6 +1,7 @@
-"""Where two blocks meet, their volumes are sewn together: those that are one become one, the others are improved.
+"""Sew the volumes of two blocks together where these meet.
 
-Every step is taken in a window around the volumes that it touches, and kept where it lowers the objective there.
+Volumes that are one become one, and the others are improved. Every step happens in a window around
+the volumes that it touches, and is kept if it lowers the objective there.
 """
 
 from __future__ import annotations
@@ -18,28 +19,23 @@ from .objective import compute_objective
 from .prices import LEFT_OUT_SHARE, LEFT_OUT_UNITS
 from .scene import Scene
 from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0, U1, V0, V1, compute_roof_heights, is_fixed
-from .whole import PLACE_COLUMNS, Whole
+from .whole import POSITION, Whole
 from .window import change_in_window
 
-SEAM_STRIP_M = 0.8  # m to either side of a cut: volumes that reach into this strip are looked at
-SEAM_MARGIN_M, LARGE_VOLUME_MARGIN_M = (
-    1.0,
-    5.0,
-)  # m around volumes that a window shows, and around one whose neighbours reach too far
-MOST_WINDOW_M2, MOST_TIMES = (
-    1200.0,
-    1.5,
-)  # of a window over a volume and all its neighbours; times its own box
-WINDOW_POINTS = 1200  # of a window of seams at most
-NEIGHBOUR_GAP_M = 0.6  # m between volumes that may be one
-SAME_ROOF_M, SAME_ROOF_SHARE = (
-    0.6,
-    0.4,
-)  # m between planes that may be one, over at least such a share of a volume
-SAMPLES = 4  # a side of a volume at which its planes are compared with another's
-TOUCH_GAP_M = 0.6  # m between volumes that touch
-NEXT_TO_M = 0.5  # m beyond a volume within which others are its neighbours
-LEFT_OUT_ROUNDS = 2  # in which neighbours take the place of a volume that is left out
+# Distance (m) to either side of a cut. Volumes that reach into this strip are improved.
+SEAM_STRIP_M = 0.8
+SEAM_MARGIN_M = 1.0  # Distance (m) around volumes that a window shows.
+LARGE_VOLUME_MARGIN_M = 5.0  # Distance (m) around a volume whose neighbours reach too far.
+MOST_WINDOW_M2 = 1200.0  # Largest window (m2) over a volume and all its neighbours.
+MOST_TIMES = 1.5  # Largest window over a volume and its neighbours, in its own boxes.
+WINDOW_POINTS = 1200  # Most points of a window of seams.
+NEIGHBOUR_GAP_M = 0.6  # Distance (m) between volumes that may be one.
+SAME_ROOF_M = 0.6  # Height (m) between planes that may be one.
+SAME_ROOF_SHARE = 0.4  # Share of a volume over which they must be so near.
+SAMPLES = 4  # Samples a side of a volume at which its planes are compared with another's.
+TOUCH_GAP_M = 0.6  # Distance (m) between volumes that touch.
+NEXT_TO_M = 0.5  # Distance (m) beyond a volume within which others are its neighbours.
+LEFT_OUT_ROUNDS = 2  # Rounds in which neighbours take the place of a volume that is left out.
 
 
 def sew(whole: Whole, box: Box, axis: int, cut_place: float) -> None:
@@ -48,12 +44,15 @@ def sew(whole: Whole, box: Box, axis: int, cut_place: float) -> None:
     if len(whole.list_volumes(strip)) < 2:
         return
     merge_pairs(whole, strip)
-    for place in [whole.volumes[k, PLACE_COLUMNS].tobytes() for k in whole.list_volumes(strip)]:
+    for place in [whole.volumes[k, POSITION].tobytes() for k in whole.list_volumes(strip)]:
         improve_volume(whole, place)
 
 
 def merge_pairs(whole: Whole, strip: Box) -> None:
-    """Make one of every two volumes in a strip that are all but one, where that lowers the objective."""
+    """Merge pairs of volumes in a strip that are nearly one.
+
+    A merger is kept if it lowers the objective.
+    """
     tried_pairs: set[bytes] = set()
     has_merged = True
     while has_merged:
@@ -68,7 +67,10 @@ def merge_pairs(whole: Whole, strip: Box) -> None:
 
 
 def list_pairs(whole: Whole, strip: Box) -> list[tuple[int, int]]:
-    """Ordered pairs of volumes of one direction that reach into a strip and lie beside each other, or overlap."""
+    """List ordered pairs of volumes of one direction that reach into a strip.
+
+    They lie beside each other, or overlap.
+    """
     numbers = whole.list_volumes(strip)
     return [
         (j, k)
@@ -85,7 +87,10 @@ def is_beside(row: np.ndarray, other: np.ndarray) -> bool:
 
 
 def is_same_roof(whole: Whole, j: int, k: int) -> bool:
-    """Whether volume k, were it everywhere, would be all but as high as volume j over much of it."""
+    """Return whether volume k, were it everywhere, has nearly volume j's heights.
+
+    It must over much of volume j.
+    """
     e = whole.boxes[j]
     if not e[0] <= e[1]:
         return False
@@ -100,7 +105,10 @@ def is_same_roof(whole: Whole, j: int, k: int) -> bool:
 
 
 def merge_pair(whole: Whole, j: int, k: int) -> bool:
-    """Draw volume k over volume j, which goes, where that lowers the objective; tell whether it did."""
+    """Draw volume k over volume j, which is dropped, if that lowers the objective.
+
+    Returns whether it did.
+    """
 
     def merge_rows(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
         at_j, at_k = (find_row(rows, number) for number in (j, k))
@@ -117,13 +125,16 @@ def merge_pair(whole: Whole, j: int, k: int) -> bool:
 
 
 def find_row(rows: np.ndarray, number: int) -> int:
-    """Which of the rows has a number; 0, the base, where it is gone."""
+    """Return which of the rows has a number, 0 (the base) if it is gone."""
     matches = np.flatnonzero(rows[1:, ROW_NUMBER] == number)
     return int(matches[0]) + 1 if len(matches) else 0
 
 
 def improve_volume(whole: Whole, place: bytes) -> None:
-    """Improve the volume at a place, or leave it out, on the points around it and its neighbours."""
+    """Improve the volume at a place, or leave it out.
+
+    The window shows the points around it and its neighbours.
+    """
     k = whole.find(place)
     if k is None:
         return
@@ -151,8 +162,10 @@ def improve_volume(whole: Whole, place: bytes) -> None:
 def leave_out(
     whole: Whole, rows: np.ndarray, scene: Scene, value: float, k: int
 ) -> tuple[np.ndarray, float]:
-    """The volumes without the k-th, those beside where it shows drawn over its place if need be, where
-    that lowers the objective."""
+    """Leave the k-th volume out, if that lowers the objective.
+
+    If necessary, volumes beside the place where it is visible are drawn over it.
+    """
     trial = remove_volume(rows, k)
     limit = value + LEFT_OUT_UNITS * scene.evidence + LEFT_OUT_SHARE * scene.n
     trial_value = compute_objective(trial, scene, limit)
@@ -178,12 +191,15 @@ def leave_out(
 
 
 def list_volume_slopes(rows: np.ndarray) -> np.ndarray:
-    """Slopes that the volumes but the base have."""
+    """Select typical slopes of the volumes but the base."""
     return select_typical_slopes(rows[1:]) if len(rows) > 1 else np.zeros(0)
 
 
 def frame_neighbours(whole: Whole, k: int) -> Box:
-    """The window over a volume and all that touch it; less where that would be more than a few blocks."""
+    """Return the window over a volume and all that touch it.
+
+    It is smaller if that would be more than a few blocks.
+    """
     extent = Box(*whole.boxes[k])
     neighbours = whole.list_volumes(extent.widen(NEXT_TO_M))
     window = enclose_boxes([extent, *(Box(*whole.boxes[j]) for j in neighbours)])

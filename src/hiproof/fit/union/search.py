@@ -1,4 +1,8 @@
-"""From a plan to volumes: structure from some of the points, simplified as a draughtsman would, settled on all of them."""
+"""Search the volumes of a plan.
+
+Structure is searched with some of the points, simplified as a draughtsman would, and settled on all
+of them.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +23,20 @@ from .run_on import extend_ends
 from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
 
-SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
-# What a person would leave out of low-pitched roofs: differences up to LENIENT_DEAD_M (more on large roofs).
-LENIENT_DEAD_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
+SEARCH_POINTS = 600  # Points in which structure is searched. All of them settle it.
+LENIENT_DEAD_M = 0.1  # Difference (m) that a person would leave out of low-pitched roofs.
+LENIENT_MORE_M = 0.04  # Difference (m) that a person would leave out of large roofs besides.
+LENIENT_SOFT_M = 0.18  # Distance (m) over which larger differences grow to the cost of a point.
+LENIENT_SLOPE = 0.15  # Steepest slope (rise over run) of a low-pitched roof.
 
 
 def find_volumes(
     plan: Plan, outline: shapely.Polygon, settings, types: tuple[str, ...] = ()
 ) -> tuple[np.ndarray, float, Scene]:
-    """Volumes (k, COLUMNS) of the roof over `outline`, their objective (points) and the scene of all points.
+    """Find the volumes (k, COLUMNS) of the roof over `outline`.
 
-    `settings` are those of [compound]; volumes have only shapes that parts of `types` need (any where there are none).
+    Also returns their objective (points) and the scene of all points. `settings` are those of
+    [compound]. Volumes have only shapes that parts of `types` need, any without types.
     """
     count = len(plan.cloud.u)
     numbers = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
@@ -41,9 +48,8 @@ def find_volumes(
     full_scene = make_scene(
         plan, outline, angles, evidence[1], settings.tolerance_m, list_allowed_shapes(types)
     )
-    if (
-        outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS
-    ):  # else a house's search sees every point
+    # Otherwise, the search of a house uses every point.
+    if outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
         site = PlanSite(outline, plan, full_scene, {})
         volumes = run_in_groups(trim_and_extend, find_in_windows(plan, outline, full_scene), site)
         return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
@@ -61,12 +67,12 @@ def find_volumes(
 
 
 def trim_and_extend(volumes: np.ndarray, scene: Scene, _: object = None) -> np.ndarray:
-    """Draw hidden edges in, and let ends that stand out of a neighbour run on into it."""
+    """Draw hidden edges in, and extend ends that stand out of a neighbour into it."""
     volumes, value = trim(volumes, scene, compute_objective(volumes, scene, np.inf))
     return extend_ends(volumes, scene, value)[0]
 
 
 def soften_scene(scene: Scene, area_m2: float) -> Scene:
-    """The scene with a larger residual free of cost."""
+    """Return the scene with larger residuals free of cost."""
     dead = LENIENT_DEAD_M + LENIENT_MORE_M * min(max((area_m2 - COMMON_HOUSE_M2) / 100.0, 0.0), 1.0)
     return scene._replace(dead=dead, width=LENIENT_SOFT_M)

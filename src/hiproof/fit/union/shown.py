@@ -1,4 +1,7 @@
-"""Parts that show nowhere go: what lies under others, or shows along the border in slivers only, which a neighbour takes."""
+"""Remove parts that are not visible.
+
+They lie under others, or are visible along the border in slivers only, which a neighbour takes.
+"""
 
 from __future__ import annotations
 
@@ -15,20 +18,23 @@ from .plan import Plan
 from .regions import find_neighbour, list_polygons, unite_outlines, widen_gap
 from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
 
-GRID_SEAM_M = 1e-5  # between corners that are the same but for the grid they lie on
+# Distance (m) between corners that are the same but for the grid on which they lie.
+GRID_SEAM_M = 1e-5
 
 
 def keep_visible(
     parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = math.inf
 ) -> list[Part]:
-    """Those of the parts that show, over all that the parts cover; what would leave more than `widest_m2` bare stays too."""
+    """Keep the visible parts, and cover all that the parts cover with these.
+
+    A part that would leave more than `widest_m2` bare stays, too.
+    """
     if len(parts) < 2:
         return parts
     u, v = list_nodes(scene, VISIBLE_DEPTH_M)
     xy = plan.frame.xy_local(np.column_stack([u[0], v[0]]))
-    places = np.bincount(
-        find_highest(parts, xy)[1], minlength=len(parts)
-    ).tolist()  # at which each part is the highest
+    # These are the numbers of places at which each part is the highest.
+    places = np.bincount(find_highest(parts, xy)[1], minlength=len(parts)).tolist()
     visible = [part for part, count in zip(parts, places, strict=True) if count]
     hidden = [part for part, count in zip(parts, places, strict=True) if not count]
     for part in hidden:
@@ -38,7 +44,10 @@ def keep_visible(
 
 
 def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part] | None:
-    """`parts` with what only the `hidden` one covers added to the pieces beside it; None where that cannot be or is too much."""
+    """Add what only the `hidden` part covers to the pieces beside it.
+
+    Returns None if that is impossible or too much.
+    """
     covered, hidden_area = unite_outlines(parts), unite_outlines([hidden])
     pieces = [list(part.pieces) for part in parts]
     bare = list_polygons(shapely.difference(hidden_area, covered, grid_size=OVERLAY_GRID_M))

@@ -1,8 +1,9 @@
-"""The sides of the volumes as straight lines: along the outline, between its corners, or shared with a neighbour.
+"""Choose the sides of the volumes as straight lines.
 
-Walls are seldom quite at right angles. Lines near a side of a volume's rectangle compete for it: edges of the outline, lines
-between two of its corners, and the side as it was found. Each costs what its points say and, the less outline lies along
-it, up to the price of a loose edge.
+They lie along the outline, between its corners, or are shared with a neighbour. Walls are seldom
+quite at right angles. Lines near a side of a volume's rectangle compete for it: edges of the
+outline, lines between two of its corners, and the side as the search left it. Each costs what its
+points say and, the less outline lies along it, up to the price of a loose edge.
 """
 
 from __future__ import annotations
@@ -21,44 +22,41 @@ from .prices import FAR_COST_A_METRE, LOOSE_COST, UNSUPPORTED_COST
 from .scene import Scene
 from .volumes import DIRECTION, U0, V0, V1
 
-MOST_SIDE_LEAN = 0.5  # of a line that a side may take
-MOST_OFFSET_M = 1.0  # how far off it may be in the middle of the side; a line that leans is further off at its ends
-ALONG_M, OUTLINE_REACH_M, SHORTEST_LINE_M = (
-    0.12,
-    6.0,
-    0.7,
-)  # outline so near a line lies along it; edges so far beside carry on
-CHORD_END_M, MOST_CHORD_CORNERS = (
-    0.6,
-    40,
-)  # how far beyond a side the ends of a line between corners may be
-SHARED_M = 0.3  # m within which a side takes its neighbour's line
-SHOWN_M = 0.5  # m next to a side in which points need its volume, or else it lies hidden
-MOVED_M, MOVES = (
-    1.0,
-    50,
-)  # how far, in how many steps, a side is moved to see how well its points say where it is
-SIDE_REACH_M = max(MOST_OFFSET_M, MOVED_M)  # beyond a volume's edges, where its sides do not lean
-NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
-LEAST_NEED, FEWEST_NEEDED = (
-    0.3,
-    3,
-)  # a point that costs so much more without a volume needs it; fewer show nothing
-POINT_SIGMA_M = 0.03  # standard deviation of where points themselves are in plan: of their swath and in their beam
+MOST_SIDE_LEAN = 0.5  # Largest lean of a line that a side may take.
+# Furthest (m) that the line may lie from the middle of the side. A line that leans is further off
+# at its ends.
+MOST_OFFSET_M = 1.0
+ALONG_M = 0.12  # Outline so near a line (m) lies along it.
+OUTLINE_REACH_M = 6.0  # Edges so far (m) beside a side carry on along it.
+SHORTEST_LINE_M = 0.7  # Shortest length (m) of a line.
+CHORD_END_M = 0.6  # Distance (m) beyond a side of the ends of a line between corners.
+MOST_CHORD_CORNERS = 40  # Most corners of an outline with such lines.
+SHARED_M = 0.3  # A side takes its neighbour's line within this distance (m).
+SHOWN_M = 0.5  # Distance (m) next to a side in which points need its volume, unless it is hidden.
+MOVED_M = 1.0  # Furthest (m) that a side is moved to see how well points determine its place.
+MOVES = 50  # Steps in which it is moved each way.
+# Reach (m) beyond a volume's edges, where its sides do not lean.
+SIDE_REACH_M = max(MOST_OFFSET_M, MOVED_M)
+NATS_A_POINT = 3.0  # Log-likelihood that a point makes if it is explained.
+LEAST_NEED = 0.3  # A point that costs so much more without a volume needs it.
+FEWEST_NEEDED = 3  # Fewer such points show nothing.
+POINT_SIGMA_M = 0.03  # Standard deviation (m) of points in plan, of their swath and in their beam.
+# The sides that meet in each corner, in order around a volume.
 CORNER_SIDES = (
     (0, 2),
     (1, 2),
     (1, 3),
     (0, 3),
-)  # the sides that meet in each corner, in order around a volume
-LEAST_KNOWN = 0.05  # a place so likely at the end of the way is not known
+)
+LEAST_KNOWN = 0.05  # A place so likely at the end of the way is not determined.
 
 
 class SideLines(NamedTuple):
-    """Lines x = start + lean * y through the outline's edges and chords that may be sides, from one to the other of y (2, m).
+    """Lines x = start + lean * y through the outline that may be sides.
 
-    The ends of all edges, across and along, are `x_edges`, `y_edges` (2, n). The whole outline reaches
-    over `x_extent` and `y_extent` (2,), lowest and highest, also where only some of its edges are near.
+    They follow its edges and chords, from one to the other of y (2, m). The ends of all edges,
+    across and along, are `x_edges`, `y_edges` (2, n). The whole outline reaches over `x_extent` and
+    `y_extent` (2,), lowest and highest, also where only some of its edges are near.
     """
 
     start: np.ndarray
@@ -73,10 +71,11 @@ class SideLines(NamedTuple):
 
 @dataclass(frozen=True)
 class Side:
-    """A line x = at + lean * y in the axes of its volume's direction: x across the side, y along it.
+    """A line x = offset + lean * y in the axes of its volume's direction.
 
-    `anchored` to the outline: its eave is where the outline is. `sigma` (m) is the standard deviation of where it is, 0 where
-    the outline gives it, infinite where no points tell, or where other volumes hide it.
+    x is across the side, y along it. If it is `anchored` to the outline, its eave is where the
+    outline is. `sigma` (m) is the standard deviation of its place. It is 0 where the outline gives
+    the place, and infinite where no points determine it or other volumes hide it.
     """
 
     offset: float
@@ -88,9 +87,10 @@ class Side:
 def list_lines(
     edges: np.ndarray, chords: np.ndarray, turns: np.ndarray, outline: np.ndarray
 ) -> list[list[SideLines]]:
-    """The lines that sides across u and across v may take, by direction: along edges and chords (2, m, 2).
+    """List the lines that sides across u and across v may take, by direction.
 
-    `outline` (2, n, 2) are all edges of the outline, of which `edges` may be only some.
+    They lie along `edges` and `chords` (2, m, 2). `outline` (2, n, 2) are all edges of the outline,
+    of which `edges` may be only some.
     """
     ends = np.concatenate([edges, chords], axis=1)
     lines_by_direction = []
@@ -111,9 +111,10 @@ def list_lines(
 def choose_sides(
     volumes: np.ndarray, lines: list[list[SideLines]], scene: Scene
 ) -> list[list[Side]]:
-    """The four sides (u low, u high, v low, v high) of every volume, on the `lines` of its direction where these are near.
+    """Choose the four sides (u low, u high, v low, v high) of every volume.
 
-    The sides of the base are far away.
+    They lie on the `lines` of its direction where these are near. The sides of the base are far
+    away.
     """
     sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
     for k in range(1, len(volumes)):
@@ -132,7 +133,7 @@ def choose_sides(
 
 
 def list_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
-    """Starts and ends (2, m, 2) of the outline's edges in the plan's first direction."""
+    """Return starts and ends (2, m, 2) of the outline's edges in the first direction."""
     rings = [outline.exterior, *outline.interiors]
     corners = [
         (shapely.get_coordinates(r) - plan.frame.origin[:2]) @ plan.frame.rotation.T for r in rings
@@ -143,7 +144,10 @@ def list_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
 
 
 def list_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
-    """Starts and ends (2, m, 2) of the straight lines inside the outline between two of its corners; none of too many."""
+    """Return starts and ends (2, m, 2) of the lines between two corners.
+
+    They lie inside the outline. There are none if it has too many corners.
+    """
     corners = np.array(sorted(set(map(tuple, shapely.get_coordinates(outline).tolist()))))
     if len(corners) > MOST_CHORD_CORNERS:
         return np.zeros((2, 0, 2))
@@ -162,7 +166,10 @@ def select_lines(
     x_extent: np.ndarray,
     y_extent: np.ndarray,
 ) -> SideLines:
-    """Those `long` (m,) of the lines from one to the other of x, y (2, m) that are nearly square to the axis x."""
+    """Select the `long` (m,) lines that are nearly square to the axis x.
+
+    They run from one to the other of x, y (2, m).
+    """
     across, along = x[1] - x[0], y[1] - y[0]
     numbers = np.nonzero(long & (np.abs(across) < MOST_SIDE_LEAN * np.abs(along)))[0]
     lean = across[numbers] / along[numbers]
@@ -182,7 +189,10 @@ def select_lines(
 
 @compiled
 def choose_volume_sides(volumes, k, across_u, across_v, scene):
-    """What `Side` says of each side of volume k, on the cheapest of the lines `across_u` and `across_v`: four arrays (4,)."""
+    """Choose each side of volume k on the cheapest of the lines across u and across v.
+
+    Returns the four values of `Side`, as arrays (4,).
+    """
     direction = int(volumes[k, DIRECTION])
     numbers = find_near_places(volumes[k], across_u, scene.U[direction], scene.V[direction])
     gain = measure_gain(volumes, k, numbers, scene)
@@ -204,7 +214,10 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
 
 @compiled
 def find_near_places(volume, across_u, u, v):
-    """The numbers of the places u, v that a volume's sides, or walls beside these, depend on."""
+    """Return the numbers of the places u, v on which a volume's sides depend.
+
+    Walls beside the sides depend on them, too.
+    """
     least_u, most_u = across_u.x_extent[0], across_u.x_extent[1]
     least_v, most_v = across_u.y_extent[0], across_u.y_extent[1]
     wide, deep = volume[U0 + 1] - volume[U0], volume[V1] - volume[V0]
@@ -219,7 +232,10 @@ def find_near_places(volume, across_u, u, v):
 
 @compiled
 def measure_gain(volumes, k, numbers, scene):
-    """How much more the places `numbers` (m,) cost were volume k everywhere than without it (m,)."""
+    """Return how much more the places `numbers` (m,) cost with volume k everywhere.
+
+    It is compared with the roof without it.
+    """
     U, V = scene.U[:, numbers], scene.V[:, numbers]
     context = measure_context(volumes, U, V, k)
     everywhere, roof_without = (
@@ -237,7 +253,7 @@ def measure_gain(volumes, k, numbers, scene):
 
 @compiled
 def compute_cost_at(i, z, scene):
-    """What point or ghost i costs under a roof so high."""
+    """Return what point or cell i costs under a roof at height z."""
     if i < scene.n:
         return compute_point_cost(scene.z[i], z, scene.dead, scene.width)
     return compute_cell_cost(z, scene.weight[i], scene.shade[i], scene.low, scene.high)
@@ -245,7 +261,10 @@ def compute_cost_at(i, z, scene):
 
 @compiled
 def find_cheapest_line(volume, edge, lines, uv, gain, evidence):
-    """Which of the lines is cheapest for a side of a volume; -1 where the side as it is is cheaper than all."""
+    """Find the cheapest line for a side of a volume, -1 if the side is cheaper.
+
+    A line is cheaper than the side if it explains the points better.
+    """
     axis, place = edge // 2, volume[U0 + edge]
     y_low = max(volume[V0 - 2 * axis], lines.y_extent[0])
     y_high = min(volume[V1 - 2 * axis], lines.y_extent[1])
@@ -277,7 +296,7 @@ def find_cheapest_line(volume, edge, lines, uv, gain, evidence):
 
 @compiled
 def estimate_side_sigma(volume, edge, lines, uv, gain, anchored):
-    """The `sigma` of a side, which the outline gives where it is `anchored`."""
+    """Estimate the `sigma` of a side, which is 0 if it is `anchored`."""
     if not is_needed_at(volume, edge, lines, uv, gain):
         return np.inf
     return 0.0 if anchored else estimate_place_sigma(volume, edge, uv, gain)
@@ -285,7 +304,10 @@ def estimate_side_sigma(volume, edge, lines, uv, gain, anchored):
 
 @compiled
 def is_needed_at(volume, edge, lines, uv, gain):
-    """Whether points next to an edge of the volume, or to the outline where it lies beyond that, need the volume."""
+    """Return whether points next to an edge of the volume need the volume.
+
+    Beyond the outline, points next to the outline count.
+    """
     axis, sign = edge // 2, -1.0 if edge % 2 == 0 else 1.0
     place = min(max(volume[U0 + edge], lines.x_extent[0]), lines.x_extent[1])
     x, y = uv[axis], uv[1 - axis]
@@ -301,8 +323,11 @@ def is_needed_at(volume, edge, lines, uv, gain):
 
 @compiled
 def estimate_place_sigma(volume, edge, uv, gain):
-    """Standard deviation (m) of where the edge of a volume is, by what its points cost were it elsewhere within MOVED_M; infinite
-    where they do not tell, or where another place is better than the volume's own."""
+    """Estimate the standard deviation (m) of the place of a volume's edge.
+
+    It follows from what the edge's points would cost with the edge elsewhere within MOVED_M. It is
+    infinite if they do not determine the place, or if another place is better.
+    """
     axis, place = edge // 2, volume[U0 + edge]
     sign = -1.0 if edge % 2 == 0 else 1.0
     x, y = uv[axis], uv[1 - axis]
@@ -321,7 +346,7 @@ def estimate_place_sigma(volume, edge, uv, gain):
 
 @compiled
 def is_near_side(lines, m, place, y_low, y_high):
-    """Whether line m is near enough to the side x = at from y = low to high."""
+    """Return whether line m is near the side x = `place` from `y_low` to `y_high`."""
     start, lean = lines.start[m], lines.lean[m]
     first, last = min(lines.y[0, m], lines.y[1, m]), max(lines.y[0, m], lines.y[1, m])
     if lines.is_edge[m]:
@@ -333,7 +358,10 @@ def is_near_side(lines, m, place, y_low, y_high):
 
 @compiled
 def measure_outline_along(start, lean, x_edges, y_edges, y_low, y_high):
-    """Length (m) of outline along the line x = start + lean y, between y = low and high."""
+    """Return the length (m) of outline along the line x = start + lean y.
+
+    It counts between y = `y_low` and `y_high`.
+    """
     total = 0.0
     for e in range(x_edges.shape[1]):
         if (
@@ -346,7 +374,7 @@ def measure_outline_along(start, lean, x_edges, y_edges, y_low, y_high):
 
 
 def share_lines(volumes: np.ndarray, sides: list[list[Side]]) -> list[list[Side]]:
-    """The sides, on anchored lines of other volumes where edges of these lie where theirs do."""
+    """Move sides to anchored lines of other volumes, whose edges lie where theirs do."""
     anchored: dict[tuple[float, int], list[tuple[int, Side]]] = {}
     directions = volumes[:, DIRECTION].tolist()
     for k, volume_sides in enumerate(sides):
@@ -367,7 +395,10 @@ def share_lines(volumes: np.ndarray, sides: list[list[Side]]) -> list[list[Side]
 
 
 def take_shared_line(side: Side, lines: list[Side], middle: float) -> Side:
-    """The side, or the nearest of the `lines` of others where that is near at its `middle`."""
+    """Return the side, or the nearest of the `lines` of others if it is near.
+
+    It is near at the side's `middle`.
+    """
     if side.anchored or not lines:
         return side
     gaps = [abs(line.offset + line.lean * middle - side.offset) for line in lines]
@@ -376,7 +407,10 @@ def take_shared_line(side: Side, lines: list[Side], middle: float) -> Side:
 
 
 def find_corners(sides: list[Side]) -> np.ndarray:
-    """The corners (4, 2) where a volume's sides meet, those of CORNER_SIDES, in its direction's axes."""
+    """Return the corners (4, 2) where a volume's sides meet, in its direction's axes.
+
+    They are those of CORNER_SIDES.
+    """
     corners = []
     for i, j in CORNER_SIDES:
         a, b = sides[i], sides[j]

@@ -1,6 +1,7 @@
-"""What shows as a speck or a sliver goes, however well it explains what a scanner saw of the wall there.
+"""Drop what is visible as a speck or a sliver.
 
-That is a volume of a point or two, and a plane that is a strip at its volume's edge.
+Such are a volume of a point or two, and a plane that is a strip at its volume's edge. They are
+dropped however well they explain what a scanner saw of the wall there.
 """
 
 from __future__ import annotations
@@ -27,13 +28,17 @@ from .volumes import (
     read_coefficients,
 )
 
-FEWEST_SEEN = 3  # points over which a volume of several is the highest: two on a wall at one height are chance
-NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
-SAME_STEEPNESS = 0.05  # rise over run; planes of a hip are equally steep
+# Fewest points at which a volume of several is the highest: two on a wall at one height are chance.
+FEWEST_SEEN = 3
+NARROW_M = 0.45  # Least visible width (m) of a plane along its own fall.
+SAME_STEEPNESS = 0.05  # Planes of a hip differ less in slope (rise over run).
 
 
 def drop_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """The volumes without those that hardly any point shows, the fewest first. One alone is all there is of its roof."""
+    """Drop volumes that are visible at hardly any point, those with the fewest first.
+
+    A single volume stays: it is all there is of its roof.
+    """
     while len(volumes) > 2:
         _, top = compute_roof_heights(volumes, scene.U, scene.V)
         n_seen = np.bincount(top[: scene.n], minlength=len(volumes))[1:]
@@ -45,7 +50,10 @@ def drop_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
 
 
 def drop_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """The volumes without inclined planes of which only a narrow strip shows, where that costs no more than a part would."""
+    """Drop inclined planes of which only a narrow strip is visible.
+
+    They stay if dropping them costs more than a part would.
+    """
     value = compute_objective(volumes, scene, np.inf)
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V)
@@ -68,7 +76,11 @@ def drop_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
 
 
 def is_hip_end(volumes: np.ndarray, trial: np.ndarray, k: int, plane: int, scene: Scene) -> bool:
-    """Whether `plane`, without which volume k is a `trial`, falls as others of the volume do and ends it: no wall does."""
+    """Return whether `plane` of volume k is the end of a hip.
+
+    No wall stands for such a plane: it falls as others of the volume do, and ends it. `trial` are
+    the volumes without it.
+    """
     other_planes = [p for p in range(N_SIDES) if p != plane and volumes[k, OFFSET0 + p] < np.inf]
     as_others = (
         min(abs(volumes[k, SLOPE0 + p] - volumes[k, SLOPE0 + plane]) for p in other_planes)
@@ -85,7 +97,10 @@ def is_hip_end(volumes: np.ndarray, trial: np.ndarray, k: int, plane: int, scene
 def list_narrow_planes(
     volumes: np.ndarray, k: int, U: np.ndarray, V: np.ndarray, top: np.ndarray
 ) -> list[int]:
-    """Inclined planes of volume k that show nowhere, or over a strip narrower than NARROW_M; `top` (n,) is what shows at U, V."""
+    """List inclined planes of volume k that are visible over a strip or nowhere.
+
+    The strip is below NARROW_M. `top` (n,) are the volumes visible at U, V.
+    """
     if not (top == k).any():
         return []
     widths = measure_plane_widths(volumes, k, U, V, top)
@@ -94,7 +109,11 @@ def list_narrow_planes(
 
 @compiled
 def measure_plane_widths(volumes, k, U, V, top):
-    """How wide, along its own fall, each inclined plane (4,) of volume k shows at those of U, V (directions, n) where it is the `top`."""
+    """Return how wide each inclined plane (4,) of volume k is visible.
+
+    The width is along the plane's own fall, at those of U, V (directions, n) where the volume is
+    the `top`.
+    """
     u, v, c = (
         U[int(volumes[k, DIRECTION])],
         V[int(volumes[k, DIRECTION])],

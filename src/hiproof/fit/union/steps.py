@@ -1,7 +1,8 @@
-"""What an edge of a volume costs that shows: a step in the roof. Compiled.
+"""Compute the price of a visible edge of a volume, a step. Compiled.
 
-It costs a fixed sum (less where it is very short), more by the metre, most for low steps, which nearly always stand for a valley or a
-needless cut, and something extra where no corner of the outline lies in line with it. It is looked at in samples along it.
+It is a fixed sum (less if the edge is very short), more by the metre, and most for low steps, which
+nearly always stand for a valley or a needless cut. An edge costs extra if no corner of the outline
+lies in line with it. It is sampled along its length.
 """
 
 from __future__ import annotations
@@ -14,23 +15,24 @@ import numpy as np
 from ...compiled import compiled
 from .volumes import DIRECTION, REPLACES, U0, U1, V0, V1, find_lowest, is_within, read_coefficients
 
-VISIBLE_STEP_M, STEP_DEPTH_M = (
-    0.05,
-    0.2,
-)  # a gap that is a step; how far inside the outline it shows
-# m from which on an edge costs the whole of its fixed sum; were shorter ones free, a flight of small steps would cost less than one straight edge
+VISIBLE_STEP_M = 0.05  # Lowest gap (m) that is a step.
+STEP_DEPTH_M = 0.2  # Depth (m) inside the outline at which a step is visible.
+# Length (m) from which on an edge costs the whole of its fixed sum. If shorter ones were free, a
+# flight of small steps would cost less than one straight edge.
 FULL_PRICE_M = 0.55
-# m from an outline's corner within which an edge is in line with it, and within which it ends there
-CORNER_LINE_M, END_AT_CORNER_M = 0.25, 0.7
-# m between the places at which a step between volumes is judged, and how many at most of an edge
-EDGE_SAMPLE_M, MOST_EDGE_SAMPLES = 0.5, 40
-# samples that a processor looks at together, of which MOST_EDGE_SAMPLES is a multiple: so many more are looked at that none is left over
+CORNER_LINE_M = 0.25  # Distance (m) from a corner within which an edge is in line with it.
+END_AT_CORNER_M = 0.7  # Distance (m) from a corner within which an edge ends there.
+EDGE_SAMPLE_M = 0.5  # Distance (m) between the samples of an edge.
+MOST_EDGE_SAMPLES = 40  # Most samples of an edge.
+# Samples that a processor computes together. MOST_EDGE_SAMPLES is a multiple of it: samples are
+# added so that none is left over.
 SAMPLES_AT_ONCE = 8
-COVER_TOUCH_M = 0.03  # m; a volume that reaches so near covers the place
+COVER_TOUCH_M = 0.03  # A volume that reaches so near (m) covers the place.
 
 
-# Of a scene what the cost of edges depends on, and room (MOST_EDGE_SAMPLES,) to work in: where the samples of an edge are, and the heights on
-# either side of it. Fewer arrays are fewer to count references of, a million times.
+# What the price of edges depends on, of a scene, and room (MOST_EDGE_SAMPLES,) to work in: the
+# places of an edge's samples, and the heights on either side. Fewer arrays are fewer references to
+# count, a million times.
 Walls = namedtuple(
     "Walls",
     "turn depth corner_u corner_v pitch vertices corners places inside outside prices evidence",
@@ -47,7 +49,10 @@ def gather_walls(scene):
 
 @compiled(allocates=False)
 def price_edge(volumes, walls, k, edge):
-    """Units of complexity for what shows of one edge (0 u low, 1 u high, 2 v low, 3 v high) of volume k."""
+    """Compute the units of one visible edge of volume k.
+
+    Edges are 0 u low, 1 u high, 2 v low, 3 v high.
+    """
     direction, axis, place = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     inside, in_line = locate_line(walls, direction, axis, place)
     if not inside:
@@ -81,8 +86,10 @@ def price_edge(volumes, walls, k, edge):
 
 @compiled(inline="always")
 def locate_line(walls, direction, axis, place):
-    """Whether a line of one axis of a direction comes far enough inside the outline for a step to show there, and whether it is in line
-    with one of the outline's vertices."""
+    """Return whether a line of one axis lies deep enough inside for a visible step.
+
+    Also returns whether it is in line with one of the outline's vertices.
+    """
     lowest = highest = walls.vertices[direction, axis, 0]
     in_line = False
     for q in range(walls.vertices.shape[2]):
@@ -97,8 +104,10 @@ def locate_line(walls, direction, axis, place):
 
 @compiled(inline="always")
 def place_samples(volumes, walls, k, edge):
-    """How many of an edge's samples are inside the outline, and m from one to the next; where along the edge they are goes to
-    walls.places."""
+    """Fill walls.places with an edge's samples inside the outline.
+
+    Returns how many there are, and the metres from one to the next.
+    """
     direction, place, across = (
         int(volumes[k, DIRECTION]),
         volumes[k, U0 + edge],
@@ -128,15 +137,16 @@ def place_samples(volumes, walls, k, edge):
 
 @compiled(inline="always")
 def pad_count(count):
-    """The next multiple of SAMPLES_AT_ONCE."""
+    """Return the next multiple of SAMPLES_AT_ONCE."""
     return (count + SAMPLES_AT_ONCE - 1) // SAMPLES_AT_ONCE * SAMPLES_AT_ONCE
 
 
 @compiled(inline="always")
 def fill_heights(volumes, walls, k, edge, m):
-    """Fill walls.inside and walls.outside with the heights just inside and just outside of volume k at the first `m` of walls.places.
+    """Fill walls.inside and walls.outside with the heights on either side of an edge.
 
-    All places in one volume after another, so that a processor does several at once.
+    They are those at the first `m` of walls.places, just inside and just outside of volume k. All
+    places in one volume follow each other, so that a processor computes several at once.
     """
     direction, place = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
     places, inside, outside, turn = walls.places, walls.inside, walls.outside, walls.turn
@@ -178,7 +188,7 @@ def fill_heights(volumes, walls, k, edge, m):
 
 @compiled(allocates=False)
 def count_corner_ends(walls, direction, axis, place, first, last):
-    """How many of the two ends of what lies of the line `place` inside the outline are at corners of it."""
+    """Count the ends of a line inside the outline that are at corners of it."""
     has_first = has_last = 0
     for q in range(walls.corners.shape[1]):
         if abs(walls.corners[direction, q, axis] - place) < CORNER_LINE_M:

@@ -1,7 +1,7 @@
-"""Rows of equal monopitches as saw-teeth ("shed").
+"""Unite rows of equal monopitches as saw-teeth ("shed").
 
-Where a tooth ends is seen only by the points beside a step as high as the tooth. That all are alike tells it better: planes of one
-slope so far apart have teeth so wide.
+Only the points beside a step as high as the tooth show where a tooth ends. That all teeth are alike
+determines it better: planes of one slope so far apart have teeth so wide.
 """
 
 from __future__ import annotations
@@ -21,19 +21,20 @@ from ...primitives.shed import TEETH
 from .regions import exclude_parts, list_polygons, unite_outlines
 from .shown import absorb_slivers
 
-# rise over run; m; share of a size; rad: within which teeth, or the halves of a gambrel, are alike
-SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
-UNEVEN_M = 0.1  # heights of teeth, were they equally wide, that differ by more: they are not
-TOOTH_SHARE, GRID_STEP_M = (
-    0.8,
-    0.4,
-)  # of a tooth's area, at places so close, that a part must show as
-# m within which a row ends at a wall of the roof, of its length that must, and m between parts that are beside each other
-AT_WALL_M, AT_WALL, CRACK_M = 0.05, 0.5, 0.02
+SLOPE_ALIKE = 0.05  # Difference in slope (rise over run) within which teeth are alike.
+HEIGHT_ALIKE_M = 0.25  # Difference in height (m) within which teeth are alike.
+SIZE_ALIKE = 0.2  # Share of a size within which teeth, or the halves of a gambrel, are alike.
+TURN_ALIKE_RAD = 0.03  # Angle (rad) within which teeth, or the halves of a gambrel, are parallel.
+UNEVEN_M = 0.1  # Teeth whose heights differ by more (m), if they were equally wide, are not.
+TOOTH_SHARE = 0.8  # Share of a tooth's area over which a part must be visible as it.
+GRID_STEP_M = 0.4  # Distance (m) of the places at which that is sampled.
+AT_WALL_M = 0.05  # A row ends at a wall of the roof within this distance (m).
+AT_WALL = 0.5  # Share of the row's length that must be at the wall.
+CRACK_M = 0.02  # Distance (m) between parts that are beside each other.
 
 
 def unite_saw_teeth(parts: list[Part]) -> list[Part]:
-    """`parts` with every row of equal monopitches replaced by one saw-tooth ("shed")."""
+    """Replace every row of equal monopitches by one saw-tooth ("shed")."""
     for row, other_parts in list_rows(parts):
         united = make_saw_tooth(row, other_parts)
         if united is not None:
@@ -42,7 +43,7 @@ def unite_saw_teeth(parts: list[Part]) -> list[Part]:
 
 
 def list_rows(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
-    """Every row of equal monopitches, in order from the lowest v to the highest, and the parts beside it."""
+    """Yield every row of equal monopitches, from the lowest v, and the other parts."""
     teeth = [part for part in parts if is_tooth(part)]
     while teeth:
         row = [teeth.pop(0)]
@@ -66,7 +67,10 @@ def list_rows(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
 
 
 def extend_row(row: list[Part], other_parts: list[Part]) -> tuple[list[Part], list[Part]]:
-    """The row with parts of the others that show as its next tooth although they are more than that, and the others without them."""
+    """Extend a row by parts that look like its next tooth although they are more.
+
+    Also returns the other parts without these.
+    """
     parts = [*row, *other_parts]
     for step in 1.0, -1.0:
         while len(row) < max(TEETH):
@@ -88,7 +92,7 @@ def extend_row(row: list[Part], other_parts: list[Part]) -> tuple[list[Part], li
 
 
 def make_next_tooth(row: list[Part], last: Part, step: float) -> Part:
-    """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
+    """Make the tooth that would follow the `last` of a row, or precede it (`step` -1)."""
     across = (
         step
         * average_parameter(row, "width")
@@ -100,14 +104,17 @@ def make_next_tooth(row: list[Part], last: Part, step: float) -> Part:
 
 
 def select_equal_heights(parts: list[Part], tooth: Part) -> Iterator[Part]:
-    """The parts that are about as high as a `tooth` in the midst of it."""
+    """Select the parts that are about as high as a `tooth` in its middle."""
     middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
     target = tooth.height_at(middle)[0]
     return (part for part in parts if abs(part.height_at(middle)[0] - target) <= HEIGHT_ALIKE_M)
 
 
 def is_visible_as(part: Part, tooth: Part, other_parts: list[Part]) -> bool:
-    """Whether what shows of a part under `other_parts` is the `tooth`: there as high nearly everywhere, and nowhere else."""
+    """Return whether what is visible of a part under others is the `tooth`.
+
+    It is as high there nearly everywhere, and visible nowhere else.
+    """
     xy = lay_places([part])
     z, target = part.height_at(xy), tooth.height_at(xy)
     beneath = np.max([other.height_at(xy) for other in other_parts], axis=0)
@@ -118,7 +125,7 @@ def is_visible_as(part: Part, tooth: Part, other_parts: list[Part]) -> bool:
 
 
 def lay_places(parts: Iterable[Part]) -> np.ndarray:
-    """Places (n, 2) on a grid over the box around all that parts cover."""
+    """Lay places (n, 2) on a grid over the box around all that parts cover."""
     x0, y0, x1, y1 = unite_outlines(parts).bounds
     return np.stack(
         np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1
@@ -126,12 +133,12 @@ def lay_places(parts: Iterable[Part]) -> np.ndarray:
 
 
 def average_parameter(row: list[Part], name: str) -> float:
-    """The mean of a parameter of a row's teeth."""
+    """Return the mean of a parameter of a row's teeth."""
     return float(np.mean([part.parameters[name] for part in row]))
 
 
 def raise_tooth(tooth: Part, part: Part) -> Part:
-    """The `tooth` over what a part covers of it and near it, as high there as that part."""
+    """Return the `tooth` over what a part covers of it, as high as that part."""
     (piece,) = tooth.pieces
     margin_area = shapely.buffer(
         piece.outline, SIZE_ALIKE * tooth.parameters["width"], join_style="mitre"
@@ -150,7 +157,10 @@ def is_tooth(part: Part) -> bool:
 
 
 def is_next_tooth(tooth: Part, next_tooth: Part) -> bool:
-    """Whether `make_next_tooth` is the like of `tooth` and lies right behind its upper edge, as high there as that was before."""
+    """Return whether `next_tooth` follows `tooth` in a row.
+
+    It is like it, and lies right behind its upper edge, as high there as that was before.
+    """
     size, other_size = tooth.parameters, next_tooth.parameters
     turn = math.remainder(next_tooth.kappa - tooth.kappa, 2.0 * math.pi)
     slopes = [p["height"] / p["width"] for p in (size, other_size)]
@@ -175,9 +185,12 @@ def is_next_tooth(tooth: Part, next_tooth: Part) -> bool:
 
 @dataclass(frozen=True)
 class RowFrame:
-    """Where a row stands: u along the teeth and v across them are `axes` (2, 2) about `origin` (2,), teeth reach from `left` to
-    `right` along u, the row was seen from `first` to `last` along v, and covers `covered`; `roof` is all that is roofed, and `walls`
-    its border: cracks between parts are none."""
+    """The place of a row of teeth.
+
+    u along the teeth and v across them are `axes` (2, 2) about `origin` (2,). Teeth reach from
+    `left` to `right` along u. The row was visible from `first` to `last` along v, and covers
+    `covered`. `roof` is all that is roofed, and `walls` its border: cracks between parts are none.
+    """
 
     origin: np.ndarray
     axes: np.ndarray
@@ -190,12 +203,15 @@ class RowFrame:
     walls: shapely.Geometry
 
     def make_strip(self, foot: float, top: float) -> shapely.Polygon:
-        """From v = `foot` to `top` as long as the teeth; nothing where `top` is not above."""
+        """Return the strip from v = `foot` to `top`, as long as the teeth.
+
+        It is empty if `top` is not above `foot`.
+        """
         box = shapely.box(self.left, foot, self.right, top) if top > foot else shapely.Polygon()
         return shapely.transform(box, lambda uv: uv @ self.axes + self.origin)
 
     def is_wall(self, place: float) -> bool:
-        """Whether the roof's outline runs along v = `place`."""
+        """Return whether the roof's outline runs along v = `place`."""
         along = shapely.intersection(
             self.walls, self.make_strip(place - AT_WALL_M, place + AT_WALL_M)
         )
@@ -203,7 +219,7 @@ class RowFrame:
 
 
 def frame_row(row: list[Part], other_parts: list[Part]) -> RowFrame:
-    """Where a row of teeth stands among the other parts."""
+    """Return the place of a row of teeth among the other parts."""
     origin, kappa = row[0].translation[:2], row[0].kappa
     axes = np.array([[math.cos(kappa), math.sin(kappa)], [-math.sin(kappa), math.cos(kappa)]])
     covered, others_area = (unite_outlines(group) for group in (row, other_parts))
@@ -217,10 +233,11 @@ def frame_row(row: list[Part], other_parts: list[Part]) -> RowFrame:
 
 
 def make_saw_tooth(row: list[Part], other_parts: list[Part]) -> list[Part] | None:
-    """The other parts and one shed of the row; None where some of its teeth are wider than others, or their planes tell of others than
-    were seen.
+    """Return the other parts and one shed of the row.
 
-    What a tooth reaches further than it was seen it takes from the others, and leaves them what it reaches less.
+    Returns None if some of its teeth are wider than others, or if their planes imply other teeth
+    than were visible. What a tooth reaches further than it was visible, it takes from the others.
+    What it reaches less, it leaves them.
     """
     other_parts, splinters = separate_splinters(row, other_parts)
     ground = frame_row([*row, *splinters], other_parts)
@@ -234,7 +251,7 @@ def make_saw_tooth(row: list[Part], other_parts: list[Part]) -> list[Part] | Non
         float(breaks[-1] - breaks[0]),
         average_parameter(row, "width"),
     )
-    # planes that hardly slope tell of teeth of another width than was seen, or of less than none
+    # Planes that hardly slope imply teeth of another width than was visible, or of a negative one.
     if np.ptp(heights) > UNEVEN_M or abs(width / len(row) - seen_wide) > SIZE_ALIKE * seen_wide:
         return None
     rise = float(slopes.mean() * width / len(row))
@@ -254,7 +271,7 @@ def make_saw_tooth(row: list[Part], other_parts: list[Part]) -> list[Part] | Non
     if not left_over.pieces:
         return [*other_parts, shed]
     absorbed = absorb_slivers(other_parts, left_over, math.inf)
-    # where no other part lies beside it, the outermost teeth reach as far as the row did
+    # If no other part lies beside it, the outermost teeth reach as far as the row did.
     return (
         [*absorbed, shed]
         if absorbed is not None
@@ -263,7 +280,10 @@ def make_saw_tooth(row: list[Part], other_parts: list[Part]) -> list[Part] | Non
 
 
 def separate_splinters(row: list[Part], other_parts: list[Part]) -> tuple[list[Part], list[Part]]:
-    """The other parts, and those that are narrow strips between the teeth: what a scanner saw of a tooth's wall."""
+    """Separate narrow strips between the teeth from the other parts.
+
+    They are what a scanner saw of a tooth's wall.
+    """
     covered = unite_outlines(row)
     narrow = SIZE_ALIKE * min(part.parameters["width"] for part in row)
     closed_area = shapely.buffer(
@@ -282,9 +302,10 @@ def separate_splinters(row: list[Part], other_parts: list[Part]) -> tuple[list[P
 
 
 def lay_out_teeth(feet: np.ndarray, ground: RowFrame) -> np.ndarray:
-    """Where the teeth of a row begin and the last one ends (n + 1,), v in metres, all equally wide.
+    """Return where the teeth of a row begin and the last one ends (n + 1,).
 
-    Their planes would be at height 0 at `feet` (n,). Ends at walls are where the outline has them.
+    They are v in metres, all equally wide. The teeth's planes would be at height 0 at `feet` (n,).
+    Ends at walls are those of the outline.
     """
     count, first, last = len(feet), ground.first, ground.last
     numbers = np.arange(count) - 0.5 * (count - 1)
@@ -299,7 +320,10 @@ def lay_out_teeth(feet: np.ndarray, ground: RowFrame) -> np.ndarray:
 
 
 def cut_teeth(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: RowFrame) -> tuple[Piece, ...]:
-    """The pieces of a saw-tooth, a tooth each, over what its row covers and reaches further."""
+    """Cut the pieces of a saw-tooth, a tooth each.
+
+    They lie over what its row covers and where it reaches further.
+    """
     further = [
         ground.make_strip(breaks[0], ground.first),
         ground.make_strip(ground.last, breaks[-1]),

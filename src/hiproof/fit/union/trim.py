@@ -1,6 +1,7 @@
-"""What lies hidden of a volume is drawn in: no rectangle reaches further under another than it has to.
+"""Draw in what is hidden of each volume.
 
-First sides next to a line of the outline's corners are drawn out to it, for what shows of others in between is no roof of theirs.
+No rectangle reaches further under another than necessary. First, sides next to a line of the
+outline's corners are drawn out to it: what is visible of others in between is no roof of theirs.
 """
 
 from __future__ import annotations
@@ -13,16 +14,21 @@ from .prices import CUT_UNITS, SLACK_UNITS
 from .scene import Scene, list_nodes
 from .volumes import DIRECTION, U0, U1, V0, V1, compute_roof_heights
 
-HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
-# m from what shows within which an edge or a corner is the place to draw a side in to
-NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
-# m, and of the raster's steps, which are long on large roofs, for which a volume is hidden that shows in several places
-RUN_GAP_M, RUN_GAP_NODES = 0.8, 2.5
-OUTWARDS = np.array([-1.0, 1.0])  # of the low and the high edge along an axis
+HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
+COVER_M = 0.25  # They are drawn in to this distance (m) beyond what is visible.
+NEAR_EDGE_M = 0.5  # An edge within this distance (m) of what is visible is the place for a side.
+NEAR_VERTEX_M = 0.3  # A corner within this distance (m) of what is visible is the place for a side.
+RUN_GAP_M = 0.8  # Length (m) over which a volume is hidden that is visible in several places.
+RUN_GAP_NODES = 2.5  # The same in the raster's steps, which are long on large roofs.
+# The outward direction of the low and the high edge along an axis.
+OUTWARDS = np.array([-1.0, 1.0])
 
 
 def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-    """The volumes without those that nowhere show, hidden edges drawn in to what shows of each; and the objective."""
+    """Drop volumes that are not visible, and draw hidden edges in.
+
+    Edges are drawn in to what is visible of each volume. Also returns the objective.
+    """
     volumes, value = draw_out(volumes, scene, value)
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V)
@@ -49,12 +55,14 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
 
 
 def find_runs(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the runs of places x (n,) begin and end (m,) that follow each other by no more than a few steps of the raster, and how
-    many places each has."""
+    """Find the runs of places x (n,) that are close together.
+
+    Places of one run are no more than a few steps of the raster apart. Returns where the runs begin
+    and end (m,), and how many places each has.
+    """
     gap, lowest, highest = max(RUN_GAP_M, RUN_GAP_NODES * pitch), x.min(), x.max()
-    if np.bincount(
-        ((x - lowest) * (2.0 / gap)).astype(int)
-    ).all():  # some in every half of a gap: one run, found without sorting
+    # With places in every half of a gap there is one run, found without sorting.
+    if np.bincount(((x - lowest) * (2.0 / gap)).astype(int)).all():
         return np.array([lowest]), np.array([highest]), np.array([len(x)])
     x = np.sort(x)
     gaps = np.flatnonzero(x[1:] - x[:-1] > gap)
@@ -63,7 +71,10 @@ def find_runs(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-    """The volumes with every edge at the line of corners that is next to it on its outer side, where that costs next to nothing."""
+    """Draw every edge out to the line of corners next to it.
+
+    An edge is drawn out if that costs nearly nothing.
+    """
     edges, lines = (
         volumes[:, U0 : V1 + 1].reshape(-1, 2, 2, 1),
         scene.vertices[volumes[:, DIRECTION].astype(int)],
@@ -90,9 +101,10 @@ def draw_in(
     U: np.ndarray,
     V: np.ndarray,
 ) -> tuple[np.ndarray, float]:
-    """Edge `edge` (a column) of volume k drawn in to the line near `seen_to` that others have, or just beyond it.
+    """Draw edge `edge` (a column) of volume k in to a line near `seen_to`.
 
-    It may cost next to nothing, or whatever its steps cost where no height at the nodes U, V changes.
+    It is a line of others, or lies just beyond. It may cost nearly nothing, or whatever its steps
+    cost if no height at the nodes U, V changes.
     """
     is_low = edge in (U0, V0)
     hidden = seen_to - volumes[k, edge] if is_low else volumes[k, edge] - seen_to
@@ -117,8 +129,10 @@ def draw_in(
 def cut_short(
     volumes: np.ndarray, scene: Scene, value: float, k: int, edge: int, seen_to: float
 ) -> tuple[np.ndarray, float]:
-    """Edge `edge` (a column) of volume k at `seen_to`, where most of what shows of it ends, if neighbours may take the rest for next to
-    nothing."""
+    """Cut edge `edge` (a column) of volume k at `seen_to`.
+
+    Most of what is visible of it ends there. Neighbours must take the rest for nearly nothing.
+    """
     is_low = edge in (U0, V0)
     if (seen_to - volumes[k, edge] if is_low else volumes[k, edge] - seen_to) < HIDDEN_M:
         return volumes, value
@@ -137,14 +151,20 @@ def cut_short(
 
 
 def has_width(row: np.ndarray) -> bool:
-    """Whether a volume's rectangle holds more than a line, as one that shows at one line of nodes may end in."""
+    """Return whether a volume's rectangle holds more than a line.
+
+    One that is visible at one line of nodes may end as a line.
+    """
     return bool(row[U0] < row[U1] and row[V0] < row[V1])
 
 
 def list_near_lines(
     volumes: np.ndarray, scene: Scene, k: int, edge: int, seen_to: float
 ) -> list[float]:
-    """The nearest line to `seen_to` that another volume's edge or a corner of the outline has; none if none is near."""
+    """Return the nearest line to `seen_to`, in a list, or an empty list without any.
+
+    It is another volume's edge or a corner of the outline.
+    """
     axis, direction = (edge - U0) // 2, int(volumes[k, DIRECTION])
     column = U0 + 2 * axis
     other_rows = [

@@ -1,7 +1,8 @@
-"""Volumes that only skewed walls keep apart: one over both, where planes along its own sides explain its points as well.
+"""Merge volumes that only skewed walls keep apart.
 
-The search's planes face along two axes. A roof over walls that are not quite parallel has planes that do not, and two volumes
-beside each other then stand for one.
+One volume takes their place if planes along its own sides explain its points as well. The search's
+planes face along two axes. A roof over walls that are not quite parallel has other planes, and two
+volumes beside each other then stand for one.
 """
 
 from __future__ import annotations
@@ -48,22 +49,21 @@ from .volumes import (
     price_volume,
 )
 
-UNITE_GAP_M, UNITE_OFFSET_M = (
-    0.4,
-    1.0,
-)  # how far apart the rectangles may lie, and their sides along the line of both
-SLOPES_ALIKE, HEIGHTS_ALIKE_M = (
-    0.15,
-    0.5,
-)  # rise over run, m: further apart, two volumes are not tried as one
-MOST_CUT_CORNERS = (
-    2  # volumes drawn out over walls that cut corners off: a house has one bay or two
-)
+UNITE_GAP_M = 0.4  # Largest distance (m) between the rectangles.
+UNITE_OFFSET_M = 1.0  # Largest distance (m) of their sides along the line of both.
+SLOPES_ALIKE = 0.15  # Volumes whose slopes (rise over run) differ more are not tried as one.
+HEIGHTS_ALIKE_M = 0.5  # Volumes whose heights (m) differ more are not tried as one.
+# Most volumes drawn out over walls that cut corners off: a house has one bay or two.
+MOST_CUT_CORNERS = 2
 
 
 class OutlineEnds(NamedTuple):
-    """What an outline ends volumes with: its edges and chords (2, m, 2) in the first direction's axes, the lines that sides
-    may take of these, by direction, and its walls (m, 2, 2). `outline` (2, n, 2) are all edges, near or not."""
+    """The lines of an outline at which volumes end.
+
+    Its `edges` and `chords` (2, m, 2) are in the first direction's axes, `lines` are those of these
+    that sides may take, by direction, and `walls` are (m, 2, 2). `outline` (2, n, 2) are all edges,
+    near or not.
+    """
 
     edges: np.ndarray
     chords: np.ndarray
@@ -74,7 +74,7 @@ class OutlineEnds(NamedTuple):
 
 @dataclass(frozen=True)
 class DrawnRoof:
-    """Volumes (k, COLUMNS) with their sides and planes, and what the roof costs with these (points)."""
+    """Volumes (k, COLUMNS) with their sides and planes, and the roof's cost."""
 
     volumes: np.ndarray
     sides: list[list[Side]]
@@ -89,10 +89,10 @@ def unite_volumes(
     cache: Cache,
     movable: Collection[int] | None = None,
 ) -> DrawnRoof:
-    """The volumes along their sides, without those that do not pay once planes face as these do.
+    """Draw the volumes along their sides, and drop or merge those that do not pay.
 
-    Only volumes of the numbers `movable` are made one with others, or go; all where it is None. Planes
-    that are `cache` in this scene are not fitted again; those found become known.
+    Only volumes of the numbers `movable` are merged with others or dropped, all if it is None.
+    Planes in the `cache` of this scene are not fitted again.
     """
     value = compute_objective(volumes, scene, np.inf)
     best = cover_cut_corners(draw_roof(volumes, ends, scene, cache), ends, scene, cache)
@@ -126,7 +126,7 @@ def gather_ends(outline: shapely.Polygon, plan: Plan, scene: Scene) -> OutlineEn
 
 
 def select_ends(ends: OutlineEnds, scene: Scene) -> OutlineEnds:
-    """Those of the ends that reach into what a scene shows, or nearly."""
+    """Select those of the ends that reach into a scene, or nearly do."""
     lower = np.array([scene.corner_u, scene.corner_v]) - OUTLINE_REACH_M
     upper = lower + np.multiply(scene.depth.shape, scene.pitch) + 2.0 * OUTLINE_REACH_M
     edges, chords, walls = (
@@ -138,12 +138,18 @@ def select_ends(ends: OutlineEnds, scene: Scene) -> OutlineEnds:
 
 
 def is_reaching(lines: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Which of the lines between ends (2, m, 2) reach into the box from `lower` to `upper` (2,)."""
+    """Return which of the lines between ends (2, m, 2) reach into a box.
+
+    It reaches from `lower` to `upper` (2,).
+    """
     return ((lines.min(axis=0) < upper) & (lines.max(axis=0) > lower)).all(axis=1)
 
 
 def cover_cut_corners(roof: DrawnRoof, ends: OutlineEnds, scene: Scene, cache: Cache) -> DrawnRoof:
-    """The roof with one volume over walls that cut its corners off in place of several, where that is cheaper, at most MOST_CUT_CORNERS times."""
+    """Replace several volumes by one over walls that cut its corners off, if cheaper.
+
+    This happens at most MOST_CUT_CORNERS times.
+    """
     for _ in range(MOST_CUT_CORNERS):
         roof_before = roof
         for trial in draw_over_corners(roof_before.volumes, ends.walls, scene):
@@ -160,12 +166,15 @@ def cover_cut_corners(roof: DrawnRoof, ends: OutlineEnds, scene: Scene, cache: C
 
 
 def is_base_bared(trial: np.ndarray, volumes: np.ndarray, scene: Scene) -> bool:
-    """Whether the base shows under a trial and not under the volumes that it would take the place of."""
+    """Return whether a trial bares the base, and the volumes that it replaces do not."""
     return bool(is_base_visible(trial, scene)) and not is_base_visible(volumes, scene)
 
 
 def bound_cost(volumes: np.ndarray, scene: Scene) -> float:
-    """What a roof costs whatever further planes lower it: its volumes, its edges, and the points above it."""
+    """Return what a roof costs at least, whatever further planes lower it.
+
+    It costs its volumes, its edges, and the points above it.
+    """
     z, _ = compute_roof_heights(volumes, scene.U, scene.V)
     is_above = scene.z[: scene.n] > z[: scene.n]
     return float(compute_costs(z, scene)[: scene.n][is_above].sum()) + price_structure(
@@ -180,7 +189,10 @@ def price_structure(volumes: np.ndarray, scene: Scene) -> float:
 
 
 def list_reductions(roof: DrawnRoof, movable: Collection[int] | None) -> Iterator[np.ndarray]:
-    """Volumes with two that are alike made one; and without one, where sides are not square to each other."""
+    """Yield volumes with two alike merged, and without one.
+
+    The latter are tried if sides are not square to each other.
+    """
     is_movable = [
         movable is None or number in movable for number in roof.volumes[:, ROW_NUMBER].tolist()
     ]
@@ -196,7 +208,10 @@ def list_reductions(roof: DrawnRoof, movable: Collection[int] | None) -> Iterato
 
 
 def draw_roof(volumes: np.ndarray, ends: OutlineEnds, scene: Scene, cache: Cache) -> DrawnRoof:
-    """The volumes with the sides, on the outline's lines where these are near, and the planes that suit them."""
+    """Draw the volumes with their sides and the planes that suit these.
+
+    Sides are on the outline's lines where these are near.
+    """
     key = volumes.tobytes()
     if key not in cache:
         sides = choose_sides(volumes, ends.lines, scene)
@@ -207,14 +222,13 @@ def draw_roof(volumes: np.ndarray, ends: OutlineEnds, scene: Scene, cache: Cache
 
 
 def is_alike(row: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two volumes lie beside each other in one line, with all but the same planes."""
+    """Return whether two volumes lie beside each other in line, with similar planes."""
     if row[DIRECTION] != other[DIRECTION] or row[REPLACES] or other[REPLACES]:
         return False
     if not is_in_line(row[U0 : V1 + 1].tolist(), other[U0 : V1 + 1].tolist()):
         return False
-    rectangles = np.array([row[U0 : V1 + 1], other[U0 : V1 + 1]]).reshape(
-        2, 2, 2
-    )  # volume, axis, end
+    # The axes are volume, axis, end.
+    rectangles = np.array([row[U0 : V1 + 1], other[U0 : V1 + 1]]).reshape(2, 2, 2)
     is_present = (
         np.isfinite(row[OFFSET0 : OFFSET0 + N_PLANES]),
         np.isfinite(other[OFFSET0 : OFFSET0 + N_PLANES]),
@@ -234,7 +248,10 @@ def is_alike(row: np.ndarray, other: np.ndarray) -> bool:
 
 
 def is_in_line(rectangle: list[float], other: list[float]) -> bool:
-    """Whether two rectangles (u0, u1, v0, v1) lie beside each other in one line."""
+    """Return whether two rectangles lie beside each other in one line.
+
+    The rectangles are u0, u1, v0, v1.
+    """
     for column, across in ((0, 2), (2, 0)):
         gap = max(rectangle[column], other[column]) - min(rectangle[column + 1], other[column + 1])
         offset = max(
@@ -246,7 +263,7 @@ def is_in_line(rectangle: list[float], other: list[float]) -> bool:
 
 
 def merge_rectangles(volume: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """One volume over the rectangles of two, with the planes of either."""
+    """Return one volume over the rectangles of two, with the planes of either."""
     large, small = sorted(
         (volume, other), key=lambda row: -(row[U0 + 1] - row[U0]) * (row[V0 + 1] - row[V0])
     )

@@ -1,12 +1,14 @@
-"""A roof under construction: volumes as rows of one array, their heights and what they cost, compiled.
+"""Describe a roof under construction: volumes as rows of one array. Compiled.
 
-A volume is a rectangle in one of the building's directions and a min of at most five planes in its own axes u, v:
+A volume is a rectangle in one of the building's directions and a min of at most five planes in its
+own axes u, v:
 
     rising along +u, rising along -u, rising along +v, rising along -v, level
 
-The four inclined ones may lean: face square to a wall that is not quite along the axes.
-The roof is the max of the volumes in whose rectangle a place lies, but a volume that replaces (a recess cut into a slope, a
-low annex beside a gable's wall) is all that shows within it of what came before. Row 0 is the base: level, everywhere.
+The four inclined ones may lean: they then face square to a wall that is not quite along the axes.
+The roof is the max of the volumes in whose rectangle a place lies. A volume that replaces others (a
+recess cut into a slope, a low annex beside a gable's wall) hides within it all that came before.
+Row 0 is the base: level, and everywhere.
 """
 
 from __future__ import annotations
@@ -16,35 +18,38 @@ import numpy as np
 from ...compiled import compiled
 from .prices import LEANING_COST, PARAMETER_COST, PART_COST, REPLACING_COST
 
-# Columns of a volume's row: its direction's number, rectangle (metres in that direction's axes), the slopes of the four
-# inclined planes, the offsets of all five (z at u = v = 0; infinite where it has no such plane), tie and whether it replaces,
-# leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y the other of u, v; a digest of how
-# things stood around it when no move changed it.
-DIRECTION = 0
-U0, U1, V0, V1 = 1, 2, 3, 4  # columns of a volume's row: its rectangle
-SLOPE0, OFFSET0 = 5, 9  # columns of the four slopes, and of the five planes' offsets
-TIE, REPLACES = 14, 15  # columns: which slopes are equal, and whether it replaces what lies below
-LEAN0 = 16  # first column of how far each plane faces off its axis
-# column: a digest of the surroundings in which no move was found for it, infinite where it is fixed
+DIRECTION = 0  # Column of a volume's row: the number of its direction.
+# Columns of its rectangle, in metres of that direction's axes.
+U0, U1, V0, V1 = 1, 2, 3, 4
+SLOPE0 = 5  # First column of the slopes of its four inclined planes.
+# First column of the offsets of its five planes: z at u = v = 0, infinite where it has no such
+# plane.
+OFFSET0 = 9
+TIE = 14  # Column that says which slopes are equal.
+REPLACES = 15  # Column that says whether it replaces what lies below.
+# First column of the leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y
+# the other of u, v.
+LEAN0 = 16
+# Column: a digest of the surroundings in which no move was found for it, infinite where it is
+# fixed.
 SETTLED = 20
-# column: the number of a volume among the whole roof's while a window of it is searched, 0 for a new volume
+# Column: its number among the whole roof's volumes while a window of it is searched, 0 for a new
+# volume.
 ROW_NUMBER = 21
-COLUMNS = 22  # of a row
-N_SIDES, N_PLANES, LEVEL = 4, 5, 4  # planes that slope, all planes, the level one's number
+COLUMNS = 22  # Number of columns of a row.
+N_SIDES = 4  # Number of planes that slope.
+N_PLANES = 5  # Number of all planes.
+LEVEL = 4  # Number of the level plane.
 
-FREE, OPPOSITE, ALL_EQUAL = (
-    0.0,
-    1.0,
-    2.0,
-)  # which slopes are equal: none, those that face each other, all
-SLOPE_LOW, SLOPE_HIGH = (
-    0.04,
-    2.75,
-)  # rise over run, 2 and 70 degrees: flatter is level, steeper a wall
+FREE = 0.0  # The tie under which no slopes are equal.
+OPPOSITE = 1.0  # The tie under which slopes that face each other are equal.
+ALL_EQUAL = 2.0  # The tie under which all slopes are equal.
+SLOPE_LOW = 0.04  # A flatter slope (rise over run), 2 degrees, is level.
+SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
 
 
 def make_base(height: float) -> np.ndarray:
-    """Volumes (1, COLUMNS): the level base at `height`."""
+    """Return volumes (1, COLUMNS): the level base at `height`."""
     volumes = np.zeros((1, COLUMNS))
     volumes[0, OFFSET0 : OFFSET0 + N_PLANES] = np.inf
     volumes[0, OFFSET0 + LEVEL] = height
@@ -54,7 +59,10 @@ def make_base(height: float) -> np.ndarray:
 
 @compiled
 def read_coefficients(volumes, k):
-    """The numbers of volume k's planes: five offsets, four slopes, four slopes across (as scalars they stay in registers)."""
+    """Return the numbers of volume k's planes.
+
+    They are five offsets, four slopes, and four slopes across, as scalars that stay in registers.
+    """
     # no view of a row: counting the references to one costs more than reading the numbers
     along = volumes[k, 5], volumes[k, 6], volumes[k, 7], volumes[k, 8]
     lean = volumes[k, 16], volumes[k, 17], volumes[k, 18], volumes[k, 19]
@@ -72,25 +80,31 @@ def read_coefficients(volumes, k):
 
 @compiled(inline="always")
 def read_rectangle(volumes, k):
-    """Where volume k begins and ends along u and along v."""
+    """Return where volume k begins and ends along u and along v."""
     return volumes[k, 1], volumes[k, 2], volumes[k, 3], volumes[k, 4]
 
 
 @compiled(inline="always")
 def is_fixed(volumes, k):
-    """Whether no move may change volume k, because it reaches out of the window that is searched."""
+    """Return whether no move may change volume k: it reaches out of the search window."""
     return volumes[k, SETTLED] == np.inf
 
 
 @compiled(inline="always")
 def is_within(ends, u, v):
-    """Whether u, v lies in a rectangle, whose `ends` these are; without branches, so that a processor asks for several at once."""
+    """Return whether u, v lies in a rectangle with these `ends`.
+
+    It has no branches, so a processor computes several places at once.
+    """
     return (ends[0] <= u) & (u <= ends[1]) & (ends[2] <= v) & (v <= ends[3])
 
 
 @compiled(inline="always")
 def find_lowest(c, u, v):
-    """Height at u, v of the volume whose `read_coefficients` are c, its rectangle not asked."""
+    """Return the height at u, v of a volume with coefficients c.
+
+    Its rectangle does not matter.
+    """
     along = min(c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v)
     across = min(c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u)
     return min(min(along, across), c[4])
@@ -98,7 +112,7 @@ def find_lowest(c, u, v):
 
 @compiled(inline="always")
 def find_lowest_plane(c, u, v):
-    """Height at u, v and which of the planes is the lowest there."""
+    """Return the height at u, v, and the lowest plane there."""
     z0, z1 = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
     z2, z3 = c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u
     best, plane = c[4], LEVEL
@@ -111,20 +125,29 @@ def find_lowest_plane(c, u, v):
 
 @compiled(inline="always")
 def measure_run(row, k, u, v):
-    """What plane k of a volume rises along, by its slope: metres from the axes' origin at u, v."""
+    """Return the run of plane k of a volume at u, v: metres from the axes' origin.
+
+    The plane rises along it, by its slope.
+    """
     x, y = (u, v) if k < 2 else (v, u)
     return (x if k % 2 == 0 else -x) + row[LEAN0 + k] * y
 
 
 def measure_runs(row: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """What each of a volume's four inclined planes rises along at u, v (n,): (4, n) metres from the axes' origin."""
+    """Return the runs (4, n) of a volume's four inclined planes at u, v (n,).
+
+    They are in metres from the axes' origin.
+    """
     lean = row[LEAN0 : LEAN0 + N_SIDES]
     return np.stack([u + lean[0] * v, -u + lean[1] * v, v + lean[2] * u, -v + lean[3] * u])
 
 
 @compiled
 def compute_roof_heights(volumes, U, V):
-    """Height (n,) of the roof and the volume (n,) that shows, at U, V (directions, n)."""
+    """Return the height (n,) of the roof and the visible volume (n,) at U, V.
+
+    These are (directions, n).
+    """
     n = U.shape[1]
     z, top = np.full(n, -np.inf), np.zeros(n, np.int64)
     for k in range(len(volumes)):
@@ -140,7 +163,7 @@ def compute_roof_heights(volumes, U, V):
 
 @compiled
 def count_slopes(row):
-    """How many slopes of its own a volume has under its tie."""
+    """Count the slopes of its own that a volume has under its tie."""
     along = int(row[OFFSET0] < np.inf) + int(row[OFFSET0 + 1] < np.inf)
     across = int(row[OFFSET0 + 2] < np.inf) + int(row[OFFSET0 + 3] < np.inf)
     if row[TIE] == FREE:
@@ -160,7 +183,7 @@ def count_planes(row):
 
 @compiled
 def price_volume(row):
-    """Units of complexity of one volume, its edges not counted."""
+    """Return the units of one volume without its edges."""
     replacing = REPLACING_COST if row[REPLACES] > 0.0 else 0.0
     leaning = 0.0
     for k in range(N_SIDES):
@@ -172,7 +195,10 @@ def price_volume(row):
 
 @compiled
 def is_allowed(row, allowed):
-    """Whether a volume's shape is among `allowed` (2, 3, 3, 2): has a top, planes along and across, free slopes."""
+    """Return whether a volume's shape is among `allowed` (2, 3, 3, 2).
+
+    The axes are: has a top, planes along, planes across, free slopes.
+    """
     along = int(row[OFFSET0] < np.inf) + int(row[OFFSET0 + 1] < np.inf)
     across = int(row[OFFSET0 + 2] < np.inf) + int(row[OFFSET0 + 3] < np.inf)
     return allowed[int(row[OFFSET0 + LEVEL] < np.inf), along, across, int(row[TIE] == FREE)]
@@ -180,7 +206,10 @@ def is_allowed(row, allowed):
 
 @compiled
 def equalise_slopes(row):
-    """Make the slopes that the tie calls equal so; each plane turns about the middle of its half of the rectangle."""
+    """Make the slopes equal that the tie makes equal.
+
+    Each plane turns about the middle of its half of the rectangle.
+    """
     if row[TIE] == FREE:
         return
     step = N_SIDES if row[TIE] == ALL_EQUAL else 2

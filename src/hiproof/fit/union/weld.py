@@ -1,10 +1,10 @@
-"""Make what nearly meets meet, where the roof gets cheaper by it: sides, corners and low steps.
+"""Make what nearly meets meet, if the roof gets cheaper by it.
 
-    misfit + units * (parameters that show + corners)
+    misfit + units * (visible parameters + corners)
 
-A corner has a price because it is what a draughtsman counts. Repairs are tried the smallest first,
-each in a window around it, and one that pays is kept. After a round the roof is drawn anew, until
-no repair pays. The outline never moves.
+This concerns sides, corners and low steps. A corner has a price because a draughtsman counts it.
+Repairs are tried the smallest first, each in a window around it, and one that pays is kept. After a
+round, the roof is drawn again, until no repair pays. The outline never moves.
 """
 
 from __future__ import annotations
@@ -32,23 +32,22 @@ from .scene import Scene, select_points
 from .sides import Side, find_corners
 from .volumes import DIRECTION, U0, V0, V1
 
-WINDOW_M2, MARGIN_M = (
-    400.0,
-    2.0,
-)  # a roof of so many square metres is one window; how far a window reaches beyond a repair
-# repairs that are drawn for every WINDOW_M2 of the outline, and rounds: each draws as much as
-# composing its window costs.
-# What comes after them stays as the search left it.
-MOST_TRIALS, MOST_ROUNDS = 40, 20
-MOST_POINTS = 1500  # of a window that judge; of more every k-th
+WINDOW_M2 = 400.0  # A roof of so many square metres is one window.
+MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
+# Repairs that are drawn for every WINDOW_M2 of the outline: each draws as much as composing its
+# window costs. Later ones are not tried.
+MOST_TRIALS = 40
+MOST_ROUNDS = 20  # Most rounds of repairs.
+MOST_JUDGES = 1500  # Most points of a window that judge. Of more, every k-th does.
+# The corners of a volume in which each of its sides ends.
 SIDE_ENDS = (
     (0, 3),
     (1, 2),
     (0, 1),
     (2, 3),
-)  # the corners of a volume in which each of its sides ends
-LEFT_OVER = 1e-9  # m; an equation that the others leave so little of holds by them
-ONE_LINE_M = 0.02  # sides of two volumes nearer than this are one line
+)
+LEFT_OVER = 1e-9  # An equation of which the others leave less (m) holds because of them.
+ONE_LINE_M = 0.02  # Sides of two volumes nearer than this (m) are one line.
 
 
 class WeldProblem(NamedTuple):
@@ -78,8 +77,11 @@ class WeldProblem(NamedTuple):
 
 
 class RoofState(NamedTuple):
-    """A roof: its sides and planes, the unknowns that its equations leave free (p, q), and what the
-    points of its members cost under these, None where they have not been fitted together yet."""
+    """A roof: its sides and planes.
+
+    `basis` (p, q) spans the unknowns that its equations leave free. `cost` is what the points of
+    its members cost under these, None if they have not been fitted together yet.
+    """
 
     sides: list[list[Side]]
     planes: list[Planes]
@@ -105,7 +107,7 @@ class Window(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a window shows of a roof: regions, these as one part, and plan for each of its sites.
+    """What a window shows of a roof: regions, one part of these, and plan by site.
 
     A plan is None where its regions make none.
     """
@@ -116,7 +118,7 @@ class Drawing(NamedTuple):
 
     @property
     def corners(self) -> float:
-        """How many corners the plans have, infinitely many where one is None."""
+        """The number of corners of the plans, infinite where one is None."""
         return sum(math.inf if plan is None else plan.corners for plan in self.plans)
 
 
@@ -152,13 +154,13 @@ def make_problem(
 
 
 def begin_state(sides: list[list[Side]], problem: WeldProblem) -> RoofState:
-    """The roof as volumes agree on it."""
+    """Return the roof as volumes agree on it."""
     agreement = problem.agreement
     return RoofState(sides, list(agreement.planes), agreement.basis, agreement.cost)
 
 
 def compute_member_cost(agreement: Agreement, scene: Scene) -> float:
-    """What the points of members cost under the equations that hold between them."""
+    """Return what the points of members cost under the accepted equations."""
     members = list(agreement.members.values())
     return fit_members(members, agreement.basis, agreement.start, scene).cost
 
@@ -181,8 +183,8 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
 class RepairTrial:
     """A window of a roof as it is in a `state`, with which repairs in it are compared.
 
-    `plan` is that of the whole roof. The window is drawn when a repair asks for it, unless its
-    drawing is `known`.
+    `plan` is that of the whole roof. The window is drawn when a repair needs it, unless its drawing
+    is `known`.
     """
 
     state: RoofState
@@ -204,7 +206,7 @@ class RepairTrial:
         return price_window(self.state, self.drawing, self.owners_beyond, self.window, self.problem)
 
     def draw_if_cheaper(self, state: RoofState) -> Drawing | None:
-        """Draw the window after a repair; None where it costs as much or has as many corners."""
+        """Draw the window after a repair; None if it costs as much or has as many corners."""
         if self.drawing.corners == math.inf:
             return None
         trial = draw_window(state, self.window, self.problem)
@@ -221,9 +223,9 @@ def run_round(
     tried_repairs: set[tuple],
     problem: WeldProblem,
 ) -> tuple[RoofState, Drawing | None]:
-    """The roof with every repair that pays, of those not `tried_repairs`, one in each window.
+    """Return the roof with every repair that pays, one in each window.
 
-    Its drawing comes with it where it is known.
+    Repairs in `tried_repairs` are left out. The roof's drawing comes with it if it is known.
     """
     plan = drawing.plans[0]
     if plan is None:
@@ -254,7 +256,7 @@ def run_round(
 
 
 def list_owners_beyond(plan_drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
-    """The planes, by volume and number, that show beyond a window too."""
+    """Return the planes, by volume and number, that are visible beyond a window, too."""
     x0, y0, x1, y1 = box.bounds
     x, y = plan_drawn.places.T
     out = (x < x0) | (x > x1) | (y < y0) | (y > y1)
@@ -263,12 +265,15 @@ def list_owners_beyond(plan_drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple
 
 
 def make_whole_box(problem: WeldProblem) -> shapely.Polygon:
-    """The window that holds all of the roof."""
+    """Return the box of a window that holds all of the roof."""
     return shapely.box(*problem.outline.bounds)
 
 
 def frame_repair(repair: Repair, state: RoofState, problem: WeldProblem) -> shapely.Polygon:
-    """The window of a repair: around the sides that move and the volumes whose planes change."""
+    """Return the window of a repair.
+
+    It lies around the sides that move and the volumes whose planes change.
+    """
     volumes, plan, scene = problem.volumes, problem.plan, problem.scene
     owners = {k for _, terms in repair.equations for _, (k, _) in terms}
     quads = [problem.site.cut_quad(volumes[k], state.sides[k])[0] for k in owners if k > 0]
@@ -289,20 +294,23 @@ def frame_repair(repair: Repair, state: RoofState, problem: WeldProblem) -> shap
 
 
 def list_quads(state: RoofState, problem: WeldProblem) -> list[shapely.Polygon]:
-    """The plans of all volumes but the base, in local coordinates."""
+    """Return the plans of all volumes but the base, in local coordinates."""
     pairs = zip(problem.volumes[1:], state.sides[1:], strict=True)
     return [problem.site.cut_quad(volume, volume_sides)[0] for volume, volume_sides in pairs]
 
 
 def make_window(box: shapely.Polygon, quads: list[shapely.Polygon], problem: WeldProblem) -> Window:
-    """What of the roof, whose volumes have these `quads`, lies in a box of local coordinates."""
+    """Return what of the roof lies in a box of local coordinates.
+
+    Its volumes have these `quads`.
+    """
     scene, xy, order = problem.scene, problem.xy, problem.order
     numbers = np.array([0, *(1 + np.flatnonzero(shapely.intersects(quads, box)))], int)
     x0, y0, x1, y1 = box.bounds
     first, last = np.searchsorted(xy[:, 0], (x0, x1), sorter=order)
     strip = np.sort(order[first:last])
     inside = strip[(xy[strip, 1] >= y0) & (xy[strip, 1] <= y1)]
-    count = min(len(inside), MOST_POINTS)
+    count = min(len(inside), MOST_JUDGES)
     window_scene = select_points(scene, inside)
     judges = inside[np.arange(count) * len(inside) // max(count, 1)]
     outline = problem.outline
@@ -322,8 +330,10 @@ def price_window(
     window: Window,
     problem: WeldProblem,
 ) -> float:
-    """What a window of a roof costs (points), with the parameters that show in it or `other_owners`;
-    infinite where no plan comes out.
+    """Return what a window of a roof costs (points).
+
+    It has the parameters that are visible in it or in `other_owners`. It is infinite if no plan
+    results.
     """
     scene, numbers = problem.scene, window.numbers
     owners = set(other_owners)
@@ -344,7 +354,7 @@ def price_window(
 def apply_repair(
     state: RoofState, repair: Repair, window: Window, problem: WeldProblem
 ) -> RoofState | None:
-    """The roof after a repair; None where its points ask too much for it."""
+    """Return the roof after a repair, None if its points cost too much more."""
     most_cost = REPAIR_UNITS * problem.scene.evidence
     sides, planes, basis, cost = state
     for (k, edge), side in repair.sides.items():
@@ -365,9 +375,10 @@ def apply_repair(
 def fit_repair(
     repair: Repair, state: RoofState, most_cost: float, problem: WeldProblem
 ) -> tuple[list[Planes], np.ndarray, float] | None:
-    """Planes fitted under a repair's equations too, the unknowns left free, the points' cost.
+    """Fit planes under a repair's equations, too.
 
-    None where points cost over `most_cost` more.
+    Returns them, the unknowns left free, and the points' cost. Returns None if points cost over
+    `most_cost` more.
     """
     members, start = problem.agreement.members, problem.agreement.start
     rows = []
@@ -395,7 +406,7 @@ def fit_repair(
         return None
     planes = list(state.planes)
     for k, plane_rows in zip(members, fit.rows, strict=True):
-        # as well known as before: that planes meet somewhere does not say how well it is known
+        # The covariance stays: that planes meet somewhere does not make their place more precise.
         planes[k] = replace(planes[k], rows=plane_rows)
     return planes, free, fit.cost
 
@@ -403,7 +414,7 @@ def fit_repair(
 def move_line(
     sides: list[list[Side]], k: int, edge: int, line: Side, problem: WeldProblem
 ) -> list[list[Side]]:
-    """All sides, with those on the line of side `edge` of volume k moved onto another `line`."""
+    """Move all sides on the line of side `edge` of volume k onto another `line`."""
     moved = [list(volume_sides) for volume_sides in sides]
     for j, other in list_sides_on_line(sides, k, edge, problem):
         moved[j][other] = replace(line, sigma=sides[j][other].sigma)
@@ -413,7 +424,10 @@ def move_line(
 def list_sides_on_line(
     sides: list[list[Side]], k: int, edge: int, problem: WeldProblem
 ) -> list[tuple[int, int]]:
-    """The sides, as (volume, edge), on the line of side `edge` of volume k and off the outline."""
+    """List the sides, as (volume, edge), on the line of side `edge` of volume k.
+
+    Sides on the outline are left out.
+    """
     offsets, lean, anchored = problem.site.recall(lay_out_sides, sides)
     old_side, directions = sides[k][edge], problem.volumes[:, DIRECTION]
     is_near = (
@@ -427,7 +441,10 @@ def list_sides_on_line(
 
 
 def lay_out_sides(sides: list[list[Side]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where all sides lie, how they lean, and whether they are anchored: three arrays (k, 4)."""
+    """Return where all sides lie, their leans, and whether they are anchored.
+
+    These are three arrays (k, 4).
+    """
     offsets, lean = (
         np.array([[getattr(side, name) for side in volume_sides] for volume_sides in sides])
         for name in ("offset", "lean")
@@ -442,7 +459,10 @@ def lay_out_sides(sides: list[list[Side]]) -> tuple[np.ndarray, np.ndarray, np.n
 def measure_extra_cost(
     volumes: np.ndarray, k: int, edge: int, old_side: Side, side: Side, scene: Scene
 ) -> float:
-    """How much more the points of a `scene` cost where `edge` of volume k lies on the line `side`."""
+    """Return how much more points cost with `edge` of volume k on the line `side`.
+
+    The points are those of `scene`.
+    """
     axis, direction, sign = edge // 2, int(volumes[k, DIRECTION]), -1.0 if edge % 2 == 0 else 1.0
     x, y = (scene.U[direction], scene.V[direction])[:: 1 if axis == 0 else -1]
     is_within = (y >= volumes[k, V0 - 2 * axis]) & (y <= volumes[k, V1 - 2 * axis])

@@ -1,7 +1,7 @@
-"""A whole large roof: its points, its outline, and the volumes found so far, each asked by where it lies.
+"""Hold a whole large roof: points, outline, and the volumes found so far.
 
-The search of a large roof never looks at all of it at once. It opens windows (`window.py`), and what a window
-needs of the roof is here, sorted so that its cost depends on the window alone.
+The search of a large roof never looks at all of it at once. It opens windows (`window.py`), and
+what a window needs of the roof is here, sorted so that its cost depends on the window alone.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .box import NOWHERE, Box, clip_to_box, measure_box
+from .box import EMPTY_BOX, Box, clip_to_box, measure_box
 from .plan import Plan
 from .scene import Scene
 from .volumes import (
@@ -26,17 +26,18 @@ from .volumes import (
     make_base,
 )
 
-# m by which the base lies below the lowest point of a roof searched in windows: no window moves it, and it never shows
+# Distance (m) of the base below the lowest point of a roof searched in windows: no window moves it,
+# and it is never visible.
 BELOW_ALL_M = 1.0
-# columns of a volume that say where it lies
-PLACE_COLUMNS = slice(DIRECTION, V1 + 1)
+POSITION = slice(DIRECTION, V1 + 1)  # Columns of a volume that give its place.
 
 
 class Whole:
     """The roof of one large building while its windows are searched.
 
-    `scene` is that of all points; `u`, `v`, `z` (n,) are the points, ascending by u; `outline` is in the plan's axes.
-    `volumes` (k, COLUMNS) hold their own row's number in the column NUMBER.
+    `scene` is that of all points. `u`, `v`, `z` (n,) are the points, ascending by u, and `outline`
+    is in the plan's axes. `volumes` (k, COLUMNS) hold their own row's number in the column
+    ROW_NUMBER.
     """
 
     def __init__(
@@ -58,20 +59,20 @@ class Whole:
         self.set_volumes(self.volumes)
 
     def set_volumes(self, volumes: np.ndarray) -> None:
-        """Hold these volumes, each numbered by its row."""
+        """Set the volumes, each numbered by its row."""
         self.volumes = volumes
         self.volumes[:, ROW_NUMBER] = np.arange(len(volumes))
         self.boxes = np.array([self.find_extent(row) for row in volumes])
 
     def find_points(self, box: Box) -> np.ndarray:
-        """Numbers (m,) of the points in a box, among those sorted by u."""
+        """Return the numbers (m,) of the points in a box, among those sorted by u."""
         first, last = np.searchsorted(self.u, box.u0), np.searchsorted(self.u, box.u1, side="right")
         v = self.v[first:last]
         return first + np.flatnonzero((v >= box.v0) & (v <= box.v1))
 
     def find_extent(self, row: np.ndarray) -> Box:
-        """The box around what lies inside the outline of a volume's rectangle."""
-        key = row[PLACE_COLUMNS].tobytes()
+        """Return the box around what lies inside the outline of a volume's rectangle."""
+        key = row[POSITION].tobytes()
         if key not in self.extents:
             self.extents[key] = self.measure_extent(row)
         return self.extents[key]
@@ -79,7 +80,7 @@ class Whole:
     def measure_extent(self, row: np.ndarray) -> Box:
         rectangle = Box(*row[[U0, U1, V0, V1]].tolist())
         if rectangle.u0 >= rectangle.u1 or rectangle.v0 >= rectangle.v1:
-            return NOWHERE
+            return EMPTY_BOX
         if row[DIRECTION] == 0:
             return measure_box(clip_to_box(self.outline, rectangle))
         c, s = self.scene.turn[int(row[DIRECTION])]
@@ -89,11 +90,11 @@ class Whole:
         return (
             measure_box(shapely.intersection(shapely.make_valid(clipped), turned))
             if not clipped.is_empty
-            else NOWHERE
+            else EMPTY_BOX
         )
 
     def list_volumes(self, box: Box) -> list[int]:
-        """Numbers of the volumes, but the base, that reach into a box."""
+        """Return the numbers of the volumes, but the base, that reach into a box."""
         e = self.boxes
         is_reaching = (
             (e[:, 0] < box.u1) & (e[:, 1] > box.u0) & (e[:, 2] < box.v1) & (e[:, 3] > box.v0)
@@ -101,13 +102,14 @@ class Whole:
         return [k for k in np.flatnonzero(is_reaching).tolist() if k > 0]
 
     def select_rows(self, box: Box) -> np.ndarray:
-        """The base, and the volumes that reach into a box."""
+        """Return the base, and the volumes that reach into a box."""
         return self.volumes[[0, *self.list_volumes(box)]]
 
     def replace(self, numbers: list[int], rows: np.ndarray) -> None:
         """Put `rows` in place of the volumes numbered `numbers`.
 
-        A row keeps its place in the order by its number; a new row (number 0) follows the row before it.
+        A row keeps its place in the order by its number; a new row (number 0) follows the row
+        before it.
         """
         kept_numbers = np.delete(np.arange(len(self.volumes)), numbers)
         places, last = [], 0.0
@@ -121,14 +123,20 @@ class Whole:
         self.set_volumes(all_rows[order])
 
     def find(self, place: bytes) -> int | None:
-        """The number of the volume that lies at a place (the bytes of its columns PLACE_COLUMNS); None where it is gone."""
+        """Find the number of the volume at a place, None if it is gone.
+
+        A place is the bytes of the columns POSITION.
+        """
         for k in range(1, len(self.volumes)):
-            if self.volumes[k, PLACE_COLUMNS].tobytes() == place:
+            if self.volumes[k, POSITION].tobytes() == place:
                 return k
         return None
 
     def compute_heights(self) -> np.ndarray:
-        """Heights (n,) of the roof at all points, each volume asked only where it lies."""
+        """Return heights (n,) of the roof at all points.
+
+        Each volume is evaluated only where it lies.
+        """
         z = np.full(len(self.u), self.volumes[0, OFFSET0 + LEVEL])
         c, s = self.scene.turn[:, :1], self.scene.turn[:, 1:]
         for k in range(1, len(self.volumes)):

@@ -1,7 +1,8 @@
-"""What a search sees of a box of a large roof: a scene of its own, and how what is found there returns to the whole roof.
+"""Open windows on a large roof: scenes of a box, and changes in it.
 
-A window holds a bounded number of points, spread over all heights, grid lines and unobserved cells of its own, and
-all volumes that reach into it. What reaches out of it stays as it was. Steps along its border cost nothing.
+A window holds a bounded number of points, spread over all heights, grid lines and unobserved cells
+of its own, and all volumes that reach into it. What reaches out of it stays as it was. Steps along
+its border cost nothing.
 """
 
 from __future__ import annotations
@@ -22,14 +23,17 @@ from .scene import Scene, find_leans, pad_rows, sort_along
 from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0
 from .whole import Whole
 
-MOST_WINDOW_CELLS = 40  # cells a side of a window at most; of a larger one they are wider
-FEWEST_POINTS = 4  # a window of fewer points shows nothing
+MOST_WINDOW_CELLS = 40  # Most cells a side of a window. Of a larger one they are wider.
+FEWEST_POINTS = 4  # A window of fewer points shows nothing.
 
 Operation = Callable[[np.ndarray, Scene, float], tuple[np.ndarray, float]]
 
 
 def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
-    """The scene of a box, of at most so many of its points; None where it holds no roof or hardly a point."""
+    """Return the scene of a box, of at most so many of its points.
+
+    Returns None if it holds no roof or hardly a point.
+    """
     part = shapely.MultiPolygon(list_polygons(clip_to_box(whole.outline, box)))
     numbers = whole.find_points(box)
     if part.is_empty or len(numbers) < FEWEST_POINTS:
@@ -50,8 +54,8 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         for x in ring_corners.T
     ]
     cloud = Cloud(cloud_u, cloud_v, cloud_z, *map(plans.find_cells, lines[:2], (cloud_u, cloud_v)))
-    ghosts = lay_window_cells(whole, Grid(*lines[:2]), cloud, n / part.area)
-    u, v = np.r_[cloud_u, ghosts[0]], np.r_[cloud_v, ghosts[1]]
+    unobserved = lay_window_cells(whole, Grid(*lines[:2]), cloud, n / part.area)
+    u, v = np.r_[cloud_u, unobserved[0]], np.r_[cloud_v, unobserved[1]]
     c, s = scene.turn[:, :1], scene.turn[:, 1:]
     U, V = c * u + s * v, c * v - s * u
     depth, corner = cut_depth_raster(scene, box)
@@ -59,9 +63,9 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         U=U,
         V=V,
         order=sort_along(U, V),
-        z=np.r_[cloud_z, np.zeros(len(ghosts[0]))],
-        weight=np.r_[np.ones(n), ghosts[2]],
-        shade=np.r_[np.zeros(n), ghosts[3]],
+        z=np.r_[cloud_z, np.zeros(len(unobserved[0]))],
+        weight=np.r_[np.ones(n), unobserved[2]],
+        shade=np.r_[np.zeros(n), unobserved[3]],
         n=n,
         low=float(cloud_z.min()) - plans.HEIGHT_MARGIN_M,
         high=float(cloud_z.max()) + plans.HEIGHT_MARGIN_M,
@@ -87,7 +91,10 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
 def lay_window_cells(
     whole: Whole, grid: Grid, cloud: Cloud, density: float
 ) -> tuple[np.ndarray, ...]:
-    """Unobserved cells of a window inside the outline: u, v, weight and shade (g,), as `plan.lay_ghosts` has them."""
+    """Return the unobserved cells of a window: u, v, weight and shade (g,).
+
+    They lie inside the outline, and weigh as those of `plan.lay_unobserved_cells`.
+    """
     centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in grid)
     u, v = np.repeat(centre_u, len(centre_v)), np.tile(centre_v, len(centre_u))
     weight = np.outer(np.diff(grid.u), np.diff(grid.v)) * density
@@ -97,7 +104,10 @@ def lay_window_cells(
 
 
 def measure_depth_at(scene: Scene, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Depth (n,) inside the outline of places in the plan's axes, by the raster's nearest nodes."""
+    """Return the depth (n,) inside the outline of places in the plan's axes.
+
+    It is that of the raster's nearest nodes.
+    """
     i = np.round((u - scene.corner_u) / scene.pitch).astype(int)
     j = np.round((v - scene.corner_v) / scene.pitch).astype(int)
     rows, columns = scene.depth.shape
@@ -105,7 +115,10 @@ def measure_depth_at(scene: Scene, u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def cut_depth_raster(scene: Scene, box: Box) -> tuple[np.ndarray, tuple[float, float]]:
-    """The raster of depths in a box, no deeper than the box's border is near, and its corner."""
+    """Return the raster of depths in a box, and its corner.
+
+    No place is deeper than its distance from the box's border.
+    """
     p, low_u, low_v = scene.pitch, scene.corner_u, scene.corner_v
     i0, j0 = max(math.floor((box.u0 - low_u) / p), 0), max(math.floor((box.v0 - low_v) / p), 0)
     i1, j1 = math.ceil((box.u1 - low_u) / p) + 1, math.ceil((box.v1 - low_v) / p) + 1
@@ -126,10 +139,11 @@ def change_in_window(
     operation: Operation,
     movable: Collection[int] | None = None,
 ) -> bool:
-    """Change the volumes that reach into a box where that lowers the objective there; tell whether it did.
+    """Change the volumes that reach into a box, if that lowers the objective there.
 
-    Volumes that reach out of the box, and those that are not `movable`, return as they were. What is found ends where the
-    box does. Where it reaches beyond the box (in other directions), the objective of the larger box has to fall, too.
+    Returns whether it did. Volumes that reach out of the box, and those that are not `movable`,
+    return as they were. New volumes end where the box does. If they reach beyond it (in other
+    directions), the objective of the larger box has to fall, too.
     """
     numbers = whole.list_volumes(box)
     scene = open_window(whole, box, most_points)
@@ -161,7 +175,7 @@ def change_in_window(
 def list_fixed_volumes(
     whole: Whole, box: Box, numbers: list[int], movable: Collection[int] | None
 ) -> list[int]:
-    """Which of the volumes `numbers` a window may not change."""
+    """List which of the volumes `numbers` a window may not change."""
     reach_out = [k for k in numbers if not box.contains(Box(*whole.boxes[k]))]
     return (
         reach_out
@@ -171,7 +185,10 @@ def list_fixed_volumes(
 
 
 def restore_volumes(rows: np.ndarray, volumes: np.ndarray, fixed: list[int]) -> np.ndarray:
-    """The volumes `rows` with those numbered `fixed` as they were among `volumes`, each once."""
+    """Return the volumes `rows` with those numbered `fixed` as they were, each once.
+
+    They are restored from `volumes`.
+    """
     for k in fixed:
         matches = np.flatnonzero(rows[1:, ROW_NUMBER] == k) + 1
         if len(matches):
@@ -184,7 +201,10 @@ def restore_volumes(rows: np.ndarray, volumes: np.ndarray, fixed: list[int]) -> 
 
 
 def end_at_border(whole: Whole, rows: np.ndarray, box: Box) -> np.ndarray:
-    """Volumes of the first direction end where a window does, unless it ends where the outline does."""
+    """Let volumes of the first direction end where a window does.
+
+    They do not where the window ends at the outline.
+    """
     is_aligned = rows[:, DIRECTION] == 0
     for side in range(4):
         if abs(box[side] - whole.box[side]) < plans.HEIGHT_MARGIN_M:
@@ -197,7 +217,10 @@ def end_at_border(whole: Whole, rows: np.ndarray, box: Box) -> np.ndarray:
 def is_lower_beyond(
     whole: Whole, box: Box, numbers: list[int], rows: np.ndarray, most_points: int
 ) -> bool:
-    """Whether rows in place of the volumes `numbers` lower the objective of a larger box, too."""
+    """Return whether `rows` lower the objective of a larger box, too.
+
+    The volumes have these `numbers`.
+    """
     scene = open_window(whole, box, 2 * most_points)
     if scene is None:
         return False
@@ -210,7 +233,10 @@ def is_lower_beyond(
 
 
 def forget_digests(volumes: np.ndarray) -> np.ndarray:
-    """The volumes without the digests of their surroundings: what a window knew of them does not hold outside it."""
+    """Return the volumes without the digests of their surroundings.
+
+    What a window knows of them does not hold outside it.
+    """
     volumes = volumes.copy()
     volumes[:, SETTLED] = 0.0
     return volumes
