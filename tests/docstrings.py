@@ -20,7 +20,7 @@ Documented = ast.Module | ast.ClassDef | ast.FunctionDef
 
 
 def iterate_docstrings() -> Iterator[tuple[str, Documented, str]]:
-    """Yield the place, the node and the docstring of all that has one outside `fit/union`."""
+    """Yield the place, the node and the docstring of all that has one outside of tests."""
     around = [file for file in list_files_around() if file.parts[len(ROOT.parts)] != "tests"]
     for file in (*list_files(), *around):
         yield from iterate_file(file)

@@ -2,8 +2,8 @@
 
 usage: python tests/naming.py
 
-Prints the figures of names for the package without `fit/union`, for `fit/union` alone, and for
-everything around the package; then those of the documentation's language.
+Prints the figures of names for the package and for everything around it; then those of the
+documentation's language.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/hiproof"
 AROUND = ("tests", "benchmarks", "experiments", "docs", "examples", "qgis", "release")
 COLUMNS = 100  # of a line of code
-# Being rewritten: their names are not held to the standard yet.
-LATER = ("src/hiproof/fit/union/", "tests/fit/test_union", "tests/union_scenes.py")
 
 FUNCTION_WORDS = frozenset(
     re.findall(
@@ -73,19 +71,14 @@ ALLOWED_FUNCTIONS = frozenset({"of", "around", "at", "near", "compiled", "joined
 ALLOWED_CONSTANTS = frozenset({"PRIMITIVE"})  # each shape's file defines its own
 
 
-def list_files(is_later: bool = False) -> list[Path]:
-    """Return the package's source files, with or without those that are renamed later."""
-    return [file for file in sorted(PACKAGE.rglob("*.py")) if is_later_file(file) == is_later]
+def list_files() -> list[Path]:
+    """Return the package's source files."""
+    return sorted(PACKAGE.rglob("*.py"))
 
 
 def list_files_around() -> list[Path]:
     """Return the Python files of tests, benchmarks, experiments, examples and the plugin."""
-    files = [file for folder in AROUND for file in sorted((ROOT / folder).rglob("*.py"))]
-    return [file for file in files if not is_later_file(file)]
-
-
-def is_later_file(file: Path) -> bool:
-    return name_file(file).startswith(LATER)
+    return [file for folder in AROUND for file in sorted((ROOT / folder).rglob("*.py"))]
 
 
 def name_file(file: Path) -> str:
@@ -252,8 +245,7 @@ def print_language() -> None:
 
 
 def main() -> None:
-    print_names("package without fit/union", list_files())
-    print_names("fit/union", list_files(is_later=True))
+    print_names("package", list_files())
     print_names("tests, benchmarks, experiments, examples and plugin", list_files_around())
     print_language()
 

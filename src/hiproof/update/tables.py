@@ -26,7 +26,7 @@ from ..write.tables.styles import Style
 from .earlier import RUN_PARAMETERS
 
 CSV_FILE, GPKG_FILE = "changes.csv", "changes.gpkg"
-COLUMNS: dict[str, type] = {
+TABLE_COLUMNS: dict[str, type] = {
     "id": str,
     "class": str,
     "kind": str,
@@ -99,7 +99,7 @@ def write_csv(path: Path, changes: list[FoundChange]) -> None:
     """Write a row a building."""
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(COLUMNS)
+        table.writerow(TABLE_COLUMNS)
         table.writerows(make_row(change) for change in changes)
 
 
@@ -138,7 +138,9 @@ def write_geopackage(path: Path, changes: list[FoundChange], head: FileHead) -> 
     """Write the layers of buildings and of places, with their QGIS style."""
     with closing(GeoPackage(path, plan_wkt(head.crs_of_files))) as file:
         outlines = [change.outline for change in changes]
-        add_layer(file, BUILDINGS_LAYER, COLUMNS, outlines, [make_row(c) for c in changes], head)
+        add_layer(
+            file, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, [make_row(c) for c in changes], head
+        )
         places = [
             shapely.union_all([polygon(rings, "an outline") for rings in place["outlines"]])
             for change in changes
