@@ -136,7 +136,7 @@ def test_shade_is_as_rays_have_it(tmp_path):
         for face in (k for k, f in enumerate(solid.faces) if f.kind == ROOF):
             normal = vectors[face] / np.linalg.norm(vectors[face])
             places = sample_face(solid, face, normal)[::4] + (0, 0, 0.01)
-            edges = cadastre.surroundings.find_shading_edges(number, float(places[:, 2].min()))
+            edges = cadastre.edges.find_shading_edges(number, float(places[:, 2].min()))
             direct = np.maximum(sky.sun[high] @ normal, 0.0) * sky.direct[high]
             facing = direct > 0
             horizon = find_horizon(places, edges)

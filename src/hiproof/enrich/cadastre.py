@@ -45,7 +45,7 @@ class Cadastre:
 
     def __init__(self, town: Town, questions: SunQuestions) -> None:
         self.town, self.questions = town, questions
-        self.surroundings = ShadingEdges(town)
+        self.edges = ShadingEdges(town)
         self.locate = functools.lru_cache(16)(functools.partial(locate, town.records.head))
 
     def find_sky(self, number: int) -> Sky:
@@ -72,7 +72,7 @@ class Cadastre:
         ]
         places = {face: sample_face(solid, face, normals[face]) for face in faces}
         z_low = min(float(xyz[:, 2].min()) for xyz in places.values())
-        edges = self.surroundings.find_shading_edges(number, z_low)
+        edges = self.edges.find_shading_edges(number, z_low)
         sky = self.find_sky(number)
         surfaces = {}
         totals = np.zeros(3)
