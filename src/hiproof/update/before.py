@@ -27,8 +27,8 @@ from .register import SampledRoof, register_surveys
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Epochs, Surveys
 
-ENOUGH_ROOFS = 200
-"""Sampled roofs: they tell the shift to millimetres, and their noise to a tenth of it."""
+ENOUGH_ROOFS = 100
+"""Sampled roofs: they tell the shift within a centimetre, and their noise to a tenth of it."""
 
 SORTED_MARK = "sorted"  # file in the earlier folder: its points are complete
 
@@ -73,7 +73,7 @@ def sort_earlier(clouds: tuple[str, ...], folder: Path, executor: Any) -> None:
 def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[SampledRoof]:
     """Yield the points and roofs of sampled buildings, tile by tile.
 
-    They are those of squares that a hash of their place draws, until there are enough.
+    They are those of squares that a hash of their place draws, up to ENOUGH_ROOFS.
     """
     members, chosen = load_members(state), draw_buildings(plan)
     for tile, indices in plan.tiles.items():
@@ -94,16 +94,14 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
 
 
 def draw_buildings(plan: WorkPlan) -> set[int]:
-    """Return the numbers of the sampled buildings."""
-    areas = [job for job in plan.jobs if not job.area.is_empty]
-    lower = shapely.bounds([job.area for job in areas]).reshape(-1, 4)[:, :2]
+    """Return the numbers of the sampled buildings.
+
+    Their order follows from their places alone: by the hash of their square, then by place.
+    """
+    jobs = [job for job in plan.jobs if not job.area.is_empty]
+    lower = shapely.bounds([job.area for job in jobs]).reshape(-1, 4)[:, :2]
     squares = np.floor(lower / SAMPLE_CELL_M).astype(np.int64)
-    members: dict[tuple[int, int], set[int]] = {}
-    for job, (i, j) in zip(areas, squares.tolist(), strict=True):
-        members.setdefault((i, j), set()).add(job.index)
-    chosen: set[int] = set()
-    for cell in sorted(members, key=hash_cell):
-        chosen |= members[cell]
-        if len(chosen) >= ENOUGH_ROOFS:
-            break
-    return chosen
+    order = sorted(
+        range(len(jobs)), key=lambda k: (hash_cell(tuple(squares[k].tolist())), *lower[k].tolist())
+    )
+    return {jobs[k].index for k in order[:ENOUGH_ROOFS]}
