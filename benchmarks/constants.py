@@ -2,7 +2,7 @@
 
 They are run with half of it, with it, and with twice of it.
 
-usage: python -m benchmarks.constants hiproof.fit.union.grow.MOST_REGROWN [--shares 1 0.25]
+usage: python -m benchmarks.constants hiproof.fit.union.prices.CORNER_COST [--shares 1 0.25]
 [--factors 0.5 1 2]
 
 The package is copied, the number changed in the copy's text, and `benchmarks.delft --parity even`
@@ -107,7 +107,7 @@ def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> s
 
 def tell() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("name", help="module and name, such as hiproof.fit.union.grow.MOST_REGROWN")
+    parser.add_argument("name", help="module and name, such as hiproof.fit.union.prices.CORNER_COST")
     parser.add_argument(
         "--shares", nargs="+", default=["1", "0.25"], help="of the points, as in benchmarks.delft"
     )

@@ -46,7 +46,8 @@ WHOLE_WORD_BELOW = 4
 # What is hidden in addresses only: single letters and small numbers stand in most sentences.
 NO_SECRET = re.compile(r"\W*.?\W*|\d{1,3}")
 ADDRESS_PATTERN = re.compile(
-    r"//|@|%2F%2F|^/vsi|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=",
+    r"//|@|%2F%2F|^/vsi"
+    r"|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=",
     re.IGNORECASE,
 )
 
@@ -113,8 +114,9 @@ def find_secrets(address: str) -> set[str]:
     >>> addresses = "postgresql//adm:S3cr3t@127.0.0.1/t", "host=h password=S3c r3t user=me"
     >>> [sorted(find_secrets(address)) for address in addresses]
     [['S3cr3t'], ['S3c', 'S3c r3t', 'r3t']]
-    >>> find_secrets("tiles/a.laz"), find_secrets("https://host:8080/tile.laz"), find_secrets("postgresql://me@host/db")
-    (set(), set(), set())
+    >>> harmless = "tiles/a.laz", "https://host:8080/tile.laz", "postgresql://me@host/db"
+    >>> [find_secrets(address) for address in harmless]
+    [set(), set(), set()]
     """
     decoded = unquote(address)
     whole = {secret for text in {address, decoded, unquote(decoded)} for secret in candidates(text)}
@@ -212,8 +214,10 @@ def mask(text: str) -> str:
 
     >>> mask("expected a table at postgresql://me:secret@host/db?table=fp, got none")
     'expected a table at postgresql://me:...@host/db?table=fp, got none'
-    >>> mask("PG:host=db user=me password='se cret' dbname=x"), mask("https://host/a.laz?sig=a%2Fb&v=1")
-    ('PG:host=db user=me password=... dbname=x', 'https://host/a.laz?sig=...&v=1')
+    >>> mask("PG:host=db user=me password='se cret' dbname=x")
+    'PG:host=db user=me password=... dbname=x'
+    >>> mask("https://host/a.laz?sig=a%2Fb&v=1")
+    'https://host/a.laz?sig=...&v=1'
     """
     text = AFTER_USER.sub(rf"\1:{HIDDEN}@", text)
     text = TOKEN_AS_USER.sub(rf"\1{HIDDEN}@", text)
