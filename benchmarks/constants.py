@@ -107,7 +107,9 @@ def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> s
 
 def tell() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("name", help="module and name, such as hiproof.fit.union.prices.CORNER_COST")
+    parser.add_argument(
+        "name", help="module and name, such as hiproof.fit.union.prices.CORNER_COST"
+    )
     parser.add_argument(
         "--shares", nargs="+", default=["1", "0.25"], help="of the points, as in benchmarks.delft"
     )
