@@ -88,14 +88,18 @@ def unite_volumes(
     scene: Scene,
     cache: Cache,
     movable: Collection[int] | None = None,
+    covers_corners: bool = True,
 ) -> DrawnRoof:
     """Draw the volumes along their sides, and drop or merge those that do not pay.
 
     Only volumes of the numbers `movable` are merged with others or dropped, all if it is None.
-    Planes in the `cache` of this scene are not fitted again.
+    Planes in the `cache` of this scene are not fitted again. `covers_corners` says whether one
+    volume may replace several over walls that cut its corners off.
     """
     value = compute_objective(volumes, scene, np.inf)
-    best = cover_cut_corners(draw_roof(volumes, ends, scene, cache), ends, scene, cache)
+    best = draw_roof(volumes, ends, scene, cache)
+    if covers_corners:
+        best = cover_cut_corners(best, ends, scene, cache)
     has_improved = True
     while has_improved:
         has_improved = False
