@@ -8,6 +8,7 @@ import shapely
 
 from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
+from hiproof.compose.bends import bent_faces
 from hiproof.model import Face, Solid
 from hiproof.settings import Settings
 from roof_zoo import KINDS, generate_roof
@@ -105,3 +106,19 @@ def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
         if not check_solid(plain):
             assert check_solid(turned) == ()
         assert np.abs(plain.vertices - turned.vertices).max() < 2e-3
+
+
+def test_a_face_that_no_triangles_fill_is_bent_and_the_others_are_told_apart():
+    crossing = [(3.0, 2.0), (0.0, 3.0), (2.0, 3.0), (0.0, 0.0), (3.0, 0.0)]
+    rings = [
+        [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.0, 1.0, 0.0)],  # a saddle
+        [(x, y, 0.0) for x, y in crossing],
+        [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)],
+    ]
+    with pytest.raises(shapely.GEOSException):
+        shapely.constrained_delaunay_triangles(shapely.Polygon(crossing))
+    vertices = np.concatenate(rings)
+    ring_start = np.array([0, 4, 9, 13])
+    normals = np.array([[-0.4, -0.4, 0.8], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
+    bent = bent_faces(np.arange(3), vertices, np.arange(13), ring_start, np.arange(4), normals)
+    assert bent.tolist() == [0, 1]

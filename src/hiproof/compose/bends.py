@@ -25,7 +25,7 @@ def bent_faces(
     face_start: np.ndarray,
     normals: np.ndarray,
 ) -> np.ndarray:
-    """Return those of `faces` (k,) that are bent.
+    """Return those of `faces` (k,) that are bent, or that no triangles fill.
 
     The solid is flattened as for `check_faces`, and `normals` (f, 3) are those of its best planes.
 
@@ -42,11 +42,21 @@ def bent_faces(
         bounds = ring_start[face_start[face] : face_start[face + 1] + 1]
         outer, *holes = (flat[lower + a : lower + b] for a, b in pairwise(bounds - bounds[0]))
         polygons.append(shapely.Polygon(outer, holes))
-    triangles, owner = shapely.get_parts(
-        shapely.constrained_delaunay_triangles(polygons), return_index=True
-    )
+    collections = triangulate(polygons)
+    triangles, owner = shapely.get_parts(collections, return_index=True)
     places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
-    return faces[are_bent(places, owner, corners, flat, start, normals[faces])]
+    bent = are_bent(places, owner, corners, flat, start, normals[faces])
+    return faces[bent | shapely.is_missing(collections)]
+
+
+def triangulate(polygons: list[shapely.Polygon]) -> np.ndarray:
+    """Triangulate each of the polygons, None for one that GEOS finds no triangles of."""
+    try:
+        return np.asarray(shapely.constrained_delaunay_triangles(polygons), object)
+    except shapely.GEOSException:
+        if len(polygons) == 1:
+            return np.array([None], object)
+        return np.concatenate([triangulate([polygon]) for polygon in polygons])
 
 
 @compiled

@@ -59,11 +59,8 @@ def cut_walls(
 
 
 def is_sound(solid: Solid) -> bool:
-    """Return whether a solid is valid; one whose faces cannot be triangulated is not."""
-    try:
-        return not check_solid(solid)
-    except shapely.GEOSException:
-        return False
+    """Return whether a solid is valid."""
+    return not check_solid(solid)
 
 
 def cut_polygon(
