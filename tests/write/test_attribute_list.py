@@ -3,6 +3,7 @@ list them.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from handmade import gable_house, make_building, make_lost_building
@@ -14,6 +15,8 @@ from hiproof.primitives.family import COMPONENTS
 from hiproof.primitives.parameters import list_parameters, list_side_parameters
 from hiproof.write import write_all
 from hiproof.write.attribute_list import (
+    CHANGE,
+    CHANGE_PLACE,
     EVALUATION,
     HEAD,
     HIPROOF,
@@ -48,16 +51,42 @@ def test_everything_is_explained():
         assert all(attribute.meaning and attribute.kind for attribute in table.attributes)
 
 
+PLACE = {
+    "kind": "roof_raised",
+    "difference": 1.0,
+    "sigma": 0.1,
+    "area": 9.0,
+    "parts": [0],
+    "outlines": [],
+}
+CHANGED = {
+    "class": "changed",
+    "survey": "2024-05-01",
+    "chance": 1e-9,
+    "places": [PLACE],
+    "lineage": [],
+    "predecessors": [],
+}
+OF_A_CHANGE = {"change", "change_kind", "change_m", "change_sigma_m", "valid_from", "valid_to"}
+
+
+def change_building(building):
+    return replace(building, change=CHANGED)
+
+
 def test_buildings_have_the_attributes_declared():
     feet = Units(0.3048, 0.3048, "foot", "foot")
-    for building in (make_building(gable_house()), make_lost_building()):
+    sound = make_building(gable_house())
+    declared = {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
+    of_a_change = {OWN + name for name in OF_A_CHANGE}
+    for building in (sound, make_lost_building(), change_building(sound)):
         result = building_attributes(building, measure_figures(building), units=feet)
         added = set(result) - set(building.attributes)
-        assert added == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
+        assert added == (declared - of_a_change if building.change is None else declared)
         for attribute, prefix in (
             (a, p) for table, p in ((ROOFER, PREFIX), (HIPROOF, OWN)) for a in table
         ):
-            value = result[prefix + attribute.name]
+            value = result.get(prefix + attribute.name)
             assert value is None or isinstance(value, KINDS[attribute.kind]), attribute.name
     assert OWN + "units" not in building_attributes(make_lost_building(), None, units=METRES)
 
@@ -83,7 +112,11 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
     ]
     assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
     record = building_record(make_building(gable_house()))
-    assert list(record) == names(PARAMETERS)
+    assert list(record) == [name for name in names(PARAMETERS) if name != "change"]
+    changed = building_record(change_building(make_building(gable_house())))
+    assert list(changed) == names(PARAMETERS)
+    assert list(changed["change"]) == names(CHANGE)
+    assert list(changed["change"]["places"][0]) == names(CHANGE_PLACE)
     assert list(record["parts"][0]) == names(PART)
     assert list(head_record(FileHead())) == names(HEAD)
     row = BuildingFigures("a", "gable", "modelled", comparison=Comparison("b")).row()

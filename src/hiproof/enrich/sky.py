@@ -18,10 +18,10 @@ from ..extras import import_extra
 from .horizon import SECTORS
 
 FARTHEST_STATION_KM = 300.0  # distance (km) beyond which weather says nothing of a place
-EARTH_RADIUS_KM = 6371.0
+EARTH_RADIUS_KM = 6371.0  # mean radius, for distances to weather stations
 LEAST_COS_ZENITH = 0.01745  # pvlib's bound of the circumsolar ratio: 89 degrees
 YEAR = "2023"  # of the clear sky: no leap year, and its sun is that of any year
-HOURS = 8760
+HOURS = 8760  # of a year that is no leap year
 
 
 class Sky(NamedTuple):
