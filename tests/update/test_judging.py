@@ -192,9 +192,9 @@ def test_the_common_shift_is_found_though_one_roof_in_five_changed(rng):
         samples.append(SampledRoof(roof, scan(rng, roof), scan(rng, roof) + shift + raised))
     found = register_surveys(samples)
     assert np.abs(np.array(found.xyz) - shift).max() < 0.03
-    assert np.abs(found.applied - shift).max() < 0.03
+    assert np.abs(found.clear_xyz - shift).max() < 0.03
     assert found.noise.roof < 0.05
 
 
 def test_without_roofs_no_shift_is_applied():
-    assert register_surveys([]).applied.tolist() == [0.0, 0.0, 0.0]
+    assert register_surveys([]).clear_xyz.tolist() == [0.0, 0.0, 0.0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import GROUND, ROOF, WALL, Solid
-from ..write.roof_figures import FLAT_SLOPE_DEG, cross, face_fans
+from ..write.roof_figures import FLAT_SLOPE_DEG, make_triangles, sum_by_face
 
 OF_3DBAG = {
     "ground_area_m2": "b3_opp_grond",
@@ -38,9 +38,5 @@ def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
 
 def area_vectors(solid: Solid) -> np.ndarray:
     """Return the vector areas (faces, 3) of a solid's faces."""
-    fan, face_of = face_fans(solid)
-    corners = solid.vertices[fan] - solid.vertices.mean(axis=0)
-    triangles = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.stack(
-        [np.bincount(face_of, along, len(solid.faces)) for along in triangles.T], axis=1
-    )
+    triangles = make_triangles(solid, solid.vertices.mean(axis=0))
+    return sum_by_face(triangles.vectors, triangles.face_of, len(solid.faces))

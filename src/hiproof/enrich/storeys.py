@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..model import ROOF, Solid
-from ..write.roof_figures import cross, face_fans
+from ..write.roof_figures import make_triangles
 
 RESIDENTIAL_STOREY_M, OTHER_STOREY_M = (2.5, 3.3), (3.0, 5.0)
 """Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling
@@ -61,13 +61,10 @@ class RoofLevels:
     """The plan areas of a roof above any height."""
 
     def __init__(self, solid: Solid) -> None:
-        fan, face_of = face_fans(solid)
-        roof = np.array([face.kind == ROOF for face in solid.faces])[face_of]
-        corners = solid.vertices[fan[roof]]
-        origin = solid.vertices.mean(axis=0)
-        edges = corners - origin
-        self.plan = 0.5 * cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])[:, 2]
-        self.z = np.sort(corners[:, :, 2], axis=1)
+        triangles = make_triangles(solid, solid.vertices.mean(axis=0))
+        roof = np.array([face.kind == ROOF for face in solid.faces])[triangles.face_of]
+        self.plan = triangles.vectors[roof, 2]
+        self.z = np.sort(solid.vertices[triangles.fan[roof], 2], axis=1)
         self.z_top = float(self.z.max())
 
     def measure_above(self, z: float) -> float:

@@ -2,8 +2,7 @@
 
 New points lie over the earlier roofs by dz - a dx - b dy, where (a, b) is the roof's slope and (dx,
 dy, dz) the shift. A robust least squares over a sample of buildings tells it; whole buildings that
-changed are outliers. The sample is all buildings of squares of 250 m, which a hash of their place
-draws: it does not depend on work tiles.
+changed are outliers. A hash of places draws the sample (before.py): it does not depend on tiles.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 from ..model import Roof
 from .cells import SurveyNoise, compare_points, select_inner, shrink_outline
 from .clusters import flag_cells
-from .residuals import find_slopes
+from .residuals import find_slopes, measure_residuals
 
 MOST_POINTS = 400
 """Points of a building that are used: more tell the roof's own errors rather than the shift."""
@@ -71,14 +70,14 @@ class SurveyShift:
     noise: SurveyNoise = field(default_factory=SurveyNoise)
 
     @property
-    def applied(self) -> np.ndarray:
+    def clear_xyz(self) -> np.ndarray:
         """What (3,) is taken off the new points: the shift where it is clear."""
         xyz, sigma = np.array(self.xyz), np.array(self.sigma)
         return np.where(np.abs(xyz) > CLEAR_SIGMAS * sigma, xyz, 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the shift for JSON."""
-        return dataclasses.asdict(self) | {"applied": self.applied.tolist()}
+        return dataclasses.asdict(self) | {"applied": self.clear_xyz.tolist()}
 
     @staticmethod
     def from_dict(record: dict[str, Any]) -> SurveyShift:
@@ -99,7 +98,7 @@ def register_surveys(samples: Iterable[SampledRoof]) -> SurveyShift:
     found = SurveyShift(
         tuple(np.round(shift, 4).tolist()), tuple(np.round(sigma, 4).tolist()), len(rows)
     )
-    moved = [s._replace(new=s.new - found.applied) for s in samples]
+    moved = [s._replace(new=s.new - found.clear_xyz) for s in samples]
     return dataclasses.replace(found, noise=measure_noise(moved))
 
 
@@ -179,8 +178,6 @@ def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
 
 def measure_scatter(points: np.ndarray, number: np.ndarray, roof: Roof) -> float:
     """Return the scatter (m) of points (n, 3) about the median of their cell (n,)."""
-    from .residuals import measure_residuals
-
     residuals = measure_residuals(roof, points)
     order = np.lexsort([residuals, number])
     number, residuals = number[order], residuals[order]

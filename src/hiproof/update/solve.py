@@ -107,7 +107,7 @@ def update_tile(
     """
     root = Path(folder)
     plan, surveys, members = load_plan(root), Surveys.load(root / SURVEYS_FILE), load_members(root)
-    epochs = Epochs(root, tile, terrain, surveys.shift.applied)
+    epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
     keep = functools.partial(keep_failure, root, tile, plan)
 
     updater = Updater(plan, epochs, surveys, keep)

@@ -26,28 +26,23 @@ from ..write.tables.styles import Style
 from .earlier import RUN_PARAMETERS
 
 CSV_FILE, GPKG_FILE = "changes.csv", "changes.gpkg"
-TABLE_COLUMNS: dict[str, type] = {
+CHANGE_COLUMNS: dict[str, type] = {
     "id": str,
     "class": str,
     "kind": str,
     "difference_m": float,
     "sigma_m": float,
     "area_m2": float,
+}
+"""Columns of both tables: a change, and its figures at one place."""
+TABLE_COLUMNS: dict[str, type] = {
+    **CHANGE_COLUMNS,
     "chance": float,
     "survey": str,
     "places": int,
     "predecessors": str,
 }
-PLACE_COLUMNS: dict[str, type] = {
-    "id": str,
-    "class": str,
-    "kind": str,
-    "difference_m": float,
-    "sigma_m": float,
-    "area_m2": float,
-    "old_part": int,
-    "new_part": int,
-}
+PLACE_COLUMNS: dict[str, type] = {**CHANGE_COLUMNS, "old_part": int, "new_part": int}
 BUILDINGS_LAYER, PLACES_LAYER = "changed_buildings", "changed_places"
 CHANGE_STYLES = tuple(
     Style(layer, "changes", '"class"', CHANGE_COLOURS, alpha)

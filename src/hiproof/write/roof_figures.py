@@ -90,14 +90,9 @@ def roof_figures(solid: Solid) -> RoofFigures:
     """
     if not solid.select_faces(ROOF):
         raise ValueError("its solid has no RoofSurface")
-    fan, face_of = face_fans(solid)
     origin = solid.vertices.mean(axis=0)
-    corners = solid.vertices[fan] - origin  # (t, 3 corners, 3)
-    # their vector areas
-    triangles = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.stack(
-        [np.bincount(face_of, along, len(solid.faces)) for along in triangles.T], axis=1
-    )
+    fan, face_of, corners, triangles = make_triangles(solid, origin)
+    area = sum_by_face(triangles, face_of, len(solid.faces))
     is_roof = np.array([face.kind == ROOF for face in solid.faces])
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     roof = is_roof[face_of]
@@ -138,6 +133,28 @@ def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, 
         name: find_level(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))
     }
     return {name: float(height + z_origin) for name, height in heights.items()}
+
+
+class Triangles(NamedTuple):
+    """Fan triangles (t,) of faces: vertex numbers, faces, corners, vector areas."""
+
+    fan: np.ndarray
+    face_of: np.ndarray
+    corners: np.ndarray
+    vectors: np.ndarray
+
+
+def make_triangles(solid: Solid, origin: np.ndarray) -> Triangles:
+    """Make the fan triangles of a solid, with corners (t, 3, 3) from `origin` (3,)."""
+    fan, face_of = face_fans(solid)
+    corners = solid.vertices[fan] - origin
+    vectors = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return Triangles(fan, face_of, corners, vectors)
+
+
+def sum_by_face(vectors: np.ndarray, face_of: np.ndarray, count: int) -> np.ndarray:
+    """Sum vector areas (t, 3) over each of `count` faces."""
+    return np.stack([np.bincount(face_of, along, count) for along in vectors.T], axis=1)
 
 
 def face_fans(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
