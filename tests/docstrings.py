@@ -1,4 +1,4 @@
-"""List the docstrings outside of tests whose first lines are not as CONTRIBUTING.md asks.
+"""List the docstrings outside of tests that are not as CONTRIBUTING.md asks.
 
 usage: python tests/docstrings.py
 """
@@ -34,28 +34,31 @@ def iterate_file(file: Path) -> Iterator[tuple[str, Documented, str]]:
 
 
 def find_fault(node: Documented, text: str) -> str:
-    """Return what is wrong with a docstring's first line, empty where nothing is.
+    """Return what is wrong with a docstring, empty where nothing is.
 
     >>> function = ast.parse("def area(): ...").body[0]
     >>> find_fault(function, "Return the area."), find_fault(function, "The area.")
-    ('', 'begins with no verb')
+    ('', 'first line begins with no verb')
     """
     first, *rest = text.splitlines()
+    paragraphs = [" ".join(paragraph.split()) for paragraph in text.split("\n\n")]
+    if len(set(paragraphs)) < len(paragraphs):
+        return "says a paragraph twice"
     if len(first) > LONGEST_LINE:
-        return f"is longer than {LONGEST_LINE} characters"
+        return f"first line is longer than {LONGEST_LINE} characters"
     if not first.endswith((".", "?")) or (rest and rest[0].strip()):
-        return "is no sentence of its own"
+        return "first line is no sentence of its own"
     is_function = isinstance(node, ast.FunctionDef) and not is_property(node)
     word = first.split()[0]
     if is_function and (word in NOUNS or not re.fullmatch(r"[A-Z][a-z]+,?", word)):
-        return "begins with no verb"
+        return "first line begins with no verb"
     return ""
 
 
 def find_faulty_docstrings() -> list[str]:
-    """Return the places of docstrings with a faulty first line, and what is wrong."""
+    """Return the places of faulty docstrings, and what is wrong."""
     faults = ((place, find_fault(node, text)) for place, node, text in iterate_docstrings())
-    return [f"{place}: first line {fault}" for place, fault in faults if fault]
+    return [f"{place}: {fault}" for place, fault in faults if fault]
 
 
 if __name__ == "__main__":

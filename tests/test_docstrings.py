@@ -1,4 +1,4 @@
-"""Keep the first lines of docstrings as CONTRIBUTING.md asks: one short imperative sentence."""
+"""Keep docstrings as CONTRIBUTING.md asks: first one short imperative sentence, nothing twice."""
 
 import ast
 
@@ -7,7 +7,7 @@ import pytest
 from docstrings import LONGEST_LINE, find_fault, find_faulty_docstrings
 
 
-def test_every_first_line_is_a_short_sentence_that_begins_with_a_verb():
+def test_docstrings_begin_with_a_short_imperative_sentence_and_repeat_nothing():
     assert find_faulty_docstrings() == []
 
 
@@ -21,6 +21,7 @@ def test_every_first_line_is_a_short_sentence_that_begins_with_a_verb():
         ("Return the area", False),
         ("Return the area of\nthe outline.", False),
         (f"Return {'x' * LONGEST_LINE}.", False),
+        ("Return the area.\n\nIt is in m2.\n\nIt is\nin m2.", False),
     ],
 )
 def test_faults_are_found(text, is_sound):

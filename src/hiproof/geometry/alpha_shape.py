@@ -2,8 +2,6 @@
 
 A bay is kept where it is wider than the radius.
 
-A bay is kept where it is wider than the radius.
-
 Edelsbrunner, Kirkpatrick and Seidel (1983): the triangles of the Delaunay triangulation whose
 circumradius is below alpha. Its boundary lies inside the true outline by about half the spacing of
 the points.
@@ -26,8 +24,6 @@ def default_radius(xy: np.ndarray) -> float:
     """Return the radius (m) for points `xy` (n, 2): 2.5 mean spacings.
 
     The mean spacing is that of the points spread evenly over their convex hull.
-
-    The mean spacing is that of the points spread evenly over their convex hull.
     """
     # one line through all: many points would be as many geometries
     hull_area = shapely.convex_hull(shapely.linestrings(xy)).area if len(xy) > 2 else 0.0
@@ -38,9 +34,6 @@ def alpha_shape(
     xy: np.ndarray, radius: float | None = None, holes: bool = False
 ) -> shapely.Polygon:
     """Return the outline of points `xy` (n, 2) by the alpha shape.
-
-    The outline is the largest component of the alpha shape of `radius` metres, with its holes
-    filled or kept.
 
     The outline is the largest component of the alpha shape of `radius` metres, with its holes
     filled or kept.

@@ -1,8 +1,6 @@
 """Roof shapes: their contract, one shape a file, and the catalogue.
 
 contract.py has the contract. halves.py makes halves of other shapes.
-
-contract.py has the contract. halves.py makes halves of other shapes.
 """
 
 from .catalogue import CATALOGUE, get

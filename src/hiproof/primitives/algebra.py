@@ -35,8 +35,6 @@ class Formula:
         """Return the value at `shape` (6,): V, U, q0, q1, q2, q3.
 
         Values are (m,) where the parameters are arrays (m,).
-
-        Values are (m,) where the parameters are arrays (m,).
         """
         total: Any = 0.0
         for factor, powers in self.sparse:
@@ -97,8 +95,6 @@ class Formula:
 
     def __truediv__(self, other: Formula | float) -> Formula:
         """Divide by one monomial.
-
-        A sum in the denominator has no finite form and raises ValueError.
 
         A sum in the denominator has no finite form and raises ValueError.
         """

@@ -1,8 +1,6 @@
 """Asymmetric gable (saltbox): two planes of different slope.
 
 The ridge need not lie in the middle.
-
-The ridge need not lie in the middle.
 """
 
 from collections.abc import Mapping
@@ -40,8 +38,6 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     """Return the gable's v1..v6 with the ridge moved and the back eave raised.
 
     The ridge is v3 v4, moved by the offset. The eave is v5 v6, raised by the step.
-
-    The ridge is v3 v4, moved by the offset. The eave is v5 v6, raised by the step.
     """
     u, v, h, offset, step = (
         p["length"] / 2,
@@ -55,8 +51,6 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 def canonical(theta: np.ndarray) -> np.ndarray:
     """Turn the gable so that its lower eave lies at -v.
-
-    Of equal eaves, that of the steeper slope lies there.
 
     Of equal eaves, that of the steeper slope lies there.
     """
@@ -73,8 +67,6 @@ def canonical(theta: np.ndarray) -> np.ndarray:
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Return a ridge a tenth of the width off the middle, and a raised eave.
-
-    The higher eave lies at 30 % of the height.
 
     The higher eave lies at 30 % of the height.
     """

@@ -2,8 +2,6 @@
 
 Bays and eight-sided towers have such walls.
 
-Bays and eight-sided towers have such walls.
-
 Each rises square from its own wall:
 
     facing_cantK     the way out to the wall (degrees from the length, counter-clockwise)
@@ -81,8 +79,6 @@ def keep_cants_in_place(
     parameters: Mapping[str, float], along: float, across: float
 ) -> dict[str, float]:
     """Return parameters that keep the cants' walls where they are.
-
-    The middle of the part's rectangle went `along` and `across`.
 
     The middle of the part's rectangle went `along` and `across`.
 

@@ -50,8 +50,6 @@ def get(name: str) -> Primitive:
 
     Raises SettingsError, which lists the known names, for any other.
 
-    Raises SettingsError, which lists the known names, for any other.
-
     >>> get("gable").parameters
     ('width', 'length', 'height')
     """

@@ -2,19 +2,16 @@
 
 Two descriptions of the same surface meet here:
 
-* the paper's: S = f(theta_p) with theta_p in metres (width, length, height, ...), vertices and
-  faces in the primitive
-  frame: plan centre at the origin, u along the ridge (length), v across (width), lowest eave at z =
-  0;
-* the fit's: theta = [cx, cy, kappa, V, U, q0, q1, q2, q3] with V, U the half extents across and
-  along and q the
-  heights, slopes and fractions of the planes z = a u + b v + c; a, b, c are formulas (algebra.py)
-  of V, U and q. Every
-  bound is a plain interval, and the roof is the minimum of its planes over the rectangle |u| <= U,
-  |v| <= V.
+* The paper's is S = f(theta_p), with theta_p in metres (width, length, height and others). Vertices
+  and faces are in the primitive frame: the plan's centre is the origin, u runs along the ridge
+  (length), v across (width), and the lowest eave lies at z = 0.
+* The fit's is theta = [cx, cy, kappa, V, U, q0, q1, q2, q3]. V and U are the half extents across
+  and along, and q the heights, slopes and fractions of the planes z = a u + b v + c. Their a, b, c
+  are formulas (algebra.py) of V, U and q. Every bound is a plain interval. The roof is the minimum
+  of its planes over the rectangle |u| <= U, |v| <= V.
 
-x = cx + u cos(kappa) - v sin(kappa), y = cy + u sin(kappa) + v cos(kappa); T_L = (cx, cy, eave
-height).
+x = cx + u cos(kappa) - v sin(kappa), y = cy + u sin(kappa) + v cos(kappa), and T_L = (cx, cy, the
+eave's height).
 """
 
 from __future__ import annotations
@@ -50,8 +47,6 @@ class Sides(Protocol):
     """A member's planes (family.py): eave heights (m) and slopes by side.
 
     `top` is the height (m) of a level plane.
-
-    `top` is the height (m) of a level plane.
     """
 
     @property
@@ -69,9 +64,6 @@ class Sides(Protocol):
 @dataclass(frozen=True)
 class DerivedStart:
     """Start values from the fit of a simpler type.
-
-    `q` are formulas of the `source`'s V, U and q, in axes that are turned by so many quarters from
-    its own.
 
     `q` are formulas of the `source`'s V, U and q, in axes that are turned by so many quarters from
     its own.
@@ -98,8 +90,6 @@ def at_quarters(
     """Return the same start in several directions.
 
     Roofs that a half turn changes need it.
-
-    Roofs that a half turn changes need it.
     """
     return tuple(DerivedStart(source, q, quarter) for quarter in quarters)
 
@@ -107,8 +97,6 @@ def at_quarters(
 @dataclass(frozen=True)
 class Vote:
     """Start values from a vote of the points.
-
-    The points vote on quarter turns, slopes and shifts of the ridge (shares of V).
 
     The points vote on quarter turns, slopes and shifts of the ridge (shares of V).
     """
@@ -201,15 +189,11 @@ class Primitive:
         """Whether it has at most one plane a side and one level plane.
 
         Then a volume can have its shape.
-
-        Then a volume can have its shape.
         """
         return self.strips == 1 and len(set(self.sides)) == len(self.sides)
 
     def variant(self, theta_p: Mapping[str, float]) -> Primitive:
         """Return the variant with the number of teeth or the parameters of `theta_p`.
-
-        Returns the primitive itself where these name no other.
 
         Returns the primitive itself where these name no other.
         """
@@ -270,8 +254,6 @@ class Primitive:
         """Return theta (9,) of a roof from its named parameters.
 
         The roof is turned by `kappa` and moved to `translation`, T_L (3,).
-
-        The roof is turned by `kappa` and moved to `translation`, T_L (3,).
         """
         theta = np.zeros(9)
         theta[[CX, CY, KAPPA]] = translation[0], translation[1], kappa
@@ -289,8 +271,6 @@ class Primitive:
         """Return theta_p in order and the lowest eave's height at a `shape`.
 
         `shape` is V, U, q0..q3, or several of them as arrays (m,).
-
-        `shape` is V, U, q0..q3, or several of them as arrays (m,).
         """
         return [measure.at(shape) for measure in (*self.measures.values(), self.eave)]
 
@@ -298,9 +278,6 @@ class Primitive:
         """Return whether all lengths are positive and survive rounding.
 
         Rounded parameters have to make the same slopes.
-
-        Rounded parameters have to make the same slopes.
-
         Slopes over a run of less than a millimetre do not follow from lengths in micrometres.
         """
         theta_p, _, _ = self.from_theta(theta)
@@ -324,8 +301,6 @@ class Primitive:
         """Return the one theta of the same surface with axes in fixed roles.
 
         kappa lies in (-pi/2, pi/2] or (-pi, pi].
-
-        kappa lies in (-pi/2, pi/2] or (-pi, pi].
         """
         theta = self.canonical(np.array(theta, float))
         period = math.pi if self.half_turn_symmetric else 2 * math.pi
@@ -334,8 +309,6 @@ class Primitive:
 
     def plane_values(self, theta: np.ndarray) -> np.ndarray:
         """Return the planes (k, 3) over u, v at `theta` (9,), in the order of `faces`.
-
-        A plane is z = a u + b v + c.
 
         A plane is z = a u + b v + c.
         """
@@ -351,8 +324,6 @@ class Primitive:
 
     def height_at(self, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
         """Return the height (n,) of the roof `theta` at `xy` (n, 2).
-
-        The roof is continued beyond its plan rectangle.
 
         The roof is continued beyond its plan rectangle.
         """
@@ -381,8 +352,6 @@ class Primitive:
         """Return the roof part of `theta` (9,), in theta's own frame.
 
         It has one plan rectangle a tooth, and planes over x, y.
-
-        It has one plan rectangle a tooth, and planes over x, y.
         """
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
@@ -409,10 +378,6 @@ def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) 
     """Turn vertices (n, 3) by `kappa` about Z and move them: R V + T_L, eq. 9.
 
     `translation` is T_L (3,).
-
-    `translation` is T_L (3,).
-
-    9.
     """
     c, s = math.cos(kappa), math.sin(kappa)
     return vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + translation
@@ -422,8 +387,6 @@ def rectangle(
     theta_p: Mapping[str, float], lower: float = 0.0, upper: float = 0.0
 ) -> list[tuple[float, float, float]]:
     """Return the corners v1..v4 of the plan, clockwise from (+u, -v).
-
-    They lie at height `lower` on the -v side and at `upper` on the +v side.
 
     They lie at height `lower` on the -v side and at `upper` on the +v side.
     """

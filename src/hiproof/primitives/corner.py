@@ -26,9 +26,6 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     The eaves are v1 (at +u and -v), v2 and v3; the hip ends in v4; the far corner is v5 as the
     front has it, v6 as the end has it.
 
-    The eaves are v1 (at +u and -v), v2 and v3; the hip ends in v4; the far corner is v5 as the
-    front has it, v6 as the end has it.
-
     The hip runs out at the back or, of a steeper front, at the left: then the far corner belongs to
     the end, and to the front else; where it is not a slope's own, v4 stands for it.
     """

@@ -2,8 +2,6 @@
 
 The planes rise along the rectangle's two axes.
 
-The planes rise along the rectangle's two axes.
-
 A member has a plane rising from its eave on some of the four sides of its rectangle, and perhaps a
 level top:
 
@@ -64,8 +62,6 @@ def describe_sides(shape: Primitive) -> tuple[bool, int, int]:
     """Return whether a shape has a top, and its numbers of planes along u and v.
 
     The numbers count planes that rise along u and across v.
-
-    The numbers count planes that rise along u and across v.
     """
     along = sum(side in (LEFT, RIGHT) for side in shape.sides)
     return LEVEL in shape.sides, along, sum(side in (FRONT, BACK) for side in shape.sides)
@@ -95,13 +91,6 @@ COMPONENTS = {
 @dataclass(frozen=True)
 class Member:
     """A shape of the family: a rectangle, eaves, slopes and a level top.
-
-    `kappa` (rad) is its direction, `centre` (2,) its middle, `half` (2,) its extents along u and v.
-    `eaves` (4,) are heights at their own sides, infinite where a side has no plane. `slopes` is
-    (4,), and the height of the level `top` is infinite without one. `leans` (4,) are what the
-    planes rise along their sides, as shares of their slopes, and `cants` (4, c) further planes.
-    Several of one `kappa` that have planes on the same sides may be one `Member`: its arrays then
-    have a further axis, and its `top` is an array, with one place for each.
 
     `kappa` (rad) is its direction, `centre` (2,) its middle, `half` (2,) its extents along u and v.
     `eaves` (4,) are heights at their own sides, infinite where a side has no plane. `slopes` is
@@ -167,8 +156,6 @@ class Member:
         """Return the planes a, b, c over u, v about the centre.
 
         They are those of the sides in order, of the cants, then the top.
-
-        They are those of the sides in order, of the cants, then the top.
         """
         planes: list[tuple[float, float, float]] = []
         for side in self.sides:
@@ -191,8 +178,6 @@ class Member:
         """Return the height at which the planes of the two sides across `axis` meet.
 
         It is infinite where one of them is missing.
-
-        It is infinite where one of them is missing.
         """
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
@@ -211,15 +196,11 @@ class Member:
         """Return the member with its eaves and slopes over another rectangle.
 
         `half` (2,) are the new half extents.
-
-        `half` (2,) are the new half extents.
         """
         return replace(self, half=half)
 
     def turn(self, quarters: int = 1) -> Member:
         """Return the same surface with axes turned by `quarters` times 90 degrees.
-
-        `quarters` is 0 to 3.
 
         `quarters` is 0 to 3.
         """
@@ -248,8 +229,6 @@ class Member:
         """Return the same surface in the direction in which it is named.
 
         The ridge runs along u, and the planes lie on the sides that SHAPES says.
-
-        The ridge runs along u, and the planes lie on the sides that SHAPES says.
         """
         return self.turn(self.quarter_turns)
 
@@ -275,10 +254,6 @@ class Member:
         The least comes first: steeper, then lower, in front and on the left. The key is that of
         this member after so many `turns`, which bring its sides `places` to the left, right, front
         and back.
-
-        The least comes first: steeper, then lower, in front and on the left. The key is that of
-        this member after so many `turns`, which bring its sides `places` to the left, right, front
-        and back.
         """
         slopes = [float(self.slopes[place]) for place in places]
         eaves = [float(self.eaves[place]) if self.has[place] else 0.0 for place in places]
@@ -297,8 +272,6 @@ class Member:
 
     def lies_along(self, axis: int) -> bool:
         """Return whether `axis` is the longer way.
-
-        The longer way is the ridge of the sides that meet lower, else that of the rectangle.
 
         The longer way is the ridge of the sides that meet lower, else that of the rectangle.
         """
@@ -336,8 +309,6 @@ class Member:
         """The catalogue's shape of the same surface, and its canonical theta (9,).
 
         The member has to be in its canonical direction.
-
-        The member has to be in its canonical direction.
         """
         if self.leans.any() or self.cants.shape[1]:
             return None
@@ -361,8 +332,6 @@ class Member:
 
     def theta(self, shape: Primitive) -> np.ndarray:
         """Return theta (9,) of the catalogue's `shape`, (9, m) of several.
-
-        The front and the right side count where the others equal these.
 
         The front and the right side count where the others equal these.
         """
@@ -406,9 +375,6 @@ class Member:
 
         Each of several has its own. Without a shape they are side by side. They are seen from
         `kappa` or its opposite, so that a small change does not turn the member round.
-
-        Each of several has its own. Without a shape they are side by side. They are seen from
-        `kappa` or its opposite, so that a small change does not turn the member round.
         """
         if shape is None:
             return [*self.list_side_measures().values(), self.base]
@@ -426,8 +392,6 @@ class Member:
         untold: int = 0,
     ) -> Part:
         """Return a part of this shape that roofs `outlines`.
-
-        It is in the frame of `kappa` and `centre`, and called `name` if that is its kin.
 
         It is in the frame of `kappa` and `centre`, and called `name` if that is its kin.
 
@@ -450,8 +414,6 @@ class Member:
         words: tuple[dict[str, float], float, np.ndarray],
     ) -> dict[str, float]:
         """Return the standard deviations of a part's parameters and t_z by name.
-
-        `words` are the parameters by which the part describes this member.
 
         `words` are the parameters by which the part describes this member.
         """
@@ -484,10 +446,6 @@ def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
 
     All names are allowed where `allowed` is empty.
 
-    All names are allowed where `allowed` is empty.
-
-    None where none is. All are where `allowed` is empty.
-
     >>> name_among("pyramid", ("gable", "hip")), name_among("corner", ("gable",))
     ('hip', None)
     """
@@ -500,8 +458,6 @@ def compute_planes(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> np.ndarray:
     """Return the planes (k, 3) over x, y of a roof type with its parameters.
-
-    This is the inverse of `Member.describe`.
 
     This is the inverse of `Member.describe`.
 

@@ -2,8 +2,6 @@
 
 It is the paper's Figure 3.
 
-It is the paper's Figure 3.
-
 Where the ridge lies off the middle, towards the back, `ridge_offset` says how far, and the back's
 eave is the higher one: a catslide is a gable too.
 """

@@ -34,8 +34,6 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     """Return pairs at +u and -u over eave, break, ridge, break and eave.
 
     They run from the eave at -v to the eave at +v.
-
-    They run from the eave at -v to the eave at +v.
     """
     u, v, b = p["length"] / 2, p["width"] / 2, p["break_width"] / 2
     h, z = p["height"], p["break_height"]

@@ -1,8 +1,6 @@
 """Half-hip (jerkinhead): a gable with ends cut by small hips.
 
 The hips start part-way down the slopes.
-
-The hips start part-way down the slopes.
 """
 
 from collections.abc import Mapping
@@ -35,8 +33,6 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     """Return the hip's v1..v6, then the ends of the hips' eaves.
 
     They are v7 and v9 at +u, v8 and v10 at -u.
-
-    They are v7 and v9 at +u, v8 and v10 at -u.
     """
     u, v, h, r = p["length"] / 2, p["width"] / 2, p["height"], p["ridge_length"] / 2
     b, z = v * p["hip_height"] / h, h - p["hip_height"]
@@ -46,8 +42,6 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Return hips of 40 % of the height.
-
-    They are as steep as the slopes where the length allows.
 
     They are as steep as the slopes where the length allows.
     """

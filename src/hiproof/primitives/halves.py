@@ -82,8 +82,6 @@ def shift_plane_to_half(plane: tuple[Formula, ...], axis: int) -> Plane:
     """Return a plane over u, v about the half's middle.
 
     The half's middle lies half of its extent at +u, or at -v, of the whole's.
-
-    The half's middle lies half of its extent at +u, or at -v, of the whole's.
     """
     symbol, extent = AXES[axis]
     a, b, c = (formula(coefficient).with_multiple(symbol, 2.0) for coefficient in plane)
@@ -92,8 +90,6 @@ def shift_plane_to_half(plane: tuple[Formula, ...], axis: int) -> Plane:
 
 def cut_vertices(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
     """Return vertices (n, 3) of the whole about the half's middle.
-
-    Those beyond the cut move straight across onto it.
 
     Those beyond the cut move straight across onto it.
 

@@ -54,8 +54,6 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Return slopes over a quarter of the width on each side.
 
     They take as much of the length.
-
-    They take as much of the length.
     """
     return {
         "width": width,

@@ -28,8 +28,6 @@ def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> N
 
     `parameters` are finite numbers by name.
 
-    `parameters` are finite numbers by name.
-
     >>> refuse_no_shape("gable", {"width": -8.0, "length": 12.0, "height": 3.0}, "part 0")
     Traceback (most recent call last):
     hiproof.errors.InputError: expected a positive width of part 0, got -8; give metres
@@ -128,8 +126,6 @@ def list_parameters(kind: str) -> tuple[str, ...]:
 
 def list_side_parameters(kind: str) -> tuple[str, ...]:
     """Return the names of each side's own parameters of a family member.
-
-    Skews and cants, which are rare, are left out.
 
     Skews and cants, which are rare, are left out.
     """

@@ -1,8 +1,6 @@
 """Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches in a row.
 
 Each rises towards +v to a vertical step.
-
-Each rises towards +v to a vertical step.
 """
 
 from collections.abc import Mapping
@@ -19,8 +17,6 @@ TEETH = range(2, 7)
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     """Return four corners a tooth, v1..v4 as a monopitch has them.
-
-    Teeth run from -v to +v.
 
     Teeth run from -v to +v.
     """
@@ -45,8 +41,6 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
 
 def saw_tooth(teeth: int, additions: tuple[Primitive, ...] = ()) -> Primitive:
     """Return the saw-tooth roof with `teeth` teeth.
-
-    q0 is the height at each tooth's foot.
 
     q0 is the height at each tooth's foot.
     """

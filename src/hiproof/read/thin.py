@@ -59,8 +59,6 @@ def hashes(xyz: np.ndarray) -> np.ndarray:
     """Return a 64-bit hash (n,) of each point's coordinates.
 
     It mixes bits as splitmix64 does (Steele et al. 2014).
-
-    2014).
     """
     bits = np.ascontiguousarray(np.asarray(xyz, float)[:, :3]).view(np.uint64)
     mixed = np.zeros(len(bits), np.uint64)
