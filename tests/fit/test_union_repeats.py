@@ -64,6 +64,34 @@ def test_each_dormer_of_a_row_is_found_from_one_of_them(dormers):
     assert begins == pytest.approx(dormers, abs=0.5)  # points are half a metre apart
 
 
+@pytest.mark.parametrize("count", [5, 6, 7])
+def test_few_points_beside_a_block_add_no_more_than_one_copy(count):
+    """Check that copies end where the edges of one would move past the points that called for it.
+
+    Copies of such a place once went on for ever.
+    """
+    block, box, outline = [8.0, 12.0, 0.0, 8.0], [1.0, 3.0, 0.0, 3.0], shapely.box(0, 0, 16, 8)
+
+    def height(x, y):
+        boxes = np.where((x > 1) & (x < 3) & (y < 3), 6.0, 5.0)
+        return np.where((x > 8) & (x < 12), 9.0, boxes)
+
+    points = sample_heights(height, outline, 4.0, 0.02)
+    beside = (points[:, 0] > 7.6) & (points[:, 0] < 8.0) & (points[:, 1] < 3.0)
+    few = np.column_stack([np.full(count, 7.85), np.linspace(0.3, 2.7, count), np.full(count, 6.0)])
+    few[:, 0] += np.linspace(-0.14, 0.14, count)
+    points = np.vstack([points[~beside], few])
+    plan = lay_out_plan(points, outline)
+    origin = plan.frame.origin
+    volumes = np.repeat(make_base(5.0 - origin[2]), 3, axis=0)
+    for row, (x0, x1, y0, y1), z in zip(volumes[1:], (block, box), (9.0, 6.0), strict=True):
+        ends = (np.array([[x0, y0], [x1, y1]]) - origin[:2]) @ plan.frame.rotation.T
+        row[U0 : V1 + 1] = np.sort(ends, axis=0).T.ravel()
+        row[OFFSET0 + LEVEL] = z - origin[2]
+    scene = make_scene(plan, outline, [0.0], 3.0, 0.2, list_allowed_shapes(()))
+    assert len(repeat_volumes(volumes, scene)) <= 4
+
+
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0, 1]), st.floats(-20.0, 20.0))
 def test_a_moved_volume_is_as_high_at_moved_places(seed, axis, step_m):

@@ -59,13 +59,30 @@ def repeat_along(volumes: np.ndarray, k: int, axis: int, scene: Scene) -> np.nda
     lower, upper = volumes[k, V0 - 2 * axis], volumes[k, V1 - 2 * axis]
     strip = select_points(scene, np.flatnonzero((lower <= y) & (y <= upper)))
     while len(strip.z) and (copy := find_copy(volumes, k, axis, strip, scene.evidence)) is not None:
-        volumes = np.vstack([volumes, copy])
-        value = compute_objective(volumes, scene, np.inf)
-        last = len(volumes) - 1
-        volumes, value = refit_volume(volumes, scene, value, last)
-        context = measure_context(volumes, scene.U, scene.V, last)
-        move_edges(volumes, scene, last, value, COPY_REACH_M, context)
+        volumes = add_copy(volumes, copy, strip, scene)
     return volumes
+
+
+def add_copy(volumes: np.ndarray, copy: np.ndarray, strip: Scene, scene: Scene) -> np.ndarray:
+    """Add a copy, refitted and with its edges moved.
+
+    It is added as it is if it saves too little then. So every copy saves something, and their
+    number is bounded.
+    """
+    with_copy = np.vstack([volumes, copy])
+    last = len(volumes)
+    value = compute_objective(with_copy, scene, np.inf)
+    settled, value = refit_volume(with_copy, scene, value, last)
+    settled = settled.copy()
+    context = measure_context(settled, scene.U, scene.V, last)
+    move_edges(settled, scene, last, value, COPY_REACH_M, context)
+    saved = compute_strip_costs(volumes, strip).sum() - compute_strip_costs(settled, strip).sum()
+    return settled if saved > COPY_UNITS * scene.evidence else with_copy
+
+
+def compute_strip_costs(volumes: np.ndarray, strip: Scene) -> np.ndarray:
+    """Return what each point and unobserved cell (n,) of a strip costs."""
+    return compute_costs(compute_roof_heights(volumes, strip.U, strip.V)[0], strip)
 
 
 def find_copy(
@@ -78,7 +95,7 @@ def find_copy(
     """
     x = (strip.U, strip.V)[axis][int(volumes[k, DIRECTION])]
     lower, upper = volumes[k, U0 + 2 * axis : U0 + 2 * axis + 2]
-    cost = compute_costs(compute_roof_heights(volumes, strip.U, strip.V)[0], strip)
+    cost = compute_strip_costs(volumes, strip)
     order = np.argsort(x, kind="stable")
     total, x = np.concatenate([[0.0], np.cumsum(cost[order])]), x[order]
     back = np.arange(lower - upper, x[0] - lower, -COPY_STEP_M)
@@ -88,9 +105,7 @@ def find_copy(
     for n in np.flatnonzero(total[last] - total[first] > most_saved):
         part = select_points(strip, np.sort(order[first[n] : last[n]]))
         copy = move_volume(volumes[k], axis, steps[n])
-        cost_after = compute_costs(
-            compute_roof_heights(np.vstack([volumes, copy]), part.U, part.V)[0], part
-        ).sum()
+        cost_after = compute_strip_costs(np.vstack([volumes, copy]), part).sum()
         saved = total[last[n]] - total[first[n]] - cost_after
         if saved > most_saved:
             best, most_saved = copy, saved
