@@ -24,14 +24,15 @@ import numpy as np
 from hiproof.compose import check_solid
 from hiproof.enrich.answer import answer
 from hiproof.enrich.areas import area_vectors
-from hiproof.enrich.cadastre import Cadastre, SunQuestions
+from hiproof.enrich.cadastre import Cadastre
 from hiproof.enrich.horizon import find_horizon, measure_share
 from hiproof.enrich.records import Records, index_records
-from hiproof.enrich.run import Questions, enrich_run
+from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sky import HOURS, YEAR, import_pvlib, make_sky
 from hiproof.enrich.sun import irradiate, sample_face
 from hiproof.enrich.town import Town
 from hiproof.model import ROOF
+from hiproof.settings import EnrichSettings
 from hiproof.write.meshes.triangles import faces_triangles
 
 DELFT = (52.0, 4.36)
@@ -133,7 +134,7 @@ def compare_with_rays(folder: Path, roofs: int) -> np.ndarray:
     There is one of every face of so many roofs.
     """
     town = open_town(simulate_town(folder, 100, 4000.0, 3))
-    cadastre = Cadastre(town, SunQuestions())
+    cadastre = Cadastre(town, EnrichSettings())
     shift = -town.read(0).solid.vertices[0]
     solids = [town.read(k).solid.move(shift) for k in range(len(town.records))]
     triangles = np.concatenate(
@@ -162,7 +163,7 @@ def measure_cost(folder: Path, count: int, per_km2: float) -> tuple[float, float
     """Return the CPU time (ms) a building with the sun, and the peak memory (MB)."""
     path = simulate_town(folder, count, per_km2)
     start = time.process_time()
-    enrich_run(path, questions=Questions(sun=SunQuestions()), processes=1)
+    enrich_run(path, settings=EnrichSettings(sun=True), processes=1)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     return 1000.0 * (time.process_time() - start) / count, peak
 

@@ -17,10 +17,9 @@ import typer
 
 import hiproof
 from hiproof.cli.app import app
-from hiproof.enrich.cadastre import SunQuestions
-from hiproof.enrich.run import Questions, enrich_run
+from hiproof.enrich.run import enrich_run
 from hiproof.primitives import CATALOGUE
-from hiproof.settings import Settings
+from hiproof.settings import EnrichSettings, Settings
 from hiproof.simulate import demo_files
 
 ROOT = Path(__file__).parents[1]
@@ -137,7 +136,7 @@ def at_hand(tmp_path_factory):
     folder, files = tmp_path_factory.mktemp("snippets"), demo_files()
     options = {"footprints": str(files["footprints"]), "where": "id < 'house-04'"}
     hiproof.reconstruct_area(hiproof.Request((str(files["cloud"]),), folder / "models", **options))
-    enrich_run(folder / "models", questions=Questions(sun=SunQuestions()))
+    enrich_run(folder / "models", settings=EnrichSettings(sun=True))
     footprint = hiproof.read_footprints(files["footprints"])[0].polygon
     cloud = hiproof.read_points(files["cloud"])
     roof = (cloud.classification == 6) & shapely.intersects_xy(footprint, *cloud.xyz[:, :2].T)

@@ -314,6 +314,36 @@ class WriteSettings:
 
 
 @dataclass(frozen=True)
+class EnrichSettings:
+    """[enrich] answers about finished models."""
+
+    touch_m: float = setting(
+        0.3,
+        "distance up to which walls of neighbours touch",
+        "m",
+        0.0,
+        2.0,
+        option="--touch",
+    )
+    use_attribute: str = setting(
+        "",
+        "attribute of the footprints that names the use of a building, such as residential or "
+        "office; empty takes all buildings as residential",
+        option="--use-attribute",
+    )
+    sun: bool = setting(False, "add the sun on every roof surface (extra `sun`)", option="--sun")
+    weather: str = setting(
+        "",
+        "weather of a typical year, for --sun; empty takes a clear sky",
+        option="--weather",
+        names="files",
+    )
+    albedo: float = setting(
+        0.2, "share of light that the ground reflects, for --sun", "", 0.0, 1.0, option="--albedo"
+    )
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings by section; immutable, comparable, and written beside every run.
 
@@ -331,6 +361,7 @@ class Settings:
     reconstruct: ReconstructSettings = field(default_factory=ReconstructSettings)
     city: CitySettings = field(default_factory=CitySettings)
     write: WriteSettings = field(default_factory=WriteSettings)
+    enrich: EnrichSettings = field(default_factory=EnrichSettings)
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:

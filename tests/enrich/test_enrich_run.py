@@ -9,10 +9,13 @@ from typer.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich import run as enrich_module
-from hiproof.enrich.run import Questions, enrich_run
-from hiproof.errors import InputError, OutputError
+from hiproof.enrich import write as write_module
+from hiproof.enrich.run import enrich_run
+from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.parametric.finished import open_run
 from hiproof.parametric.run import build_file
+from hiproof.settings import EnrichSettings
+from hiproof.simulate import demo_files
 from streets import lose_house, place_house, write_street
 
 FILES = ("buildings.gml", "buildings.city.jsonl", "buildings.gpkg")
@@ -72,10 +75,10 @@ def test_the_run_s_own_files_stay(run, tmp_path):
 
 
 def test_a_second_call_replaces_the_first(run):
-    enrich_run(run, questions=Questions(touch_m=0.0))
+    enrich_run(run, settings=EnrichSettings(touch_m=0.0))
     first = read_files(run / "enriched")
-    enrich_run(run, questions=Questions(touch_m=0.3))
-    enrich_run(run, questions=Questions(touch_m=0.0))
+    enrich_run(run, settings=EnrichSettings(touch_m=0.3))
+    enrich_run(run, settings=EnrichSettings(touch_m=0.0))
     assert read_files(run / "enriched") == first
 
 
@@ -101,12 +104,12 @@ def test_an_interrupted_command_goes_on(run, tmp_path, monkeypatch):
     enrich_run(run, tmp_path / "whole")
     made = []
 
-    def fail_at_last(parameters, questions, block, first, last):
+    def fail_at_last(parameters, settings, block, first, last):
         if first == 4 and not made.count(4):
             made.append(first)
             raise KeyboardInterrupt
         made.append(first)
-        enrich_block(parameters, questions, block, first, last)
+        enrich_block(parameters, settings, block, first, last)
 
     enrich_block = enrich_module.enrich_block
     monkeypatch.setattr(enrich_module, "enrich_block", fail_at_last)
@@ -139,10 +142,91 @@ def test_two_buildings_of_one_id_are_refused(tmp_path):
 def test_a_building_that_cannot_be_built_does_not_end_the_run(tmp_path):
     bad = place_house("bad", 6.0, 0.0)
     bad["parts"][0]["position"] = [0, 0, -50]
-    enrich_run(write_street(tmp_path, [place_house("a", 0, 0), bad]))
+    folder = write_street(tmp_path, [place_house("a", 0, 0), bad])
+    result = CliRunner().invoke(app, ["enrich", str(folder)])
+    assert result.exit_code == 2 and "1 of 2 buildings enriched" in result.output
     attributes = read_features(tmp_path / "enriched")["bad"]["attributes"]
     assert attributes["hiproof_status"] == "not_built"
+    assert f"not enriched: building bad: {attributes['hiproof_not_enriched']}\n" in result.output
     assert read_features(tmp_path / "enriched")["a"]["attributes"]["hiproof_neighbours_unknown"]
+
+
+def test_a_building_that_fails_is_named_and_the_others_have_answers(run, monkeypatch):
+    def fail_at_h1(town, number, *rest):
+        if number == 1:
+            raise ArithmeticError("the wall is bent")
+        return answer(town, number, *rest)
+
+    answer = write_module.answer
+    monkeypatch.setattr(write_module, "answer", fail_at_h1)
+    result = CliRunner().invoke(app, ["enrich", str(run), "--jobs", "1"])
+    assert result.exit_code == 1 and "5 of 6 buildings enriched" in result.output
+    assert "not enriched: building h1: ArithmeticError: the wall is bent" in result.output
+    features = read_features(run / "enriched")
+    assert "the wall is bent" in features["h1"]["attributes"]["hiproof_not_enriched"]
+    assert "hiproof_party_walls" not in features["h1"]["attributes"]
+    assert features["h1"]["geometry"][-1]["type"] == "Solid"
+    assert features["h2"]["attributes"]["hiproof_party_wall_area_m2"] > 0
+    assert json.loads((run / "enriched" / "run.json").read_text())["enriched"]["not_enriched"] == 1
+
+
+def test_failures_of_an_interrupted_command_are_kept(run, monkeypatch):
+    def fail(town, number, *rest):
+        if number == 1:
+            raise ArithmeticError("the wall is bent")
+        if number == 4 and not interrupted:
+            interrupted.append(number)
+            raise KeyboardInterrupt
+        return answer(town, number, *rest)
+
+    answer, interrupted = write_module.answer, []
+    monkeypatch.setattr(enrich_module, "BLOCK_BUILDINGS", 2)
+    monkeypatch.setattr(write_module, "answer", fail)
+    with pytest.raises(KeyboardInterrupt):
+        enrich_run(run, processes=1)
+    monkeypatch.setattr(write_module, "answer", answer)
+    resumed = enrich_run(run, processes=1)
+    assert [failure.id for failure in resumed.failures] == ["h1"] and resumed.exit_code == 1
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """A run of two houses, enriched by the command that made it."""
+    folder, files = tmp_path_factory.mktemp("demo") / "models", demo_files()
+    command = ["reconstruct", str(files["cloud"]), "--footprints", str(files["footprints"])]
+    command += ["--where", "id < 'house-02'", "--out", str(folder), "--jobs", "1", "--enrich"]
+    return folder, command, CliRunner().invoke(app, [*command, "--touch", "0.1"])
+
+
+def test_a_run_and_its_answers_are_one_command(demo):
+    folder, _, result = demo
+    assert result.exit_code == 0, result.output
+    own, enriched = read_features(folder), read_features(folder / "enriched")
+    assert list(own) == list(enriched)
+    assert all("hiproof_party_walls" in values["attributes"] for values in enriched.values())
+    assert json.loads((folder / "enriched" / "run.json").read_text())["enriched"]["touch_m"] == 0.1
+
+
+def test_other_answers_fit_no_building_again(demo):
+    folder, command, _ = demo
+    before = (folder / "parameters.jsonl").stat().st_mtime_ns
+    assert CliRunner().invoke(app, [*command, "--touch", "0.2"]).exit_code == 0
+    assert (folder / "parameters.jsonl").stat().st_mtime_ns == before
+    assert json.loads((folder / "enriched" / "run.json").read_text())["enriched"]["touch_m"] == 0.2
+
+
+@pytest.mark.parametrize(
+    "options, reason",
+    [
+        (["--touch", "0.1"], "expected --enrich with options of `hiproof enrich`, got none"),
+        (["--enrich", "--weather", "a.epw"], "expected --weather with --sun, got it alone"),
+    ],
+)
+def test_options_that_lack_another_are_refused_before_the_run(options, reason, tmp_path):
+    command = ["reconstruct", str(demo_files()["cloud"]), "--out", str(tmp_path / "out"), *options]
+    result = CliRunner().invoke(app, command)
+    assert isinstance(result.exception, HiproofError) and reason in str(result.exception)
+    assert not (tmp_path / "out").exists()
 
 
 def test_parameters_without_an_offset_are_enriched(tmp_path):

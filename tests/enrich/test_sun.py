@@ -8,13 +8,14 @@ from typer.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich.areas import area_vectors
-from hiproof.enrich.cadastre import Cadastre, SunQuestions, locate
+from hiproof.enrich.cadastre import Cadastre, locate
 from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
-from hiproof.enrich.run import Questions, enrich_run
+from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sky import make_sky
 from hiproof.enrich.sun import irradiate, measure_sky, sample_face
 from hiproof.errors import InputError
 from hiproof.model import ROOF
+from hiproof.settings import EnrichSettings
 from hiproof.write.attribute_list import ENRICHED_SUN, ENRICHED_SUN_SURFACE, OWN
 from hiproof.write.head import FileHead
 from hiproof.write.meshes.triangles import faces_triangles
@@ -122,7 +123,7 @@ def cast_rays(triangles, places, directions):
 
 def test_shade_is_as_rays_have_it(tmp_path):
     town = open_street(tmp_path, make_quarter())
-    cadastre = Cadastre(town, SunQuestions())
+    cadastre = Cadastre(town, EnrichSettings())
     buildings = [town.read(k) for k in range(len(town.records))]
     shift = -buildings[0].solid.vertices[0]
     solids = [building.solid.move(shift) for building in buildings]
@@ -152,9 +153,9 @@ def test_a_tower_shades_from_the_south_alone(tmp_path):
     shaded = {}
     for name, y in (("south", -25.0), ("north", 15.0)):
         town = open_street(tmp_path / name, [house, place_house("tower", 0, y, 6, 20, 30.0)])
-        shaded[name] = Cadastre(town, SunQuestions()).describe(0, town.read(0).solid)
+        shaded[name] = Cadastre(town, EnrichSettings()).describe(0, town.read(0).solid)
     free = open_street(tmp_path / "free", [house])
-    alone, surfaces = Cadastre(free, SunQuestions()).describe(0, free.read(0).solid)
+    alone, surfaces = Cadastre(free, EnrichSettings()).describe(0, free.read(0).solid)
     year, share = "hiproof_roof_sun_kwh", "hiproof_sun_shaded_share"
     assert shaded["south"][0][year] < 0.9 * alone[year] < shaded["north"][0][year] < alone[year]
     assert shaded["south"][1].popitem()[1][share] > 0.15
@@ -206,13 +207,13 @@ def test_weather_that_does_not_fit_is_refused(change, reason, tmp_path):
     folder = write_street(tmp_path / "run", [place_house("a", 0, 0)])
     change(tmp_path / "a.epw")
     with pytest.raises(InputError, match=reason):
-        enrich_run(folder, questions=Questions(sun=SunQuestions(str(tmp_path / "a.epw"))))
+        enrich_run(folder, settings=EnrichSettings(sun=True, weather=str(tmp_path / "a.epw")))
 
 
 def test_a_run_without_a_crs_has_no_sun(tmp_path):
     folder = write_street(tmp_path, [place_house("a", 0, 0)], crs=None)
     with pytest.raises(InputError, match="expected a run with a CRS for --sun"):
-        enrich_run(folder, questions=Questions(sun=SunQuestions()))
+        enrich_run(folder, settings=EnrichSettings(sun=True))
 
 
 def test_weather_alone_is_refused(tmp_path):

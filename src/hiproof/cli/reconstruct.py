@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,8 +11,9 @@ import typer
 
 from ..errors import SettingsError
 from ..log import LOGGER, console_level, start
-from ..settings import Settings
+from ..settings import EnrichSettings, Settings
 from .command import print_every_option
+from .enrich import enrich_folder
 from .options import parse_box, with_settings
 
 SETTINGS_FILE = "hiproof.toml"
@@ -87,6 +90,13 @@ def reconstruct(
     restart: Annotated[
         bool, typer.Option("--restart", help="discard an earlier run in this folder")
     ] = False,
+    enrich: Annotated[
+        bool,
+        typer.Option(
+            "--enrich",
+            help="also add party walls, house types and more, as `hiproof enrich` does",
+        ),
+    ] = False,
     log_file: Annotated[
         Path | None, typer.Option(help="append the log to this file", rich_help_panel=FURTHER)
     ] = None,
@@ -112,12 +122,21 @@ def reconstruct(
 
     start(console_level(), log_file)
     box = None if bbox is None else parse_box(bbox)
+    if not enrich and "enrich" in (changes or {}):
+        raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
+
+    @functools.cache
+    def read_settings() -> Settings:
+        file = config or find_settings_file(*clouds, footprints)
+        return (Settings.from_toml(file) if file else Settings()).replace(changes or {})
 
     def make_request() -> Any:
         from ..city.request import Request
         from ..read.pointcloud import expand_paths
 
-        file = config or find_settings_file(*clouds, footprints)
+        settings = read_settings()
+        if enrich:
+            refuse_before(settings.enrich)
         return Request(
             clouds=tuple(map(str, expand_paths(tuple(clouds)))),
             out=out,
@@ -128,13 +147,24 @@ def reconstruct(
             id_attribute=id_attribute,
             terrain=terrain,
             overrides=overrides,
-            settings=(Settings.from_toml(file) if file else Settings()).replace(changes or {}),
+            # answers change no model, so that other answers resume the same run
+            settings=dataclasses.replace(settings, enrich=EnrichSettings()),
             processes=jobs,
             scheduler=scheduler,
             restart=restart,
         )
 
-    raise typer.Exit(run_request(make_request))
+    code = run_request(make_request)
+    if enrich:
+        code = code or enrich_folder(out, None, read_settings().enrich, jobs)
+    raise typer.Exit(code)
+
+
+def refuse_before(settings: EnrichSettings) -> None:
+    """Raise InputError before a run for what would end `hiproof enrich` after it."""
+    from ..enrich.cadastre import refuse_unusable
+
+    refuse_unusable(settings)
 
 
 def find_settings_file(*inputs: str | None) -> Path | None:

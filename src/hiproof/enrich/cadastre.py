@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import shapely
@@ -11,6 +11,7 @@ import shapely
 from ..errors import InputError
 from ..model import ROOF, Solid
 from ..read.crs import find_units, horizontal_crs, parse_crs
+from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.head import FileHead
 from ..write.values import round_value
@@ -21,7 +22,6 @@ from .sky import Sky, import_pvlib, make_sky
 from .sun import irradiate, sample_face
 from .town import Town
 
-ALBEDO = 0.2  # share of light that the ground reflects: pvlib's value of a town's
 SKY_CELL_M = 10_000.0  # side (m) of a square that has one sky: its sun differs by 0.1 degrees
 PANEL_MARGIN_M = 0.3  # width (m) that panels leave free along the edges of a roof face
 # Share of the irradiation that becomes electricity: modules of 20 %, and 0.8 for heat, cables and
@@ -29,22 +29,11 @@ PANEL_MARGIN_M = 0.3  # width (m) that panels leave free along the edges of a ro
 PANEL_EFFICIENCY, PERFORMANCE_RATIO = 0.20, 0.80
 
 
-class SunQuestions(NamedTuple):
-    """What is asked of the sun.
-
-    `weather` is a file, empty for a clear sky; `albedo` is the share of light that the ground
-    reflects.
-    """
-
-    weather: str = ""
-    albedo: float = ALBEDO
-
-
 class Cadastre:
     """The sun on the roofs of a town."""
 
-    def __init__(self, town: Town, questions: SunQuestions) -> None:
-        self.town, self.questions = town, questions
+    def __init__(self, town: Town, settings: EnrichSettings) -> None:
+        self.town, self.settings = town, settings
         self.edges = ShadingEdges(town)
         self.locate = functools.lru_cache(16)(functools.partial(locate, town.records.head))
 
@@ -55,7 +44,7 @@ class Cadastre:
         longitude, latitude, north = self.locate(float(x), float(y))
         # clear skies change little in 100 m of height
         altitude = max(round(records.read(number).z_ground, -2), 0.0)
-        return make_sky(latitude, longitude, altitude, -north, self.questions.weather)
+        return make_sky(latitude, longitude, altitude, -north, self.settings.weather)
 
     def describe(
         self, number: int, solid: Solid
@@ -77,7 +66,7 @@ class Cadastre:
         surfaces = {}
         totals = np.zeros(3)
         for face in faces:
-            sun = irradiate(normals[face], places[face], edges, sky, self.questions.albedo)
+            sun = irradiate(normals[face], places[face], edges, sky, self.settings.albedo)
             year = float(sun.by_month.sum())
             panels = measure_panels(solid, face, normals[face])
             power = panels * year * PANEL_EFFICIENCY * PERFORMANCE_RATIO
@@ -129,12 +118,22 @@ def measure_panels(solid: Solid, face: int, normal: np.ndarray) -> float:
     return float(shapely.buffer(outline, -PANEL_MARGIN_M, join_style="mitre").area)
 
 
-def refuse_wrong_questions(records: Records, questions: SunQuestions) -> None:
-    """Raise InputError where the sun cannot be answered.
+def refuse_unusable(settings: EnrichSettings) -> None:
+    """Raise InputError where no run can be answered.
 
-    pvlib is missing, the run has no CRS, or its weather file does not fit.
+    pvlib is missing, or an option lacks another.
     """
-    import_pvlib()
+    if settings.sun:
+        import_pvlib()
+    elif settings.weather:
+        raise InputError("expected --weather with --sun, got it alone; add --sun")
+
+
+def refuse_unfit(records: Records, settings: EnrichSettings) -> None:
+    """Raise InputError where the sun of this run cannot be answered.
+
+    It has no CRS, or its weather file does not fit.
+    """
     modelled = np.flatnonzero(records.index.modelled)
-    if len(modelled):
-        Cadastre(Town(records), questions).find_sky(int(modelled[0]))
+    if settings.sun and len(modelled):
+        Cadastre(Town(records), settings).find_sky(int(modelled[0]))

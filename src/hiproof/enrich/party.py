@@ -14,11 +14,12 @@ import numpy as np
 import shapely
 
 from ..geometry.rings import with_area
+from ..settings import EnrichSettings
 from .walls import Wall
 
-# Largest distance (m) between walls that touch: outlines of neighbours, moved onto their roofs one
-# by one, differ by up to the accuracy of two strips.
-PARTY_GAP_M = 0.3
+# Usual largest distance (m) between walls that touch: outlines of neighbours, moved onto their
+# roofs one by one, differ by up to the accuracy of two strips.
+PARTY_GAP_M = EnrichSettings.touch_m
 # Largest angle (degrees) between walls that touch. Walls at a larger angle part by PARTY_GAP_M
 # within 2 m.
 MOST_ANGLE_DEG = 10.0

@@ -25,42 +25,44 @@ from ..errors import InputError, OutputError
 from ..evaluate.run import run_record
 from ..formats import FORMATS, list_requested_files
 from ..masking import masked_values
-from ..settings import Settings
+from ..settings import EnrichSettings, Settings
 from ..write.cityjson.features import choose_offset
 from ..write.files import atomic, atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.head import FileHead
 from ..write.run_files import join_fragments
-from .cadastre import Cadastre, SunQuestions, refuse_wrong_questions
-from .party import PARTY_GAP_M
+from .cadastre import Cadastre, refuse_unfit, refuse_unusable
 from .records import Index, Records, index_records
 from .town import Town
-from .write import make_fragments
+from .write import EnrichFailure, make_fragments, read_failure
 
 BLOCK_BUILDINGS = 64  # buildings of a task: a second of work
 FOLDER, WAITING = "enriched", ".enrich"
 """The folder of a run that has its enriched files, and that of blocks until these are written."""
 
 
-class Questions(NamedTuple):
-    """What is asked of every building."""
-
-    touch_m: float = PARTY_GAP_M
-    use_attribute: str = ""
-    sun: SunQuestions | None = None
-
-
 class Enriched(NamedTuple):
-    """The files that were written, and how many buildings they have."""
+    """The files that were written, and how many buildings they have.
+
+    `failures` are those without answers.
+    """
 
     files: list[Path]
     buildings: int
+    failures: list[EnrichFailure]
+
+    @property
+    def exit_code(self) -> int:
+        """0 if every model has answers, 1 for an internal error, 2 for other failures."""
+        if any(failure.is_internal for failure in self.failures):
+            return 1
+        return 2 if self.failures else 0
 
 
 def enrich_run(
     run: Path,
     out: Path | None = None,
-    questions: Questions | None = None,
+    settings: EnrichSettings | None = None,
     processes: int | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Enriched:
@@ -71,24 +73,24 @@ def enrich_run(
     the run itself changes. Raises InputError for what is no run, and OutputError for a folder that
     cannot be written.
     """
+    settings = settings or EnrichSettings()
+    refuse_unusable(settings)
     parameters = run / FORMATS["parameters"].file if run.is_dir() else run
     out = out or parameters.parent / FOLDER
     refuse_own_folder(out)
-    questions = questions or Questions()
-    waiting = make_waiting_folder(out, parameters, questions)
+    waiting = make_waiting_folder(out, parameters, settings)
     index = index_records(parameters)
     with atomic_file(waiting / "index.npz") as file:
         np.savez(file, **index._asdict())
     records = Records(parameters, index)
-    if questions.sun is not None:
-        refuse_wrong_questions(records, questions.sun)
+    refuse_unfit(records, settings)
     total = len(records)
     blocks = list_blocks(waiting, total)
     missing = [block for block in blocks if not block[0].is_file()]
     done = total - sum(last - first for _, first, last in missing)
     executor = make_executor(processes or as_many_as_pay(total, len(missing)))
     try:
-        tasks = ((str(parameters), questions, str(block[0]), *block[1:]) for block in missing)
+        tasks = ((str(parameters), settings, str(block[0]), *block[1:]) for block in missing)
         for task, _, error in executor.run(enrich_block, tasks):
             if error is not None:
                 raise error
@@ -96,10 +98,11 @@ def enrich_run(
             progress(done, total)
     finally:
         executor.close()
-    files = join_blocks(blocks, find_head(records), out)
-    write_record(parameters.parent, out, questions, total)
+    files, failures = join_blocks(blocks, find_head(records), out)
+    result = Enriched(list(files.values()), total, failures)
+    write_record(parameters.parent, out, settings, result)
     shutil.rmtree(waiting.parent, ignore_errors=True)
-    return Enriched(list(files.values()), total)
+    return result
 
 
 def refuse_own_folder(out: Path) -> None:
@@ -111,7 +114,7 @@ def refuse_own_folder(out: Path) -> None:
         )
 
 
-def make_waiting_folder(out: Path, parameters: Path, questions: Questions) -> Path:
+def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -> Path:
     """Make the hidden folder of the blocks of a request; those of others are removed."""
     try:
         state = parameters.stat()
@@ -120,9 +123,8 @@ def make_waiting_folder(out: Path, parameters: Path, questions: Questions) -> Pa
             f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
             "path"
         ) from error
-    request: list[Any] = [__version__, str(parameters), state.st_size, state.st_mtime_ns, questions]
-    if questions.sun is not None and Path(questions.sun.weather).is_file():
-        request.append(Path(questions.sun.weather).stat().st_mtime_ns)
+    request = [__version__, str(parameters), state.st_size, state.st_mtime_ns]
+    request += [settings_mark(settings)]
     key = hashlib.sha256(json.dumps(request).encode()).hexdigest()[:16]
     waiting = out / WAITING / key
     if waiting.parent.is_dir():
@@ -138,6 +140,17 @@ def make_waiting_folder(out: Path, parameters: Path, questions: Questions) -> Pa
     return waiting
 
 
+def settings_mark(settings: EnrichSettings) -> list[Any]:
+    """Return settings for JSON, with the time of the files that they name."""
+    values = list(dataclasses.astuple(settings))
+    paths = [
+        Path(getattr(settings, declared.name))
+        for declared in dataclasses.fields(settings)
+        if declared.metadata["names"] == "files"
+    ]
+    return values + [path.stat().st_mtime_ns for path in paths if path.is_file()]
+
+
 def list_blocks(waiting: Path, total: int) -> list[tuple[Path, int, int]]:
     """Return the file of each block with the numbers of its buildings, [first, last)."""
     return [
@@ -146,13 +159,14 @@ def list_blocks(waiting: Path, total: int) -> list[tuple[Path, int, int]]:
     ]
 
 
-def enrich_block(parameters: str, questions: Questions, block: str, first: int, last: int) -> None:
+def enrich_block(
+    parameters: str, settings: EnrichSettings, block: str, first: int, last: int
+) -> None:
     """Write the texts of the buildings [first, last) to the file `block`."""
-    town, cadastre = open_town(parameters, questions, str(Path(block).with_name("index.npz")))
+    town, cadastre = open_town(parameters, settings, str(Path(block).with_name("index.npz")))
     head = find_head(town.records)
     parts = [
-        make_fragments(town, number, head, questions.use_attribute, cadastre)
-        for number in range(first, last)
+        make_fragments(town, number, head, settings, cadastre) for number in range(first, last)
     ]
     with atomic_file(block) as file:
         save_fragments(file, parts)
@@ -160,7 +174,7 @@ def enrich_block(parameters: str, questions: Questions, block: str, first: int, 
 
 @functools.lru_cache(1)
 def open_town(
-    parameters: str, questions: Questions, index_file: str
+    parameters: str, settings: EnrichSettings, index_file: str
 ) -> tuple[Town, Cadastre | None]:
     """Open the run's buildings, and the sun on their roofs if asked.
 
@@ -168,8 +182,8 @@ def open_town(
     """
     with np.load(index_file, allow_pickle=False) as arrays:
         index = Index(**{name: arrays[name] for name in Index._fields})
-    town = Town(Records(Path(parameters), index), questions.touch_m)
-    return town, None if questions.sun is None else Cadastre(town, questions.sun)
+    town = Town(Records(Path(parameters), index), settings.touch_m)
+    return town, Cadastre(town, settings) if settings.sun else None
 
 
 def find_head(records: Records) -> FileHead:
@@ -187,23 +201,31 @@ def find_head(records: Records) -> FileHead:
     return dataclasses.replace(head, offset=choose_offset(head.units.cityjson.from_metres(corner)))
 
 
-def join_blocks(blocks: list[tuple[Path, int, int]], head: FileHead, out: Path) -> dict[str, Path]:
-    """Join the texts of all blocks into files; returns these by format."""
+def join_blocks(
+    blocks: list[tuple[Path, int, int]], head: FileHead, out: Path
+) -> tuple[dict[str, Path], list[EnrichFailure]]:
+    """Join the texts of all blocks into files.
+
+    Returns these by format, and the buildings without answers.
+    """
+    failures: list[EnrichFailure] = []
     files = list_requested_files(Settings(write=head.write), out)
     del files["parameters"]
 
     def read_blocks() -> Iterator[Fragments]:
         for path, _, _ in blocks:
-            yield from load_fragments(path)
+            for fragments in load_fragments(path):
+                failures.extend(filter(None, [read_failure(fragments)]))
+                yield fragments
 
     join_fragments(files, read_blocks(), head)
-    return files
+    return files, failures
 
 
-def write_record(folder: Path, out: Path, questions: Questions, total: int) -> None:
+def write_record(folder: Path, out: Path, settings: EnrichSettings, result: Enriched) -> None:
     """Write the run's record for the enriched files, with what was asked."""
-    asked: dict[str, Any] = {"hiproof": __version__, "buildings": total, **questions._asdict()}
-    asked["sun"] = questions.sun and questions.sun._asdict()
+    asked: dict[str, Any] = {"hiproof": __version__, "buildings": result.buildings}
+    asked |= {"not_enriched": len(result.failures), **dataclasses.asdict(settings)}
     record = masked_values({**run_record(folder), "enriched": asked})
     with atomic(out / "run.json") as hidden:
         hidden.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

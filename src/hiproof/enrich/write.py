@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-import shapely
+import json
+from typing import NamedTuple
 
+from ..errors import HiproofError, report_error
 from ..formats import import_format, requested_fragments
 from ..log import LOGGER
-from ..settings import WriteSettings
+from ..model import Building
+from ..settings import EnrichSettings, WriteSettings
+from ..status import Status
+from ..write.attribute_list import OWN
 from ..write.building_attributes import building_attributes, measure_figures
-from ..write.fragments import Fragments, Sheet
+from ..write.fragments import Fragment, Fragments, Sheet
 from ..write.head import FileHead
 from ..write.values import plain_text
 from .answer import Answers, answer
@@ -17,6 +22,20 @@ from .town import Town
 
 NOT_MADE = ("parameters",)
 """Modules of files that enriched folders do not have: parameters stay the run's."""
+
+FAILURE = "failure"
+"""Where a building's fragments say why it has no answers, empty where it has."""
+
+
+class EnrichFailure(NamedTuple):
+    """A building that has no answers, with the reason.
+
+    `is_internal` is whether hiproof is to blame rather than the input.
+    """
+
+    id: str
+    reason: str
+    is_internal: bool
 
 
 def list_kinds(write: WriteSettings) -> list[str]:
@@ -28,19 +47,14 @@ def make_fragments(
     town: Town,
     number: int,
     head: FileHead,
-    use_attribute: str = "",
+    settings: EnrichSettings,
     cadastre: Cadastre | None = None,
 ) -> Fragments:
     """Return the texts of building `number`, with all answers about it.
 
-    A building whose geometry defeats a library stays as it was, and the log says so.
+    A building that fails stays as it was, and has the reason as an attribute.
     """
-    building = town.read(number)
-    try:
-        result = answer(town, number, use_attribute, cadastre)
-    except (ValueError, shapely.GEOSException) as error:
-        LOGGER.warning("building %s was not enriched: %s", building.id, error)
-        result = Answers(building, {}, {})
+    result, failure = answer_or_fail(town, number, settings, cadastre)
     building, figures = result.building, measure_figures(result.building)
     attributes = building_attributes(
         building, figures, head.prefix, head.units.gml, head.write.osm_tags
@@ -54,4 +68,35 @@ def make_fragments(
         head,
         result.surfaces,
     )
-    return {kind: import_format(kind).fragment(sheet) for kind in list_kinds(head.write)}
+    texts = {kind: import_format(kind).fragment(sheet) for kind in list_kinds(head.write)}
+    return {**texts, FAILURE: Fragment(json.dumps(failure).encode() if failure else b"")}
+
+
+def answer_or_fail(
+    town: Town, number: int, settings: EnrichSettings, cadastre: Cadastre | None
+) -> tuple[Answers, EnrichFailure | None]:
+    """Answer all questions about building `number`, or say why not."""
+    building = town.read(number)
+    if building.built is None and town.records.index.modelled[number]:
+        is_internal = building.status is Status.INTERNAL_ERROR
+        return leave(building, building.detail, is_internal)
+    try:
+        return answer(town, number, settings.use_attribute, cadastre), None
+    except HiproofError as error:
+        return leave(building, str(error), False)
+    except Exception as error:
+        report = report_error(error)
+        LOGGER.debug("building %s was not enriched: %s", building.id, report.trace)
+        return leave(building, report.detail, True)
+
+
+def leave(building: Building, reason: str, is_internal: bool) -> tuple[Answers, EnrichFailure]:
+    """Return a building as it was, with the reason why it has no answers."""
+    failure = EnrichFailure(plain_text(building.id), reason, is_internal)
+    return Answers(building, {f"{OWN}not_enriched": reason}, {}), failure
+
+
+def read_failure(fragments: Fragments) -> EnrichFailure | None:
+    """Return the failure of a building by its fragments, None where it has answers."""
+    text = fragments[FAILURE].text
+    return EnrichFailure(*json.loads(text)) if text else None

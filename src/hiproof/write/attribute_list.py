@@ -216,6 +216,13 @@ ENRICHED = (
         "whether a neighbour may lack a model: one that touches the outline has none, or the "
         "building stands at the border of the run",
     ),
+    Attribute(
+        "not_enriched",
+        "text",
+        "",
+        "only where `hiproof enrich` failed on the building: the reason; it has none of the other "
+        "attributes then",
+    ),
 )
 """What `hiproof enrich` adds to a building."""
 
