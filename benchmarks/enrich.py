@@ -28,9 +28,10 @@ from hiproof.enrich.cadastre import Cadastre
 from hiproof.enrich.horizon import find_horizon, measure_share
 from hiproof.enrich.records import Records, index_records
 from hiproof.enrich.run import enrich_run
-from hiproof.enrich.sky import HOURS, YEAR, import_pvlib, make_sky
+from hiproof.enrich.sky import make_sky
 from hiproof.enrich.sun import irradiate, sample_face
 from hiproof.enrich.town import Town
+from hiproof.enrich.weather import HOURS, YEAR, import_pvlib
 from hiproof.model import ROOF
 from hiproof.settings import EnrichSettings
 from hiproof.write.meshes.triangles import faces_triangles

@@ -95,6 +95,7 @@ def inputs(tmp_path_factory):
     las.points = las.points[shapely.intersects_xy(area, las.x, las.y)]
     las.write(folder / "tile.laz")
     write_epw(folder / "delft.epw")
+    (folder / "horizon.txt").write_text("5\n20\n5\n0\n")
     (folder / "tiles").mkdir()
     shutil.copy(folder / "tile.laz", folder / "tiles/tile.laz")
     shutil.copy(files["footprints"], folder / "footprints.gpkg")

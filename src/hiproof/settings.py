@@ -334,9 +334,25 @@ class EnrichSettings:
     sun: bool = setting(False, "add the sun on every roof surface (extra `sun`)", option="--sun")
     weather: str = setting(
         "",
-        "weather of a typical year, for --sun; empty takes a clear sky",
+        "weather of a typical year (EPW, TMY3 or PVGIS), for --sun; empty takes a clear sky",
         option="--weather",
         names="files",
+    )
+    horizon: str = setting(
+        "",
+        "horizon file of PVGIS, which shades all buildings, for --sun: heights in degrees at equal "
+        "angles, clockwise from the north",
+        option="--horizon",
+        names="files",
+    )
+    terrain: str = setting(
+        "",
+        "terrain model (GeoTIFF; extra `terrain`), which shades up to 20 km away, for --sun; "
+        "`hiproof reconstruct --enrich --sun` takes that of the run",
+        names="files",
+    )
+    sun_on_walls: bool = setting(
+        False, "also add the sun on every outer wall, for --sun", option="--sun-on-walls"
     )
     albedo: float = setting(
         0.2, "share of light that the ground reflects, for --sun", "", 0.0, 1.0, option="--albedo"

@@ -7,14 +7,17 @@ import pytest
 from typer.testing import CliRunner
 
 from hiproof.cli.app import app
+from hiproof.enrich.answer import answer
 from hiproof.enrich.areas import area_vectors
-from hiproof.enrich.cadastre import Cadastre, locate
+from hiproof.enrich.cadastre import Cadastre, measure_faces
 from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
+from hiproof.enrich.panels import measure_panels
+from hiproof.enrich.place import locate
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sky import make_sky
 from hiproof.enrich.sun import irradiate, measure_sky, sample_face
 from hiproof.errors import InputError
-from hiproof.model import ROOF
+from hiproof.model import ROOF, WALL
 from hiproof.settings import EnrichSettings
 from hiproof.write.attribute_list import ENRICHED_SUN, ENRICHED_SUN_SURFACE, OWN
 from hiproof.write.head import FileHead
@@ -191,23 +194,9 @@ def test_the_files_of_a_run_have_the_sun(tmp_path):
     for layer, declared in (("buildings", ENRICHED_SUN), ("roof_surfaces", ENRICHED_SUN_SURFACE)):
         head, _, _, columns = pyogrio.raw.read(folder / "enriched/buildings.gpkg", layer=layer)
         table = dict(zip(head["fields"], columns, strict=True))
-        assert {OWN + a.name for a in declared} <= set(table)
-        assert all((table[OWN + a.name] >= 0).all() for a in declared)
-
-
-@pytest.mark.parametrize(
-    "change, reason",
-    [
-        (lambda path: write_epw(path, latitude=45.0), "within 300 km of the buildings, got one 7"),
-        (lambda path: path.write_text("no weather"), "expected weather of a typical year as EPW"),
-        (lambda path: None, "expected weather of a typical year as EPW"),
-    ],
-)
-def test_weather_that_does_not_fit_is_refused(change, reason, tmp_path):
-    folder = write_street(tmp_path / "run", [place_house("a", 0, 0)])
-    change(tmp_path / "a.epw")
-    with pytest.raises(InputError, match=reason):
-        enrich_run(folder, settings=EnrichSettings(sun=True, weather=str(tmp_path / "a.epw")))
+        names = {OWN + a.name for a in declared} - {"hiproof_wall_sun_kwh"}
+        assert names <= set(table)
+        assert all((table[name] >= 0).all() for name in names)
 
 
 def test_a_run_without_a_crs_has_no_sun(tmp_path):
@@ -216,6 +205,47 @@ def test_a_run_without_a_crs_has_no_sun(tmp_path):
         enrich_run(folder, settings=EnrichSettings(sun=True))
 
 
-def test_weather_alone_is_refused(tmp_path):
-    result = CliRunner().invoke(app, ["enrich", str(tmp_path), "--weather", "a.epw"])
-    assert isinstance(result.exception, InputError)
+def test_walls_have_the_sun_that_pvlib_gives_them(tmp_path):
+    town = open_street(tmp_path, [place_house("a", 0, 0, rise=2.0)])
+    cadastre = Cadastre(town, EnrichSettings(sun=True, sun_on_walls=True))
+    solid = town.read(0).solid
+    _, normals = measure_faces(solid)
+    attributes, surfaces = cadastre.describe(0, solid)
+    walls = [face for face, item in enumerate(solid.faces) if item.kind == WALL]
+    assert len(walls) == 4 and set(walls) < set(surfaces)
+    sky = cadastre.find_sky(0)
+    for face in walls:
+        free = irradiate(normals[face], np.zeros((1, 3)), NOTHING, sky, 0.2)
+        assert surfaces[face]["hiproof_sun_kwh_m2"] == pytest.approx(free.by_month.sum(), rel=1e-6)
+        assert "hiproof_pv_kwh" not in surfaces[face]
+    total = sum(measure_faces(solid)[0][k] * surfaces[k]["hiproof_sun_kwh_m2"] for k in walls)
+    assert attributes["hiproof_wall_sun_kwh"] == pytest.approx(total, rel=1e-4)
+
+
+def test_party_walls_have_no_sun_and_facing_walls_little(tmp_path):
+    houses = [place_house("a", 0, 0), place_house("b", 6, 0), place_house("c", 14, 0, eave=12.0)]
+    town = open_street(tmp_path, houses)
+    cadastre = Cadastre(town, EnrichSettings(sun=True, sun_on_walls=True))
+    result = answer(town, 1, cadastre=cadastre)
+    _, normals = measure_faces(result.building.solid)
+    east = [k for k, n in enumerate(normals) if n[0] > 0.99]
+    west = [k for k, n in enumerate(normals) if n[0] < -0.99]
+    assert all(set(result.surfaces[k]) == {"hiproof_party_with"} for k in west)
+    # 2 m from a wall that is twice as high
+    assert all(result.surfaces[k]["hiproof_sun_shaded_share"] > 0.5 for k in east)
+
+
+def test_walls_change_nothing_on_roofs(tmp_path):
+    town = open_street(tmp_path, make_quarter())
+    without = Cadastre(town, EnrichSettings(sun=True)).describe(4, town.read(4).solid)
+    walls = Cadastre(town, EnrichSettings(sun=True, sun_on_walls=True))
+    attributes, surfaces = walls.describe(4, town.read(4).solid)
+    assert {name: attributes[name] for name in without[0]} == without[0]
+    assert {face: surfaces[face] for face in without[1]} == without[1]
+
+
+@pytest.mark.parametrize("depth, area", [(10.0, 5.4 * 9.4), (1.7, 5.4 * 1.1), (1.5, 0.0)])
+def test_panels_need_a_margin_and_their_own_width(depth, area, tmp_path):
+    solid = open_street(tmp_path, [place_house("a", 0, 0, depth=depth)]).read(0).solid
+    (face,) = (k for k, item in enumerate(solid.faces) if item.kind == ROOF)
+    assert measure_panels(solid, face, np.array([0.0, 0.0, 1.0])) == pytest.approx(area, abs=1e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +23,10 @@ def enrich(
     out: Annotated[
         Path | None, typer.Option(help="folder for the results (default: enriched, in the run)")
     ] = None,
+    terrain: Annotated[
+        str,
+        typer.Option(help="terrain model (GeoTIFF; extra `terrain`) that shades, for --sun"),
+    ] = "",
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -39,7 +44,13 @@ def enrich(
     Exit code: 0 every building with a model has answers, 1 an internal error, 2 some parameters
     make no valid solid, or unusable input.
     """
-    raise typer.Exit(enrich_folder(run, out, Settings().replace(changes or {}).enrich, jobs))
+    settings = Settings().replace(changes or {}).enrich
+    raise typer.Exit(enrich_folder(run, out, with_terrain(settings, terrain), jobs))
+
+
+def with_terrain(settings: EnrichSettings, terrain: str | None) -> EnrichSettings:
+    """Return settings with a terrain model, unless they name one."""
+    return dataclasses.replace(settings, terrain=settings.terrain or terrain or "")
 
 
 def enrich_folder(run: Path, out: Path | None, settings: EnrichSettings, jobs: int | None) -> int:

@@ -13,7 +13,7 @@ from ..errors import SettingsError
 from ..log import LOGGER, console_level, start
 from ..settings import EnrichSettings, Settings
 from .command import print_every_option
-from .enrich import enrich_folder
+from .enrich import enrich_folder, with_terrain
 from .options import parse_box, with_settings
 
 SETTINGS_FILE = "hiproof.toml"
@@ -156,7 +156,9 @@ def reconstruct(
 
     code = run_request(make_request)
     if enrich:
-        code = code or enrich_folder(out, None, read_settings().enrich, jobs)
+        answers = read_settings().enrich
+        answers = with_terrain(answers, terrain if answers.sun else None)
+        code = enrich_folder(out, None, answers, jobs) or code
     raise typer.Exit(code)
 
 

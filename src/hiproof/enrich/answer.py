@@ -57,7 +57,7 @@ def answer(
     }
     surfaces = {face: {f"{OWN}party_with": name} for face, name in party.items()}
     if cadastre is not None:
-        sun, faces = cadastre.describe(number, solid)
+        sun, faces = cadastre.describe(number, solid, party)
         attributes, surfaces = attributes | sun, surfaces | faces
     return Answers(with_solid(building, solid), attributes, surfaces)
 

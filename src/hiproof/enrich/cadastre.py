@@ -1,138 +1,181 @@
-"""The solar cadastre: the sun on roof faces, and what panels would yield."""
+"""The solar cadastre: the sun on roofs and walls, and what panels would yield."""
 
 from __future__ import annotations
 
 import functools
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import shapely
 
 from ..errors import InputError
 from ..model import ROOF, Solid
-from ..read.crs import find_units, horizontal_crs, parse_crs
 from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
-from ..write.head import FileHead
 from ..write.values import round_value
 from .areas import area_vectors
+from .far import TerrainHorizon, read_horizon
+from .horizon import SECTORS
+from .panels import estimate_yield, measure_panels
+from .place import locate
 from .records import Records
 from .shade import ShadingEdges
-from .sky import Sky, import_pvlib, make_sky
-from .sun import irradiate, sample_face
+from .sky import Sky, make_sky
+from .sun import Irradiation, irradiate, sample_face, sample_wall
 from .town import Town
+from .walls import find_walls
+from .weather import import_pvlib
 
 SKY_CELL_M = 10_000.0  # side (m) of a square that has one sky: its sun differs by 0.1 degrees
-PANEL_MARGIN_M = 0.3  # width (m) that panels leave free along the edges of a roof face
-# Share of the irradiation that becomes electricity: modules of 20 %, and 0.8 for heat, cables and
-# inverters.
-PANEL_EFFICIENCY, PERFORMANCE_RATIO = 0.20, 0.80
+LEVEL_ROOF = 1e-3  # least share of a roof face that plan shows: steeper ones are walls
+FOR_SUN = ("weather", "horizon", "terrain", "sun_on_walls")
+"""Settings that say something of the sun alone."""
+
+Surfaces = dict[int, dict[str, Any]]
+"""Attributes of faces by number."""
 
 
 class Cadastre:
-    """The sun on the roofs of a town."""
+    """The sun on the roofs and walls of a town."""
 
     def __init__(self, town: Town, settings: EnrichSettings) -> None:
         self.town, self.settings = town, settings
         self.edges = ShadingEdges(town)
         self.locate = functools.lru_cache(16)(functools.partial(locate, town.records.head))
+        self.terrain = TerrainHorizon(town.records, settings.terrain) if settings.terrain else None
+        self.read_horizon = functools.lru_cache(16)(read_horizon)
 
     def find_sky(self, number: int) -> Sky:
         """Return the sky over a building: that of the middle of its square of SKY_CELL_M."""
-        records = self.town.records
-        x, y = (np.floor(records.index.boxes[number, :2] / SKY_CELL_M) + 0.5) * SKY_CELL_M
-        longitude, latitude, north = self.locate(float(x), float(y))
+        longitude, latitude, north = self.locate_cell(number)
         # clear skies change little in 100 m of height
-        altitude = max(round(records.read(number).z_ground, -2), 0.0)
+        altitude = max(round(self.town.records.read(number).z_ground, -2), 0.0)
         return make_sky(latitude, longitude, altitude, -north, self.settings.weather)
 
-    def describe(
-        self, number: int, solid: Solid
-    ) -> tuple[dict[str, Any], dict[int, dict[str, Any]]]:
-        """Return attributes of building `number`, and of its roof faces.
+    def locate_cell(self, number: int) -> tuple[float, float, float]:
+        """Return longitude, latitude and true north of a building's square."""
+        x, y = (self.town.records.index.boxes[number, :2] // SKY_CELL_M + 0.5) * SKY_CELL_M
+        return self.locate(float(x), float(y))
 
-        These are by number in its `solid`.
+    def find_far_horizon(self, number: int, z: float) -> np.ndarray:
+        """Return the tangents (SECTORS,) of the far horizon, seen from a height."""
+        horizon = np.zeros(SECTORS)
+        if self.settings.horizon:
+            north = self.locate_cell(number)[2]
+            horizon = np.maximum(horizon, self.read_horizon(self.settings.horizon, -north))
+        if self.terrain is not None:
+            x, y = self.town.records.index.boxes[number].reshape(2, 2).mean(axis=0).tolist()
+            horizon = np.maximum(horizon, self.terrain.find_horizon(x, y, z))
+        return horizon
+
+    def describe(
+        self, number: int, solid: Solid, party: Collection[int] = ()
+    ) -> tuple[dict[str, Any], Surfaces]:
+        """Return attributes of building `number`, and of its faces.
+
+        These are by number in its `solid`, of which the faces `party` are party walls.
         """
-        vectors = area_vectors(solid)
-        size = np.linalg.norm(vectors, axis=1)
-        normals = vectors / np.maximum(size, 1e-12)[:, None]
+        attributes, surfaces = self.describe_roofs(number, solid)
+        if self.settings.sun_on_walls:
+            sums, walls = self.describe_walls(number, solid, party)
+            attributes, surfaces = attributes | sums, surfaces | walls
+        return attributes, surfaces
+
+    def describe_roofs(self, number: int, solid: Solid) -> tuple[dict[str, Any], Surfaces]:
+        """Return attributes of building `number`, and of its roof faces."""
+        size, normals = measure_faces(solid)
         faces = [
-            k for k, face in enumerate(solid.faces) if face.kind == ROOF and normals[k, 2] > 1e-3
+            face
+            for face, item in enumerate(solid.faces)
+            if item.kind == ROOF and normals[face, 2] > LEVEL_ROOF
         ]
         places = {face: sample_face(solid, face, normals[face]) for face in faces}
+        suns = self.irradiate_faces(number, places, normals)
+        surfaces, totals = {}, np.zeros(3)
+        for face, sun in suns.items():
+            year = float(sun.by_month.sum())
+            panels = measure_panels(solid, face, normals[face])
+            power = estimate_yield(panels, year)
+            totals += (size[face] * year, panels, power)
+            surfaces[face] = round_values(
+                {**name_values(sun), "pv_area_m2": panels, "pv_kwh": power}, 3
+            )
+        names = ("roof_sun_kwh", "pv_area_m2", "pv_kwh")
+        return round_values(dict(zip(names, totals.tolist(), strict=True)), 1), surfaces
+
+    def describe_walls(
+        self, number: int, solid: Solid, party: Collection[int]
+    ) -> tuple[dict[str, Any], Surfaces]:
+        """Return attributes of building `number`, and of its outer walls."""
+        size, normals = measure_faces(solid)
+        walls = [wall for wall in find_walls(solid) if wall.face not in party]
+        places = {wall.face: sample_wall(wall, normals[wall.face]) for wall in walls}
+        suns = self.irradiate_faces(number, places, normals)
+        total = sum(size[face] * sun.by_month.sum() for face, sun in suns.items())
+        surfaces = {face: round_values(name_values(sun), 3) for face, sun in suns.items()}
+        return round_values({"wall_sun_kwh": float(total)}, 1), surfaces
+
+    def irradiate_faces(
+        self, number: int, places: dict[int, np.ndarray], normals: np.ndarray
+    ) -> dict[int, Irradiation]:
+        """Return the sun on faces of building `number` with sample points `places`."""
+        if not places:
+            return {}
         z_low = min(float(xyz[:, 2].min()) for xyz in places.values())
         edges = self.edges.find_shading_edges(number, z_low)
         sky = self.find_sky(number)
-        surfaces = {}
-        totals = np.zeros(3)
-        for face in faces:
-            sun = irradiate(normals[face], places[face], edges, sky, self.settings.albedo)
-            year = float(sun.by_month.sum())
-            panels = measure_panels(solid, face, normals[face])
-            power = panels * year * PANEL_EFFICIENCY * PERFORMANCE_RATIO
-            totals += (size[face] * year, panels, power)
-            values = {"sun_kwh_m2": year}
-            values |= {f"sun_kwh_m2_{m:02}": v for m, v in enumerate(sun.by_month.tolist(), 1)}
-            values |= {"sun_shaded_share": sun.shaded_share}
-            values |= {"pv_area_m2": panels, "pv_kwh": power}
-            surfaces[face] = {OWN + name: round_value(value, 3) for name, value in values.items()}
-        names = ("roof_sun_kwh", "pv_area_m2", "pv_kwh")
-        attributes = {
-            OWN + name: round_value(value, 1) for name, value in zip(names, totals, strict=True)
+        return {
+            face: irradiate(
+                normals[face],
+                xyz,
+                edges,
+                sky,
+                self.settings.albedo,
+                self.find_far_horizon(number, float(xyz[:, 2].mean())),
+            )
+            for face, xyz in places.items()
         }
-        return attributes, surfaces
 
 
-def locate(head: FileHead, x: float, y: float) -> tuple[float, float, float]:
-    """Return longitude, latitude and true north at a place, in degrees.
-
-    The place is in world metres, the direction clockwise from the axis that points north. Raises
-    InputError where the run has no CRS.
-    """
-    from pyproj import Transformer
-
-    crs = parse_crs(head.crs)
-    if crs is None:
-        raise InputError(
-            "expected a run with a CRS for --sun, got one without; run `hiproof reconstruct` with "
-            "--crs"
-        )
-    to_globe = Transformer.from_crs(horizontal_crs(crs), "EPSG:4326", always_xy=True)
-    there = find_units(crs, unit_name=head.unit).from_metres(np.array([[x, y]]))[0]
-    longitude, latitude = to_globe.transform(*there)
-    step = to_globe.transform(longitude, latitude + 1e-3, direction="INVERSE")
-    north = np.degrees(np.arctan2(step[0] - there[0], step[1] - there[1]))
-    return float(longitude), float(latitude), float(north)
+def measure_faces(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the areas (n,) and unit normals (n, 3) of a solid's faces."""
+    vectors = area_vectors(solid)
+    size = np.linalg.norm(vectors, axis=1)
+    return size, vectors / np.maximum(size, 1e-12)[:, None]
 
 
-def measure_panels(solid: Solid, face: int, normal: np.ndarray) -> float:
-    """Return the area (m2) of a roof face that panels may cover.
+def name_values(sun: Irradiation) -> dict[str, float]:
+    """Return the values of a face's sun by name."""
+    values = {"sun_kwh_m2": float(sun.by_month.sum())}
+    values |= {f"sun_kwh_m2_{m:02}": v for m, v in enumerate(sun.by_month.tolist(), 1)}
+    return values | {"sun_shaded_share": sun.shaded_share}
 
-    It is PANEL_MARGIN_M or more from its edges. The face is laid flat:
-    plan coordinates are stretched along its slope.
-    """
-    flat = float(np.hypot(normal[0], normal[1]))
-    down = normal[:2] / flat if flat > 0 else np.array([1.0, 0.0])
-    axes = np.column_stack([down / normal[2], (-down[1], down[0])])
-    outline = shapely.transform(solid.project_face(solid.faces[face]), lambda xy: xy @ axes)
-    return float(shapely.buffer(outline, -PANEL_MARGIN_M, join_style="mitre").area)
+
+def round_values(values: dict[str, float], digits: int) -> dict[str, Any]:
+    """Return rounded values under our own names."""
+    return {OWN + name: round_value(value, digits) for name, value in values.items()}
 
 
 def refuse_unusable(settings: EnrichSettings) -> None:
     """Raise InputError where no run can be answered.
 
-    pvlib is missing, or an option lacks another.
+    pvlib is missing, an option lacks another, or the horizon cannot be read.
     """
     if settings.sun:
         import_pvlib()
-    elif settings.weather:
-        raise InputError("expected --weather with --sun, got it alone; add --sun")
+        if settings.horizon:
+            read_horizon(settings.horizon)
+        return
+    for name in FOR_SUN:
+        if getattr(settings, name):
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(f"expected {option} with --sun, got it alone; add --sun")
 
 
 def refuse_unfit(records: Records, settings: EnrichSettings) -> None:
     """Raise InputError where the sun of this run cannot be answered.
 
-    It has no CRS, or its weather file does not fit.
+    It has no CRS, or its weather or its terrain does not fit.
     """
     modelled = np.flatnonzero(records.index.modelled)
     if settings.sun and len(modelled):

@@ -1,4 +1,4 @@
-"""The sun on a roof: irradiation by month, shaded by buildings.
+"""The sun on a face: irradiation by month, shaded by buildings and by the far horizon.
 
 The sky is Hay and Davies': light from the sun's direction, circumsolar light included, is shaded
 where the sun stands below the horizon of a place; the isotropic light is weighted by the part of
@@ -15,17 +15,18 @@ import shapely
 from ..model import Solid
 from .horizon import LIFT_M, SECTORS, find_horizon, measure_share
 from .sky import Sky
+from .walls import Wall
 
 MIDDLES = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS)
-SPACING_M = 1.0  # distance (m) of sample points on a roof face, in plan
+SPACING_M = 1.0  # distance (m) of sample points: on a roof face in plan, on a wall along it
 MOST_SAMPLES = 64  # of a face; larger faces have points farther apart
 
 
 class Irradiation(NamedTuple):
-    """What a roof face gets in a year.
+    """What a face gets in a year.
 
     `by_month` (12,) is in kWh/m2; `shaded_share` is the share of the direct light that buildings
-    take away.
+    and terrain take away.
     """
 
     by_month: np.ndarray
@@ -33,13 +34,19 @@ class Irradiation(NamedTuple):
 
 
 def irradiate(
-    normal: np.ndarray, places: np.ndarray, edges: np.ndarray, sky: Sky, albedo: float
+    normal: np.ndarray,
+    places: np.ndarray,
+    edges: np.ndarray,
+    sky: Sky,
+    albedo: float,
+    far: np.ndarray | float = 0.0,
 ) -> Irradiation:
-    """Return the irradiation of a roof face with a unit `normal` (3,).
+    """Return the irradiation of a face with a unit `normal` (3,).
 
-    `places` (n, 3) are sample points on it, `edges` (m, 2, 3) the roof edges that may shade them.
+    `places` (n, 3) are sample points on it, `edges` (m, 2, 3) the roof edges that may shade them,
+    `far` (SECTORS,) the tangents of the far horizon.
     """
-    horizon = find_horizon(places + (0.0, 0.0, LIFT_M), edges)
+    horizon = np.maximum(find_horizon(places + (0.0, 0.0, LIFT_M), edges), far)
     facing = np.maximum(sky.sun @ normal, 0.0)
     seen = measure_share(horizon, sky.sector, sky.tangent)
     direct = facing * sky.direct
@@ -69,9 +76,20 @@ def measure_sky(normal: np.ndarray, horizon: np.ndarray) -> float:
 
 def sample_face(solid: Solid, face: int, normal: np.ndarray) -> np.ndarray:
     """Return sample points (n, 3) on a roof face, a grid in plan."""
-    outline = solid.project_face(solid.faces[face])
-    low_x, low_y, high_x, high_y = outline.bounds
-    step = max(SPACING_M, float(np.sqrt(outline.area / MOST_SAMPLES)))
+    xy = sample_area(solid.project_face(solid.faces[face]))
+    corner = solid.vertices[solid.faces[face].rings[0][0]]
+    return np.column_stack([xy, corner[2] - (xy - corner[:2]) @ normal[:2] / normal[2]])
+
+
+def sample_wall(wall: Wall, normal: np.ndarray) -> np.ndarray:
+    """Return sample points (n, 3) just outside a wall with a unit `normal` (3,)."""
+    return wall.lift(sample_area(wall.polygon)) + LIFT_M * normal
+
+
+def sample_area(area: shapely.Geometry) -> np.ndarray:
+    """Return sample points (n, 2) of an area, a grid at most SPACING_M apart."""
+    low_x, low_y, high_x, high_y = area.bounds
+    step = max(SPACING_M, float(np.sqrt(area.area / MOST_SAMPLES)))
     x, y = (
         np.linspace(low, high, 2 * count + 1)[1::2]
         for low, high, count in (
@@ -80,8 +98,5 @@ def sample_face(solid: Solid, face: int, normal: np.ndarray) -> np.ndarray:
         )
     )
     xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    xy = xy[shapely.contains_xy(outline, xy)]
-    if not len(xy):
-        xy = shapely.get_coordinates(shapely.point_on_surface(outline))
-    corner = solid.vertices[solid.faces[face].rings[0][0]]
-    return np.column_stack([xy, corner[2] - (xy - corner[:2]) @ normal[:2] / normal[2]])
+    xy = xy[shapely.contains_xy(area, xy)]
+    return xy if len(xy) else shapely.get_coordinates(shapely.point_on_surface(area))

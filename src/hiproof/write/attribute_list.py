@@ -228,7 +228,18 @@ ENRICHED = (
 
 ENRICHED_SUN = (
     Attribute("roof_sun_kwh", "number", "kWh", "irradiation of all roof surfaces in a year"),
-    Attribute("pv_area_m2", "number", "m2", "area for panels: 0.3 m and more from roof edges"),
+    Attribute(
+        "wall_sun_kwh",
+        "number",
+        "kWh",
+        "irradiation of all outer walls in a year, only with `--sun-on-walls`",
+    ),
+    Attribute(
+        "pv_area_m2",
+        "number",
+        "m2",
+        "area for panels: 0.3 m and more from roof edges, and nowhere narrower than 1 m",
+    ),
     Attribute(
         "pv_kwh",
         "number",
@@ -238,14 +249,19 @@ ENRICHED_SUN = (
 )
 
 ENRICHED_SUN_SURFACE = (
-    Attribute("sun_kwh_m2", "number", "kWh/m2", "irradiation in a year, shaded by buildings"),
+    Attribute(
+        "sun_kwh_m2",
+        "number",
+        "kWh/m2",
+        "irradiation in a year, shaded by buildings, terrain and the horizon file",
+    ),
     *(
         Attribute(f"sun_kwh_m2_{month:02}", "number", "kWh/m2", f"the same in month {month}")
         for month in range(1, 13)
     ),
-    Attribute("sun_shaded_share", "number", "", "share of the direct light that buildings take"),
-    Attribute("pv_area_m2", "number", "m2", "area for panels, as of a building"),
-    Attribute("pv_kwh", "number", "kWh", "yield of such panels in a year"),
+    Attribute("sun_shaded_share", "number", "", "share of the direct light that these take"),
+    Attribute("pv_area_m2", "number", "m2", "of a roof: area for panels, as of a building"),
+    Attribute("pv_kwh", "number", "kWh", "of a roof: yield of such panels in a year"),
 )
 
 ENRICHED_3DBAG = (
@@ -604,8 +620,9 @@ TABLES = (
     ),
     AttributeTable("Buildings, added by `hiproof enrich --sun`", ENRICHED_FILES, ENRICHED_SUN, OWN),
     AttributeTable(
-        "Roof surfaces, added by `hiproof enrich --sun`",
-        ENRICHED_FILES,
+        "Surfaces, added by `hiproof enrich --sun`",
+        f"{ENRICHED_FILES}; walls, only with `--sun-on-walls`, in `buildings.gml` and "
+        "`buildings.city.jsonl` alone",
         ENRICHED_SUN_SURFACE,
         OWN,
     ),

@@ -1,0 +1,123 @@
+"""The far horizon: that of a terrain model, and that of a file as PVGIS has it."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..read.crs import find_units, parse_crs
+from ..read.raster import RasterTerrain
+from ..read.terrain import read_terrain
+from .horizon import SECTORS
+from .records import Records
+from .weather import EARTH_RADIUS_KM
+
+MIDDLES_DEG = (np.arange(SECTORS) + 0.5) * (360.0 / SECTORS)
+TERRAIN_REACH_M = (
+    20_000.0  # distance (m) up to which terrain shades: 350 m of height rise 1 degree there
+)
+# Places of the grid that stands in for the terrain: 4 MB, read in a second, and 40 m apart where
+# the terrain model is so large.
+MOST_PLACES = 1_000_000
+FINEST_M = 5.0  # least distance (m) of these places: terrain as near as that is a garden
+PROBES = 200  # places along a side of a box in which the extent of a terrain is looked for
+RAY_GROWTH = 1.02  # of the distance from one place along a ray to the next
+REFRACTION = 0.13  # of light near the ground: terrain sinks by d2 (1 - 0.13) / 2 R
+
+
+def read_horizon(path: str, convergence: float = 0.0) -> np.ndarray:
+    """Read the tangents (SECTORS,) of a horizon file of PVGIS.
+
+    It has heights in degrees, at equal angles clockwise from the north. `convergence` (degrees) is
+    the direction of the run's grid north, clockwise from true north. Raises InputError.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+        heights = np.array([float(word) for word in text.replace(",", " ").split()])
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"expected a horizon file in {path}, got: {error!s:.200}; give heights in degrees at "
+            "equal angles, clockwise from the north, one a line"
+        ) from error
+    if len(heights) < 2 or not (np.isfinite(heights).all() and (np.abs(heights) < 90.0).all()):
+        raise InputError(
+            f"expected 2 or more heights between 0 and 90 degrees in {path}, got {len(heights)} or "
+            "others; mend the file"
+        )
+    azimuths = np.arange(len(heights)) * (360.0 / len(heights))
+    sectors = np.interp(MIDDLES_DEG + convergence, azimuths, heights, period=360.0)
+    return np.tan(np.radians(np.maximum(sectors, 0.0)))
+
+
+class TerrainHorizon:
+    """The horizon that a terrain model makes around places of a run."""
+
+    def __init__(self, records: Records, path: str) -> None:
+        crs = parse_crs(records.head.crs)
+        terrain = read_terrain(path, crs, find_units(crs, unit_name=records.head.unit))
+        boxes = records.index.boxes[np.isfinite(records.index.boxes[:, 0])]
+        self.corner, self.spacing, self.heights = sample_terrain(terrain, boxes)
+        count = np.log(TERRAIN_REACH_M / (2 * self.spacing)) / np.log(RAY_GROWTH)
+        self.distances = 2 * self.spacing * RAY_GROWTH ** np.arange(int(np.ceil(count)))
+        self.sink = self.distances**2 * (1.0 - REFRACTION) / (2000.0 * EARTH_RADIUS_KM)
+        self.list_rays = functools.lru_cache(1)(self.cast_rays)
+
+    def cast_rays(self, x: float, y: float) -> np.ndarray:
+        """Return the heights (SECTORS, n) of the terrain along rays from a place."""
+        angles = np.radians(MIDDLES_DEG)
+        directions = np.stack([np.sin(angles), np.cos(angles)], axis=-1)
+        places = (x, y) + directions[:, None] * self.distances[None, :, None]
+        column, row = np.rint((places - self.corner) / self.spacing).astype(int).transpose(2, 0, 1)
+        rows, columns = self.heights.shape
+        is_known = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        heights = self.heights[np.where(is_known, row, 0), np.where(is_known, column, 0)]
+        return np.where(is_known, heights, -np.inf) - self.sink
+
+    def find_horizon(self, x: float, y: float, z: float) -> np.ndarray:
+        """Return the tangents (SECTORS,) of the horizon at a place."""
+        rise = (self.list_rays(x, y) - z) / self.distances
+        return np.maximum(rise.max(axis=1), 0.0)
+
+
+def sample_terrain(
+    terrain: RasterTerrain, boxes: np.ndarray
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return heights of a terrain on a grid, -inf where they are unknown.
+
+    They come after the grid's low corner and the distance of its places. The grid is as fine as
+    MOST_PLACES allow, in the box in which the terrain may shade buildings of `boxes` (n, 4). Raises
+    InputError where the terrain covers nothing of it.
+    """
+    low, high = find_known_box(terrain, boxes)
+    spacing = max(FINEST_M, float(np.sqrt(np.prod(high - low) / MOST_PLACES)))
+    x, y = (np.arange(a, b + spacing, spacing) for a, b in zip(low, high, strict=True))
+    # row by row: a terrain model is read in tiles
+    heights = np.stack(
+        [terrain.height_at(np.column_stack([x, np.full(len(x), row)])) for row in y]
+    ).astype(np.float32)
+    return low, spacing, np.where(np.isfinite(heights), heights, np.float32(-np.inf))
+
+
+def find_known_box(terrain: RasterTerrain, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners of the box in which a terrain is known near buildings."""
+    low, high = (
+        boxes[:, :2].min(axis=0) - TERRAIN_REACH_M,
+        boxes[:, 2:].max(axis=0) + TERRAIN_REACH_M,
+    )
+    sides = np.linspace(low, high, PROBES)
+    places = np.stack(np.meshgrid(*sides.T), axis=-1).reshape(-1, 2)
+    places = np.concatenate([places, boxes[:, :2], boxes[:, 2:]])
+    places = places[terrain.pixels_at(places)[2]]
+    if not len(places):
+        raise InputError(
+            f"expected a terrain model around the buildings, got {terrain.source}, which covers "
+            "none of them; check its place and its CRS"
+        )
+    step = sides[1] - sides[0]
+    return (
+        np.maximum(places.min(axis=0) - step, low),
+        np.minimum(places.max(axis=0) + step, high),
+    )
