@@ -17,8 +17,8 @@ PANEL_EFFICIENCY, PERFORMANCE_RATIO = 0.20, 0.80
 def measure_panels(solid: Solid, face: int, normal: np.ndarray) -> float:
     """Return the area (m2) of a roof face that panels may cover.
 
-    It is PANEL_MARGIN_M or more from its edges, and nowhere narrower than PANEL_WIDTH_M. The face is
-    laid flat: plan coordinates are stretched along its slope.
+    It is PANEL_MARGIN_M or more from its edges, and nowhere narrower than PANEL_WIDTH_M. The face
+    is laid flat: plan coordinates are stretched along its slope.
     """
     flat = float(np.hypot(normal[0], normal[1]))
     down = normal[:2] / flat if flat > 0 else np.array([1.0, 0.0])

@@ -1,4 +1,4 @@
-"""The sun on a face: irradiation by month, shaded by buildings and by the far horizon.
+"""The sun on a face: irradiation by month, shaded by buildings and terrain.
 
 The sky is Hay and Davies': light from the sun's direction, circumsolar light included, is shaded
 where the sun stands below the horizon of a place; the isotropic light is weighted by the part of
