@@ -69,9 +69,12 @@ def reconstruct(
     if not fitted.parts:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
     roof = Roof(fitted.parts, fitted.outline, frame)
-    base = stages.find_ground(fitted.outline, points, frame, terrain, roof)
+    base = stages.find_ground(
+        fitted.outline, points, frame, terrain, roof, settings.reconstruct.walls
+    )
     roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, base, settings, unused)
+    building = stages.reach_terrain(building, base, settings)
     for text in (of_footprint, site.remark):
         building = stages.add_remark(building, text)
     return building

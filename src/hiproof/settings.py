@@ -228,6 +228,13 @@ class ReconstructSettings:
         choices=("skip", "model"),
         option="--empty-footprints",
     )
+    walls: str = setting(
+        "level",
+        "lower end of walls: level ends them at one height, the lowest terrain along the outline; "
+        "terrain lets them reach down to the terrain everywhere",
+        choices=("level", "terrain"),
+        option="--walls",
+    )
 
 
 @dataclass(frozen=True)

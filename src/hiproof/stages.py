@@ -90,12 +90,14 @@ class Fitted:
 class Ground:
     """The lower end of walls: its height, source and terrain line.
 
-    The height is in the world, and the line runs along the outline.
+    The height is in the world, and the line runs along the outline. `known_share` is the share of
+    the line's vertices whose height is known.
     """
 
     z: float
     source: str
     intersection: tuple[np.ndarray, ...] = ()
+    known_share: float = 0.0
 
 
 def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> None:
@@ -531,13 +533,15 @@ def find_ground(
     frame: LocalFrame,
     terrain: Terrain | None,
     roof: Roof | None = None,
+    walls: str = "level",
 ) -> Ground:
     """Find z_min, and the terrain's line around the outline.
 
     It is the lowest terrain under the roof's eave vertices (paper section 3.3).
 
     Where no terrain is known it is assumed as low as a low wall's foot, or as the lowest points of
-    the walls that are seen below `roof`.
+    the walls that are seen below `roof`. `walls` are those of the settings: where they follow the
+    terrain, a line of which a part is unknown runs at z_min there.
     """
     from .compose import terrain_intersection
     from .compose.settle import PLAN_DIGITS, round_number
@@ -549,14 +553,20 @@ def find_ground(
         heights, source = query_terrain(terrain, frame.to_world(corners))
         if np.isfinite(heights).any():
             z = round_number(np.nanmin(heights), PLAN_DIGITS)
-            lines = terrain_intersection(
-                outline,
-                lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2],
-                z - frame.origin[2],
-            )
-            return Ground(
-                z, source, tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines)
-            )
+            unknown: list[np.ndarray] = []
+
+            def height_at(xy: np.ndarray) -> np.ndarray:
+                heights = terrain.height_at(frame.to_world(xy)) - frame.origin[2]
+                unknown.append(np.isnan(heights))
+                return (
+                    np.where(unknown[-1], z - frame.origin[2], heights)
+                    if walls == "terrain"
+                    else heights
+                )
+
+            lines = terrain_intersection(outline, height_at, z - frame.origin[2])
+            rounded = tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines)
+            return Ground(z, source, rounded, 1.0 - float(np.concatenate(unknown).mean()))
     assumed, source = assume_ground(points, roof)
     return Ground(round_number(assumed + frame.origin[2], PLAN_DIGITS), source)
 
@@ -681,6 +691,29 @@ def judge(
     return add_cautions(
         grade_building(round_building(measured), points, select_unused(roof, unused)), points, inner
     )
+
+
+def reach_terrain(building: Building, ground: Ground, settings: Settings) -> Building:
+    """Return the building with walls down to the terrain, where settings say so.
+
+    A remark says where they end at one level all the same.
+    """
+    if building.built is None or settings.reconstruct.walls == "level":
+        return building
+    if not ground.intersection:
+        return add_remark(building, "its walls end at one level, for no terrain is known")
+    from .compose.finish import add_underside
+    from .model import Underside
+
+    origin = building.roof.frame.origin
+    underside = Underside(terrain=tuple(line - origin for line in ground.intersection))
+    try:
+        finished = dataclasses.replace(building, built=add_underside(building.model, underside))
+    except CompositionError as error:
+        return add_remark(building, f"its walls end at one level ({error})")
+    share = 1.0 - ground.known_share
+    level = f"its walls end at one level along {100 * share:.0f} % of its outline"
+    return add_remark(finished, f"{level}, for no terrain is known there" if share else "")
 
 
 def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:

@@ -17,6 +17,9 @@ check             whether the result is valid by ISO 19107
 check_kernel      its compiled half
 bends             which faces are bent (val3dity's 204)
 blocks            LoD1: prisms over the outline
+profile           heights of the terrain along an outline
+underside         walls down to the terrain, and passages below a solid
+finish            a model with the underside that it is to have
 building_parts    a solid cut where its roofs meet, for formats that know building parts
 """
 

@@ -9,9 +9,9 @@ side over the plan, on its own vertices, so they cannot overlap and their volume
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import shapely
@@ -20,6 +20,8 @@ from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import GRID_M
 from .check import check_solid
 from .shell import compact_solid
+
+Item = TypeVar("Item")
 
 LEAST_PART_M2 = 4.0
 """Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders
@@ -120,7 +122,8 @@ def plan_borders(solid: Solid, roofs: list[int], place_of: list[Place]) -> Borde
     }
 
 
-def list_edges(ring: tuple[int, ...]) -> Iterable[tuple[int, int]]:
+def list_edges(ring: Sequence[Item]) -> Iterable[tuple[Item, Item]]:
+    """Pair every item of a ring with the next."""
     return zip(ring, (*ring[1:], ring[0]), strict=True)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import GROUND, ROOF, WALL, Solid
+from ..model import CEILING, GROUND, ROOF, WALL, Solid
 from ..write.roof_figures import FLAT_SLOPE_DEG, make_triangles, sum_by_face
 
 OF_3DBAG = {
@@ -20,7 +20,8 @@ OF_3DBAG = {
 def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
     """Return areas (m2) by name; `party_m2` of its walls are party walls.
 
-    A roof face is flat below FLAT_SLOPE_DEG, as its azimuth is null there.
+    A roof face is flat below FLAT_SLOPE_DEG, as its azimuth is null there. Ceilings over passages
+    count as ground.
     """
     vectors = area_vectors(solid)
     size = np.linalg.norm(vectors, axis=1)
@@ -28,7 +29,7 @@ def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
     slope = np.degrees(np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
     walls = float(size[kinds == WALL].sum())
     return {
-        "ground_area_m2": float(size[kinds == GROUND].sum()),
+        "ground_area_m2": float(size[(kinds == GROUND) | (kinds == CEILING)].sum()),
         "flat_roof_area_m2": float(size[(kinds == ROOF) & (slope < FLAT_SLOPE_DEG)].sum()),
         "sloped_roof_area_m2": float(size[(kinds == ROOF) & (slope >= FLAT_SLOPE_DEG)].sum()),
         "outer_wall_area_m2": max(walls - party_m2, 0.0),

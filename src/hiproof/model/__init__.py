@@ -5,6 +5,7 @@ Arrays are float64; plan geometry is shapely; frames are in the names.
 inputs      point clouds and footprints
 roof        pieces, parts, roofs: a roof is a max of mins of planes
 solid       faces, solids
+underside   how a solid ends below: terrain, passages
 fit         one primitive fitted to points
 building    models and buildings
 shown       where each part of a roof shows from above
@@ -15,10 +16,13 @@ from .building import Building, Model, Quality
 from .fit import Fit
 from .inputs import Footprint, PointCloud, as_xyz
 from .roof import Part, Piece, Roof
-from .solid import GROUND, ROOF, WALL, Face, Solid
+from .solid import CEILING, GROUND, ROOF, WALL, Face, Solid
+from .underside import ONE_LEVEL, Passage, Underside
 
 __all__ = [
+    "CEILING",
     "GROUND",
+    "ONE_LEVEL",
     "ROOF",
     "WALL",
     "Building",
@@ -27,10 +31,12 @@ __all__ = [
     "Footprint",
     "Model",
     "Part",
+    "Passage",
     "Piece",
     "PointCloud",
     "Quality",
     "Roof",
     "Solid",
+    "Underside",
     "as_xyz",
 ]

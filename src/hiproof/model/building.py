@@ -17,6 +17,7 @@ from ..status import Grade, Status
 from .roof import Part, Roof
 from .shown import compute_visible_pieces, measure_visible_pieces, unite_visible_pieces
 from .solid import Solid
+from .underside import ONE_LEVEL, Underside
 
 
 @dataclass(frozen=True)
@@ -45,11 +46,20 @@ class Model:
     The solid stands in world coordinates.
 
     `compose` says how, None for the defaults: a changed building is composed as it was.
+    `underside` says how the solid ends below. Where that is not one level, `level_solid` is the
+    solid that does stand on one.
     """
 
     roof: Roof
     solid: Solid
     compose: ComposeSettings | None = None
+    underside: Underside = ONE_LEVEL
+    level_solid: Solid | None = None
+
+    @property
+    def on_one_level(self) -> Solid:
+        """The solid as it stands on one level."""
+        return self.solid if self.level_solid is None else self.level_solid
 
     @cached_property
     def visible_pieces(self) -> list[list[shapely.Geometry]]:

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
+CEILING = "OuterCeilingSurface"  # over a passage
 
 
 @dataclass(frozen=True)
@@ -16,8 +17,8 @@ class Face:
 
     The outer ring comes first, counter-clockwise when seen from outside.
 
-    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part of a
-    RoofSurface, else -1.
+    `kind` is RoofSurface, WallSurface, GroundSurface or OuterCeilingSurface; `part` the index of
+    the roof part of a RoofSurface, else -1.
     """
 
     rings: tuple[tuple[int, ...], ...]

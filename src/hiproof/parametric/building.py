@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import InputError
-from ..model import Building, Model, Roof
+from ..model import ONE_LEVEL, Building, Model, Roof, Underside
 from ..settings import ComposeSettings, Settings
 from .record import read_building, require_mapping
+from .underside import read_underside
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:
@@ -30,10 +31,18 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
     if "id" not in require_mapping(parameters, "the building"):
         raise InputError("expected the id of the building, got none; give one")
     building, roof = read_building(parameters)
-    return building if roof is None else with_model(building, roof, compose)
+    if roof is None:
+        return building
+    underside = read_underside(parameters, building, roof)
+    return with_model(building, roof, compose, underside)
 
 
-def with_model(building: Building, roof: Roof, compose: ComposeSettings | None = None) -> Building:
+def with_model(
+    building: Building,
+    roof: Roof,
+    compose: ComposeSettings | None = None,
+    underside: Underside = ONE_LEVEL,
+) -> Building:
     """Return the building with a model of its `roof`.
 
     Raises CompositionError as `build` does.
@@ -42,4 +51,9 @@ def with_model(building: Building, roof: Roof, compose: ComposeSettings | None =
 
     settings = dataclasses.replace(Settings(), compose=compose or ComposeSettings())
     solid = composed(roof, building.z_ground - roof.frame.origin[2], settings)
-    return dataclasses.replace(building, built=Model(roof, solid.move(roof.frame.origin), compose))
+    model = Model(roof, solid.move(roof.frame.origin), compose)
+    if underside.is_level:
+        return dataclasses.replace(building, built=model)
+    from ..compose.finish import add_underside
+
+    return dataclasses.replace(building, built=add_underside(model, underside))

@@ -341,7 +341,8 @@ def build_given(
             "neither; give one"
         )
     area = polygon(rings, "outline")
-    ground = choose_ground(override, area, local, frame, terrain)
+    walls = settings.reconstruct.walls
+    ground = choose_ground(override, area, local, frame, terrain, walls)
     parts = override.parts
     if parts is None and override.block_height is not None:
         level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
@@ -373,6 +374,7 @@ def build_given(
         shift=building.shift,
     )
     created = measure_building(created, local) if len(local) else created
+    created = stages.reach_terrain(created, ground, settings)
     return stages.add_remark(created, of_footprint)
 
 
@@ -392,10 +394,11 @@ def choose_ground(
     points: np.ndarray,
     frame: LocalFrame,
     terrain: Any,
+    walls: str,
 ) -> stages.Ground:
     """Return the ground: as given, else the terrain's."""
     ground = stages.find_ground(
-        outline, points if len(points) else np.zeros((1, 3)), frame, terrain
+        outline, points if len(points) else np.zeros((1, 3)), frame, terrain, walls=walls
     )
     if override.z_ground is not None:
         return dataclasses.replace(ground, z=override.z_ground, source="override")

@@ -49,6 +49,7 @@ BUILDING_KINDS = {
     "z_ground": NUMBER_OR_NULL,
     "ground_source": TEXT_OR_NULL,
     "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},
+    "walls": {"enum": ["level", "terrain"]},
     "attributes": {"type": "object"},
     "points": {"type": "integer", "minimum": 0},
     "residuals": SHARES,

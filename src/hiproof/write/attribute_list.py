@@ -149,6 +149,14 @@ HIPROOF = (
     ),
     Attribute("ground_source", "text", "", "where the ground's height came from"),
     Attribute(
+        "ground_low",
+        "number",
+        "m",
+        "lowest height of the terrain along the outline; null where no terrain is known",
+    ),
+    Attribute("ground_high", "number", "m", "highest height of the terrain along the outline"),
+    Attribute("ground_mean", "number", "m", "mean height of the terrain along the outline"),
+    Attribute(
         "shift_x",
         "number",
         "m",
@@ -173,7 +181,12 @@ HIPROOF = (
 )
 
 ENRICHED = (
-    Attribute("ground_area_m2", "number", "m2", "area of the ground surface"),
+    Attribute(
+        "ground_area_m2",
+        "number",
+        "m2",
+        "area of the ground surface, and of ceilings over passages",
+    ),
     Attribute("flat_roof_area_m2", "number", "m2", "area of roof faces that slope less than 3 deg"),
     Attribute("sloped_roof_area_m2", "number", "m2", "area of all other roof faces"),
     Attribute("outer_wall_area_m2", "number", "m2", "area of walls that touch no other building"),
@@ -367,6 +380,12 @@ PARAMETERS = (
         "list",
         "m",
         "closed lines of x, y, z in the world where the walls meet the terrain",
+    ),
+    Attribute(
+        "walls",
+        "text",
+        "",
+        "terrain, where walls reach down to terrain_line; left out: they end at z_ground",
     ),
     Attribute("attributes", "object", "", "the input's own"),
     Attribute("points", "count", "", "points that the building was judged by"),

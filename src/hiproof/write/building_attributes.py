@@ -18,6 +18,7 @@ from .attribute_list import OWN, PREFIX
 from .osm_tags import osm_tags
 from .reprojected import Reprojected
 from .roof_figures import RoofFigures, find_ground_height, roof_figures
+from .terrain_figures import measure_terrain
 from .values import metres, plain, plain_text, round_value
 
 FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
@@ -133,12 +134,22 @@ def hiproof_attributes(
         "outline_iou": round_value(quality.outline_iou),
         "unexplained_area_m2": round_value(quality.unexplained_area_m2),
         "ground_source": building.ground_source or None,
+        **ground_attributes(building),
         "shift_x": round_value(building.shift[0]),
         "shift_y": round_value(building.shift[1]),
         "iso19107_lod22": None
         if building.built is None
         else check_as_written(building.solid, units),
     }
+
+
+def ground_attributes(building: Building) -> dict[str, Any]:
+    """Return the heights of the terrain along the outline, without prefix."""
+    heights = measure_terrain(building.terrain_intersection)
+    names = ("ground_low", "ground_high", "ground_mean")
+    return dict.fromkeys(names) | (
+        {} if heights is None else dict(zip(names, map(metres, heights), strict=True))
+    )
 
 
 def change_attributes(change: Mapping[str, Any]) -> dict[str, Any]:

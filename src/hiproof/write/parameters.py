@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..model import Building, Part
+from ..model import Building, Model, Part
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
@@ -116,6 +116,7 @@ def building_record(building: Building) -> dict[str, Any]:
     """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
     change = {} if building.change is None else {"change": building.change}
+    below = {} if building.built is None else underside_record(building.built)
     return {
         "id": plain_text(building.id),
         "status": building.status.code,
@@ -129,6 +130,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
         "terrain_line": [places(line) for line in building.terrain_intersection],
+        **below,
         "attributes": {
             plain_text(name): plain(value) for name, value in building.attributes.items()
         },
@@ -145,6 +147,11 @@ def building_record(building: Building) -> dict[str, Any]:
         "types": by_name(building.types),
         **change,
     }
+
+
+def underside_record(model: Model) -> dict[str, Any]:
+    """Return how a solid ends below; nothing where it stands on one level."""
+    return {"walls": "terrain"} if model.underside.terrain else {}
 
 
 def part_record(part: Part) -> dict[str, Any]:

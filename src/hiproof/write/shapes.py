@@ -5,11 +5,12 @@ It is footprint and roof edge, blocks, and building parts, as far as requested.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import CompositionError
 from ..model import GROUND, Building, Face, Solid
 from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
@@ -72,9 +73,9 @@ def make_shapes(
     lods = set(write.lods)
     if building.built is None or figures is None or (lods == {"2.2"} and write.parts_as == "one"):
         return NO_SHAPES
-    solid = building.solid
+    solid = building.model.on_one_level
     ground = solid.select_faces(GROUND)[0]
-    cut = cut_into_parts(solid) if write.parts_as == "buildingparts" or "1.3" in lods else ()
+    cut = cut_into_parts(building) if write.parts_as == "buildingparts" or "1.3" in lods else ()
     parts = part_shapes(building, cut, lods, prefix) if write.parts_as == "buildingparts" else ()
     lod12 = whole_block(solid, ground, figures) if lods & {"1.2", "1.3"} else None
     return Shapes(
@@ -86,10 +87,26 @@ def make_shapes(
     )
 
 
-def cut_into_parts(solid: Solid) -> tuple[BuildingPart, ...]:
-    from ..compose.building_parts import building_parts
+def cut_into_parts(building: Building) -> tuple[BuildingPart, ...]:
+    """Return the building's parts, each with the underside of the whole.
 
-    return building_parts(solid)
+    There are none where one would have no valid solid.
+    """
+    from ..compose.building_parts import building_parts
+    from ..compose.finish import finish_solid
+
+    model = building.model
+    parts = building_parts(model.on_one_level)
+    if model.underside.is_level:
+        return parts
+    origin = model.roof.frame.origin
+    try:
+        return tuple(
+            replace(part, solid=finish_solid(part.solid, model.underside, origin, model.compose))
+            for part in parts
+        )
+    except CompositionError:
+        return ()
 
 
 def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:

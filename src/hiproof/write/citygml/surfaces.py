@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from ...frames import Units
-from ...model import GROUND, ROOF, WALL, Face, Solid
+from ...model import CEILING, GROUND, ROOF, WALL, Face, Solid
 from ..roof_figures import RoofFigures
 from ..values import round_value
 from ..xml_text import generic_attribute
 
-ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
+ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground", CEILING: "ceiling"}
 
 
 def surface_ids(faces: tuple[Face, ...], name: str, part: str = "") -> list[str]:

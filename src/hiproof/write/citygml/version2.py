@@ -242,9 +242,10 @@ def format_roof_and_height(
 
 def level_surfaces(sheet: Sheet) -> str:
     """Return footprint and roof edge (LoD0), where requested."""
-    shapes, solid = sheet.shapes, sheet.building.solid
+    shapes = sheet.shapes
     if shapes.outline is None:
         return ""
+    solid = sheet.building.model.on_one_level
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
     surface = multi_surface(list_face_rings((upward,), undo_shift(sheet)))
     edge = multi_surface(
@@ -262,7 +263,7 @@ def undo_shift(sheet: Sheet) -> np.ndarray:
     They are in the file's unit.
     """
     return sheet.head.units.gml.from_metres(
-        sheet.building.solid.vertices - np.array([*sheet.building.shift, 0.0])
+        sheet.building.model.on_one_level.vertices - np.array([*sheet.building.shift, 0.0])
     )
 
 

@@ -102,13 +102,14 @@ def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> li
 
     Semantics tell them apart.
     """
-    corners, grounds = building.solid.vertices, building.solid.select_faces(GROUND)
+    solid = building.model.on_one_level
+    corners, grounds = solid.vertices, solid.select_faces(GROUND)
     unmoved = corners - np.array([*building.shift, 0.0]) if any(building.shift) else corners
     footprint = multi_surface(ground_boundaries(grounds, unmoved, vertices))
     if shapes.outline is None:
         return [footprint]
     edge = multi_surface(
-        ground_boundaries((shapes.outline,), shapes.edge_vertices(building.solid), vertices)
+        ground_boundaries((shapes.outline,), shapes.edge_vertices(solid), vertices)
     )
     return [named_surfaces(footprint, GROUND), named_surfaces(edge, ROOF)]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ...frames import Units
-from ...model import GROUND, ROOF, WALL, Building, Face, Solid
+from ...model import CEILING, GROUND, ROOF, WALL, Building, Face, Solid
 from ..colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
 from ..parameters import numbers, part_record
 
@@ -35,9 +35,9 @@ class ViewedModel(NamedTuple):
     part_types: Mapping[int, str]
 
     def faces_by_look(self) -> dict[Look, list[Face]]:
-        """Group roofs, walls and grounds by their look."""
+        """Group roofs, walls, grounds and ceilings by their look."""
         result: dict[Look, list[Face]] = {}
-        for kind in (ROOF, WALL, GROUND):
+        for kind in (ROOF, WALL, GROUND, CEILING):
             for face in self.solid.select_faces(kind):
                 result.setdefault(choose_look(face, self.part_types), []).append(face)
         return result

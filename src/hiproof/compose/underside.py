@@ -1,0 +1,371 @@
+"""The underside of a solid that does not stand on one level.
+
+Its walls reach down to the terrain, and passages lead through below it.
+
+The solid over one level is composed first. Its ground is cut in plan into cells: the ground itself,
+and each passage. Then walls get new feet, cells at different heights get a wall between them, a
+passage gets a ceiling, and the ground is cut into triangles where it is not level. Coordinates are
+whole tenths of a millimetre throughout.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from ..errors import CompositionError
+from ..geometry.rings import with_area
+from ..model import CEILING, GROUND, ROOF, WALL, Face, Passage, Solid, Underside
+from ..settings import ComposeSettings
+from .arrangement import GRID_M
+from .building_parts import list_edges
+from .check import check_solid
+from .profile import Profile
+
+LEAST_ROOM_M = 0.5  # between the ground and a passage's ceiling; nobody goes through less
+SNAP_UNITS = 1000.0  # 0.1 m; corners of passages so near a wall lie on it
+ON_EDGE_UNITS = 2.0  # 0.2 mm; rounding moves a corner off its edge by less
+ON_ROOF_UNITS = 10.0  # 1 mm; a corner lies under a roof face so near in plan
+
+Place = tuple[int, int]
+"""A place in plan, in units of the grid."""
+
+Corner = tuple[int, int, int]
+"""A corner of a solid, in units of the grid."""
+
+
+class GroundCell(NamedTuple):
+    """A part of the ground in plan, with its `ceiling`.
+
+    The ceiling is a height in units of the grid, None on the ground itself.
+    """
+
+    polygon: shapely.Polygon
+    ceiling: int | None
+
+
+def make_underside(solid: Solid, underside: Underside, options: ComposeSettings) -> Solid:
+    """Return a valid `solid` that stands on one level with its `underside` made.
+
+    Both are in the roof's frame. Where terrain rises above a roof, the ground gives way. Raises
+    CompositionError for a passage that is too low or not under the roof, and where no valid solid
+    comes out.
+    """
+    findings: tuple = ()
+    clearance = options.ground_clearance_m
+    for cap in (cap_by_place(solid, clearance), cap_everywhere(solid, clearance)):
+        result = Shell(solid, underside, cap).close()
+        findings = check_solid(result, planarity_m=options.planarity_m)
+        if not findings:
+            return result
+        if not underside.terrain:
+            break
+    raise CompositionError(
+        f"expected a valid solid over its terrain and passages, got: {findings[0].message}; leave "
+        "them out"
+    )
+
+
+Cap = Callable[[np.ndarray], np.ndarray]
+"""The greatest height (n,) of the ground at places (n, 2), in units of the grid."""
+
+
+def cap_by_place(solid: Solid, clearance_m: float) -> Cap:
+    """Return a height below the lowest roof face over each place."""
+    roofs = solid.select_faces(ROOF)
+    polygons = np.array(
+        [shapely.transform(solid.project_face(face), lambda xy: xy / GRID_M) for face in roofs]
+    )
+    planes = np.array([fit_plane(solid, face) for face in roofs])
+
+    def cap(xy: np.ndarray) -> np.ndarray:
+        over = shapely.distance(shapely.points(xy)[:, None], polygons[None]) <= ON_ROOF_UNITS
+        z = xy @ planes[:, :2].T + (planes[:, 2] - clearance_m) / GRID_M
+        return np.where(over, z, np.inf).min(axis=1)
+
+    return cap
+
+
+def cap_everywhere(solid: Solid, clearance_m: float) -> Cap:
+    """Return a height below the lowest roof for every place."""
+    lowest = min(
+        solid.vertices[list(ring), 2].min()
+        for face in solid.select_faces(ROOF)
+        for ring in face.rings
+    )
+    return lambda xy: np.full(len(xy), (lowest - clearance_m) / GRID_M)
+
+
+def fit_plane(solid: Solid, face: Face) -> np.ndarray:
+    """Return the plane (a, b, c) of a face that is not upright."""
+    xyz = solid.vertices[[vertex for ring in face.rings for vertex in ring]]
+    design = np.column_stack([xyz[:, :2], np.ones(len(xyz))])
+    return np.linalg.lstsq(design, xyz[:, 2], rcond=None)[0]
+
+
+class Shell:
+    """A solid while its underside is made."""
+
+    def __init__(self, solid: Solid, underside: Underside, cap: Cap) -> None:
+        self.solid = solid
+        self.grid: list[Corner] = [
+            (x, y, z) for x, y, z in np.rint(solid.vertices / GRID_M).astype(int).tolist()
+        ]
+        grounds = [ring for face in solid.select_faces(GROUND) for ring in face.rings]
+        self.ground_edges = {edge for ring in grounds for edge in list_edges(ring)}
+        self.on_ground = {vertex for edge in self.ground_edges for vertex in edge}
+        self.z_base = self.grid[grounds[0][0]][2]
+        rings = [[self.grid[vertex][:2] for vertex in reversed(ring)] for ring in grounds]
+        self.profile = Profile(underside.terrain) if underside.terrain else None
+        self.cells = cut_cells(shapely.Polygon(rings[0], rings[1:]), underside.passages)
+        self.rings = self.node_cells(rings)
+        self.ground = self.measure_ground(cap)
+        self.cell_at = {
+            edge: number
+            for number, cell_rings in enumerate(self.rings)
+            for ring in cell_rings
+            for edge in list_edges(ring)
+        }
+        self.refuse_unusable()
+        self.levels = self.collect_levels()
+
+    def node_cells(self, ground: list[list[Place]]) -> list[list[list[Place]]]:
+        """Return the rings of all cells with every place that lies on their edges.
+
+        These are corners of the ground and of other cells, and where a wall's foot bends.
+        """
+        rings = [list_rings(cell.polygon) for cell in self.cells]
+        pool = {place for ring in [*ground, *itertools.chain(*rings)] for place in ring}
+        if self.profile is not None:
+            for start, end in (edge for ring in ground for edge in list_edges(ring)):
+                knots = self.profile.place_knots(*(np.array([start, end]) * GRID_M))
+                pool |= {(x, y) for x, y in np.rint(knots / GRID_M).astype(int).tolist()}
+        self.pool = np.array(sorted(pool))
+        return [[self.node_ring(ring) for ring in cell_rings] for cell_rings in rings]
+
+    def node_ring(self, ring: list[Place]) -> list[Place]:
+        return [
+            place
+            for start, end in list_edges(ring)
+            for place in (start, *self.find_on_edge(start, end))
+        ]
+
+    def find_on_edge(self, start: Place, end: Place) -> list[Place]:
+        """Return the places between the ends of an edge that lie on it, in its order."""
+        along = np.subtract(end, start)
+        length = float(np.hypot(*along))
+        offset = self.pool - start
+        t = offset @ along / length
+        aside = np.abs(offset @ [-along[1], along[0]]) / length
+        inner = (t > ON_EDGE_UNITS) & (t < length - ON_EDGE_UNITS) & (aside <= ON_EDGE_UNITS)
+        return [(x, y) for x, y in self.pool[inner][np.argsort(t[inner])].tolist()]
+
+    def measure_ground(self, cap: Cap) -> dict[Place, int]:
+        """Return the height of the ground at every place of a cell."""
+        places = sorted({place for rings in self.rings for ring in rings for place in ring})
+        if self.profile is None:
+            return dict.fromkeys(places, self.z_base)
+        xy = np.array(places, float)
+        z = np.minimum(self.profile.height_at(xy * GRID_M) / GRID_M, cap(xy))
+        return dict(zip(places, np.floor(z).astype(int).tolist(), strict=True))
+
+    def refuse_unusable(self) -> None:
+        """Raise CompositionError for a passage that is too low, or too high for the roof."""
+        roofs = self.solid.select_faces(ROOF)
+        for cell, rings in zip(self.cells, self.rings, strict=True):
+            if cell.ceiling is None:
+                continue
+            ground = max(self.ground[place] for ring in rings for place in ring)
+            if (cell.ceiling - ground) * GRID_M < LEAST_ROOM_M:
+                raise CompositionError(
+                    f"expected a passage at least {LEAST_ROOM_M:g} m high, got one of "
+                    f"{(cell.ceiling - ground) * GRID_M:.2f} m over the ground; raise its ceiling"
+                )
+            lowest = min(find_lowest_roof(self.solid, face, cell.polygon) for face in roofs)
+            if lowest - cell.ceiling * GRID_M < LEAST_ROOM_M:
+                raise CompositionError(
+                    f"expected a passage at least {LEAST_ROOM_M:g} m below the roof, got one "
+                    f"{lowest - cell.ceiling * GRID_M:.2f} m below it; lower its ceiling"
+                )
+
+    def find_bottom(self, cell: int, place: Place) -> int:
+        """Return the height at which the solid begins over a place of a cell."""
+        ceiling = self.cells[cell].ceiling
+        return self.ground[place] if ceiling is None else ceiling
+
+    def collect_levels(self) -> dict[Place, list[int]]:
+        """Return the heights of all corners over each place, in order."""
+        levels: dict[Place, set[int]] = {}
+        for vertex, (x, y, z) in enumerate(self.grid):
+            if vertex not in self.on_ground:
+                levels.setdefault((x, y), set()).add(z)
+        for number, rings in enumerate(self.rings):
+            for place in itertools.chain(*rings):
+                levels.setdefault(place, set()).add(self.find_bottom(number, place))
+        return {place: sorted(heights) for place, heights in levels.items()}
+
+    def close(self) -> Solid:
+        """Return the solid with its new faces."""
+        faces: list[tuple[list[list[Corner]], str, int]] = []
+        for face in self.solid.faces:
+            if face.kind == WALL:
+                faces.append(([self.lower_ring(ring) for ring in face.rings], WALL, -1))
+            elif face.kind != GROUND:
+                rings = [[self.grid[vertex] for vertex in ring] for ring in face.rings]
+                faces.append((rings, face.kind, face.part))
+        faces += [([ring], WALL, -1) for ring in self.list_inner_walls()]
+        for number in range(len(self.cells)):
+            faces += [(rings, kind, -1) for rings, kind in self.list_undersides(number)]
+        return number_faces(faces)
+
+    def lower_ring(self, ring: tuple[int, ...]) -> list[Corner]:
+        """Return the ring of a wall with its new foot."""
+        corners: list[Corner] = []
+        for start, end in list_edges(ring):
+            if (end, start) in self.ground_edges:
+                corners += self.list_foot(self.grid[start][:2], self.grid[end][:2])
+            elif start not in self.on_ground:
+                corners.append(self.grid[start])
+        return self.pass_levels(corners)
+
+    def list_foot(self, start: Place, end: Place) -> list[Corner]:
+        """Return the corners of a wall's foot from one end to the other."""
+        places = [start, *self.find_on_edge(start, end), end]
+        corners: list[Corner] = []
+        for a, b in itertools.pairwise(places):
+            if (a, b) not in self.cell_at:
+                raise CompositionError(
+                    "expected passages whose corners lie on the walls they cross, got one beside "
+                    "a wall; draw it across the outline"
+                )
+            cell = self.cell_at[a, b]
+            corners += [(*a, self.find_bottom(cell, a)), (*b, self.find_bottom(cell, b))]
+        return corners
+
+    def pass_levels(self, corners: list[Corner]) -> list[Corner]:
+        """Return a ring with every corner that upright edges pass, each once."""
+        ring: list[Corner] = []
+        for start, end in list_edges(corners):
+            if start == end:
+                continue
+            ring.append(start)
+            if start[:2] == end[:2]:
+                low, high = sorted((start[2], end[2]))
+                between = [z for z in self.levels[start[:2]] if low < z < high]
+                ring += [(*start[:2], z) for z in (between if start[2] < end[2] else between[::-1])]
+        return ring
+
+    def list_inner_walls(self) -> Iterable[list[Corner]]:
+        """Yield the walls beside passages, each as a ring seen from the passage."""
+        for (a, b), cell in self.cell_at.items():
+            other = self.cell_at.get((b, a))
+            if other is None:
+                continue
+            low = self.find_bottom(cell, a), self.find_bottom(cell, b)
+            high = self.find_bottom(other, a), self.find_bottom(other, b)
+            if low[0] <= high[0] and low[1] <= high[1] and low != high:
+                yield self.pass_levels([(*a, low[0]), (*b, low[1]), (*b, high[1]), (*a, high[0])])
+
+    def list_undersides(self, number: int) -> Iterable[tuple[list[list[Corner]], str]]:
+        """Yield the faces below a cell: its ceiling, or the ground as level as it is."""
+        rings = [
+            [(*place, self.find_bottom(number, place)) for place in ring]
+            for ring in self.rings[number]
+        ]
+        heights = {corner[2] for ring in rings for corner in ring}
+        if len(heights) == 1:
+            kind = GROUND if self.cells[number].ceiling is None else CEILING
+            yield [ring[::-1] for ring in rings], kind
+            return
+        outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
+        polygon = shapely.Polygon(outer, holes)
+        for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(polygon)):
+            places = shapely.get_coordinates(shapely.orient_polygons(triangle))[:3].astype(int)
+            yield [[(x, y, self.ground[x, y]) for x, y in places.tolist()][::-1]], GROUND
+
+
+def list_rings(polygon: shapely.Polygon) -> list[list[Place]]:
+    """Return the rings of a polygon on the grid, its area on their left."""
+    polygon = shapely.orient_polygons(polygon)
+    return [
+        [(x, y) for x, y in np.rint(shapely.get_coordinates(ring)[:-1]).astype(int).tolist()]
+        for ring in (polygon.exterior, *polygon.interiors)
+    ]
+
+
+def cut_cells(area: shapely.Polygon, passages: Iterable[Passage]) -> list[GroundCell]:
+    """Cut the ground, in units of the grid, into cells; of passages the first counts.
+
+    Slivers of ground beside a passage belong to it.
+    """
+    cells: list[GroundCell] = []
+    rest: shapely.Geometry = area
+    for passage in passages:
+        outline = shapely.transform(passage.outline, lambda xy: np.rint(xy / GRID_M))
+        outline = snap_corners(outline, area)
+        covered = with_area(shapely.intersection(outline, rest, grid_size=1.0))
+        remainder = with_area(shapely.difference(rest, covered, grid_size=1.0))
+        slivers = [
+            part
+            for part in shapely.get_parts(remainder)
+            if shapely.buffer(part, -SNAP_UNITS / 2).is_empty
+        ]
+        if slivers:
+            covered = with_area(shapely.union_all([covered, *slivers], grid_size=1.0))
+            remainder = with_area(shapely.difference(rest, covered, grid_size=1.0))
+        ceiling = round(passage.ceiling / GRID_M)
+        cells += [GroundCell(part, ceiling) for part in list_areas(covered)]
+        rest = remainder
+    return [*cells, *(GroundCell(part, None) for part in list_areas(rest))]
+
+
+def list_areas(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    return [part for part in shapely.get_parts(geometry) if not part.is_empty]
+
+
+def snap_corners(outline: shapely.Polygon, area: shapely.Polygon) -> shapely.Geometry:
+    """Return a passage whose corners near the outline's lie on it."""
+    border = shapely.boundary(area)
+    corners = shapely.multipoints(shapely.get_coordinates(area))
+
+    def snap(xy: np.ndarray) -> np.ndarray:
+        result = xy.copy()
+        for number, point in enumerate(shapely.points(xy)):
+            for target in (corners, border):
+                if shapely.distance(point, target) <= SNAP_UNITS:
+                    nearest = shapely.shortest_line(point, target)
+                    result[number] = np.rint(shapely.get_coordinates(nearest)[-1])
+                    break
+        return result
+
+    return shapely.make_valid(shapely.transform(outline, snap))
+
+
+def find_lowest_roof(solid: Solid, face: Face, polygon: shapely.Polygon) -> float:
+    """Return the lowest height of a roof face over a polygon on the grid."""
+    roof = shapely.transform(solid.project_face(face), lambda xy: xy / GRID_M)
+    shared = with_area(shapely.intersection(roof, polygon))
+    if shared.area < SNAP_UNITS:
+        return np.inf
+    a, b, c = fit_plane(solid, face)
+    return float((shapely.get_coordinates(shared) * GRID_M @ [a, b] + c).min())
+
+
+def number_faces(faces: Iterable[tuple[list[list[Corner]], str, int]]) -> Solid:
+    """Return the solid of faces given by their rings of corners."""
+    numbers: dict[Corner, int] = {}
+    numbered = tuple(
+        Face(
+            tuple(
+                tuple(numbers.setdefault(corner, len(numbers)) for corner in ring) for ring in rings
+            ),
+            kind,
+            part,
+        )
+        for rings, kind, part in faces
+    )
+    return Solid(np.round(np.array(list(numbers), float) * GRID_M, 4), numbered)

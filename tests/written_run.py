@@ -1,0 +1,35 @@
+"""The files of a run written of given buildings, and built again of their parameters."""
+
+import numpy as np
+
+from hiproof.compose import check_solid
+from hiproof.formats import list_requested_files
+from hiproof.parametric.run import build_file
+from hiproof.read.solids import read_solids
+from hiproof.settings import Settings
+from hiproof.write import FileHead, fragments, join_fragments
+from hiproof.write.naming import gml_name
+
+MODELS = (".gml", ".jsonl")
+
+
+def write_run(folder, buildings, write, crs="EPSG:7415"):
+    """Write the files that settings [write] ask for, and return their paths."""
+    settings = Settings.from_dict({"write": write})
+    head = FileHead(crs, offset=np.array([85000.0, 446000.0, 0.0]), write=settings.write)
+    files = list_requested_files(settings, folder)
+    texts = [fragments(b, (b.id, gml_name(b.id)), head)[1] for b in buildings]
+    join_fragments(files, texts, head)
+    return list(files.values())
+
+
+def require_valid_files(folder, buildings, write):
+    """Every shell of every file is valid, and `hiproof build` makes each file again."""
+    for path in write_run(folder, buildings, write):
+        if path.suffix in MODELS and path.name != "parameters.jsonl":
+            solids = list(read_solids(path))
+            assert len(solids) >= len(buildings)
+            assert [(name, check_solid(s)) for name, s in solids if check_solid(s)] == []
+    build_file(folder / "parameters.jsonl", folder / "again")
+    for path in write_run(folder, buildings, write):
+        assert (folder / "again" / path.name).read_bytes() == path.read_bytes(), path.name
