@@ -93,6 +93,17 @@ class ReadSettings:
         'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" '
         "(docs/overrides.md)",
     )
+    fallback_roof_height: str = setting(
+        "",
+        "column of the footprints with roof heights (m) for buildings without usable points; "
+        "+COLUMN means above the ground",
+        option="--fallback-roof-height",
+    )
+    fallback_ground_height: str = setting(
+        "",
+        "column of the footprints with ground heights (m) for these where no terrain is known",
+        option="--fallback-ground-height",
+    )
     split_gap_m: float = setting(
         0.0,
         "without footprints: clear space that separates buildings; 0 adapts it to the density",

@@ -14,6 +14,9 @@ class Status(Enum):
         "flat block: too few points to determine a roof shape, its height is the median of the "
         "points"
     )
+    FROM_ATTRIBUTES = (
+        "flat block: no usable points, its height is that of the footprint's attributes"
+    )
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
     NO_BUILDING = "no model: nothing stands on the footprint, its points lie on the ground"
     BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"
@@ -137,6 +140,7 @@ ATTENTION_OF_STATUS = {
     Status.NOT_BUILT: Attention.FAILED,
     Status.SIMPLIFIED: Attention.DOUBTFUL,
     Status.FLAT_FALLBACK: Attention.DOUBTFUL,
+    Status.FROM_ATTRIBUTES: Attention.NO_POINTS,
     Status.NO_POINTS: Attention.NO_POINTS,
     Status.NO_ROOF: Attention.NO_POINTS,
     Status.NO_BUILDING: Attention.CHANGED,

@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import InputError, InputWarning, OutputError
 from ..log import LOGGER, count_things
 from ..masking import mask
+from ..parametric.fallback import list_fallback_columns
 from ..parametric.file import HEAD_KEY, objects
 from ..parametric.override import KEYS, Override, read_override
 from ..read.attribute_columns import make_known_condition, restore_declared_types
@@ -224,9 +225,16 @@ def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
     Raises InputError for those that are not there.
     """
     pairs = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
+    fallbacks = list_fallback_columns(plan.settings.read)
     if not plan.jobs:
         return []
     columns = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
+    for column in fallbacks:
+        if column not in columns:
+            raise InputError(
+                f"expected a column of the footprints ({', '.join(sorted(columns)) or 'none'}) for "
+                f"heights of buildings without points, got {column!r}; name one of these"
+            )
     refuse_others([column for column, _ in pairs], sorted(columns), "columns of the footprints")
     refuse_others([key for _, key in pairs], KEYS, "keys of an override")
     return pairs

@@ -23,6 +23,7 @@ from ..log import LOGGER
 from ..masking import mask
 from ..method import reconstruct
 from ..model import Building
+from ..parametric.fallback import list_fallback_columns, use_fallback
 from ..parametric.override import Override, overridden
 from ..read.assign import PointGrid, grow_polygon
 from ..read.raster import RasterTerrain
@@ -77,10 +78,23 @@ class Surroundings:
 
     def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
         self.roof, self.noise, self.model, self.plan = points["roof"], points["noise"], model, plan
-        self.grid, self.noise_grid = PointGrid(self.roof), PointGrid(self.noise)
-        self.ground = ground_cells(points["ground"])
-        self.low = Cells(lowest_in_cells(points["low"]))
+        self.points, self.grid = points, PointGrid(self.roof)
         self.shifts: dict[int, Shift] = {}
+
+    @functools.cached_property
+    def noise_grid(self) -> PointGrid:
+        """The noise points by place."""
+        return PointGrid(self.noise)
+
+    @functools.cached_property
+    def ground(self) -> Cells:
+        """The ground points by cell; an update may do without them."""
+        return ground_cells(self.points["ground"])
+
+    @functools.cached_property
+    def low(self) -> Cells:
+        """The lowest points of other classes by cell."""
+        return Cells(lowest_in_cells(self.points["low"]))
 
     def find_row_shift(self, job: Job) -> Shift:
         """Return the shift of a job's area from its roof, that of its whole row."""
@@ -379,32 +393,12 @@ def solve_one(
         keep(job, job.error.trace, no_terrain)
         return record_failure(plan, job, job.error.detail)
     try:
-        job, moved = surroundings.move(job)
-        roof_points, max_points_a_building = (
-            surroundings.select_roof_points(job),
-            plan.settings.city.max_points_a_building,
-        )
-        if (
-            not roof_points.is_seen
-            and override is None
-            and not (roof_points.is_ground and keeps_empty(plan))
-        ):
-            return fragments(
-                make_unseen_building(job, roof_points), plan.list_names(job), plan.head
-            )
         # first of all: a footprint is put where points are many
-        points = without_repeats(roof_points.points)
-        in_use = thin_to_count(points, max_points_a_building)
-        other_points = surroundings.select_other_points(job)
-        bare = surroundings.bare(job, roof_points, other_points)
-        building = reconstruct_job(job, points, in_use, bare, surroundings, override)
-        if len(in_use) < len(points):
-            building = add_full_density(building, len(in_use), len(points))
-        building = add_remark(add_remark(building, moved), roof_points.remark)
-        building = add_remark(building, surroundings.remark_terrain(job))
-        building = add_remark(
-            surroundings.inspect(building, other_points, points), remark_missing_ground(building)
-        )
+        job, moved = surroundings.move(job)
+        building = solve_by_points(plan, job, moved, surroundings, override)
+        if building.built is None and list_fallback_columns(plan.settings.read):
+            terrain = surroundings.choose_terrain(job)
+            building = use_fallback(building, override, terrain, plan.settings)
         building, texts = fragments(building, plan.list_names(job), plan.head)
         if building.status is Status.INTERNAL_ERROR:
             keep(job, building.detail, record_terrain)
@@ -415,6 +409,34 @@ def solve_one(
         report = report_error(error)
         keep(job, report.trace, record_terrain)
         return record_failure(plan, job, report.detail)
+
+
+def solve_by_points(
+    plan: WorkPlan, job: Job, moved: str, surroundings: Surroundings, override: Override | None
+) -> Building:
+    """Return a building as its points and its override have it.
+
+    `moved` is the remark on its footprint.
+    """
+    roof_points = surroundings.select_roof_points(job)
+    if (
+        not roof_points.is_seen
+        and override is None
+        and not (roof_points.is_ground and keeps_empty(plan))
+    ):
+        return make_unseen_building(job, roof_points)
+    points = without_repeats(roof_points.points)
+    in_use = thin_to_count(points, plan.settings.city.max_points_a_building)
+    other_points = surroundings.select_other_points(job)
+    bare = surroundings.bare(job, roof_points, other_points)
+    building = reconstruct_job(job, points, in_use, bare, surroundings, override)
+    if len(in_use) < len(points):
+        building = add_full_density(building, len(in_use), len(points))
+    building = add_remark(add_remark(building, moved), roof_points.remark)
+    building = add_remark(building, surroundings.remark_terrain(job))
+    return add_remark(
+        surroundings.inspect(building, other_points, points), remark_missing_ground(building)
+    )
 
 
 def recorded_terrain(

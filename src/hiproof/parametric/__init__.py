@@ -15,6 +15,7 @@ recess      a level part that takes the place of what it covers, and goes where 
 edit        a building with another part, or without one
 refit       heights and pitches of given parts fitted to points
 override    what a person says of a building, obeyed by the fit
+fallback    a block of the height in a footprint's attributes, where points are missing
 """
 
 from .building import build

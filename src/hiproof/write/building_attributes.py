@@ -21,7 +21,7 @@ from .roof_figures import RoofFigures, find_ground_height, roof_figures
 from .terrain_figures import measure_terrain
 from .values import metres, plain, plain_text, round_value
 
-FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
+FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.FROM_ATTRIBUTES)
 
 
 def measure_figures(building: Building) -> RoofFigures | None:

@@ -1,0 +1,167 @@
+"""Heights from attributes where a building has no usable points.
+
+Registers often know how high a building is. A block of that height then stands for the roof, with a
+status of its own. Points and overrides count before it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .. import stages
+from ..errors import CompositionError, SettingsError
+from ..frames import LocalFrame
+from ..model import Building
+from ..settings import ReadSettings, Settings
+from ..status import Doubt, Status
+from ..write.parameters import outline_record
+from .building import build
+from .override import RANGES, Override
+
+ABOVE_GROUND = "+"  # before a column: its heights count from the ground
+WITHOUT_POINTS = (Status.NO_POINTS, Status.NO_ROOF)
+
+
+@dataclass(frozen=True)
+class FallbackHeights:
+    """Heights (m) that a footprint's attributes hold, None where unknown.
+
+    `block_m` is above the ground; `roof_m` and `ground_m` are in the world.
+    """
+
+    roof_m: float | None = None
+    block_m: float | None = None
+    ground_m: float | None = None
+
+
+def list_fallback_columns(read: ReadSettings) -> list[str]:
+    """Return the columns that fallback heights come from.
+
+    Raises SettingsError for a ground above the ground.
+    """
+    if read.fallback_ground_height.startswith(ABOVE_GROUND):
+        raise SettingsError(
+            "expected a column of heights in the world as --fallback-ground-height, got "
+            f"{read.fallback_ground_height}; only --fallback-roof-height takes +COLUMN"
+        )
+    named = read.fallback_roof_height.removeprefix(ABOVE_GROUND), read.fallback_ground_height
+    return [name for name in named if name]
+
+
+def read_fallback(attributes: Mapping[str, Any], read: ReadSettings) -> FallbackHeights:
+    """Read the fallback heights in a footprint's attributes.
+
+    What no building can have, such as -9999, is unknown.
+
+    >>> read_fallback({"h": "9.5"}, ReadSettings(fallback_roof_height="+h")).block_m
+    9.5
+    """
+    roof = read.fallback_roof_height
+    is_block = roof.startswith(ABOVE_GROUND)
+    kind = "block_height" if is_block else "ridge_height"
+    height = read_height(attributes.get(roof.removeprefix(ABOVE_GROUND)), kind)
+    ground = read_height(attributes.get(read.fallback_ground_height), "z_ground")
+    return FallbackHeights(None if is_block else height, height if is_block else None, ground)
+
+
+def read_height(value: Any, kind: str) -> float | None:
+    """Read a height that a building can have, None for any other value."""
+    try:
+        height = float(value)
+    except (TypeError, ValueError):
+        return None
+    lower, upper = RANGES[kind]
+    return height if lower <= height <= upper else None
+
+
+def use_fallback(
+    building: Building, override: Override | None, terrain: Any, settings: Settings
+) -> Building:
+    """Return a block of known height where a building has no usable points.
+
+    The building stays as it is where it has a model, where its ground lies bare, or where no height
+    is known.
+    """
+    heights = read_fallback(building.attributes, settings.read)
+    if override is not None:
+        heights = prefer_override(heights, override)
+    is_known = heights.roof_m is not None or heights.block_m is not None
+    if (
+        building.status not in WITHOUT_POINTS
+        or building.footprint is None
+        or not is_known
+        or Doubt.BARE_GROUND.value in building.detail
+    ):
+        return building
+    try:
+        return build_block(building, heights, terrain, settings)
+    except CompositionError as error:
+        return stages.add_remark(building, f"its heights make no block: {error}")
+
+
+def prefer_override(heights: FallbackHeights, override: Override) -> FallbackHeights:
+    """Return the heights, with those of the override instead where it has some."""
+    ridge = override.fixed.get("ridge_height")
+    if ridge is not None:
+        heights = FallbackHeights(ridge, None, heights.ground_m)
+    if override.z_ground is not None:
+        heights = dataclasses.replace(heights, ground_m=override.z_ground)
+    return heights
+
+
+def build_block(
+    building: Building, heights: FallbackHeights, terrain: Any, settings: Settings
+) -> Building:
+    """Return the building as a block of known height.
+
+    Its ground is the terrain's, else that of its attributes.
+    """
+    shift = np.array(building.shift)
+    outline = shapely.transform(stages.largest_polygon(building.footprint), lambda xy: xy + shift)
+    corners = shapely.get_coordinates(outline)
+    frame = LocalFrame.around(np.column_stack([corners, np.zeros(len(corners))]))
+    local = stages.to_local(outline, frame)
+    ground = stages.find_ground(local, np.zeros((1, 3)), frame, terrain)
+    if ground.source.startswith("assumed"):
+        if heights.ground_m is not None:
+            ground = stages.Ground(heights.ground_m, "attribute")
+        elif heights.roof_m is not None:
+            below = heights.roof_m - stages.ASSUMED_WALL_M
+            ground = stages.Ground(below, f"assumed {stages.ASSUMED_WALL_M:g} m below its roof")
+        else:
+            return stages.add_remark(building, "its height is known, but not that of its ground")
+    top = ground.z + heights.block_m if heights.block_m is not None else heights.roof_m
+    rings = outline_record(local)
+    part = {
+        "type": "flat",
+        "parameters": {},
+        "position": [0.0, 0.0, top - frame.origin[2]],
+        "rotation": 0.0,
+        "outlines": [rings],
+    }
+    created = build(
+        {
+            "id": building.id,
+            "status": Status.FROM_ATTRIBUTES.code,
+            "origin": frame.origin.tolist(),
+            "outline": rings,
+            "z_ground": ground.z,
+            "ground_source": ground.source,
+            "parts": [part],
+        },
+        settings.compose,
+    )
+    return dataclasses.replace(
+        created,
+        detail=Status.FROM_ATTRIBUTES.value,
+        terrain_intersection=ground.intersection,
+        attributes=building.attributes,
+        footprint=building.footprint,
+        shift=building.shift,
+    )
