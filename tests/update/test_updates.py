@@ -132,6 +132,22 @@ def test_a_second_update_gives_the_same_bytes(update, run, cloud, tmp_path):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
 
 
+def test_texts_kept_of_the_run_are_those_made_anew(update, run, cloud, tmp_path):
+    """Without its state folder a run's texts are made anew; edited parameters count in any case."""
+    _, out, _ = update
+    bare = shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns(".hiproof"))
+    update_area(make_request(bare, cloud, tmp_path / "made"))
+    assert records(tmp_path / "made") == records(out)
+    edited = shutil.copytree(run, tmp_path / "edited")
+    lines = (edited / "parameters.jsonl").read_text().splitlines()
+    lines[1] = lines[1].replace('"attributes":{', '"attributes":{"door":"green",')
+    (edited / "parameters.jsonl").write_text("\n".join(lines) + "\n")
+    update_area(make_request(edited, cloud, tmp_path / "out"))
+    rows = by_id(tmp_path / "out")
+    assert "change" not in rows["house-0"] and rows["house-0"]["attributes"]["door"] == "green"
+    assert b"green" in records(tmp_path / "out")["buildings.gml"]
+
+
 def test_the_same_call_again_keeps_what_is_done(update, run, cloud):
     summary, out, _ = update
     before = (out / "changes.csv").read_bytes()

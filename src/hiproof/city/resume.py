@@ -33,6 +33,8 @@ from .plan import PLAN_FILE, WorkPlan
 from .prepare import make_plan
 from .request import Request
 
+STATE_FOLDER = ".hiproof"  # in the output folder: the run's own folder
+
 LEDGER_BYTES = 200_000  # of an empty one with its journal; where less is free that is what ails it
 
 
@@ -41,7 +43,7 @@ def open_state(out: Path) -> Path:
 
     It is made if need be.
     """
-    state = Path(out) / ".hiproof"
+    state = Path(out) / STATE_FOLDER
     try:
         state.mkdir(parents=True, exist_ok=True)
         (state / "tiles").mkdir(exist_ok=True)

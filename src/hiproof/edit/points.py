@@ -16,6 +16,7 @@ import shapely
 from .. import stages
 from ..city.noted import noted_file
 from ..city.plan import PLAN_FILE, Job, WorkPlan
+from ..city.resume import STATE_FOLDER
 from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
 from ..errors import HiproofError, InputError
@@ -42,7 +43,7 @@ class RunPoints:
         self.of_job = lru_cache(maxsize=KEPT_BUILDINGS)(self.read_job)
         inputs = found_inputs(run_record(folder), moved_to)
         self.clouds, self.terrain = inputs.clouds, inputs.terrain
-        self.state = folder / ".hiproof"
+        self.state = folder / STATE_FOLDER
         plan = self.state / PLAN_FILE
         if not plan.is_file() or not (inputs.clouds or inputs.gone):
             self.missing = (

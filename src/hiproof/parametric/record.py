@@ -244,15 +244,21 @@ def by_teeth(
 def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
     """Read the terrain's lines (m, 3) along the outline."""
     lines = [
-        np.array(
-            [
-                place(xyz, "a point of terrain_line")
-                for xyz in as_list(line, "a line of terrain_line")
-            ]
-        )
+        read_places(as_list(line, "a line of terrain_line"), "a point of terrain_line")
         for line in as_list(record.get("terrain_line") or [], "terrain_line")
     ]
     return [round_values(line, PLAN_DIGITS) for line in lines if len(line)]
+
+
+def read_places(rows: list[Any], where: str) -> np.ndarray:
+    """Read places (n, 3), one by one only where one of them is wrong."""
+    if all(isinstance(row, list) and len(row) == 3 for row in rows):
+        values = [value for row in rows for value in row]
+        if {float, int}.issuperset(map(type, values)):
+            result = np.array(values, float).reshape(-1, 3)
+            if (np.abs(result) < LARGEST_NUMBER).all():
+                return result
+    return np.array([place(row, where) for row in rows])
 
 
 def read_grade(record: Mapping[str, Any]) -> Grade | None:

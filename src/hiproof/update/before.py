@@ -26,8 +26,9 @@ from .plan import EARLIER_FOLDER, save_earlier_plan
 from .register import SampledRoof, register_surveys
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Epochs, Surveys
+from .texts import find_texts
 
-ENOUGH_ROOFS = 100
+ENOUGH_ROOFS = 60
 """Sampled roofs: they tell the shift within a centimetre, and their noise to a tenth of it."""
 
 SORTED_MARK = "sorted"  # file in the earlier folder: its points are complete
@@ -52,8 +53,15 @@ def prepare_surveys(
     sort_earlier(earlier.clouds, state / EARLIER_FOLDER, executor)
     shift = register_surveys(draw_samples(state, plan, request.terrain))
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
-    Surveys(shift, date, request.significance, bool(earlier.clouds)).save(state / SURVEYS_FILE)
+    texts = find_texts(request.run, plan)
+    surveys = Surveys(shift, date, request.significance, bool(earlier.clouds), texts)
+    surveys.save(state / SURVEYS_FILE)
     (state / EARLIER_FOLDER / SORTED_MARK).touch()
+
+
+def remove_earlier_points(state: Path) -> None:
+    """Remove the earlier points of an update that ended."""
+    shutil.rmtree(state / EARLIER_FOLDER, ignore_errors=True)
 
 
 def sort_earlier(clouds: tuple[str, ...], folder: Path, executor: Any) -> None:
@@ -88,7 +96,7 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
                 continue
             if roof is None:
                 continue
-            old, new = epochs.select(plan.jobs[index])
+            old, new = epochs.select_roofs(plan.jobs[index])
             to_local = roof.frame.to_local
             yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))
 

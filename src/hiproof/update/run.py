@@ -16,9 +16,10 @@ from ..city.plan import WorkPlan
 from ..city.resume import open_state
 from ..city.run import Steps, Summary, reconstruct_in_folder
 from ..errors import OutputError, SettingsError
+from ..garbage import collect_rarely
 from ..status import Change
 from ..write.files import atomic
-from .before import prepare_surveys
+from .before import prepare_surveys, remove_earlier_points
 from .dates import find_survey_date
 from .earlier import EarlierRun, choose_read_settings, read_earlier
 from .plan import make_update_plan
@@ -71,10 +72,11 @@ def update_area(
     def prepare(plan: WorkPlan, executor: Any, _: Progress) -> None:
         prepare_surveys(request, earlier, date, state, plan, executor)
 
-    with hold_folder(state):
+    with hold_folder(state), collect_rarely():
         summary = reconstruct_in_folder(
             request, state, progress, Steps(make_plan, update_tile, prepare)
         )
+        remove_earlier_points(state)
         return report_changes(request, earlier, state, summary)
 
 

@@ -20,14 +20,16 @@ import numpy as np
 import shapely
 
 from ..city.bundles import keep_failure
+from ..city.found import FoundRoof
 from ..city.ledger import Outcome
-from ..city.plan import Job, WorkPlan, load_plan
+from ..city.plan import Job, WorkPlan, load_plan, neighbourhood
 from ..city.solve import Surroundings, open_terrain, record_failure, solve_buildings, solve_one
 from ..city.sort import load_points
 from ..errors import report_error
 from ..log import LOGGER
 from ..model import Building, Roof
-from ..parametric.building import build
+from ..parametric.building import build, with_model
+from ..parametric.record import read_building
 from ..read.thin import without_repeats
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
@@ -46,6 +48,7 @@ from .places import (
 )
 from .plan import EARLIER_FOLDER
 from .register import SurveyShift
+from .texts import KeptBuilding, keep_texts, load_texts
 
 SURVEYS_FILE = "surveys.json"
 BARE_SHARE = 0.5
@@ -54,12 +57,16 @@ BARE_SHARE = 0.5
 
 @dataclass(frozen=True)
 class Surveys:
-    """The shift of the two surveys, the new one's date and the significance."""
+    """The shift of the two surveys, the new one's date and the significance.
+
+    `texts` is the state folder of the earlier run, "" where its texts cannot be kept.
+    """
 
     shift: SurveyShift
     date: str
     significance: float
     has_earlier: bool
+    texts: str = ""
 
     def save(self, path: Path) -> None:
         """Write the surveys for the workers."""
@@ -89,13 +96,37 @@ class Epochs:
         old = None if self.old is None else select_points(self.old, job)
         return old, select_points(self.new, job)
 
+    def select_roofs(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
+        """Return the old and new roof points (n, 3) of a building."""
+        old = None if self.old is None else select_roof(self.old, job).points
+        return old, select_roof(self.new, job).points
+
 
 def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:
-    """Return the points (n, 3) of a roof and of bare ground in its outline."""
+    """Return the points (n, 3) of a roof and of bare ground in its outline, each once."""
+    roof = select_roof(surroundings, job)
+    if not (len(roof.ground) or has_ground(surroundings, job)):
+        return roof.points
+    bare = surroundings.bare(job, roof, surroundings.select_other_points(job))
+    bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
+    return np.concatenate([roof.points, bare])
+
+
+def has_ground(surroundings: Surroundings, job: Job) -> bool:
+    """Return whether points of the ground class lie in a building's outline."""
+    ground = surroundings.ground.inside(neighbourhood(job, 0.0))
+    return bool(shapely.intersects_xy(job.area, ground[:, 0], ground[:, 1]).any())
+
+
+def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:
+    """Return the roof of a building, with the points inside its outline."""
+    if surroundings.plan.settings.read.by_class:
+        inside = surroundings.grid.inside(job.area)
+        return FoundRoof(without_repeats(surroundings.roof.take(inside, axis=0)))
     found = surroundings.select_roof_points(job)
-    bare = surroundings.bare(job, found, surroundings.select_other_points(job))
-    points = without_repeats(np.concatenate([found.points, bare]))
-    return points[shapely.intersects_xy(job.area, points[:, 0], points[:, 1])]
+    points = without_repeats(found.points)
+    inside = shapely.intersects_xy(job.area, points[:, 0], points[:, 1])
+    return dataclasses.replace(found, points=points[inside])
 
 
 def update_tile(
@@ -110,10 +141,12 @@ def update_tile(
     epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
     keep = functools.partial(keep_failure, root, tile, plan)
 
-    updater = Updater(plan, epochs, surveys, keep)
+    updater = Updater(plan, epochs, surveys, keep, load_texts(surveys.texts, tile))
 
     def solve(job: Job) -> tuple[Building, Fragments]:
         building = updater.update(job, UpdateMember.read(members[job.index], job))
+        if isinstance(building, KeptBuilding):
+            return building, building.texts
         return fragments(building, plan.list_names(job), plan.head)
 
     return solve_buildings(root, plan, tile, solve, avoid)
@@ -127,16 +160,23 @@ class Updater:
     epochs: Epochs
     surveys: Surveys
     keep: Callable[..., None]
+    texts: dict[bytes, Fragments]
 
     def update(self, job: Job, member: UpdateMember) -> Building:
         """Return a building brought up to date, whatever happens to it."""
         try:
             if member.record is None:
                 return self.replace_earlier(job, member)
-            earlier = build(member.record, self.plan.settings.compose)
-            if earlier.built is None:
-                return self.revisit_empty(job, member, earlier)
-            return self.follow_verdict(job, member, earlier, self.judge(job, earlier))
+            earlier, roof = read_building(member.record)
+            if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
+                return self.revisit_empty(job, member)
+            verdict = self.judge(job, earlier, roof)
+            if verdict.change is Change.UNCHANGED and member.is_same_outline:
+                kept = keep_texts(earlier, member.record, self.texts)
+                if kept is not None:
+                    return kept
+            earlier = with_model(earlier, roof, self.plan.settings.compose)
+            return self.follow_verdict(job, member, earlier, verdict)
         except MemoryError:
             raise
         except Exception as error:
@@ -144,13 +184,13 @@ class Updater:
             LOGGER.info("building %s failed:\n%s", job.id, report.trace)
             return record_failure(self.plan, job, report.detail)[0]
 
-    def judge(self, job: Job, earlier: Building) -> ChangeVerdict:
+    def judge(self, job: Job, earlier: Building, roof: Roof) -> ChangeVerdict:
         """Return the verdict on an earlier building by the points of both surveys."""
         old, new = self.epochs.select(job)
-        frame, shift = earlier.roof.frame, self.surveys.shift
+        frame, shift = roof.frame, self.surveys.shift
         unexplained = earlier.quality.unexplained_area_m2
         return judge_building(
-            earlier.roof,
+            roof,
             None if old is None else frame.to_local(old),
             frame.to_local(new),
             earlier.z_ground - frame.origin[2],
@@ -244,11 +284,12 @@ class Updater:
         cells = np.unique(np.floor(bare[:, :2]), axis=0)
         return len(cells) >= BARE_SHARE * job.area.area
 
-    def revisit_empty(self, job: Job, member: UpdateMember, earlier: Building) -> Building:
-        """Return what the new points make of a building that had no model."""
+    def revisit_empty(self, job: Job, member: UpdateMember) -> Building:
+        """Return what the new points make of a building that no earlier points showed."""
         new = self.reconstruct(job, member)
-        if new.built is None:
-            return earlier
+        if new.built is None or new.status is Status.FROM_ATTRIBUTES:
+            return build(member.record or {}, self.plan.settings.compose)
+        earlier = read_building(member.record or {})[0]
         is_bare = earlier.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in earlier.detail
         return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare))
 

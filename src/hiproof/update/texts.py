@@ -1,0 +1,79 @@
+"""Texts of unchanged buildings, taken from the earlier run as they are.
+
+A run keeps the texts of its buildings by work tile. They still hold where the line of a building in
+parameters.jsonl does, and where the files of both runs have the same head. So what is unchanged is
+neither composed nor written anew.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..city.merge import tile_parts
+from ..city.plan import PLAN_FILE, WorkPlan
+from ..city.resume import STATE_FOLDER
+from ..errors import OutputError
+from ..evaluate.run import run_record
+from ..model import Building
+from ..write.fragments import Fragments, load_fragments
+from ..write.json_text import dump
+from ..write.parameters import head_record
+from .earlier import RUN_PARAMETERS
+
+LINES = "parameters"  # the module whose texts are the lines of parameters.jsonl
+
+
+@dataclass(frozen=True)
+class KeptBuilding(Building):
+    """An unchanged building that is not composed: its `texts` are there.
+
+    `main_type` is the type that its record names.
+    """
+
+    texts: Fragments = field(default_factory=dict)
+    main_type: str | None = None
+
+    @property
+    def type(self) -> str | None:
+        """Roof type of the part that shows the largest area."""
+        return self.main_type
+
+
+def find_texts(run: Path, plan: WorkPlan) -> str:
+    """Return the state folder of `run`, "" where its texts are not those of this plan.
+
+    They have to be made by this version, with the same head and the same names.
+    """
+    state = Path(run) / STATE_FOLDER
+    try:
+        with (state / PLAN_FILE).open("rb") as plans, (run / RUN_PARAMETERS).open("rb") as lines:
+            names, head = json.loads(plans.readline())["names"], lines.readline()
+    except (OSError, ValueError, KeyError):
+        return ""
+    is_same = head == dump(head_record(plan.head)) + b"\n" and not names and not plan.names
+    return str(state.absolute()) if is_same and run_record(run)["hiproof"] == __version__ else ""
+
+
+def load_texts(state: str, tile: str) -> dict[bytes, Fragments]:
+    """Return the texts of a tile's buildings by their line, none where they are lost."""
+    if not state or not tile_parts(Path(state), tile).is_file():
+        return {}
+    try:
+        return {part[LINES].text: part for part in load_fragments(tile_parts(Path(state), tile))}
+    except OutputError:
+        return {}
+
+
+def keep_texts(
+    building: Building, record: dict[str, Any], texts: dict[bytes, Fragments]
+) -> KeptBuilding | None:
+    """Return the building of a record with its texts, None where `texts` lack them."""
+    found = texts.get(dump(record) + b"\n")
+    if found is None:
+        return None
+    values = {item.name: getattr(building, item.name) for item in fields(building)}
+    return KeptBuilding(**values, texts=found, main_type=record["type"])
