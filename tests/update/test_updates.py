@@ -5,6 +5,7 @@ import datetime
 import json
 import shutil
 
+import lxml.etree
 import numpy as np
 import pyogrio
 import pytest
@@ -117,6 +118,51 @@ def test_tables_and_attributes_say_what_changed(update):
     record = json.loads((out / "run.json").read_text())["update"]
     assert record["by_change"] == {"unchanged": 2, "changed": 1, "gone": 1}
     assert record["compared_with"] == "points"
+
+
+def read_gml(folder, path):
+    spaces = {"core": "http://www.opengis.net/citygml/2.0"}
+    root = lxml.etree.parse(str(folder / "buildings.gml")).getroot()
+    return root.xpath(path, namespaces=spaces)
+
+
+def test_dates_of_surveys_stand_in_all_files(update):
+    _, out, _ = update
+    assert by_id(out)["house-1"]["change"]["valid_from"] == DATE
+    assert by_id(out)["house-2"]["change"]["valid_to"] == DATE
+    assert read_gml(out, "//core:creationDate/text()") == [DATE]
+    assert read_gml(out, "//core:terminationDate/text()") == [DATE]
+    meta, _, _, columns = pyogrio.raw.read(out / "buildings.gpkg", layer="buildings")
+    values = dict(zip(meta["fields"], columns, strict=True))
+    assert values["hiproof_valid_from"].tolist() == [None, DATE, None, None]
+    assert values["hiproof_valid_to"].tolist() == [None, None, DATE, None]
+    layers = dict(pyogrio.list_layers(out / "buildings.gpkg"))
+    assert "history" not in layers
+
+
+def test_dates_and_models_that_ended_live_on(run, update, cloud, tmp_path):
+    """A house is raised, and lowered again: its first two models are history."""
+    first = update_area(make_request(run, cloud, tmp_path / "first", history=True))
+    town = make_town(seed=9)
+    same = str(write_cloud(tmp_path / "same.laz", town.xyz, town.classification))
+    request = make_request(tmp_path / "first", same, tmp_path / "second", history=True)
+    update_area(dataclasses.replace(request, date="2027-05-01"))
+    assert first.by_change == update[0].by_change
+    out = tmp_path / "second"
+    meta, _, _, columns = pyogrio.raw.read(out / "buildings.gpkg", layer="history")
+    rows = dict(zip(meta["fields"], columns, strict=True))
+    assert rows["id"].tolist() == ["house-1", "house-1", "house-2"]
+    assert rows["valid_from"].tolist() == [None, DATE, None]
+    assert rows["valid_to"].tolist() == [DATE, "2027-05-01", DATE]
+    assert np.diff(rows["z_top"])[0] == pytest.approx(RAISED_M, abs=0.05)
+    dates = by_id(out)["house-2"]["change"]
+    assert (dates["class"], dates["valid_from"]) == ("new", "2027-05-01")
+    build_file(out / "parameters.jsonl", tmp_path / "built")
+    assert records(tmp_path / "built") == records(out)
+    built = tmp_path / "built" / "buildings.gpkg"
+    assert built.read_bytes() == (out / "buildings.gpkg").read_bytes()
+    ended = by_id(out)["house-1"]["change"]["history"][0]
+    assert ended["parts"] == by_id(run)["house-1"]["parts"]
 
 
 def test_build_makes_the_same_files_from_the_parameters(update, tmp_path):

@@ -66,6 +66,9 @@ CHANGED = {
     "places": [PLACE],
     "lineage": [],
     "predecessors": [],
+    "valid_from": "2024-05-01",
+    "valid_to": None,
+    "history": [],
 }
 BELOW = {"walls"}  # keys of buildings that do not stand on one level
 OF_A_CHANGE = {"change", "change_kind", "change_m", "change_sigma_m", "valid_from", "valid_to"}

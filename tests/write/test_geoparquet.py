@@ -10,8 +10,8 @@ import shapely
 from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.errors import InputError
 from hiproof.write.head import FileHead
-from hiproof.write.tables.geopackage import TABLE_GEOMETRIES, write_attributes
-from hiproof.write.tables.geoparquet import GeoParquetWriter
+from hiproof.write.tables.geopackage import write_attributes
+from hiproof.write.tables.geoparquet import GEOMETRY_TYPES, GeoParquetWriter
 
 
 def street():
@@ -21,7 +21,7 @@ def street():
     yield make_lost_building()
 
 
-@pytest.mark.parametrize("layer", TABLE_GEOMETRIES)
+@pytest.mark.parametrize("layer", GEOMETRY_TYPES)
 def test_the_same_rows_as_the_geopackage(tmp_path, layer):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
     write_attributes(tmp_path / "b.gpkg", street(), "EPSG:7415")

@@ -34,6 +34,10 @@ def update(
         float,
         typer.Option(help="probability with which an unchanged building may be called changed"),
     ] = 0.001,
+    history: Annotated[
+        bool,
+        typer.Option("--history", help="keep models that ended, in GeoPackage and PostGIS"),
+    ] = False,
     footprints: Annotated[
         str | None,
         typer.Option(
@@ -92,6 +96,7 @@ def update(
             run_parameters=str(find_parameters(run)),
             significance=significance,
             date=date,
+            history=history,
         )
         summary = update_area(request, changes, progress)
     if console_level() is not Level.error:

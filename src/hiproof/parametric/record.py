@@ -30,7 +30,7 @@ from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
 from ..read.damage import excerpt
 from ..status import Change, Grade, Status
-from ..write.attribute_list import CHANGE, CHANGE_PLACE, PARAMETERS, PART
+from ..write.attribute_list import CHANGE, CHANGE_PLACE, ENDED_MODEL, PARAMETERS, PART
 
 WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
@@ -292,7 +292,26 @@ def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
         for k, place in enumerate(list_at(change, "places"))
     ]
     lists = {name: list_at(change, name) for name in ("lineage", "predecessors")}
-    return {name: {"places": places, **lists}.get(name, change.get(name)) for name in CHANGE_KEYS}
+    for name in ("valid_from", "valid_to"):
+        text_at(change, name)
+    if history := [read_ended(model, k) for k, model in enumerate(list_at(change, "history"))]:
+        lists["history"] = history
+    values = {**change, "places": places, **lists}
+    return {name: values.get(name) for name in CHANGE_KEYS if name != "history" or history}
+
+
+def read_ended(record: Any, number: int) -> dict[str, Any]:
+    """Read a model that ended."""
+    where = f"model {number} of the history"
+    model = dict(require_mapping(record, where))
+    refuse_other_keys(model, [attribute.name for attribute in ENDED_MODEL], where)
+    for name in ("id", "valid_from", "valid_to", "type"):
+        text_at(model, name)
+    for name in ("z_ground", "z_top"):
+        measure(model.get(name), f"{name} of {where}")
+    polygon(model.get("outline"), f"the outline of {where}")
+    list_at(model, "parts")
+    return model
 
 
 def read_change_place(record: Any, where: str) -> dict[str, Any]:

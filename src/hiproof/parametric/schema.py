@@ -12,7 +12,15 @@ from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
 from ..status import Change, ChangeKind, Grade, Status
-from ..write.attribute_list import CHANGE, CHANGE_PLACE, HEAD, PARAMETERS, PART, Attribute
+from ..write.attribute_list import (
+    CHANGE,
+    CHANGE_PLACE,
+    ENDED_MODEL,
+    HEAD,
+    PARAMETERS,
+    PART,
+    Attribute,
+)
 from ..write.parameters import VERSION
 
 NUMBER_SCHEMA, TEXT_SCHEMA = {"type": "number"}, {"type": "string"}
@@ -64,6 +72,20 @@ CHANGE_KINDS = {
     "places": {"type": "array", "items": {"$ref": "#/$defs/change_place"}},
     "lineage": {"type": "array", "items": {"type": ["integer", "null"]}},
     "predecessors": {"type": "array", "items": TEXT_SCHEMA},
+    "valid_from": TEXT_OR_NULL,
+    "valid_to": TEXT_OR_NULL,
+    "history": {"type": "array", "items": {"$ref": "#/$defs/ended_model"}},
+}
+ENDED_KINDS = {
+    "id": TEXT_SCHEMA,
+    "valid_from": TEXT_OR_NULL,
+    "valid_to": TEXT_SCHEMA,
+    "type": TEXT_OR_NULL,
+    "z_ground": NUMBER_SCHEMA,
+    "z_top": NUMBER_SCHEMA,
+    "outline": POLYGON_SCHEMA,
+    "origin": PLACE,
+    "parts": {"type": "array", "items": {"$ref": "#/$defs/part"}},
 }
 PLACE_KINDS = {
     "kind": {"enum": [kind.code for kind in ChangeKind]},
@@ -98,6 +120,7 @@ def schema() -> dict[str, Any]:
         )
         | {"allOf": parameters_by_type()},
         "change": describe_attributes(CHANGE, CHANGE_KINDS, required=("class",)),
+        "ended_model": describe_attributes(ENDED_MODEL, ENDED_KINDS, required=("id", "valid_to")),
         "change_place": describe_attributes(CHANGE_PLACE, PLACE_KINDS, required=("kind",)),
     }
     return {

@@ -54,7 +54,9 @@ def prepare_surveys(
     shift = register_surveys(draw_samples(state, plan, request.terrain))
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
     texts = find_texts(request.run, plan)
-    surveys = Surveys(shift, date, request.significance, bool(earlier.clouds), texts)
+    surveys = Surveys(
+        shift, date, request.significance, bool(earlier.clouds), texts, request.history
+    )
     surveys.save(state / SURVEYS_FILE)
     (state / EARLIER_FOLDER / SORTED_MARK).touch()
 

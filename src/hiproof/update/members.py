@@ -32,7 +32,8 @@ class UpdateMember:
     The outline lies on its roof. `record` is the earlier building's object of parameters.jsonl,
     None for a new building. `is_same_outline` says whether its outline stands, `predecessors` are
     ids of buildings that were split or merged, and `shift` (m) is how far the footprint was moved
-    onto the outline.
+    onto the outline. `ended` are the objects of the predecessors, of which the first successor
+    alone keeps them.
     """
 
     id: str
@@ -42,6 +43,7 @@ class UpdateMember:
     is_same_outline: bool = True
     predecessors: tuple[str, ...] = ()
     shift: tuple[float, float] = (0.0, 0.0)
+    ended: tuple[dict[str, Any], ...] = ()
 
     @staticmethod
     def read(values: dict[str, Any], job: Job) -> UpdateMember:
@@ -55,6 +57,7 @@ class UpdateMember:
             values["is_same_outline"],
             tuple(values["predecessors"]),
             tuple(values["shift"]),
+            tuple(values["ended"]),
         )
 
     def make_job(self, index: int) -> Job:
@@ -82,10 +85,13 @@ def make_members(
     names = {member.id for member in others} | {
         kept[s.earlier].id for s in successors if s.earlier >= 0
     }
-    result = []
+    result: list[UpdateMember] = []
     for footprint, outline, successor in zip(footprints, drawn, successors, strict=True):
-        result.append(replace_member(footprint, outline, successor, kept, shift, names))
-        names.add(result[-1].id)
+        member = replace_member(footprint, outline, successor, kept, shift, names)
+        known = {id for earlier in result for id in earlier.predecessors}
+        ended = [kept[i].record for i in successor.predecessors if kept[i].id not in known]
+        result.append(dataclasses.replace(member, ended=tuple(filter(None, ended))))
+        names.add(member.id)
     return (*result, *others)
 
 
@@ -135,7 +141,7 @@ def replace_member(
 
 def save_members(state: Path, members: tuple[UpdateMember, ...]) -> None:
     """Keep the members for the workers; their outlines stand in the plan."""
-    names = ("record", "is_same_outline", "predecessors", "shift")
+    names = ("record", "is_same_outline", "predecessors", "shift", "ended")
     lines = [dump({name: getattr(member, name) for name in names}) for member in members]
     with atomic(state / EARLIER_FILE) as temporary:
         Path(temporary).write_bytes(b"".join(line + b"\n" for line in lines))

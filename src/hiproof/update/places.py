@@ -14,6 +14,7 @@ import shapely
 
 from ..frames import LocalFrame
 from ..model import Building, Roof
+from ..parametric.building import build
 from ..status import ChangeKind, Status
 from ..write.parameters import outline_record
 from .judge import ChangeVerdict
@@ -66,6 +67,33 @@ def end_building(earlier: Building) -> Building:
         footprint=outline,
         attributes=earlier.attributes,
     )
+
+
+def end_model(record: dict[str, Any], survey: str) -> list[dict[str, Any]]:
+    """Return the history of an earlier object, and its own model at the end.
+
+    `survey` is the date of the survey that no longer shows it. An object without a model adds
+    nothing.
+    """
+    change = record.get("change") or {}
+    history = list(change.get("history", []))
+    if not record.get("parts"):
+        return history
+    earlier = build(record)
+    outline = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
+    rounded = shapely.transform(outline, lambda xy: np.round(xy, PLACE_DIGITS))
+    ended = {
+        "id": earlier.id,
+        "valid_from": change.get("valid_from"),
+        "valid_to": survey,
+        "type": earlier.type,
+        "z_ground": earlier.z_ground,
+        "z_top": round_length(earlier.solid.vertices[:, 2].max()),
+        "outline": outline_record(rounded),
+        "origin": record["origin"],
+        "parts": record["parts"],
+    }
+    return [*history, ended]
 
 
 def demolish(earlier: Building) -> Difference:

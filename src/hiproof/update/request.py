@@ -17,7 +17,7 @@ class UpdateRequest(Request):
 
     `footprints` replace the outlines of the run, None to keep them. `run_parameters` is the run's
     parameters.jsonl, whose state decides whether an interrupted update may resume. `date` is that
-    of the survey, "" to read it from the clouds.
+    of the survey, "" to read it from the clouds. `history` keeps models that ended.
     """
 
     footprints: str | None = field(default=None, metadata=FILES_FIELD)
@@ -25,3 +25,4 @@ class UpdateRequest(Request):
     run_parameters: str = field(default="", metadata=FILES_FIELD)
     significance: float = SIGNIFICANCE
     date: str = ""
+    history: bool = False

@@ -41,6 +41,7 @@ from .members import UpdateMember, load_members
 from .places import (
     demolish,
     end_building,
+    end_model,
     explains,
     move_to_frame,
     place_new,
@@ -51,6 +52,7 @@ from .register import SurveyShift
 from .texts import KeptBuilding, keep_texts, load_texts
 
 SURVEYS_FILE = "surveys.json"
+BEGINNING = (Change.CHANGED, Change.NEW)  # the roof as it is begins with the survey
 BARE_SHARE = 0.5
 """Share of an outline that has to lie bare before, for a building to be built since."""
 
@@ -59,7 +61,8 @@ BARE_SHARE = 0.5
 class Surveys:
     """The shift of the two surveys, the new one's date and the significance.
 
-    `texts` is the state folder of the earlier run, "" where its texts cannot be kept.
+    `texts` is the state folder of the earlier run, "" where its texts cannot be kept. `history`
+    says whether models that ended are kept.
     """
 
     shift: SurveyShift
@@ -67,6 +70,7 @@ class Surveys:
     significance: float
     has_earlier: bool
     texts: str = ""
+    history: bool = False
 
     def save(self, path: Path) -> None:
         """Write the surveys for the workers."""
@@ -212,22 +216,25 @@ class Updater:
         frame = earlier.roof.frame
         if verdict.change is Change.GONE:
             places = record_places([demolish(earlier)], frame)
-            return self.mark(end_building(earlier), verdict, places)
+            return self.mark(end_building(earlier), verdict, places, member)
         if verdict.change is Change.NOT_COVERED:
-            return self.mark(earlier, verdict, [])
+            return self.mark(earlier, verdict, [], member)
         if not member.is_same_outline:
             return self.redraw(job, member, earlier, verdict)
         if verdict.change is Change.UNCHANGED:
             return earlier
         if verdict.change is Change.UNCERTAIN:
-            return self.mark(earlier, verdict, record_places(name_doubts(verdict), frame))
+            places = record_places(name_doubts(verdict), frame)
+            return self.mark(earlier, verdict, places, member)
         new = self.reconstruct(job, member)
         roof = None if new.built is None else move_to_frame(new.roof, earlier.roof)
         if roof is not None and not explains(roof, earlier.roof, verdict):
             roof = None
         places = self.name_places(earlier, roof, verdict)
-        result, lineage = continue_parts(earlier, earlier if roof is None else new)
-        return self.mark(result, verdict, places, lineage)
+        if roof is None:
+            return self.mark(earlier, verdict, places, member)
+        result, lineage = continue_parts(earlier, new)
+        return self.mark(result, verdict, places, member, lineage)
 
     def name_places(
         self, earlier: Building, roof: Roof | None, verdict: ChangeVerdict
@@ -244,7 +251,8 @@ class Updater:
         """Return a building over another outline than before."""
         new = self.reconstruct(job, member)
         if new.built is None:
-            return self.mark(earlier, dataclasses.replace(verdict, change=Change.UNCERTAIN), [])
+            verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
+            return self.mark(earlier, verdict, [], member)
         roof = move_to_frame(new.roof, earlier.roof)
         is_changed = verdict.change is Change.CHANGED
         places = self.name_places(earlier, roof, verdict) if is_changed else []
@@ -256,7 +264,7 @@ class Updater:
         result, lineage = continue_parts(earlier, new)
         places += record_places([outline])
         return self.mark(
-            result, dataclasses.replace(verdict, change=Change.CHANGED), places, lineage
+            result, dataclasses.replace(verdict, change=Change.CHANGED), places, member, lineage
         )
 
     def replace_earlier(self, job: Job, member: UpdateMember) -> Building:
@@ -266,13 +274,11 @@ class Updater:
             return new
         if not member.predecessors:
             is_bare = self.was_bare(job)
-            return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare))
+            return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare), member)
         one = len(member.predecessors) == 1
         kind = ChangeKind.SPLIT if one else ChangeKind.MERGED
         place = Difference(kind, math.nan, math.nan, job.area.area, job.area, (-1, 0))
-        marked = self.mark(new, ChangeVerdict(Change.CHANGED), record_places([place]))
-        change = {**(marked.change or {}), "predecessors": list(member.predecessors)}
-        return dataclasses.replace(marked, change=change)
+        return self.mark(new, ChangeVerdict(Change.CHANGED), record_places([place]), member)
 
     def was_bare(self, job: Job) -> bool:
         """Return whether the earlier survey shows bare ground over most of an outline."""
@@ -291,22 +297,40 @@ class Updater:
             return build(member.record or {}, self.plan.settings.compose)
         earlier = read_building(member.record or {})[0]
         is_bare = earlier.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in earlier.detail
-        return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare))
+        places = place_new(new, is_bare)
+        return self.mark(new, ChangeVerdict(Change.NEW, 0.0), places, member, [])
 
     def mark(
         self,
         building: Building,
         verdict: ChangeVerdict,
         places: list[dict[str, Any]],
+        member: UpdateMember,
         lineage: list[int | None] | None = None,
     ) -> Building:
-        """Return the building with the record of its change."""
+        """Return the building with the record of its change.
+
+        A roof begins and a building ends on the day of the survey. A `lineage` comes with a model
+        that takes the place of the earlier one.
+        """
+        before = (member.record or {}).get("change") or {}
+        survey, change = self.surveys.date, verdict.change
         record = {
-            "class": verdict.change.code,
-            "survey": self.surveys.date,
+            "class": change.code,
+            "survey": survey,
             "chance": float(f"{verdict.chance:.3g}"),
             "places": places,
             "lineage": lineage or [],
-            "predecessors": [],
+            "predecessors": list(member.predecessors),
+            "valid_from": survey if change in BEGINNING else before.get("valid_from"),
+            "valid_to": survey if change is Change.GONE else None,
         }
+        ended = list(member.ended)
+        if member.record and (change is Change.GONE or lineage is not None):
+            ended.append(member.record)
+        history = before.get("history", [])
+        if self.surveys.history and ended:
+            history = [model for other in ended for model in end_model(other, survey)]
+        if history:
+            record["history"] = history
         return dataclasses.replace(building, change=record)

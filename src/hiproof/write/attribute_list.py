@@ -427,6 +427,21 @@ CHANGE = (
     Attribute(
         "predecessors", "list", "", "ids of the earlier buildings, where footprints were replaced"
     ),
+    Attribute("valid_from", "text", "", "date of the survey that first shows the roof as it is"),
+    Attribute("valid_to", "text", "", "date of the survey that no longer shows the building"),
+    Attribute("history", "list", "", "only with `--history`: earlier models that ended, as below"),
+)
+
+ENDED_MODEL = (
+    Attribute("id", "text", "", "id of the building that ended, or had that model"),
+    Attribute("valid_from", "text", "", "date of the survey that first shows it, null if unknown"),
+    Attribute("valid_to", "text", "", "date of the survey that no longer shows it"),
+    Attribute("type", "text", "", "roof type of its largest part"),
+    Attribute("z_ground", "number", "m", "height of its ground in the world"),
+    Attribute("z_top", "number", "m", "height of its highest point in the world"),
+    Attribute("outline", "list", "m", "its outline in the world"),
+    Attribute("origin", "list", "m", "origin of its parts"),
+    Attribute("parts", "list", "", "its parts"),
 )
 
 CHANGE_PLACE = (
@@ -559,6 +574,12 @@ SURFACES_LAYER = (
     Attribute("area_m2", "number", "m2", "true area of the surface"),
 )
 
+HISTORY_LAYER = (
+    *ENDED_MODEL[:6],
+    Attribute("successor", "text", "", "id of the building that takes its place in the run"),
+    Attribute("parts", "count", "", "number of its parts"),
+)
+
 HEAD = (
     Attribute("hiproof_parameters", "count", "", "version of the file"),
     Attribute("crs", "text", "", "CRS of the files built, as EPSG code or WKT"),
@@ -663,6 +684,17 @@ TABLES = (
         "Parameters: a place that changed",
         "`places` of a change in `parameters.jsonl`",
         CHANGE_PLACE,
+    ),
+    AttributeTable(
+        "Parameters: a model that ended",
+        "`history` of a change in `parameters.jsonl`",
+        ENDED_MODEL,
+    ),
+    AttributeTable(
+        "Models that ended",
+        "the layer `history` of `buildings.gpkg`, PostGIS: PREFIX_history; only after `hiproof "
+        "update --history`",
+        HISTORY_LAYER,
     ),
     AttributeTable(
         "Parts",

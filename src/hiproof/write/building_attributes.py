@@ -13,7 +13,7 @@ import numpy as np
 
 from ..frames import METRES, Units
 from ..model import Building, Solid
-from ..status import Change, Status
+from ..status import Status
 from .attribute_list import OWN, PREFIX
 from .osm_tags import osm_tags
 from .reprojected import Reprojected
@@ -155,14 +155,13 @@ def ground_attributes(building: Building) -> dict[str, Any]:
 def change_attributes(change: Mapping[str, Any]) -> dict[str, Any]:
     """Return the attributes of a building's last change, without prefix."""
     place: Mapping[str, Any] = next(iter(change["places"]), {})
-    begins = change["class"] in (Change.CHANGED.code, Change.NEW.code)
     return {
         "change": change["class"],
         "change_kind": place.get("kind"),
         "change_m": place.get("difference"),
         "change_sigma_m": place.get("sigma"),
-        "valid_from": change["survey"] if begins else None,
-        "valid_to": change["survey"] if change["class"] == Change.GONE.code else None,
+        "valid_from": change.get("valid_from"),
+        "valid_to": change.get("valid_to"),
     }
 
 

@@ -42,7 +42,7 @@ STATUS_COLOURS = {
     "modelled": "#05429b",
     "simplified": "#dfba20",
     "flat_fallback": "#b84f0c",
-    "from_attributes": "#8c6bb1",
+    "from_attributes": "#66aaee",
     "internal_error": "#1d1d1d",
     NO_MODEL: UNKNOWN_COLOUR,
 }

@@ -164,10 +164,9 @@ def building_element(sheet: Sheet) -> str:
     """
     building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
-    if sheet.head.creation_date is not None:
-        text.append(
-            f"<core:creationDate>{sheet.head.creation_date.isoformat()}</core:creationDate>"
-        )
+    text += [
+        f"<core:{date}>{value}</core:{date}>" for date, value in find_dates(sheet).items() if value
+    ]
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
         types = list_visible_types(building)
@@ -187,6 +186,16 @@ def building_element(sheet: Sheet) -> str:
         text += boundary_surfaces(solid, figures, ids, rings, sheet.surfaces)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, "</bldg:Building>"])
+
+
+def find_dates(sheet: Sheet) -> dict[str, str | None]:
+    """Return the dates of a building's life by their name in CityGML.
+
+    They are those of the surveys that show its beginning and its end.
+    """
+    change, created = sheet.building.change or {}, sheet.head.creation_date
+    begins = change.get("valid_from") if created is None else created.isoformat()
+    return {"creationDate": begins, "terminationDate": change.get("valid_to")}
 
 
 def part_element(sheet: Sheet, number: int, part: PartShape) -> str:

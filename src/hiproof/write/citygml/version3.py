@@ -18,6 +18,7 @@ from typing import Any
 from lxml import etree
 
 from ...model import Building
+from ..attribute_list import OWN
 from ..building_attributes import PREFIX
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
@@ -37,6 +38,9 @@ ORDER = (
     *(
         "name",
         "creationDate",
+        "terminationDate",
+        "validFrom",
+        "validTo",
         "genericAttribute",
         "boundary",
         "lod0MultiSurface",
@@ -61,6 +65,7 @@ GENERIC = {
     "doubleAttribute": "DoubleAttribute",
     "stringAttribute": "StringAttribute",
 }
+VALIDITY = {f"{OWN}valid_from": "validFrom", f"{OWN}valid_to": "validTo"}
 SET = "genericAttributeSet"
 LEVEL_0 = {"lod0FootPrint": "GroundSurface", "lod0RoofEdge": "RoofSurface"}
 WITH_ID = ("MultiSurface", "CompositeSurface", "Solid", "Polygon", "MultiCurve", "LineString")
@@ -120,12 +125,11 @@ def upgrade_building(old: Any) -> Any:
     """
     new = make_element(f"bldg:{local(old)}", **{ID: old.get(OLD_ID)})
     owner = new.get(ID)
-    new.extend(
-        sorted(
-            (upgrade_property(child, owner) for child in old),
-            key=lambda child: ORDER.index(local(child)),
-        )
-    )
+    properties = [upgrade_property(child, owner) for child in old]
+    properties += [
+        make_date(VALIDITY[n], child[0].text) for child in old if (n := find_name(child))
+    ]
+    new.extend(sorted(properties, key=lambda child: ORDER.index(local(child))))
     for number, geometry in enumerate(
         new.iter(*(qualify_name(f"gml:{kind}") for kind in WITH_ID)), 1
     ):
@@ -154,14 +158,25 @@ def upgrade_property(old: Any, owner: str) -> Any:
         return make_element("con:height", upgrade_height(old))
     if name == "consistsOfBuildingPart":
         return make_element("bldg:buildingPart", upgrade_building(old[0]))
-    if name == "creationDate":
-        return make_element("core:creationDate", text=f"{old.text}T00:00:00")
+    if name in ("creationDate", "terminationDate"):
+        return make_date(name, old.text)
     if name.startswith("lod"):
         renamed = name.replace("TerrainIntersection", "TerrainIntersectionCurve")
         return make_element(f"core:{renamed}", *map(upgrade_geometry, old))
     return make_element(
         f"{'gml' if name == 'name' else 'bldg'}:{name}", text=old.text, **old.attrib
     )
+
+
+def find_name(old: Any) -> str | None:
+    """Return the name of a generic attribute that is a date of validity, else None."""
+    name = old.get("name")
+    return name if name in VALIDITY else None
+
+
+def make_date(name: str, day: str) -> Any:
+    """Make a date of a feature's life; in CityGML 3.0 it has a time."""
+    return make_element(f"core:{name}", text=f"{day}T00:00:00")
 
 
 def upgrade_generic(old: Any) -> Any:

@@ -28,7 +28,7 @@ from ..writer import BuildingWriter
 from .geopackage_file import GeometryType, GeoPackage
 from .rows import split_lines, table_rows
 from .styles import STYLES, TABLE, Style, style_rows
-from .waiting import WaitingRows, column_names
+from .waiting import HISTORY, WaitingRows, column_names
 
 BUILDINGS = "buildings"
 OUTLINE_GEOMETRY, POLYGON_Z = GeometryType("MULTIPOLYGON"), GeometryType("POLYGON", has_z=True)
@@ -36,6 +36,7 @@ TABLE_GEOMETRIES = {
     BUILDINGS: OUTLINE_GEOMETRY,
     "parts": OUTLINE_GEOMETRY,
     "roof_surfaces": POLYGON_Z,
+    HISTORY: OUTLINE_GEOMETRY,
 }
 """Tables and the geometry of their rows."""
 
@@ -108,7 +109,7 @@ class AttributesWriter(BuildingWriter):
     def finish(self) -> None:
         try:
             with closing(GeoPackage(self.hidden, self.plan_wkt)) as file:
-                for waiting in self.waiting.values():
+                for waiting in (w for w in self.waiting.values() if w.is_needed):
                     write_layer(file, waiting, waiting.kinds(self.head.prefix, MOST_COLUMNS))
                 write_styles(file)
                 file.finish()

@@ -33,7 +33,7 @@ from ..meshes.triangles import faces_triangles
 from ..naming import FileUnits
 from ..values import plain_text
 from .rows import Rows, split_lines, table_rows
-from .waiting import WaitingRows, column_kind, column_names
+from .waiting import HISTORY, WaitingRows, column_kind, column_names
 
 # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the
 # extension
@@ -77,6 +77,7 @@ POSTGIS_TABLES = (
     PostgisTable("buildings", "buildings", "PolyhedralSurfaceZ", ("id",)),
     PostgisTable("parts", "parts", "MultiPolygon", ("building_id", "part")),
     PostgisTable("roof_surfaces", "roofs", "PolygonZ", ("building_id", "number")),
+    PostgisTable(HISTORY, HISTORY, "MultiPolygon", ("id", "valid_to")),
 )
 
 
@@ -180,7 +181,8 @@ class Loading:
         if self.run.replace:
             self.drop_tables()
         for table, rows in zip(POSTGIS_TABLES, waiting, strict=True):
-            self.fill_table(table, rows)
+            if rows.is_needed or self.table_exists(table.ending):
+                self.fill_table(table, rows)
         self.note_run()
         return count
 

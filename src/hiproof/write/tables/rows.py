@@ -17,7 +17,7 @@ from ...errors import OutputError
 from ...frames import METRES, Units
 from ...model import ROOF, Building, Face, Part
 from ...primitives.cants import CANTED, MEASURES, list_cants
-from ..attribute_list import SHAPE
+from ..attribute_list import HISTORY_LAYER, SHAPE
 from ..roof_figures import RoofFigures
 from ..values import metres, plain_text, round_value
 
@@ -31,6 +31,7 @@ class Rows(NamedTuple):
     buildings: tuple[Row, ...]
     parts: tuple[Row, ...] = ()
     roof_surfaces: tuple[Row, ...] = ()
+    history: tuple[Row, ...] = ()
 
     def to_text(self) -> bytes:
         """Return the rows as JSON, a line a table.
@@ -46,8 +47,8 @@ def split_lines(text: bytes) -> dict[str, bytes]:
 
     Raises OutputError for what another version did.
 
-    >>> split_lines(Rows(((None, {"id": "a"}),)).to_text())
-    {'buildings': b'[[null, {"id": "a"}]]', 'parts': b'[]', 'roof_surfaces': b'[]'}
+    >>> split_lines(Rows(((None, {"id": "a"}),)).to_text())["buildings"]
+    b'[[null, {"id": "a"}]]'
     """
     lines = text.split(b"\n")
     if len(lines) != len(Rows._fields):
@@ -75,6 +76,7 @@ def table_rows(
         (building_row(building, attributes, units),),
         parts,
         surface_rows(building, figures, units, surfaces),
+        history_rows(building, units),
     )
 
 
@@ -99,6 +101,17 @@ def find_outline(building: Building) -> shapely.Geometry | None:
         return building.footprint
     roof = building.roof
     return shapely.transform(roof.outline, roof.frame.to_world)
+
+
+def history_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
+    """Return a row a model that ended, with its outline."""
+    rows = []
+    for model in (building.change or {}).get("history", ()):
+        shell, *holes = model["outline"]
+        values = {a.name: model.get(a.name) for a in HISTORY_LAYER}
+        values |= {"successor": plain_text(building.id), "parts": len(model["parts"])}
+        rows.append((encode_geometry(shapely.Polygon(shell, holes), units), values))
+    return tuple(rows)
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:

@@ -10,10 +10,19 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import Any, BinaryIO
 
-from ..attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, ROOFER, SURFACES_LAYER
+from ..attribute_list import (
+    HIPROOF,
+    HISTORY_LAYER,
+    OSM,
+    OWN,
+    PARTS_LAYER,
+    ROOFER,
+    SURFACES_LAYER,
+)
 from .rows import Row
 
-DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
+HISTORY = "history"  # a table that only runs have in which models ended
+DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER, HISTORY: HISTORY_LAYER}
 BATCH_ROWS = 1000  # rows handed on at once: the overhead is a call's, the memory a row's
 
 
@@ -24,15 +33,21 @@ class WaitingRows:
     """
 
     def __init__(self, layer: str, file: BinaryIO) -> None:
-        self.layer, self.file = layer, file
+        self.layer, self.file, self.count = layer, file, 0
         self.found: dict[str, set[type]] = {a.name: set() for a in DECLARED.get(layer, ())}
 
     def put(self, line: bytes) -> None:
         """Store a building's rows, as a line of `Rows.to_text`."""
         for _, values in json.loads(line):
+            self.count += 1
             for name, value in values.items():
                 self.found.setdefault(name, set()).add(classify_value(value))
         self.file.write(line + b"\n")
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether a run has this table."""
+        return self.layer != HISTORY or self.count > 0
 
     def kinds(self, prefix: str, limit: int | None = None) -> dict[str, type]:
         """Return the one type of every column.
