@@ -372,6 +372,12 @@ class EnrichSettings:
     sun_on_walls: bool = setting(
         False, "also add the sun on every outer wall, for --sun", option="--sun-on-walls"
     )
+    energy_ade: bool = setting(
+        False,
+        "also write thermal zones and their boundaries into CityGML 2.0, as the Energy ADE 1.0 has "
+        "them",
+        option="--energy-ade",
+    )
     albedo: float = setting(
         0.2, "share of light that the ground reflects, for --sun", "", 0.0, 1.0, option="--albedo"
     )

@@ -220,6 +220,7 @@ def test_other_answers_fit_no_building_again(demo):
     [
         (["--touch", "0.1"], "expected --enrich with options of `hiproof enrich`, got none"),
         (["--enrich", "--weather", "a.epw"], "expected --weather with --sun, got it alone"),
+        (["--enrich", "--energy-ade", "--citygml", "3.0"], "expected a run with CityGML 2.0"),
     ],
 )
 def test_options_that_lack_another_are_refused_before_the_run(options, reason, tmp_path):

@@ -8,8 +8,8 @@ from typer.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich.answer import answer
-from hiproof.enrich.areas import area_vectors
-from hiproof.enrich.cadastre import Cadastre, measure_faces
+from hiproof.enrich.areas import area_vectors, measure_faces
+from hiproof.enrich.cadastre import Cadastre
 from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
 from hiproof.enrich.panels import measure_panels
 from hiproof.enrich.place import locate

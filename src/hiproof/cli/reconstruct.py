@@ -136,7 +136,7 @@ def reconstruct(
 
         settings = read_settings()
         if enrich:
-            refuse_before(settings.enrich)
+            refuse_before(settings)
         return Request(
             clouds=tuple(map(str, expand_paths(tuple(clouds)))),
             out=out,
@@ -162,11 +162,13 @@ def reconstruct(
     raise typer.Exit(code)
 
 
-def refuse_before(settings: EnrichSettings) -> None:
+def refuse_before(settings: Settings) -> None:
     """Raise InputError before a run for what would end `hiproof enrich` after it."""
     from ..enrich.cadastre import refuse_unusable
+    from ..enrich.energy import refuse_other_citygml
 
-    refuse_unusable(settings)
+    refuse_unusable(settings.enrich)
+    refuse_other_citygml(settings)
 
 
 def find_settings_file(*inputs: str | None) -> Path | None:

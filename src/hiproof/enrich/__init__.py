@@ -18,6 +18,7 @@ shade       the roof edges around a building that may shade it
 panels      the area of a roof face that panels may cover, and what they yield
 place       where on Earth the buildings of a run stand
 cadastre    the sun on every roof and wall of a building
+energy      thermal zones and their boundaries in the Energy ADE
 answer      all answers about one building
 write       a building's answers as texts for the files of a run
 run         `hiproof enrich`: every building of a run, in parallel

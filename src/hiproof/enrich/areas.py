@@ -41,3 +41,10 @@ def area_vectors(solid: Solid) -> np.ndarray:
     """Return the vector areas (faces, 3) of a solid's faces."""
     triangles = make_triangles(solid, solid.vertices.mean(axis=0))
     return sum_by_face(triangles.vectors, triangles.face_of, len(solid.faces))
+
+
+def measure_faces(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the areas (n,) and unit normals (n, 3) of a solid's faces."""
+    vectors = area_vectors(solid)
+    size = np.linalg.norm(vectors, axis=1)
+    return size, vectors / np.maximum(size, 1e-12)[:, None]

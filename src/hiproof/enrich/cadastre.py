@@ -13,7 +13,7 @@ from ..model import ROOF, Solid
 from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.values import round_value
-from .areas import area_vectors
+from .areas import measure_faces
 from .far import TerrainHorizon, read_horizon
 from .horizon import SECTORS
 from .panels import estimate_yield, measure_panels
@@ -135,13 +135,6 @@ class Cadastre:
             )
             for face, xyz in places.items()
         }
-
-
-def measure_faces(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
-    """Return the areas (n,) and unit normals (n, 3) of a solid's faces."""
-    vectors = area_vectors(solid)
-    size = np.linalg.norm(vectors, axis=1)
-    return size, vectors / np.maximum(size, 1e-12)[:, None]
 
 
 def name_values(sun: Irradiation) -> dict[str, float]:

@@ -32,6 +32,7 @@ from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.head import FileHead
 from ..write.run_files import join_fragments
 from .cadastre import Cadastre, refuse_unfit, refuse_unusable
+from .energy import refuse_other_citygml
 from .records import Index, Records, index_records
 from .town import Town
 from .write import EnrichFailure, make_fragments, read_failure
@@ -84,6 +85,7 @@ def enrich_run(
         np.savez(file, **index._asdict())
     records = Records(parameters, index)
     refuse_unfit(records, settings)
+    refuse_other_citygml(Settings(write=records.head.write, enrich=settings))
     total = len(records)
     blocks = list_blocks(waiting, total)
     missing = [block for block in blocks if not block[0].is_file()]

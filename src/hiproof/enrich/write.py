@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from ..write.head import FileHead
 from ..write.values import plain_text
 from .answer import Answers, answer
 from .cadastre import Cadastre
+from .energy import write_energy
 from .town import Town
 
 NOT_MADE = ("parameters",)
@@ -68,6 +70,8 @@ def make_fragments(
         head,
         result.surfaces,
     )
+    if settings.energy_ade:
+        sheet = dataclasses.replace(sheet, extension=write_energy(sheet))
     texts = {kind: import_format(kind).fragment(sheet) for kind in list_kinds(head.write)}
     return {**texts, FAILURE: Fragment(json.dumps(failure).encode() if failure else b"")}
 

@@ -34,7 +34,7 @@ class Sheet:
 
     It has the `figures` of its solid (None without one), its `attributes`, its names in CityJSON
     and in GML, and what the files of its run have in common. `surfaces` are further attributes of
-    the solid's faces, by face.
+    the solid's faces, by face; `extension` is what ends the building in CityGML 2.0.
     """
 
     building: Building
@@ -44,6 +44,7 @@ class Sheet:
     gml_name: str
     head: FileHead
     surfaces: dict[int, dict[str, Any]] = field(default_factory=dict)
+    extension: str = ""
 
     @functools.cached_property
     def shapes(self) -> Shapes:

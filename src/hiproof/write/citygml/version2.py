@@ -185,7 +185,7 @@ def building_element(sheet: Sheet) -> str:
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
         text += boundary_surfaces(solid, figures, ids, rings, sheet.surfaces)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
-    return "".join([*text, "</bldg:Building>"])
+    return "".join([*text, sheet.extension, "</bldg:Building>"])
 
 
 def find_dates(sheet: Sheet) -> dict[str, str | None]:

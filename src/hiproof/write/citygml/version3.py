@@ -10,6 +10,7 @@ and roof edge are boundaries of level 0, and a solid has a shell. So everything 
 
 from __future__ import annotations
 
+import dataclasses
 import datetime
 import os
 from collections.abc import Iterable
@@ -98,8 +99,8 @@ writer = CityGML3Writer
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """Return a building's part of a run's file."""
-    return upgrade_member(version2.fragment(sheet))
+    """Return a building's part of a run's file, without an extension of CityGML 2.0."""
+    return upgrade_member(version2.fragment(dataclasses.replace(sheet, extension="")))
 
 
 def upgrade_member(member: Fragment) -> Fragment:
