@@ -12,6 +12,7 @@ from hiproof.write.colours import (
     RESIDUAL_STOPS,
     ROOF_COLOURS,
     STATUS_COLOURS,
+    SUN_STOPS,
     UNKNOWN_COLOUR,
     WALL_COLOUR,
     linear_rgb,
@@ -43,8 +44,9 @@ LEGENDS = {
     "quality": [*GRADE_COLOURS.values(), UNKNOWN_COLOUR],
     "status": list(STATUS_COLOURS.values()),
     "residuals": [colour for _, colour in RESIDUAL_STOPS],
+    "sun": [colour for _, colour in SUN_STOPS],
 }
-FAR = {"residuals": 20.0}  # in CIELAB, neighbours of a ramp may be nearer than others
+FAR = {"residuals": 20.0, "sun": 20.0}  # in CIELAB, neighbours of a ramp may be nearer than others
 FAR_ELSE = 25.0
 
 

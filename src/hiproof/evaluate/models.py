@@ -31,6 +31,7 @@ RUN_MODELS = FORMATS["cityjsonseq"].file
 PART_ATTRIBUTE, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
 """What hiproof tells of a roof surface: its part's number and type."""
 
+SUN_ATTRIBUTE = f"{OWN}sun_kwh_m2"  # of a surface that `hiproof enrich --sun` describes
 # Of a building, so that their numbers fit the columns and tables of all formats.
 MOST_PART_NUMBER = 2**31
 
@@ -41,7 +42,8 @@ class BuildingModel:
 
     It has `attributes`, its `solid` in world metres (None where the file has none), and the roof
     types of its parts by number (`Face.part`). `is_damaged` where the file's text of it cannot be
-    read.
+    read. `suns` are the irradiations (kWh/m2 in a year) of the solid's faces, NaN where unknown;
+    none in a file without the sun.
     """
 
     id: str
@@ -49,6 +51,7 @@ class BuildingModel:
     solid: Solid | None = None
     part_types: dict[int, str] = field(default_factory=dict)
     is_damaged: bool = False
+    suns: tuple[float, ...] = ()
 
     @property
     def roof_type(self) -> str:
@@ -153,8 +156,17 @@ def read_building(id: str, city_object: Any, feature: Feature) -> BuildingModel:
         Face(s.rings, s.kind, read_part_number(s) if s.kind == ROOF else -1) for s in surfaces
     )
     solid = compact(feature.vertices, faces) if faces else None
-    model = BuildingModel(id, attributes, join_shells(solid, family) if solid is not None else None)
+    joined = join_shells(solid, family) if solid is not None else None
+    suns = read_suns(surfaces) if joined is solid else ()
+    model = BuildingModel(id, attributes, joined, suns=suns)
     return replace(model, part_types={0: model.roof_type} | part_types)
+
+
+def read_suns(surfaces: list[ShellSurface]) -> tuple[float, ...]:
+    """Read the sun on the faces of a solid, NaN where a face has none."""
+    values = [surface.semantics.get(SUN_ATTRIBUTE) for surface in surfaces]
+    suns = tuple(float(v) if isinstance(v, (int, float)) else math.nan for v in values)
+    return suns if any(map(math.isfinite, suns)) else ()
 
 
 def plain_attributes(attributes: Any) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from ..status import Status
+from ..write.attribute_list import OWN
 from ..write.colours import GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, page_colours
 from ..write.meshes.page_mesh import pack_values, solid_mesh
 from .evaluation import TEXT_COLUMNS
@@ -75,6 +76,7 @@ def building_data(
         "quality": model.grade,
         "outcome": status.value if status else model.status,
         "residual": finite(residual),
+        "sun": finite(mean_sun(model)),
         "measured": {
             name: finite(value) for name, value in measured.items() if finite(value) is not None
         },
@@ -83,6 +85,15 @@ def building_data(
         },
         "rings": outline_rings(outline, origin),
     }
+
+
+def mean_sun(model: BuildingModel) -> float | None:
+    """Return the irradiation (kWh/m2) of a roof in a year, None where it is unknown."""
+    values = model.attributes
+    areas = [values.get(f"{OWN}{kind}_roof_area_m2") for kind in ("flat", "sloped")]
+    area = sum(value for value in areas if isinstance(value, (int, float)))
+    total = values.get(f"{OWN}roof_sun_kwh")
+    return total / area if isinstance(total, (int, float)) and area > 0 else None
 
 
 def finite(value: Any) -> Any:
@@ -117,7 +128,8 @@ def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[
 def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[str, str]:
     """Return triangles of roofs and walls, and roof edges.
 
-    They are corners (t, 3, 3), building (t,), `roof_places` (t,), and edges (e, 2, 3).
+    They are corners (t, 3, 3), building (t,), `roof_places` (t,), the sun (t,), and edges
+    (e, 2, 3).
     """
     solids = [
         (index, model.solid) for index, model in enumerate(run.models) if model.solid is not None
@@ -125,6 +137,10 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
     meshes = [solid_mesh(solid.move(-origin)) for _, solid in solids]
     owners = [
         np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)
+    ]
+    suns = [
+        np.array(run.models[index].suns or [np.nan] * len(solid.faces))[mesh.face]
+        for (index, solid), mesh in zip(solids, meshes, strict=True)
     ]
     roofs = [
         roof_places(run.models[index], mesh.part, types)
@@ -136,6 +152,10 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
         ),
         "owner": pack_values(np.concatenate([np.empty(0), *owners]), "<u4"),
         "roof": pack_values(np.concatenate([np.empty(0), *roofs]), "u1"),
+        # -1 where unknown; nothing in a run without the sun
+        "sun": pack_values(np.nan_to_num(np.concatenate([np.empty(0), *suns]), nan=-1.0), "<f4")
+        if any(model.suns for model in run.models)
+        else "",
         "edges": pack_values(
             np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"
         ),

@@ -56,6 +56,18 @@ RESIDUAL_STOPS = (
 """Colour from each distance in metres upwards, blue near and red far."""
 
 
+SUN_STOPS = (
+    (0.0, "#2c7bb6"),
+    (500.0, "#9bd0e8"),
+    (800.0, "#ffee80"),
+    (1100.0, "#f58a3c"),
+    (1500.0, "#a01428"),
+)
+"""Colour from each irradiation in a year (kWh/m2) upwards: north roofs and shade are blue, and the
+best roofs of northern and of southern Europe are orange and red.
+"""
+
+
 def list_legend(kind: str | None) -> str:
     """Return the entry of a legend that lists a roof type.
 
@@ -88,6 +100,7 @@ def page_colours() -> dict[str, Any]:
         "mark": MARK_COLOUR,
         "unknown": UNKNOWN_COLOUR,
         "residual": [list(stop) for stop in RESIDUAL_STOPS],
+        "sun": [list(stop) for stop in SUN_STOPS],
     }
 
 

@@ -3,7 +3,7 @@
 const data = JSON.parse(document.getElementById("data").textContent);
 const mesh = {
   corners: unpacked(data.mesh.corners, Float32Array), owner: unpacked(data.mesh.owner, Uint32Array),
-  roof: unpacked(data.mesh.roof, Uint8Array), edges: unpacked(data.mesh.edges, Float32Array),
+  roof: unpacked(data.mesh.roof, Uint8Array), sun: unpacked(data.mesh.sun, Float32Array), edges: unpacked(data.mesh.edges, Float32Array),
 };
 const places = unpacked(data.points.places, Float32Array), distances = unpacked(data.points.distances, Float32Array);
 let mode = "type", selected = -1;
@@ -12,7 +12,12 @@ function residualColour(value) {
   return value === null ? data.colours.unknown : colourByStops(data.colours.residual, value);
 }
 
+function sunColour(value) {
+  return value === null || value < 0 ? data.colours.unknown : colourByStops(data.colours.sun, value);
+}
+
 function colourOf(building) {
+  if (mode === "sun") return sunColour(building.sun);
   if (mode === "residual") return residualColour(building.residual);
   if (mode === "type") return typeColour(data.colours, building.type);
   return data.colours[mode][building[mode]] || data.colours.unknown;
@@ -24,8 +29,9 @@ function meshColours() {
   const buildings = data.buildings.map(building => rgb(colourOf(building)));
   const types = data.types.map(type => rgb(typeColour(data.colours, type)));
   const wall = rgb(data.colours.wall), mark = rgb(data.colours.mark);
-  const roof = t => mode === "type" ? types[mesh.roof[t] - 1] : buildings[mesh.owner[t]];
-  const colourAt = t => !mesh.roof[t] ? wall : mesh.owner[t] === selected ? mark : roof(t);
+  const roof = t => mode === "type" ? types[mesh.roof[t] - 1] : mode === "sun" ? rgb(sunColour(mesh.sun[t])) : buildings[mesh.owner[t]];
+  const isPlain = t => !mesh.roof[t] && !(mode === "sun" && mesh.sun[t] >= 0);
+  const colourAt = t => isPlain(t) ? wall : mesh.owner[t] === selected ? mark : roof(t);
   return shadedColours(light, colourAt);
 }
 
@@ -111,6 +117,7 @@ function entries() {
   if (mode === "residual") {
     return colours.residual.map(([from, colour]) => [`from ${from} m`, colour]);
   }
+  if (mode === "sun") return colours.sun.map(([from, colour]) => [`from ${from} kWh/m²`, colour]);
   const names = mode === "type" ? types.map(type => entryOf(colours, type))
     : buildings.map(building => building[mode]);
   return Object.entries(colours[mode]).filter(([name]) => names.includes(name));
@@ -137,6 +144,8 @@ function show(index) {
 }
 
 viewer.onpick = select;
+// Only a run of `hiproof enrich --sun` has the sun.
+if (mesh.sun.length) document.getElementById("mode").append(new Option("sun on roofs", "sun"));
 document.getElementById("mode").addEventListener("change", event => { mode = event.target.value; recolour(); });
 document.getElementById("show-points").addEventListener("change", event => { cloud.visible = event.target.checked; viewer.draw(); });
 document.getElementById("find").addEventListener("change", event => {

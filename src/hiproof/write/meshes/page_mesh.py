@@ -18,12 +18,13 @@ from .triangles import faces_triangles
 class PageMesh:
     """Triangles of a solid, their parts, and the roof's edges.
 
-    Corners are (t, 3, 3), the part (t,) is the one that each roofs (-1: a wall), and ends of edges
-    are (e, 2, 3).
+    Corners are (t, 3, 3), the part (t,) is the one that each roofs (-1: a wall), `face` (t,) the
+    number of its face, and ends of edges are (e, 2, 3).
     """
 
     corners: np.ndarray
     part: np.ndarray
+    face: np.ndarray
     edges: np.ndarray
 
 
@@ -33,14 +34,20 @@ def solid_mesh(solid: Solid) -> PageMesh:
     Faces on the ground are left out.
     """
     corners, part, edges = [np.empty((0, 3, 3))], [], [np.empty((0, 2, 3))]
-    faces = [face for face in solid.faces if face.kind in (ROOF, WALL)]
-    for face, triangles in zip(faces, faces_triangles(solid.vertices, faces), strict=True):
+    numbers = [k for k, face in enumerate(solid.faces) if face.kind in (ROOF, WALL)]
+    faces, face_of = [solid.faces[k] for k in numbers], []
+    for number, face, triangles in zip(
+        numbers, faces, faces_triangles(solid.vertices, faces), strict=True
+    ):
+        face_of += [number] * len(triangles)
         corners.append(solid.vertices[triangles])
         part += [max(face.part, 0) if face.kind == ROOF else -1] * len(triangles)
         if face.kind == ROOF:
             rings = (solid.vertices[list(ring)] for ring in face.rings)
             edges += [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
-    return PageMesh(np.concatenate(corners), np.array(part, int), np.concatenate(edges))
+    return PageMesh(
+        np.concatenate(corners), np.array(part, int), np.array(face_of, int), np.concatenate(edges)
+    )
 
 
 def pack_values(values: np.ndarray, kind: str) -> str:

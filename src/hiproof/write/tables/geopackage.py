@@ -27,7 +27,7 @@ from ..roof_figures import RoofFigures
 from ..writer import BuildingWriter
 from .geopackage_file import GeometryType, GeoPackage
 from .rows import split_lines, table_rows
-from .styles import STYLES, TABLE, Style, style_rows
+from .styles import TABLE, Style, choose_styles, style_rows
 from .waiting import HISTORY, WaitingRows, column_names
 
 BUILDINGS = "buildings"
@@ -109,9 +109,11 @@ class AttributesWriter(BuildingWriter):
     def finish(self) -> None:
         try:
             with closing(GeoPackage(self.hidden, self.plan_wkt)) as file:
+                columns = {}
                 for waiting in (w for w in self.waiting.values() if w.is_needed):
-                    write_layer(file, waiting, waiting.kinds(self.head.prefix, MOST_COLUMNS))
-                write_styles(file)
+                    columns[waiting.layer] = waiting.kinds(self.head.prefix, MOST_COLUMNS)
+                    write_layer(file, waiting, columns[waiting.layer])
+                write_styles(file, choose_styles(columns))
                 file.finish()
         except sqlite3.Error as error:
             raise OutputError(
@@ -135,7 +137,7 @@ def write_layer(file: GeoPackage, waiting: WaitingRows, kinds: dict[str, type]) 
         first += len(rows)
 
 
-def write_styles(file: GeoPackage, styles: Sequence[Style] = STYLES) -> None:
+def write_styles(file: GeoPackage, styles: Sequence[Style]) -> None:
     """Write the table by which QGIS draws the layers."""
     rows = style_rows(styles)
     kinds: dict[str, type] = {name: bool if name == "useAsDefault" else str for name in rows[0]}

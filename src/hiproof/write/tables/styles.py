@@ -5,12 +5,12 @@ They stand in the table `layer_styles`, whose defaults QGIS applies by itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ...primitives.catalogue import CATALOGUE
 from ..attribute_list import OWN
-from ..colours import GRADE_COLOURS, ROOF_COLOURS, UNKNOWN_COLOUR, list_legend
+from ..colours import GRADE_COLOURS, ROOF_COLOURS, SUN_STOPS, UNKNOWN_COLOUR, list_legend
 from ..xml_text import xml_attribute
 
 TABLE = "layer_styles"
@@ -63,6 +63,32 @@ STYLES = (
         is_default=False,
     ),
 )
+
+
+SUN_COLUMN = f"{OWN}sun_kwh_m2"
+
+
+def sun_style() -> Style:
+    """Return the style of roof surfaces by the sun, in colours of SUN_STOPS."""
+    names = {f"from {least:g} kWh/m2": least for least, _ in reversed(SUN_STOPS)}
+    cases = (f"WHEN \"{SUN_COLUMN}\" >= {least:g} THEN '{name}'" for name, least in names.items())
+    colours = dict(zip(names, (colour for _, colour in reversed(SUN_STOPS)), strict=True))
+    expression = f"CASE {' '.join(cases)} END"
+    return Style("roof_surfaces", "sun", expression, colours | {"unknown": UNKNOWN_COLOUR}, 1.0)
+
+
+def choose_styles(columns: Mapping[str, Collection[str]]) -> tuple[Style, ...]:
+    """Return the styles of tables by their columns.
+
+    Roof surfaces that have the sun are drawn by it.
+    """
+    sun = sun_style()
+    if SUN_COLUMN not in columns.get(sun.layer, ()):
+        return STYLES
+    others = (
+        style._replace(is_default=False) if style.layer == sun.layer else style for style in STYLES
+    )
+    return (*others, sun)
 
 
 def style_rows(styles: Sequence[Style] = STYLES) -> list[dict[str, Any]]:
