@@ -106,6 +106,8 @@ class ChangeKind(Enum):
     SPLIT = "its footprint is part of an earlier one"
     MERGED = "its footprint joins earlier ones"
     UNCLEAR = "points lie off the roof, on no clear surface"
+    EXTENDED = "a roof beside the building lies outside its outline"
+    UNMAPPED = "a roof that stood before lies outside all outlines"
     DEMOLISHED = "the building was demolished"
     BUILT = "the building was built"
 

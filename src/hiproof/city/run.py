@@ -118,6 +118,7 @@ class Steps:
 
     make_plan: Callable[[Any, Progress], WorkPlan] = make_plan
     solve_tile: Callable[..., Any] = solve_tile
+    sort_cloud: Callable[..., Any] = sort_cloud
     before: Callable[[WorkPlan, Any, Progress], None] = lambda *_: None
 
 
@@ -125,7 +126,7 @@ def reconstruct_in_folder(
     request: Request, state: Path, progress: Progress, steps: Steps | None = None
 ) -> Summary:
     """Run the steps of a run that has its folder `state` to itself."""
-    steps = steps or Steps(solve_tile=solve_tile)
+    steps = steps or Steps(solve_tile=solve_tile, sort_cloud=sort_cloud)
     clock = Clock()
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
@@ -141,7 +142,7 @@ def reconstruct_in_folder(
             executor.prepare(list_compiled_pieces(request))
         clock.lap("prepare")
         arguments = functools.partial(task_arguments, request, state)
-        work_off(ledger, executor, "sort", sort_cloud, arguments, progress)
+        work_off(ledger, executor, "sort", steps.sort_cloud, arguments, progress)
         forget_points()
         refuse_without_points(plan, ledger)
         clock.lap("sort")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -221,12 +221,15 @@ class Gatherer:
             written.unlink(missing_ok=True)
 
 
-def sort_cloud(folder: str, number: int, address: str) -> dict:
+def sort_cloud(
+    folder: str, number: int, address: str, watch: Callable[[PointCloud], None] | None = None
+) -> dict:
     """Sort the point file at `address`, file `number` of the plan in `folder`.
 
     Returns {"points": read, "classes": {class: count}}. Of a file that breaks off, or is not what
     its header says, nothing is kept. Raises InputError for whatever reading it comes to, so that a
-    file's failure is that file's alone; what writing comes to passes through.
+    file's failure is that file's alone; what writing comes to passes through. With `watch`, which
+    is called with each chunk, the whole file is read.
     """
     root = Path(folder)
     plan, reaches = load_plan(root), load_reaches(root, newest(root / PLAN_FILE, root / REDO))
@@ -236,8 +239,11 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     if places := take_places(address):
         save_run_boxes(noted, places, read_header(address).count)
     try:
-        for cloud in wanted_points(address, reaches, plan.units, noted, result):
+        is_whole = watch is not None
+        for cloud in wanted_points(address, reaches, plan.units, noted, result, is_whole):
             gatherer.add(cloud)
+            if watch is not None:
+                watch(cloud)
     except (MemoryError, OutputError):
         raise
     except Exception as error:
@@ -257,11 +263,16 @@ def newest(*paths: Path) -> int:
 
 
 def wanted_points(
-    path: str, reaches: Reaches, units: Units, noted: Path, result: list[np.ndarray] | None = None
+    path: str,
+    reaches: Reaches,
+    units: Units,
+    noted: Path,
+    result: list[np.ndarray] | None = None,
+    is_whole: bool = False,
 ) -> Iterator[PointCloud]:
     """Yield the chunks of a file in `units` that may be needed.
 
-    They are all of its chunks; of a file with a spatial index, or with the places of its points in
+    They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the places of its points in
     the file `noted`, only what holds buildings' surroundings. Where it is read from end to end,
     `result` gets these places (noted.py).
     """
@@ -270,6 +281,8 @@ def wanted_points(
     header = read_header(path)
     west, south, _, east, north, _ = header.bounds
     box = units.to_metres(np.array([[west, south], [east, north]], float)).ravel()
+    if is_whole:
+        return iter_points(path, units=units, noted=None if is_copc(path) else result)
     if reaches.is_partial and np.isfinite(box).all() and not reaches.near(box):
         return iter(())
     if is_copc(path):

@@ -113,6 +113,11 @@ def print_update(summary: UpdateSummary) -> None:
             "largest change of each: "
             + ", ".join(f"{name} {n:,}" for name, n in summary.by_kind.items())
         )
+    if summary.outside:
+        typer.echo(
+            "roofs outside all outlines: "
+            + ", ".join(f"{name} {n:,}" for name, n in summary.outside.items())
+        )
     surveys, shift = summary.surveys, summary.surveys.shift
     lies = ", ".join(
         f"{value:+.2f} ± {sigma:.2f}" for value, sigma in zip(shift.xyz, shift.sigma, strict=True)

@@ -16,17 +16,18 @@ import shapely
 from ..city.plan import WorkPlan
 from ..city.registration import SAMPLE_CELL_M, hash_cell
 from ..city.run import absolute
-from ..city.tasks import sort_cloud
 from ..errors import HiproofError, InputError
 from ..log import LOGGER
 from ..parametric.record import read_building
 from .earlier import EarlierRun
 from .members import load_members
+from .outside import save_roofs_outside
 from .plan import EARLIER_FOLDER, save_earlier_plan
 from .register import SampledRoof, register_surveys
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Epochs, Surveys
 from .texts import find_texts
+from .tile import sort_survey
 
 ENOUGH_ROOFS = 60
 """Sampled roofs: they tell the shift within a centimetre, and their noise to a tenth of it."""
@@ -46,11 +47,14 @@ def prepare_surveys(
 
     What an interrupted update did is kept.
     """
-    if (state / SURVEYS_FILE).exists() and (state / EARLIER_FOLDER / SORTED_MARK).exists():
+    if not (state / EARLIER_FOLDER / SORTED_MARK).exists():
+        remove_earlier_points(state)
+        save_earlier_plan(state, plan, earlier)
+        sort_earlier(earlier.clouds, state / EARLIER_FOLDER, executor)
+        (state / EARLIER_FOLDER / SORTED_MARK).touch()
+    if (state / SURVEYS_FILE).exists():
         return
-    shutil.rmtree(state / EARLIER_FOLDER, ignore_errors=True)
-    save_earlier_plan(state, plan, earlier)
-    sort_earlier(earlier.clouds, state / EARLIER_FOLDER, executor)
+    save_roofs_outside(state, plan, bool(earlier.clouds))
     shift = register_surveys(draw_samples(state, plan, request.terrain))
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
     texts = find_texts(request.run, plan)
@@ -58,7 +62,6 @@ def prepare_surveys(
         shift, date, request.significance, bool(earlier.clouds), texts, request.history
     )
     surveys.save(state / SURVEYS_FILE)
-    (state / EARLIER_FOLDER / SORTED_MARK).touch()
 
 
 def remove_earlier_points(state: Path) -> None:
@@ -72,7 +75,7 @@ def sort_earlier(clouds: tuple[str, ...], folder: Path, executor: Any) -> None:
     Raises InputError for one that cannot be read.
     """
     tasks = ((str(folder.absolute()), i, absolute(cloud)) for i, cloud in enumerate(clouds))
-    for task, _, error in executor.run(sort_cloud, tasks):
+    for task, _, error in executor.run(sort_survey, tasks):
         if error is not None:
             raise InputError(
                 f"expected to read {task[2]}, of which the earlier run was made, got: {error}; "

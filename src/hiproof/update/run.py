@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,24 +23,26 @@ from ..write.files import atomic
 from .before import prepare_surveys, remove_earlier_points
 from .dates import find_survey_date
 from .earlier import EarlierRun, choose_read_settings, read_earlier
+from .outside import CELLS_FOLDER, load_roofs_outside
 from .plan import make_update_plan
 from .request import UpdateRequest
 from .solve import SURVEYS_FILE, Surveys
 from .tables import collect_changes, write_changes
-from .tile import update_tile
+from .tile import sort_survey, update_tile
 
 
 @dataclass(frozen=True)
 class UpdateSummary:
     """The result of an update, with buildings by class and kind of change.
 
-    `files` are changes.csv and changes.gpkg.
+    `outside` counts roofs outside all outlines by kind. `files` are changes.csv and changes.gpkg.
     """
 
     run: Summary
     surveys: Surveys
     by_change: dict[str, int]
     by_kind: dict[str, int]
+    outside: dict[str, int]
     files: tuple[Path, ...]
 
 
@@ -67,6 +70,8 @@ def update_area(
 
     def make_plan(_: Any, __: Progress) -> WorkPlan:
         (state / SURVEYS_FILE).unlink(missing_ok=True)
+        remove_earlier_points(state)
+        shutil.rmtree(state / CELLS_FOLDER, ignore_errors=True)
         return make_update_plan(request, earlier, state)
 
     def prepare(plan: WorkPlan, executor: Any, _: Progress) -> None:
@@ -74,7 +79,7 @@ def update_area(
 
     with hold_folder(state), collect_rarely():
         summary = reconstruct_in_folder(
-            request, state, progress, Steps(make_plan, update_tile, prepare)
+            request, state, progress, Steps(make_plan, update_tile, sort_survey, prepare)
         )
         remove_earlier_points(state)
         return report_changes(request, earlier, state, summary)
@@ -95,7 +100,8 @@ def report_changes(
     """Write the tables of changes and complete run.json."""
     surveys, out = Surveys.load(state / SURVEYS_FILE), Path(request.out)
     found = collect_changes(out, surveys.date)
-    files = write_changes(out, found)
+    outside = load_roofs_outside(state)
+    files = write_changes(out, found, outside, surveys.date)
     by_change = Counter(change.record["change"]["class"] for change in found)
     by_change[Change.UNCHANGED.code] = summary.buildings - len(found)
     by_kind = Counter(
@@ -108,6 +114,7 @@ def report_changes(
         surveys,
         {c.code: by_change[c.code] for c in Change if by_change[c.code]},
         dict(sorted(by_kind.items())),
+        dict(sorted(Counter(roof["kind"] for roof in outside).items())),
         files,
     )
     add_to_record(request, earlier, result)
@@ -128,6 +135,7 @@ def add_to_record(request: UpdateRequest, earlier: EarlierRun, result: UpdateSum
         "shift": surveys.shift.to_dict(),
         "by_change": result.by_change,
         "by_kind": result.by_kind,
+        "roofs_outside": result.outside,
     }
     with atomic(path) as temporary:
         Path(temporary).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

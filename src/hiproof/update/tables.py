@@ -43,6 +43,7 @@ TABLE_COLUMNS: dict[str, type] = {
     "predecessors": str,
 }
 PLACE_COLUMNS: dict[str, type] = {**CHANGE_COLUMNS, "old_part": int, "new_part": int}
+OUTSIDE_CLASS = "outside"  # the class of a roof outside all outlines
 BUILDINGS_LAYER, PLACES_LAYER = "changed_buildings", "changed_places"
 CHANGE_STYLES = tuple(
     Style(layer, "changes", '"class"', CHANGE_COLOURS, alpha)
@@ -71,6 +72,19 @@ def collect_changes(folder: Path, survey: str) -> list[FoundChange]:
         ]
 
 
+def report_outside(roof: dict[str, Any], survey: str) -> FoundChange:
+    """Return a roof outside all outlines as a change."""
+    place = {"difference": None, "sigma": None, "parts": [None, None], **roof}
+    change = {
+        "class": OUTSIDE_CLASS,
+        "chance": None,
+        "survey": survey,
+        "places": [place],
+        "predecessors": [],
+    }
+    return FoundChange({"id": roof["id"], "change": change}, None)
+
+
 def find_outline(record: dict[str, Any]) -> shapely.Geometry | None:
     """Return the outline of a building in the world, None where it is unknown."""
     outline = read_outline(record)
@@ -79,8 +93,14 @@ def find_outline(record: dict[str, Any]) -> shapely.Geometry | None:
     return outline
 
 
-def write_changes(folder: Path, changes: list[FoundChange]) -> tuple[Path, ...]:
-    """Write changes.csv and changes.gpkg into `folder`."""
+def write_changes(
+    folder: Path, found: list[FoundChange], outside: list[dict[str, Any]], survey: str
+) -> tuple[Path, ...]:
+    """Write changes.csv and changes.gpkg into `folder`.
+
+    `outside` are roofs outside all outlines, which the survey of that date shows.
+    """
+    changes = [*found, *(report_outside(roof, survey) for roof in outside)]
     with opened_parameters(folder / RUN_PARAMETERS) as (head, _):
         files = folder / CSV_FILE, folder / GPKG_FILE
         with atomic(files[0]) as temporary:
@@ -132,10 +152,9 @@ def make_place_rows(change: FoundChange) -> list[tuple[Any, ...]]:
 def write_geopackage(path: Path, changes: list[FoundChange], head: FileHead) -> None:
     """Write the layers of buildings and of places, with their QGIS style."""
     with closing(GeoPackage(path, plan_wkt(head.crs_of_files))) as file:
-        outlines = [change.outline for change in changes]
-        add_layer(
-            file, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, [make_row(c) for c in changes], head
-        )
+        buildings = [c for c in changes if c.record["change"]["class"] != OUTSIDE_CLASS]
+        outlines, rows = [c.outline for c in buildings], [make_row(c) for c in buildings]
+        add_layer(file, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, rows, head)
         places = [
             shapely.union_all([polygon(rings, "an outline") for rings in place["outlines"]])
             for change in changes

@@ -1,8 +1,25 @@
-"""The task of a work tile by name, for processes that have imported nothing yet."""
+"""The tasks of an update by name, for processes that have imported nothing yet."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from ..city.ledger import Outcome
+
+
+def sort_survey(folder: str, number: int, address: str) -> dict:
+    """Sort a point file of a survey, and keep where its roofs and its ground lie."""
+    from ..city.plan import load_plan
+    from ..city.sort import sort_cloud
+    from .outside import CELLS_FOLDER, SurveyCells
+
+    read = load_plan(Path(folder)).settings.read
+    if not read.by_class:
+        return sort_cloud(folder, number, address)
+    cells = SurveyCells(read)
+    result = sort_cloud(folder, number, address, cells.add)
+    cells.save(Path(folder) / CELLS_FOLDER / f"{number}.npz")
+    return result
 
 
 def update_tile(

@@ -36,6 +36,7 @@ CHANGE_COLOURS = {
     "gone": "#1d1d1d",
     "uncertain": "#dfba20",
     "not_covered": "#b5b5b5",
+    "outside": "#66aaee",
 }
 NO_MODEL = "no model"
 STATUS_COLOURS = {

@@ -1,0 +1,241 @@
+"""Roofs outside all outlines: new buildings, extensions, and others.
+
+Both surveys are compared in cells of a metre, wherever the clouds have points of the building
+classes. Cells along outlines and along roofs of the other survey start nothing, since gutters and
+misfits lie there. Clouds without building classes tell no roofs from trees, and show none.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..city.plan import WorkPlan
+from ..geometry.components import label_components
+from ..geometry.grid import number_cells
+from ..model import PointCloud
+from ..settings import ReadSettings
+from ..status import ChangeKind
+from ..write.files import atomic, atomic_file
+from ..write.parameters import outline_record
+from .clusters import ROUGH_M, is_strip, link_neighbours, measure_roughness
+from .plan import EARLIER_FOLDER
+
+OUTSIDE_FILE, CELLS_FOLDER = "outside.json", "cells"
+BESIDE_M = 1.0
+"""Distance (m) from an outline within which roofs belong to it: gutters, and outlines drawn within
+some decimetres."""
+
+FEWEST_OUTSIDE = 8
+"""Cells of 1 m2 that a roof has beyond that: a shed of 3 by 3 m has them."""
+
+MOSTLY = 0.5
+"""Share of the cells that show what stood there in the other survey."""
+
+ROUNDING_M = 1e-6  # far above the errors of a mean, far below the millimetres of coordinates
+
+AROUND = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)])
+
+
+class SurveyCells:
+    """The roof and the ground of a survey in cells of a metre."""
+
+    def __init__(self, read: ReadSettings):
+        self.classes = {"roof": read.building_classes, "ground": read.ground_classes}
+        self.found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"roof": [], "ground": []}
+
+    def add(self, cloud: PointCloud) -> None:
+        """Take the points of a chunk."""
+        for kind, classes in self.classes.items():
+            points = cloud.xyz[np.isin(cloud.classes, classes)]
+            if len(points):
+                self.found[kind].append(average_cells(points, np.ones(len(points))))
+
+    def save(self, path: Path) -> None:
+        """Write the cells of a file."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        arrays: dict[str, np.ndarray] = {}
+        for kind, chunks in self.found.items():
+            means, counts = join_cells(chunks)
+            arrays |= {kind: means, f"{kind}_count": counts}
+        with atomic_file(path) as file:
+            np.savez(file, **arrays)
+
+
+def average_cells(points: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean point (k, 3) and the number of points (k,) of each cell.
+
+    `points` (n, 3) stand for so many points, `counts` (n,), each.
+    """
+    cells, number = number_cells(find_cells(points))
+    total = np.bincount(number, weights=counts, minlength=len(cells))
+    offset = points.min(axis=0)
+    sums = [np.bincount(number, weights=counts * values) for values in (points - offset).T]
+    return np.column_stack(sums) / total[:, None] + offset, total
+
+
+def find_cells(points: np.ndarray) -> np.ndarray:
+    """Return the cell (k, 2) of each of the points (k, 2 or 3).
+
+    A mean of points on the lower side of a cell stays in it.
+    """
+    return np.floor(points[:, :2] + ROUNDING_M).astype(np.int64)
+
+
+def join_cells(chunks: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """Join the cells of several chunks."""
+    if not chunks:
+        return np.zeros((0, 3)), np.zeros(0)
+    return average_cells(*(np.concatenate(arrays) for arrays in zip(*chunks, strict=True)))
+
+
+def load_cells(folder: Path, kind: str) -> np.ndarray:
+    """Load the mean points (k, 3) of all cells of a kind, in the order of their cells."""
+    chunks = []
+    for path in sorted(folder.glob("[0-9]*.npz")):
+        with np.load(path) as arrays:
+            if len(arrays[kind]):
+                chunks.append((arrays[kind], arrays[f"{kind}_count"]))
+    return join_cells(chunks)[0]
+
+
+@dataclass(frozen=True)
+class RoofOutside:
+    """A roof outside all outlines; `id` is the building that it extends, if any."""
+
+    kind: ChangeKind
+    area_m2: float
+    place: shapely.Geometry
+    id: str | None = None
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the roof for JSON."""
+        polygons = [outline_record(polygon) for polygon in shapely.get_parts(self.place)]
+        return {
+            "id": self.id,
+            "kind": self.kind.code,
+            "area": self.area_m2,
+            "outlines": polygons,
+        }
+
+
+def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
+    """Find the roofs outside all outlines, and keep them in the folder `state`."""
+    folders = state / CELLS_FOLDER, state / EARLIER_FOLDER / CELLS_FOLDER
+    new, old = ({kind: load_cells(f, kind) for kind in ("roof", "ground")} for f in folders)
+    jobs = [job for job in plan.jobs if not job.area.is_empty]
+    outlines = shapely.STRtree([job.area for job in jobs])
+    found = find_unmapped(new["roof"], old["roof"] if has_earlier else new["roof"], outlines)
+    if has_earlier:
+        names = [job.id for job in jobs]
+        found += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
+        found += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
+    with atomic(state / OUTSIDE_FILE) as temporary:
+        records = [roof.to_record() for roof in found]
+        Path(temporary).write_text(json.dumps(records) + "\n", encoding="utf-8")
+
+
+def load_roofs_outside(state: Path) -> list[dict[str, Any]]:
+    """Load what `save_roofs_outside` kept."""
+    path = state / OUTSIDE_FILE
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
+
+
+def find_fresh(
+    roofs: np.ndarray,
+    other: dict[str, np.ndarray],
+    outlines: shapely.STRtree,
+    names: list[str],
+    kind: ChangeKind,
+) -> list[RoofOutside]:
+    """Return roofs that stand on what is bare ground in the other survey.
+
+    `roofs` (k, 3) are the cells of one survey, `other` those of the other one. A roof beside a
+    building extends it where `names` of the buildings are known.
+    """
+    points = roofs[~touches(roofs, outlines, 0.0)]
+    points = points[~np.isin(number_places(points), number_places(other["roof"]))]
+    near = touches(points, outlines, BESIDE_M) | is_beside(points, other["roof"])
+    ground = number_places(other["ground"])
+    result = []
+    for members in group_cells(points, ~near):
+        if np.isin(number_places(points[members]), ground).mean() < MOSTLY:
+            continue
+        place = draw_places(points[members])
+        beside = outlines.query(place, predicate="dwithin", distance=BESIDE_M)
+        if len(beside) and names:
+            id = names[int(outlines.query_nearest(place, all_matches=False)[0])]
+            result.append(RoofOutside(ChangeKind.EXTENDED, float(len(members)), place, id))
+        elif not len(beside):
+            result.append(RoofOutside(kind, float(len(members)), place))
+    return result
+
+
+def find_unmapped(
+    roofs: np.ndarray, other: np.ndarray, outlines: shapely.STRtree
+) -> list[RoofOutside]:
+    """Return roofs away from all outlines that both surveys show."""
+    points = roofs[~touches(roofs, outlines, BESIDE_M)]
+    points = points[np.isin(number_places(points), number_places(other))]
+    groups = group_cells(points, np.ones(len(points), bool))
+    places = [(len(members), draw_places(points[members])) for members in groups]
+    return [
+        RoofOutside(ChangeKind.UNMAPPED, float(size), place)
+        for size, place in places
+        if not len(outlines.query(place, predicate="dwithin", distance=BESIDE_M))
+    ]
+
+
+def group_cells(points: np.ndarray, is_core: np.ndarray) -> list[np.ndarray]:
+    """Return the members of each roof among cells `points` (k, 3).
+
+    It has FEWEST_OUTSIDE of the core (k,) side by side that form a surface, and the cells beside
+    these.
+    """
+    core = np.flatnonzero(is_core)
+    cells = find_cells(points)
+    labels = label_components(len(core), link_neighbours(cells[core]))
+    numbers, sizes = np.unique(labels, return_counts=True)
+    places = number_places(points)
+    result = []
+    for label in numbers[sizes >= FEWEST_OUTSIDE]:
+        members = core[labels == label]
+        if is_strip(points[members]) or measure_roughness(points[members]) > ROUGH_M:
+            continue
+        around = (cells[members][:, None] + AROUND).reshape(-1, 2)
+        grown = np.isin(places, number_places(around)) & ~is_core
+        result.append(np.union1d(members, np.flatnonzero(grown)))
+    return result
+
+
+def touches(points: np.ndarray, outlines: shapely.STRtree, distance_m: float) -> np.ndarray:
+    """Return whether (k,) points (k, 3) lie in an outline or so near to one."""
+    result = np.zeros(len(points), bool)
+    xy = shapely.points(points[:, :2])
+    result[outlines.query(xy, predicate="dwithin", distance=distance_m)[0]] = True
+    return result
+
+
+def is_beside(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether (k,) cells have one of `others` around them."""
+    cells = find_cells(points)
+    known = number_places(others)
+    return np.any([np.isin(number_places(cells + step), known) for step in AROUND], axis=0)
+
+
+def number_places(points: np.ndarray) -> np.ndarray:
+    """Return one whole number (k,) for the cell of each of the points (k, 2 or 3)."""
+    column, row = find_cells(points).T
+    return (column << 32) + row
+
+
+def draw_places(points: np.ndarray) -> shapely.Geometry:
+    """Return the outline of the cells of points (k, 3)."""
+    low = find_cells(points)
+    return shapely.union_all(shapely.box(*low.T, *(low + 1).T))

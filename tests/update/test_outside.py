@@ -1,0 +1,90 @@
+"""Roofs outside all outlines: built, extended, pulled down, and those that stood before."""
+
+import csv
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.model import PointCloud
+from hiproof.settings import ReadSettings
+from hiproof.update.outside import SurveyCells, load_cells
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+
+DATE = "2024-05-01"
+BUILT, STOOD, GONE = (5, 28, 15, 36), (40, 28, 48, 36), (70, 28, 78, 36)
+EXTENSION = (20, 12, 24, 20)  # beside the first house
+SMALL, TREE = (100, 28, 102, 30), (105, 28, 115, 38)
+
+
+def put_block(town, corners, height=4.0, scatter=0.0):
+    """Raise the ground of the town to the roof of a block."""
+    x, y = (town.xyz[:, :2] - ORIGIN[:2]).T
+    inside = shapely.intersects_xy(shapely.box(*corners), x, y) & (town.classification == 2)
+    noise = np.random.default_rng(3).uniform(-scatter, scatter, inside.sum())
+    town.xyz[inside, 2] += height + noise
+    town.classification[inside] = 6
+
+
+@pytest.fixture(scope="module")
+def update(tmp_path_factory):
+    folder, before, after = tmp_path_factory.mktemp("outside"), make_town(), make_town(seed=7)
+    for block in (STOOD, GONE):
+        put_block(before, block)
+    for block in (STOOD, BUILT, EXTENSION, SMALL):
+        put_block(after, block)
+    put_block(after, TREE, 6.0, scatter=2.0)
+    first, second = (
+        str(write_cloud(folder / f"{name}.laz", town.xyz, town.classification))
+        for name, town in (("first", before), ("second", after))
+    )
+    footprints = str(write_footprints(folder / "footprints.geojson", before.footprints))
+    reconstruct_area(Request((first,), folder / "run", footprints))
+    parameters = str(folder / "run" / "parameters.jsonl")
+    request = UpdateRequest(
+        (second,), folder / "out", run=folder / "run", run_parameters=parameters, date=DATE
+    )
+    return update_area(request), folder / "out"
+
+
+def test_roofs_outside_all_outlines_are_told_apart(update):
+    summary, out = update
+    assert summary.outside == {"built": 1, "demolished": 1, "extended": 1, "unmapped": 1}
+    with (out / "changes.csv").open() as file:
+        rows = {row["kind"]: row for row in csv.DictReader(file) if row["class"] == "outside"}
+    assert rows["extended"]["id"] == "house-0" and rows["built"]["id"] == ""
+    meta, _, geometry, columns = pyogrio.raw.read(out / "changes.gpkg", layer="changed_places")
+    kinds = columns[list(meta["fields"]).index("kind")].tolist()
+    places = dict(zip(kinds, shapely.from_wkb(geometry), strict=True))
+    for kind, corners in (("built", BUILT), ("demolished", GONE), ("unmapped", STOOD)):
+        box = shapely.box(*(np.array(corners) + [*ORIGIN[:2], *ORIGIN[:2]]))
+        common = places[kind].intersection(box).area / places[kind].union(box).area
+        assert common > 0.75, kind
+    box = shapely.box(*(np.array(EXTENSION) + [*ORIGIN[:2], *ORIGIN[:2]]))
+    assert places["extended"].intersection(box).area > 0.75 * box.area
+
+
+def test_buildings_inside_their_outlines_are_not_reported(update):
+    summary, _ = update
+    assert summary.by_change == {"unchanged": 4}
+
+
+def test_cells_do_not_depend_on_how_points_are_cut(tmp_path):
+    rng = np.random.default_rng(1)
+    points = np.round(rng.uniform(0, 9, (500, 3)), 3)
+    whole, halves = SurveyCells(ReadSettings()), SurveyCells(ReadSettings())
+    classes = np.where(np.arange(500) % 2, 6, 2).astype(np.uint8)
+    whole.add(PointCloud(points, classes))
+    for half in (slice(0, 250), slice(250, None)):
+        halves.add(PointCloud(points[half], classes[half]))
+    whole.save(tmp_path / "whole" / "0.npz")
+    halves.save(tmp_path / "halves" / "0.npz")
+    for kind in ("roof", "ground"):
+        cells = [load_cells(tmp_path / name, kind) for name in ("whole", "halves")]
+        assert len(cells[0]) > 70
+        np.testing.assert_allclose(*cells, atol=1e-9)
