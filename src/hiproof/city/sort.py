@@ -272,9 +272,9 @@ def wanted_points(
 ) -> Iterator[PointCloud]:
     """Yield the chunks of a file in `units` that may be needed.
 
-    They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the places of its points in
-    the file `noted`, only what holds buildings' surroundings. Where it is read from end to end,
-    `result` gets these places (noted.py).
+    They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the
+    places of its points in the file `noted`, only what holds buildings' surroundings. Where it is
+    read from end to end, `result` gets these places (noted.py).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)

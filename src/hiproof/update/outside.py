@@ -60,7 +60,7 @@ class SurveyCells:
     def save(self, path: Path) -> None:
         """Write the cells of a file."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        arrays: dict[str, np.ndarray] = {}
+        arrays: dict[str, Any] = {}
         for kind, chunks in self.found.items():
             means, counts = join_cells(chunks)
             arrays |= {kind: means, f"{kind}_count": counts}
