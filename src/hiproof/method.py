@@ -75,6 +75,7 @@ def reconstruct(
     roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, base, settings, unused)
     building = stages.reach_terrain(building, base, settings)
+    building = stages.add_installations(building, points, settings)
     for text in (of_footprint, site.remark):
         building = stages.add_remark(building, text)
     return building

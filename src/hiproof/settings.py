@@ -246,6 +246,11 @@ class ReconstructSettings:
         choices=("level", "terrain"),
         option="--walls",
     )
+    installations: bool = setting(
+        False,
+        "also find chimneys and other objects on roofs, and write them as building installations",
+        option="--installations",
+    )
 
 
 @dataclass(frozen=True)

@@ -716,6 +716,21 @@ def reach_terrain(building: Building, ground: Ground, settings: Settings) -> Bui
     return add_remark(finished, f"{level}, for no terrain is known there" if share else "")
 
 
+def add_installations(building: Building, points: np.ndarray, settings: Settings) -> Building:
+    """Return the building with the objects on its roof, where settings say so.
+
+    Its `points` (n, 3) are in the roof's frame.
+    """
+    if building.built is None or not settings.reconstruct.installations:
+        return building
+    from .fit.installations import find_installations
+
+    found = find_installations(building.roof, points)
+    return dataclasses.replace(
+        building, built=dataclasses.replace(building.model, installations=found)
+    )
+
+
 def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
     """Return the `unused` points inside a roof's outline, in its frame.
 

@@ -70,7 +70,7 @@ CHANGED = {
     "valid_to": None,
     "history": [],
 }
-BELOW = {"walls"}  # keys of buildings that do not stand on one level
+FURTHER = {"installations", "walls"}  # keys that only some buildings have
 OF_A_CHANGE = {"change", "change_kind", "change_m", "change_sigma_m", "valid_from", "valid_to"}
 
 
@@ -81,7 +81,7 @@ def change_building(building):
 def test_buildings_have_the_attributes_declared():
     feet = Units(0.3048, 0.3048, "foot", "foot")
     sound = make_building(gable_house())
-    declared = {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
+    declared = {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)} - {OWN + "installations"}
     of_a_change = {OWN + name for name in OF_A_CHANGE}
     for building in (sound, make_lost_building(), change_building(sound)):
         result = building_attributes(building, measure_figures(building), units=feet)
@@ -116,7 +116,7 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
     ]
     assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
     record = building_record(make_building(gable_house()))
-    usual = [name for name in names(PARAMETERS) if name not in BELOW]
+    usual = [name for name in names(PARAMETERS) if name not in FURTHER]
     assert list(record) == [name for name in usual if name != "change"]
     changed = building_record(change_building(make_building(gable_house())))
     assert list(changed) == usual

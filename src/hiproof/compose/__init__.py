@@ -20,6 +20,7 @@ blocks            LoD1: prisms over the outline
 profile           heights of the terrain along an outline
 underside         walls down to the terrain, and passages below a solid
 finish            a model with the underside that it is to have
+boxes             installations on roofs
 building_parts    a solid cut where its roofs meet, for formats that know building parts
 """
 

@@ -134,7 +134,7 @@ def read_building(id: str, city_object: Any, feature: Feature) -> BuildingModel:
     children = require_list(city_object.get("children") or [], "children")
     family = [
         city_object,
-        *(feature.objects[child] for child in children if child in feature.objects),
+        *(feature.objects[child] for child in children if is_part(child, feature)),
     ]
     solids = [
         select_solids(geometries),
@@ -167,6 +167,14 @@ def read_suns(surfaces: list[ShellSurface]) -> tuple[float, ...]:
     values = [surface.semantics.get(SUN_ATTRIBUTE) for surface in surfaces]
     suns = tuple(float(v) if isinstance(v, (int, float)) else math.nan for v in values)
     return suns if any(map(math.isfinite, suns)) else ()
+
+
+def is_part(child: Any, feature: Feature) -> bool:
+    """Return whether a child of a building is there and belongs to its shell."""
+    found = feature.objects.get(child)
+    return found is not None and not (
+        isinstance(found, dict) and found.get("type") == "BuildingInstallation"
+    )
 
 
 def plain_attributes(attributes: Any) -> dict[str, Any]:

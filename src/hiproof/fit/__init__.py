@@ -15,6 +15,7 @@ registration   how far all footprints of a data set do
 site           a footprint against the ground: the two that follow
 bare_ground    yards and lost wings inside a footprint, cut out
 standing       whether anything stands on a footprint
+installations  chimneys and other objects on a roof
 
 `fit_roof` is imported on first use, because it brings the compiler along.
 """

@@ -5,6 +5,7 @@ Arrays are float64; plan geometry is shapely; frames are in the names.
 inputs      point clouds and footprints
 roof        pieces, parts, roofs: a roof is a max of mins of planes
 solid       faces, solids
+installation  objects on a roof
 underside   how a solid ends below: terrain, passages
 fit         one primitive fitted to points
 building    models and buildings
@@ -15,6 +16,7 @@ heights     heights of roofs at many points, compiled
 from .building import Building, Model, Quality
 from .fit import Fit
 from .inputs import Footprint, PointCloud, as_xyz
+from .installation import Installation
 from .roof import Part, Piece, Roof
 from .solid import CEILING, GROUND, ROOF, WALL, Face, Solid
 from .underside import ONE_LEVEL, Passage, Underside
@@ -29,6 +31,7 @@ __all__ = [
     "Face",
     "Fit",
     "Footprint",
+    "Installation",
     "Model",
     "Part",
     "Passage",

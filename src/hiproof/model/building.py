@@ -14,6 +14,7 @@ from ..errors import NoModelError
 from ..log import count_things
 from ..settings import ComposeSettings
 from ..status import Grade, Status
+from .installation import Installation
 from .roof import Part, Roof
 from .shown import compute_visible_pieces, measure_visible_pieces, unite_visible_pieces
 from .solid import Solid
@@ -47,7 +48,7 @@ class Model:
 
     `compose` says how, None for the defaults: a changed building is composed as it was.
     `underside` says how the solid ends below. Where that is not one level, `level_solid` is the
-    solid that does stand on one.
+    solid that does stand on one. `installations` stand on the roof.
     """
 
     roof: Roof
@@ -55,6 +56,7 @@ class Model:
     compose: ComposeSettings | None = None
     underside: Underside = ONE_LEVEL
     level_solid: Solid | None = None
+    installations: tuple[Installation, ...] = ()
 
     @property
     def on_one_level(self) -> Solid:

@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..model import ONE_LEVEL, Building, Model, Roof, Underside
 from ..settings import ComposeSettings, Settings
+from .installations import read_installations
 from .record import read_building, require_mapping
 from .underside import read_underside
 
@@ -34,7 +35,12 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
     if roof is None:
         return building
     underside = read_underside(parameters, building, roof)
-    return with_model(building, roof, compose, underside)
+    result = with_model(building, roof, compose, underside)
+    installations = read_installations(parameters)
+    if not installations:
+        return result
+    model = dataclasses.replace(result.model, installations=installations)
+    return dataclasses.replace(result, built=model)
 
 
 def with_model(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from ..model.installation import CHIMNEY, ROOF_OBJECT
 from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
@@ -17,11 +18,13 @@ from ..write.attribute_list import (
     CHANGE_PLACE,
     ENDED_MODEL,
     HEAD,
+    INSTALLATION,
     PARAMETERS,
     PART,
     Attribute,
 )
 from ..write.parameters import VERSION
+from .installations import BOX_SIZES
 
 NUMBER_SCHEMA, TEXT_SCHEMA = {"type": "number"}, {"type": "string"}
 NUMBER_OR_NULL, TEXT_OR_NULL = {"type": ["number", "null"]}, {"type": ["string", "null"]}
@@ -57,6 +60,7 @@ BUILDING_KINDS = {
     "z_ground": NUMBER_OR_NULL,
     "ground_source": TEXT_OR_NULL,
     "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},
+    "installations": {"type": "array", "items": {"$ref": "#/$defs/installation"}},
     "walls": {"enum": ["level", "terrain"]},
     "attributes": {"type": "object"},
     "points": {"type": "integer", "minimum": 0},
@@ -102,6 +106,17 @@ PART_KINDS = {
     "sigma": NUMBERS,
     "outlines": {"type": "array", "items": POLYGON_SCHEMA},
 }
+INSTALLATION_KINDS = {
+    "type": {"enum": [CHIMNEY, ROOF_OBJECT]},
+    "parameters": {
+        "type": "object",
+        "properties": dict.fromkeys(BOX_SIZES, LENGTH_SCHEMA),
+        "required": list(BOX_SIZES),
+        "additionalProperties": False,
+    },
+    "position": PLACE,
+    "rotation": NUMBER_SCHEMA,
+}
 
 
 def schema() -> dict[str, Any]:
@@ -119,6 +134,9 @@ def schema() -> dict[str, Any]:
             required=("type", "parameters", "position"),
         )
         | {"allOf": parameters_by_type()},
+        "installation": describe_attributes(
+            INSTALLATION, INSTALLATION_KINDS, required=("type", "parameters", "position")
+        ),
         "change": describe_attributes(CHANGE, CHANGE_KINDS, required=("class",)),
         "ended_model": describe_attributes(ENDED_MODEL, ENDED_KINDS, required=("id", "valid_to")),
         "change_place": describe_attributes(CHANGE_PLACE, PLACE_KINDS, required=("kind",)),

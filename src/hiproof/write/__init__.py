@@ -8,6 +8,7 @@ attribute_list         every attribute and table, declared once
 building_attributes    the attributes of one building
 roof_figures           heights, slopes, ridge and volume of a solid
 terrain_figures        heights of the terrain along an outline
+installations          codes of chimneys and other objects on roofs
 roof_levels            heights below which a share of a roof lies, compiled
 osm_tags               a roof as OpenStreetMap tags it
 shapes                 LoD0, blocks and building parts, as far as requested

@@ -169,6 +169,12 @@ HIPROOF = (
         "",
         "ISO 19107 codes of our own check of the solid; [] is valid, none without a model",
     ),
+    Attribute(
+        "installations",
+        "count",
+        "",
+        "only where there are some (`--installations`): chimneys and other objects on the roof",
+    ),
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
     Attribute(
         "change", "text", "", "only after an update, where not unchanged: changed, new, gone, ..."
@@ -382,6 +388,12 @@ PARAMETERS = (
         "closed lines of x, y, z in the world where the walls meet the terrain",
     ),
     Attribute(
+        "installations",
+        "list",
+        "",
+        "objects on the roof, as below; left out where there are none",
+    ),
+    Attribute(
         "walls",
         "text",
         "",
@@ -482,6 +494,13 @@ PART = (
         "m",
         "polygons that the part roofs, about the origin; left out: its rectangle's share",
     ),
+)
+
+INSTALLATION = (
+    Attribute("type", "text", "", "chimney or roof_object"),
+    Attribute("parameters", "object", "m", "length, width and height of its box"),
+    Attribute("position", "list", "m", "x, y, z of the middle of its base, about the origin"),
+    Attribute("rotation", "number", "deg", "from the x axis to its length, counter-clockwise"),
 )
 
 SIZES = {
@@ -679,6 +698,11 @@ TABLES = (
     ),
     AttributeTable("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
     AttributeTable("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
+    AttributeTable(
+        "Parameters: an installation",
+        "`installations` of a building in `parameters.jsonl`",
+        INSTALLATION,
+    ),
     AttributeTable("Parameters: a change", "`change` of a building in `parameters.jsonl`", CHANGE),
     AttributeTable(
         "Parameters: a place that changed",

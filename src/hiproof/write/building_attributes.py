@@ -57,6 +57,8 @@ def building_attributes(
     }
     if osm:
         computed |= osm_tags(building, figures)
+    if building.built is not None and building.built.installations:
+        computed[OWN + "installations"] = len(building.built.installations)
     if building.change is not None:
         computed |= {
             OWN + name: value for name, value in change_attributes(building.change).items()

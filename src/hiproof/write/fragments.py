@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import OutputError
-from ..model import Building
+from ..model import Building, Solid
 from .head import FileHead
 from .roof_figures import RoofFigures
 from .shapes import Shapes, make_shapes
@@ -50,6 +50,20 @@ class Sheet:
     def shapes(self) -> Shapes:
         """What is drawn of the building beside its own solid."""
         return make_shapes(self.building, self.figures, self.head.write, self.head.prefix)
+
+    @functools.cached_property
+    def boxes(self) -> tuple[Solid, ...]:
+        """The installations of the building as solids, in the world.
+
+        They belong to LoD2.2.
+        """
+        model = self.building.built
+        if model is None or not model.installations or "2.2" not in self.head.write.lods:
+            return ()
+        from ..compose.boxes import make_box
+
+        origin = model.roof.frame.origin
+        return tuple(make_box(installation).move(origin) for installation in model.installations)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..model import Building, Model, Part
+from ..model import Building, Installation, Model, Part
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
@@ -116,7 +116,7 @@ def building_record(building: Building) -> dict[str, Any]:
     """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
     change = {} if building.change is None else {"change": building.change}
-    below = {} if building.built is None else underside_record(building.built)
+    further = {} if building.built is None else further_record(building.built)
     return {
         "id": plain_text(building.id),
         "status": building.status.code,
@@ -130,7 +130,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
         "terrain_line": [places(line) for line in building.terrain_intersection],
-        **below,
+        **further,
         "attributes": {
             plain_text(name): plain(value) for name, value in building.attributes.items()
         },
@@ -149,9 +149,25 @@ def building_record(building: Building) -> dict[str, Any]:
     }
 
 
-def underside_record(model: Model) -> dict[str, Any]:
-    """Return how a solid ends below; nothing where it stands on one level."""
-    return {"walls": "terrain"} if model.underside.terrain else {}
+def further_record(model: Model) -> dict[str, Any]:
+    """Return installations, and how a solid ends below; nothing where it is as usual."""
+    record: dict[str, Any] = {}
+    if model.installations:
+        record["installations"] = [installation_record(item) for item in model.installations]
+    if model.underside.terrain:
+        record["walls"] = "terrain"
+    return record
+
+
+def installation_record(installation: Installation) -> dict[str, Any]:
+    return {
+        "type": installation.type,
+        "parameters": {
+            name: number(getattr(installation, name)) for name in ("length", "width", "height")
+        },
+        "position": numbers(installation.position),
+        "rotation": number(math.degrees(installation.kappa)),
+    }
 
 
 def part_record(part: Part) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from ...settings import WriteSettings
 from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
+from ..installations import FUNCTION_SPACE, FUNCTIONS
 from ..naming import UniqueNames, gml_name, srs_name
 from ..roof_figures import RoofFigures, find_ground_height
 from ..shapes import PartShape
@@ -37,6 +38,7 @@ from .surfaces import (
     multi_surface,
     positions,
     surface_ids,
+    surface_members,
     terrain_element,
 )
 
@@ -149,7 +151,8 @@ def fragment(sheet: Sheet) -> Fragment:
     text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
     lines = terrain_lines(sheet)
     if sheet.figures is not None:
-        lines = [*lines, in_file(sheet, sheet.building.solid)]
+        solids = [sheet.building.solid, *sheet.boxes]
+        lines = [*lines, *(in_file(sheet, solid) for solid in solids)]
         lines += [undo_shift(sheet)] if sheet.shapes.outline is not None else []
     if not lines:
         return Fragment(text)
@@ -177,12 +180,14 @@ def building_element(sheet: Sheet) -> str:
         text.append(lod1_solid(sheet.shapes.lod13 or sheet.shapes.lod12, sheet.head.units.gml))
     if figures is None or (solid := choose_solid(sheet)) is None:
         text.append(with_terrain(sheet, "", []))
+        text += installation_elements(sheet)
     else:
         ids, rings = (
             surface_ids(solid.faces, name),
             list_face_rings(solid.faces, in_file(sheet, solid)),
         )
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
+        text += installation_elements(sheet)
         text += boundary_surfaces(solid, figures, ids, rings, sheet.surfaces)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, sheet.extension, "</bldg:Building>"])
@@ -196,6 +201,23 @@ def find_dates(sheet: Sheet) -> dict[str, str | None]:
     change, created = sheet.building.change or {}, sheet.head.creation_date
     begins = change.get("valid_from") if created is None else created.isoformat()
     return {"creationDate": begins, "terminationDate": change.get("valid_to")}
+
+
+def installation_elements(sheet: Sheet) -> list[str]:
+    """Return the bldg:BuildingInstallation of every object on the roof."""
+    elements = []
+    for number, box in enumerate(sheet.boxes):
+        members = surface_members(list_face_rings(box.faces, in_file(sheet, box)))
+        code = FUNCTIONS[sheet.building.model.installations[number].type]
+        elements.append(
+            "<bldg:outerBuildingInstallation><bldg:BuildingInstallation "
+            f'gml:id="installation-{number + 1}-{sheet.gml_name}">'
+            f'<bldg:function codeSpace="{FUNCTION_SPACE}">{code}</bldg:function>'
+            f"<bldg:lod2Geometry><gml:Solid><gml:exterior><gml:CompositeSurface>{members}"
+            "</gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod2Geometry>"
+            "</bldg:BuildingInstallation></bldg:outerBuildingInstallation>"
+        )
+    return elements
 
 
 def part_element(sheet: Sheet, number: int, part: PartShape) -> str:

@@ -55,7 +55,7 @@ ORDER = (
         "lod2TerrainIntersectionCurve",
         "height",
     ),
-    *("roofType", "buildingPart"),
+    *("function", "roofType", "buildingInstallation", "buildingPart"),
 )
 """The order of what we write of buildings and their surfaces, as the schemas inherit it: core,
 construction, building.
@@ -120,7 +120,7 @@ HUGE = etree.XMLParser(huge_tree=True, resolve_entities=False)
 
 
 def upgrade_building(old: Any) -> Any:
-    """Translate a Building or BuildingPart with all that is in it.
+    """Translate a building, a part or an installation with all that is in it.
 
     The result is in the order of the schemas.
     """
@@ -159,6 +159,10 @@ def upgrade_property(old: Any, owner: str) -> Any:
         return make_element("con:height", upgrade_height(old))
     if name == "consistsOfBuildingPart":
         return make_element("bldg:buildingPart", upgrade_building(old[0]))
+    if name == "outerBuildingInstallation":
+        return make_element("bldg:buildingInstallation", upgrade_building(old[0]))
+    if name == "lod2Geometry":
+        return make_element("core:lod2Solid", *map(upgrade_geometry, old))
     if name in ("creationDate", "terminationDate"):
         return make_date(name, old.text)
     if name.startswith("lod"):

@@ -18,17 +18,25 @@ import numpy as np
 
 from ...model import Building
 from ...settings import WriteSettings
-from ..building_attributes import PREFIX, building_attributes, measure_figures
+from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
 from ..files import scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
+from ..installations import FUNCTIONS
 from ..json_text import dump
 from ..naming import UniqueNames, reference_system
 from ..roof_figures import RoofFigures
 from ..shapes import PartShape
 from ..values import WIDEST, metres, plain_text
 from ..writer import BuildingWriter
-from .boundaries import Vertices, building_geometry, first_corner, part_geometry
+from .boundaries import (
+    LOD_SOLID,
+    Vertices,
+    building_geometry,
+    first_corner,
+    part_geometry,
+    solid_geometry,
+)
 
 SCALE = 0.0001  # units of the file; tenths of a millimetre, on which solids are composed
 # units of the file; offsets are whole thousands, so that files of neighbouring tiles often share
@@ -203,6 +211,10 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
         f"{name}-part{k}": part_object(sheet, part, vertices)
         for k, part in enumerate(sheet.shapes.parts, 1)
     }
+    installations = {
+        f"{name}-installation{k}": installation_object(sheet, k - 1, vertices)
+        for k in range(1, len(sheet.boxes) + 1)
+    }
     if geometry:
         whole = {
             "type": "Building",
@@ -210,9 +222,21 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
             "attributes": sheet.attributes,
         }
         whole["geometry"] = geometry
-    if parts:
-        whole["children"] = list(parts)
-    return {name: whole, **parts}
+    children = {**parts, **installations}
+    if children:
+        whole["children"] = list(children)
+    return {name: whole, **children}
+
+
+def installation_object(sheet: Sheet, number: int, vertices: Vertices) -> dict[str, Any]:
+    """Return the CityObject of an installation of the building."""
+    kind = sheet.building.model.installations[number].type
+    return {
+        "type": "BuildingInstallation",
+        "parents": [sheet.name],
+        "attributes": {"function": FUNCTIONS[kind], f"{OWN}type": kind},
+        "geometry": [solid_geometry(sheet.boxes[number], vertices, LOD_SOLID)],
+    }
 
 
 def part_object(sheet: Sheet, part: PartShape, vertices: Vertices) -> dict[str, Any]:

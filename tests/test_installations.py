@@ -1,0 +1,125 @@
+"""`--installations`: chimneys and other objects on roofs, in every file, built again."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from lxml import etree
+
+import hiproof
+from hiproof.errors import InputError
+from hiproof.evaluate.models import read_models
+from hiproof.settings import Settings
+from hiproof.write import building_attributes
+from hiproof.write.parameters import building_record
+from tiny_town import gable
+from written_run import require_valid_files, write_run
+
+SCHEMAS = Path(__file__).parents[2] / "shared/schemas"
+CORNER = np.array([85000.0, 446000.0])
+FOOTPRINT = shapely.box(*CORNER, *(CORNER + [12, 8]))
+CHIMNEY = (3.0, 2.5, 1.2, 0.8, 8.0)  # middle, sides and top
+
+
+def reconstruct(*boxes, installations=True, leaves=0, id="house", density=8.0):
+    """A gable of 12 by 8 m with boxes on it, and leaves above."""
+    rng = np.random.default_rng(100)
+    xy = rng.uniform((0, 0), (12, 8), (round(96 * density), 2))
+    z = gable(xy[:, 0], xy[:, 1], 8.0, 12.0, 5.0, 3.0)
+    for x, y, length, width, top in boxes:
+        z[(np.abs(xy - [x, y]) <= [length / 2, width / 2]).all(axis=1)] = top
+    crown = rng.uniform((6, 3, 8.5), (11, 7, 13), (leaves, 3))
+    points = np.vstack([np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))]), crown])
+    settings = Settings.from_dict(
+        {"segment": {"network": "never"}, "reconstruct": {"installations": installations}}
+    )
+    points[:, :2] += CORNER
+    return hiproof.reconstruct(points, FOOTPRINT, None, settings, id)
+
+
+def test_a_chimney_is_a_box_of_its_size():
+    house = reconstruct(CHIMNEY, density=20.0)
+    (chimney,) = house.model.installations
+    assert chimney.type == "chimney"
+    place = house.roof.frame.to_world(chimney.position)[:2] - CORNER
+    assert place == pytest.approx([3.0, 2.5], abs=0.15)
+    assert (chimney.length, chimney.width) == pytest.approx((1.2, 0.8), abs=0.25)
+    top = house.roof.frame.origin[2] + chimney.position[2] + chimney.height
+    assert top == pytest.approx(8.0, abs=0.1)
+    # its base is the lowest roof below it
+    assert house.roof.frame.origin[2] + chimney.position[2] == pytest.approx(6.58, abs=0.15)
+
+
+def test_a_house_has_none_without_the_option_or_without_objects():
+    assert reconstruct(CHIMNEY, installations=False).model.installations == ()
+    plain = reconstruct()
+    assert plain.model.installations == () and "installations" not in building_record(plain)
+    assert "hiproof_installations" not in building_attributes(plain)
+    with_leaves = reconstruct(leaves=150)
+    assert with_leaves.model.installations == ()
+
+
+def test_the_roof_is_the_same_with_the_option():
+    plain, found = (reconstruct(CHIMNEY, installations=value) for value in (False, True))
+    record = building_record(found)
+    assert len(record.pop("installations")) == 1
+    assert record == building_record(plain)
+
+
+@pytest.mark.parametrize("parts_as", ["one", "buildingparts"])
+def test_every_file_is_valid_and_built_again(tmp_path, parts_as):
+    houses = [reconstruct(CHIMNEY, id="a"), reconstruct(id="b")]
+    assert [len(house.model.installations) for house in houses] == [1, 0]
+    require_valid_files(tmp_path, houses, {"citygml": "both", "parts_as": parts_as})
+    lines = (tmp_path / "buildings.city.jsonl").read_text().splitlines()[1:]
+    objects = json.loads(lines[0])["CityObjects"]
+    assert objects["a"]["children"] == ["a-installation1"]
+    installation = objects["a-installation1"]
+    assert (installation["type"], installation["parents"]) == ("BuildingInstallation", ["a"])
+    assert installation["attributes"]["function"] == "1030"
+    assert objects["a"]["attributes"]["hiproof_installations"] == 1
+    assert len(json.loads(lines[1])["CityObjects"]) == 1
+    # a model's own solid has no chimney
+    model = next(read_models(tmp_path / "buildings.city.jsonl"))
+    assert model.solid.volume == pytest.approx(houses[0].volume, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("schema", "name"),
+    [
+        ("citygml2/CityGML.xsd", "buildings.gml"),
+        ("citygml3/CityGML.xsd", "buildings.citygml3.gml"),
+    ],
+)
+def test_citygml_stays_within_its_schema(tmp_path, schema, name):
+    if not (SCHEMAS / schema).exists():
+        pytest.skip("needs the schemas of CityGML in ../shared/schemas")
+    house = reconstruct(CHIMNEY)
+    write_run(tmp_path, [house], {"citygml": "both"})
+    root = etree.parse(tmp_path / name)
+    etree.XMLSchema(etree.parse(SCHEMAS / schema)).assertValid(root)
+    codes = root.xpath("//*[local-name()='BuildingInstallation']/*[local-name()='function']/text()")
+    assert codes == ["1030"]
+
+
+def test_an_edited_house_keeps_its_chimney():
+    house = reconstruct(CHIMNEY)
+    assert len(house.with_part(0, eave_height=4.9).model.installations) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"type": "flag"}, "expected chimney or roof_object as the type of installation 0"),
+        ({"parameters": {"width": 1.0}}, "expected length, width, height over 0 as the parameters"),
+        ({"colour": "red"}, "got also colour"),
+        ({"position": [0, 0]}, "position of installation 0"),
+    ],
+)
+def test_what_makes_no_box_is_one_sentence(change, reason):
+    record = building_record(reconstruct(CHIMNEY))
+    record["installations"][0] |= change
+    with pytest.raises(InputError, match=reason):
+        hiproof.build(record)
