@@ -244,6 +244,22 @@ def test_walls_change_nothing_on_roofs(tmp_path):
     assert {face: surfaces[face] for face in without[1]} == without[1]
 
 
+def test_objects_on_roofs_shade_and_leave_no_room_for_panels(tmp_path):
+    box = {"length": 1.0, "width": 1.0, "height": 2.0}
+    chimney = {"type": "chimney", "parameters": box, "position": [3.0, 5.0, 6.0], "rotation": 0.0}
+    free, house = place_house("a", 0, 0), place_house("a", 0, 0)
+    house["installations"] = [chimney]
+    values = {}
+    for name, record in (("free", free), ("chimney", house)):
+        town = open_street(tmp_path / name, [record])
+        cadastre = Cadastre(town, EnrichSettings(sun=True))
+        (values[name],) = cadastre.describe(0, town.read(0).solid)[1].values()
+    lost = values["free"]["hiproof_pv_area_m2"] - values["chimney"]["hiproof_pv_area_m2"]
+    assert lost == pytest.approx(1.6 * 1.6, abs=1e-3)
+    assert values["free"]["hiproof_sun_shaded_share"] == 0.0
+    assert 0.02 < values["chimney"]["hiproof_sun_shaded_share"] < 0.15
+
+
 @pytest.mark.parametrize("depth, area", [(10.0, 5.4 * 9.4), (1.7, 5.4 * 1.1), (1.5, 0.0)])
 def test_panels_need_a_margin_and_their_own_width(depth, area, tmp_path):
     solid = open_street(tmp_path, [place_house("a", 0, 0, depth=depth)]).read(0).solid

@@ -19,7 +19,7 @@ from .horizon import SECTORS
 from .panels import estimate_yield, measure_panels
 from .place import locate
 from .records import Records
-from .shade import ShadingEdges
+from .shade import ShadingEdges, list_objects
 from .sky import Sky, make_sky
 from .sun import Irradiation, irradiate, sample_face, sample_wall
 from .town import Town
@@ -91,10 +91,11 @@ class Cadastre:
         ]
         places = {face: sample_face(solid, face, normals[face]) for face in faces}
         suns = self.irradiate_faces(number, places, normals)
+        objects = list_objects(self.town.read(number))
         surfaces, totals = {}, np.zeros(3)
         for face, sun in suns.items():
             year = float(sun.by_month.sum())
-            panels = measure_panels(solid, face, normals[face])
+            panels = measure_panels(solid, face, normals[face], objects)
             power = estimate_yield(panels, year)
             totals += (size[face] * year, panels, power)
             surfaces[face] = round_values(

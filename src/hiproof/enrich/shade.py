@@ -1,4 +1,4 @@
-"""The roof edges around a building that may shade it."""
+"""The edges of roofs, and of objects on them, that may shade a building."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import functools
 
 import numpy as np
 
-from ..model import ROOF, Solid
+from ..compose.boxes import make_box
+from ..model import ROOF, Building, Solid
 from .records import MOST_KEPT
 from .town import Town
 
@@ -25,7 +26,9 @@ class ShadingEdges:
 
     def find_edges(self, number: int) -> np.ndarray:
         building = self.town.read(number)
-        return np.empty((0, 2, 3)) if building.built is None else roof_edges(building.solid)
+        if building.built is None:
+            return np.empty((0, 2, 3))
+        return np.concatenate([*map(roof_edges, (building.solid, *list_objects(building)))])
 
     def find_shading_edges(self, number: int, z_low: float) -> np.ndarray:
         """Return the edges (m, 2, 3) that shade places of building `number`.
@@ -44,6 +47,12 @@ class ShadingEdges:
         distance = np.hypot(*aside)
         rise = high[:, 2] - z_low
         return edges[rise > np.tan(np.radians(LOWEST_HORIZON_DEG)) * distance]
+
+
+def list_objects(building: Building) -> list[Solid]:
+    """Return the chimneys and other objects on a building's roof, in the world."""
+    origin = building.roof.frame.origin
+    return [make_box(item).move(origin) for item in building.model.installations]
 
 
 def roof_edges(solid: Solid) -> np.ndarray:

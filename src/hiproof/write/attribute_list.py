@@ -257,7 +257,8 @@ ENRICHED_SUN = (
         "pv_area_m2",
         "number",
         "m2",
-        "area for panels: 0.3 m and more from roof edges, and nowhere narrower than 1 m",
+        "area for panels: 0.3 m and more from roof edges and objects on the roof, and nowhere "
+        "narrower than 1 m",
     ),
     Attribute(
         "pv_kwh",
