@@ -22,6 +22,7 @@ from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
 from hiproof.view.server import ViewHandler, make_server, render_page
 from hiproof.write import files
+from hiproof.write.colours import SUN_STOPS, UNKNOWN_COLOUR, srgb
 from hiproof.write.meshes.tiles import write_models
 from hiproof.write.meshes.viewed import ViewedModel
 from pages import BROWSER, needs_browser
@@ -159,6 +160,56 @@ def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving
     # a click beside the buildings changes nothing
     assert say["kept"] == say["clicked"] and say["cleared"] == ""
     assert say["away"] == 0 and say["home"] == 1
+
+
+SUN = (
+    WAIT
+    + """<script>
+(async () => {
+  await ready; await settled();
+  const mode = document.getElementById("mode"), say = {}, [{ tile }] = scene.layers;
+  const choose = value => { mode.value = value; mode.dispatchEvent(new Event("change")); };
+  const painted = () => {
+    const colours = scene.coloursOf(tile), seen = {};
+    tile.owner.forEach((row, t) => {
+      const shown = Array.from(colours.subarray(12 * t, 12 * t + 3), v => v / tile.light[t]);
+      (seen[row] ||= {})[tile.isRoof[t] ? "roof" : "other"] = shown;
+    });
+    return seen;
+  };
+  say.hidden = document.getElementById("colour-by").hidden;
+  say.types = painted(); choose("sun"); say.sun = painted();
+  say.legend = document.getElementById("legend").innerText;
+  choose("type"); say.back = painted();
+  document.body.append(Object.assign(document.createElement("pre"),
+    { id: "said", textContent: JSON.stringify(say) }));
+})();
+</script>"""
+)
+
+
+@needs_browser
+def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
+    areas = {"hiproof_flat_roof_area_m2": 20.0, "hiproof_sloped_roof_area_m2": 60.0}
+    suns = [90.0 * 1000, None, 80.0 * 400]  # kWh, as a table has them
+    models = [
+        ViewedModel(id, kind, solid, {**areas, "hiproof_roof_sun_kwh": sun}, {0: kind})
+        for (id, (kind, solid)), sun in zip(SOLIDS.items(), suns, strict=False)
+    ]
+    with pytest.warns(UserWarning, match="no CRS"):
+        write_models(tmp_path / "a.3dtiles", models)
+    page = render_page("run").replace("</body>", SUN + "</body>")
+    text = render_document(page, tmp_path / "a.3dtiles", serving, tmp_path / "profile")
+    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
+    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
+    say = json.loads(answer[1])
+    assert not say["hidden"] and say["back"] == say["types"] != say["sun"]
+    assert "from 800 kWh/m²" in say["legend"]
+    colours = [colour for least, colour in SUN_STOPS if least == 1100.0] + [UNKNOWN_COLOUR]
+    for row, colour in enumerate(colours[: len(models)]):
+        rgb = 255 * np.array(srgb(colour))
+        assert np.allclose(say["sun"][str(row)]["roof"], rgb, atol=2.0)
+        assert say["sun"][str(row)]["other"] == say["types"][str(row)]["other"]
 
 
 @needs_browser

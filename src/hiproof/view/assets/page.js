@@ -32,7 +32,32 @@ function lineOf({ type, parameters }, number, told) {
 
 function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
 
+// The irradiation of a roof in a year, kWh/m2, null where `hiproof enrich --sun` did not tell it.
+function sunOf(tile, row) {
+  tile.suns ||= [];
+  if (tile.suns[row] === undefined) {
+    const values = Object.fromEntries(tile.table.row(row).map(({ name, value }) => [name, value]));
+    const area = values.hiproof_flat_roof_area_m2 + values.hiproof_sloped_roof_area_m2;
+    tile.suns[row] = values.hiproof_roof_sun_kwh > 0 && area > 0 ? values.hiproof_roof_sun_kwh / area : null;
+  }
+  return tile.suns[row];
+}
+
+function sunColour(tile, row) {
+  const sun = sunOf(tile, row);
+  return rgb(sun === null ? colours.unknown : colourByStops(colours.sun, sun));
+}
+
+function colourRoofs() {
+  const isSun = document.getElementById("mode").value === "sun";
+  scene.recolourRoofs(isSun ? sunColour : null);
+  if (isSun) showLegend(colours.sun.map(([from, colour]) => [`from ${from} kWh/m²`, colour]));
+  else showTypes();
+}
+
 function legend(tile) {
+  const control = document.getElementById("colour-by");
+  for (let row = 0; control.hidden && row < tile.table.count; row++) control.hidden = sunOf(tile, row) === null;
   for (let row = 0; row < tile.table.count; row++) {
     const told = tile.table.row(row), whole = [{ type: told.find(({ name }) => name === "type").value }];
     for (const { type } of told.map(partsOf).find(Boolean) || whole) {
@@ -40,6 +65,10 @@ function legend(tile) {
       types.set(entry, (types.get(entry) || 0) + 1);
     }
   }
+  if (document.getElementById("mode").value === "type") showTypes();
+}
+
+function showTypes() {
   showLegend([...types].sort((a, b) => b[1] - a[1]).map(([entry]) => [entry, colours.type[entry]]));
 }
 
@@ -51,6 +80,7 @@ async function begin() {
   scene.onload = legend;
   scene.onfail = reason => fail(`Some tiles cannot be read (${reason}); load the page again, or make them anew.`);
   scene.onpick = show;
+  document.getElementById("mode").addEventListener("change", colourRoofs);
   document.addEventListener("keydown", event => {
     if (event.key === "Home") scene.home();
     if (event.key === "Escape") show(null);

@@ -11,6 +11,7 @@ class TileScene extends Viewer {
     this.root = tileset.root; this.base = base; this.mark = mark;
     this.loading = 0; this.time = 0; this.selected = null;
     this.onload = () => {}; this.onfail = () => {};
+    this.roofColour = null;  // of a tile's row, [red, green, blue]; null leaves the colours of the tile
     this.home();
   }
 
@@ -59,7 +60,7 @@ class TileScene extends Viewer {
       const answer = await fetch(this.base + tile.content.uri);
       if (!answer.ok) throw new Error(`${tile.content.uri}: ${answer.status}`);
       Object.assign(tile, readTile(await answer.arrayBuffer()), { state: "drawn" });
-      tile.layer = Object.assign(this.addLayer("TRIANGLES", tile.corners, tile.colours), { tile });
+      tile.layer = Object.assign(this.addLayer("TRIANGLES", tile.corners, this.coloursOf(tile)), { tile });
       this.onload(tile);
     } catch (error) { tile.state = "failed"; this.onfail(error.message); }
     this.loading--;
@@ -75,8 +76,24 @@ class TileScene extends Viewer {
       triangles -= tile.owner.length;
       this.layers.splice(this.layers.indexOf(tile.layer), 1);
       for (const part of [tile.layer.places, tile.layer.colours]) if (this.gl) this.gl.deleteBuffer(part);
-      for (const name of ["state", "layer", "corners", "colours", "owner", "table"]) delete tile[name];
+      for (const name of ["state", "layer", "corners", "colours", "owner", "table", "light", "isRoof"]) delete tile[name];
     }
+  }
+
+  // The colours of a tile's corners, with roofs as the page asks for.
+  coloursOf(tile) {
+    const colours = tile.colours.slice(), { owner, light, isRoof } = tile;
+    if (this.roofColour) for (let t = 0; t < owner.length; t++) if (isRoof[t]) {
+      const base = this.roofColour(tile, owner[t]);
+      for (let v = 0; v < 3; v++) for (let k = 0; k < 3; k++) colours[12 * t + 4 * v + k] = base[k] * light[t];
+    }
+    return colours;
+  }
+
+  recolourRoofs(colour) {
+    this.roofColour = colour;
+    for (const layer of this.layers) this.recolour(layer, this.coloursOf(layer.tile));
+    this.select(this.selected);
   }
 
   // The building under a place of the canvas: its tile and its row there.
@@ -95,7 +112,7 @@ class TileScene extends Viewer {
     this.selected = found;
     for (const one of [before, found]) {
       if (!one || !one.tile.layer) continue;
-      const colours = one.tile.colours.slice(), { owner } = one.tile;
+      const colours = this.coloursOf(one.tile), { owner } = one.tile;
       if (one === found || (found && found.tile === one.tile)) {
         for (let t = 0; t < owner.length; t++) if (owner[t] === found.row) for (let v = 0; v < 3; v++) {
           const own = colours.subarray(12 * t + 4 * v, 12 * t + 4 * v + 3), light = Math.max(...own) / 255;
@@ -127,13 +144,16 @@ function readTile(file) {
   const painted = array(names.COLOR_0, Uint8Array, 4), ids = array(names._FEATURE_ID_0, Float32Array, 1);
   const [mx, my, mz] = document.nodes[0].translation;
   const corners = new Float32Array(3 * indices.length), colours = new Uint8Array(4 * indices.length).fill(255);
+  const light = new Float32Array(indices.length / 3), isRoof = new Uint8Array(indices.length / 3);
   indices.forEach((i, at) => {
     corners[3 * at] = places[3 * i] + mx; corners[3 * at + 1] = -places[3 * i + 2] - mz; corners[3 * at + 2] = places[3 * i + 1] + my;
-    const light = 0.72 + 0.28 * (0.35 * normals[3 * i] + 0.5 * normals[3 * i + 2] + 0.79 * normals[3 * i + 1]);
-    for (let k = 0; k < 3; k++) colours[4 * at + k] = light * shown(painted[4 * i + k] / 255);
+    const t = Math.floor(at / 3);
+    light[t] = 0.72 + 0.28 * (0.35 * normals[3 * i] + 0.5 * normals[3 * i + 2] + 0.79 * normals[3 * i + 1]);
+    isRoof[t] = normals[3 * i + 1] > 0.02;
+    for (let k = 0; k < 3; k++) colours[4 * at + k] = light[t] * shown(painted[4 * i + k] / 255);
   });
   const owner = Uint32Array.from({ length: indices.length / 3 }, (_, t) => ids[indices[3 * t]]);
-  return { corners, colours, owner, table: tableOf(document, bytes) };
+  return { corners, colours, owner, light, isRoof, table: tableOf(document, bytes) };
 }
 
 // A colour's part, linear 0..1, as displays show it, 0..255.

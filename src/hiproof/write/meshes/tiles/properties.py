@@ -14,7 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...attribute_list import HIPROOF, OSM, OWN, PREFIX, ROOFER
+from ...attribute_list import (
+    ENRICHED,
+    ENRICHED_3DBAG,
+    ENRICHED_SUN,
+    HIPROOF,
+    OSM,
+    OWN,
+    PREFIX,
+    ROOFER,
+)
 from ...naming import UniqueNames
 from ..glb import GlbDocument
 
@@ -22,6 +31,14 @@ EXTENSION = "EXT_structural_metadata"
 CLASS = "building"
 NO_NUMBER = -9999.0  # stands for what is not known, as GDAL's files use it; no attribute has it
 WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is told as text
+DESCRIBED_TABLES = (
+    (PREFIX, ROOFER),
+    (OWN, HIPROOF),
+    ("", OSM),
+    (OWN, ENRICHED),
+    ("", ENRICHED_3DBAG),
+    (OWN, ENRICHED_SUN),
+)
 DESCRIPTIONS = {
     "id": "the building's id",
     "type": "roof type of the part that shows the largest area",
@@ -29,7 +46,7 @@ DESCRIPTIONS = {
     "docs/parameters.md)",
 } | {
     prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
-    for prefix, table in ((PREFIX, ROOFER), (OWN, HIPROOF), ("", OSM))
+    for prefix, table in DESCRIBED_TABLES
     for a in table
 }
 
