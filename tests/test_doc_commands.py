@@ -8,6 +8,8 @@ import tomllib
 from pathlib import Path
 
 import laspy
+import numpy as np
+import pyogrio
 import pytest
 import shapely
 from typer.testing import CliRunner
@@ -85,6 +87,20 @@ def is_run(command):
 COMMANDS = {page: [c for c in list_commands(page) if is_run(c)] for page in PAGES}
 
 
+def write_passages(path, outline):
+    """Write a passage through a house, 2.5 m high."""
+    xmin, ymin, xmax, ymax = outline.bounds
+    passage = shapely.box(xmin - 1, (ymin + ymax) / 2 - 1, xmax + 1, (ymin + ymax) / 2 + 1)
+    pyogrio.raw.write(
+        path,
+        np.array([shapely.to_wkb(passage)]),
+        [np.array([2.5])],
+        ["height"],
+        geometry_type="Polygon",
+        crs="EPSG:28992",
+    )
+
+
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory):
     """A folder with the files that the pages name: a tile, footprints, terrain, overrides."""
@@ -100,6 +116,7 @@ def inputs(tmp_path_factory):
     shutil.copy(folder / "tile.laz", folder / "tiles/tile.laz")
     shutil.copy(files["footprints"], folder / "footprints.gpkg")
     shutil.copy(files["terrain"], folder / "dtm.tif")
+    write_passages(folder / "passages.gpkg", footprints[0].polygon)
     for name in ("known.jsonl", "city/edits.jsonl"):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(OVERRIDES, encoding="utf-8")

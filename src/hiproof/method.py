@@ -53,6 +53,7 @@ def reconstruct(
     points, settings = as_xyz(points), settings or Settings()
     stages.refuse_without_network(settings)
     building = stages.start_building(footprint, id)
+    given = footprint
     building, footprint, of_footprint = stages.align_footprint(building, points, settings)
     points, outline, status = stages.usable(points, footprint)
     if status is not Status.MODELLED:
@@ -75,6 +76,7 @@ def reconstruct(
     roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, base, settings, unused)
     building = stages.reach_terrain(building, base, settings)
+    building = stages.open_passages(building, base, given)
     building = stages.add_installations(building, points, settings)
     for text in (of_footprint, site.remark):
         building = stages.add_remark(building, text)

@@ -104,6 +104,17 @@ class ReadSettings:
         "column of the footprints with ground heights (m) for these where no terrain is known",
         option="--fallback-ground-height",
     )
+    clearance_column: str = setting(
+        "clearance",
+        "column of --underpasses that holds the height of the passage over the ground, in metres",
+        option="--clearance-column",
+    )
+    raised_column: str = setting(
+        "",
+        "column of the footprints that holds how high a building stands over the ground, in "
+        "metres, such as one on columns or over a road; empty for none",
+        option="--raised-column",
+    )
     split_gap_m: float = setting(
         0.0,
         "without footprints: clear space that separates buildings; 0 adapts it to the density",

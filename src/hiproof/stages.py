@@ -693,6 +693,42 @@ def judge(
     )
 
 
+def list_passages(
+    footprint: shapely.Geometry | Footprint | None, shift: tuple[float, float]
+) -> list[tuple[shapely.Polygon, float]]:
+    """Return the passages of a footprint, moved with it by `shift`."""
+    if not isinstance(footprint, Footprint):
+        return []
+    return [
+        (shapely.transform(polygon, lambda xy: xy + shift), clearance)
+        for polygon, clearance in footprint.passages
+    ]
+
+
+def open_passages(
+    building: Building, ground: Ground, footprint: shapely.Geometry | Footprint | None
+) -> Building:
+    """Return the building with the passages of its footprint below it.
+
+    A remark says which were left out, and why.
+    """
+    passages = list_passages(footprint, building.shift)
+    if building.built is None or not passages:
+        return building
+    from .compose.finish import add_passage
+    from .compose.settle import PLAN_DIGITS, round_number, settled_outline
+
+    frame, model = building.roof.frame, building.model
+    for polygon, clearance in passages:
+        outline = settled_outline(largest_polygon(shapely.transform(polygon, frame.to_local)))
+        ceiling = round_number(ground.z + clearance, PLAN_DIGITS)
+        try:
+            model = add_passage(model, outline, ceiling)
+        except CompositionError as error:
+            building = add_remark(building, f"a passage was left out ({error})")
+    return dataclasses.replace(building, built=model)
+
+
 def reach_terrain(building: Building, ground: Ground, settings: Settings) -> Building:
     """Return the building with walls down to the terrain, where settings say so.
 

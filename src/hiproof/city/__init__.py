@@ -8,6 +8,7 @@ run           the steps below, one after the other
 lock          one run a folder at a time
 marks         by what a folder knows whose run it holds
 resume        a folder held against the request: gone on from, or begun anew
+passages      passages below buildings, of a layer or a column
 overrides     what is known better of some buildings, and which of them have to be made again
 table_values  values of columns as overrides want them
 changed       a run whose footprints changed: what is the same stays

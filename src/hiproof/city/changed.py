@@ -22,7 +22,7 @@ from ..write.fragments import Fragment, Fragments, load_fragments, save_fragment
 from .ledger import Ledger, Task
 from .merge import remove_tiles, tile_parts, write_tile
 from .overrides import REDO, load_redo
-from .plan import PLAN_FILE, WorkPlan
+from .plan import PLAN_FILE, WorkPlan, encode_passages
 
 
 class StoredText(NamedTuple):
@@ -97,6 +97,7 @@ def digest_building(plan: WorkPlan, index: int) -> str:
         attributes,
         plan.list_names(job),
         find_row_outlines(plan, index),
+        encode_passages(job),
     ]
     return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()
 

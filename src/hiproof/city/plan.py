@@ -174,7 +174,8 @@ class WorkPlan:
             file.write(json.dumps(whole) + "\n")
             for job, area in zip(self.jobs, areas, strict=True):
                 attributes = job.footprint.attributes if job.footprint else None
-                file.write(json.dumps([job.id, area, attributes, job.error], default=str) + "\n")
+                row = [job.id, area, attributes, job.error, *encode_passages(job)]
+                file.write(json.dumps(row, default=str) + "\n")
 
     @staticmethod
     def load(path: Path) -> WorkPlan:
@@ -210,12 +211,20 @@ class WorkPlan:
 def read_job(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
     """Read a building of the plan's file.
 
-    It is [id, area, attributes, error], without attributes if there is no footprint.
+    It is [id, area, attributes, error, passage, ...], without attributes if there is no footprint.
+    A passage is [polygon, clearance].
     """
-    id, _, attributes, error = row
+    id, _, attributes, error, *rows = row
+    passages = tuple((shapely.from_wkb(wkb), clearance) for wkb, clearance in rows)
     if attributes is None:
         return Job(index, id, area, None, error and ErrorReport(*error))
-    return make_job(index, Footprint(id, area, attributes), shift)
+    return make_job(index, Footprint(id, area, attributes, passages=passages), shift)
+
+
+def encode_passages(job: Job) -> list[tuple[str, float]]:
+    """Return the passages below a building as the plan's file holds them."""
+    passages = job.footprint.passages if job.footprint else ()
+    return [(polygon.wkb_hex, clearance) for polygon, clearance in passages]
 
 
 def make_job(index: int, footprint: Footprint, shift: tuple[float, float]) -> Job:

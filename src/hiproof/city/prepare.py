@@ -22,6 +22,7 @@ from .classes import settle_classes
 from .from_cloud import Progress, jobs_from_cloud
 from .from_overture import with_overture
 from .outlines import MOST_ROW_M
+from .passages import add_passages
 from .plan import (
     Job,
     WorkPlan,
@@ -60,6 +61,7 @@ def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPla
     if terrain is not None and not request.footprints:
         terrain.knows_any(list_places(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
     settings = settle_classes(request.clouds, request.settings)
+    refuse_underpasses_alone(request)
     registration, operations, neighbours = None, [], ()
     if request.footprints:
         jobs, neighbours, registration = jobs_from_footprints(request, headers, frame, settings)
@@ -175,6 +177,15 @@ def read_headers(clouds: tuple[str, ...]) -> list:
     return [header for header in headers if header.count]
 
 
+def refuse_underpasses_alone(request: Request) -> None:
+    """Raise InputError for underpasses without footprints."""
+    if request.underpasses is not None and not request.footprints:
+        raise InputError(
+            "expected --footprints with --underpasses, got none; name the outlines of the "
+            "buildings above them"
+        )
+
+
 def jobs_from_footprints(
     request: Request, headers: list, frame: AreaFrame, settings: Settings
 ) -> tuple[tuple[Job, ...], tuple[shapely.Polygon, ...], Registration | None]:
@@ -188,6 +199,7 @@ def jobs_from_footprints(
     from .registration import find_registration, is_registered, warn_if_moved
 
     footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
+    footprints = add_passages(footprints, request, frame)
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))
     say_if_columns_run_out(str(request.footprints), footprints)

@@ -23,9 +23,9 @@ class Request:
     `footprints` (file, address or database) with their `layer`, the `id_attribute` that names them,
     an SQL condition `where` and a `bbox` (xmin, ymin, xmax, ymax) in the coordinates of the clouds
     say which buildings there are; without footprints the clouds are split. `terrain` is a raster,
-    `overrides` a file of what is known better; `processes` work on this machine (None: as many as
-    pay, see cores.py), or those of the Dask `scheduler`; `restart` begins anew in a folder that
-    holds another run.
+    `overrides` a file of what is known better, `underpasses` a layer of polygons; `processes` work
+    on this machine (None: as many as pay, see cores.py), or those of the Dask `scheduler`;
+    `restart` begins anew in a folder that holds another run.
 
     >>> from pathlib import Path
     >>> Request(("tile.laz",), Path("models"), footprints="footprints.gpkg").settings.fit.objective
@@ -46,6 +46,8 @@ class Request:
     restart: bool = field(default=False, metadata=NO_MATTER)
     where: str | None = field(default=None, metadata=WHICH)
     bbox: Box | None = field(default=None, metadata=WHICH)
+    underpasses: str | None = field(default=None, metadata=WHICH | FILES_FIELD)
 
     def __post_init__(self) -> None:
         remember(*self.clouds, self.footprints, self.terrain, self.overrides, self.scheduler)
+        remember(self.underpasses)

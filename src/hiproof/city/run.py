@@ -438,6 +438,7 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
             "bbox": request.bbox,
             "terrain": request.terrain,
             "overrides": request.overrides,
+            **({"underpasses": request.underpasses} if request.underpasses else {}),
             "started_in": str(Path.cwd()),  # what is not an address or absolute is meant from there
         },
         "footprints_source": read_source(footprints),

@@ -70,6 +70,14 @@ def reconstruct(
             "and fits the rest"
         ),
     ] = None,
+    underpasses: Annotated[
+        str | None,
+        typer.Option(
+            help="polygons of passages below buildings, a file or an address, with their "
+            "clearance in a column (--clearance-column)",
+            rich_help_panel=FURTHER,
+        ),
+    ] = None,
     config: Annotated[
         Path | None,
         typer.Option(
@@ -147,6 +155,7 @@ def reconstruct(
             id_attribute=id_attribute,
             terrain=terrain,
             overrides=overrides,
+            underpasses=underpasses,
             # answers change no model, so that other answers resume the same run
             settings=dataclasses.replace(settings, enrich=EnrichSettings()),
             processes=jobs,

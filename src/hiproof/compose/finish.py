@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import shapely
 
-from ..model import Model, Solid, Underside
+from ..model import Model, Passage, Solid, Underside
 from ..settings import ComposeSettings
 from .settle import PLAN_DIGITS
 from .underside import make_underside
@@ -22,6 +23,17 @@ def add_underside(model: Model, underside: Underside) -> Model:
         return replace(model, solid=level, underside=underside, level_solid=None)
     solid = finish_solid(level, underside, model.roof.frame.origin, model.compose)
     return replace(model, solid=solid, underside=underside, level_solid=level)
+
+
+def add_passage(model: Model, outline: shapely.Polygon, z_ceiling: float) -> Model:
+    """Return the model with one more passage.
+
+    Its `outline` is in the roof's frame, the height of its ceiling in the world. Raises
+    CompositionError as `make_underside` does.
+    """
+    passage = Passage(outline, z_ceiling - float(model.roof.frame.origin[2]))
+    passages = (*model.underside.passages, passage)
+    return add_underside(model, replace(model.underside, passages=passages))
 
 
 def finish_solid(

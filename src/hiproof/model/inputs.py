@@ -65,10 +65,12 @@ class Footprint:
     The polygon is in world coordinates, and empty if it is unusable.
 
     `shift` (x, y in m) is how far it lies beside its roof where that is known; (0, 0) where it is
-    not.
+    not. `passages` lead through below the building: polygons in world coordinates, each with its
+    clearance over the ground (m).
     """
 
     id: str
     polygon: shapely.Polygon
     attributes: dict[str, Any] = field(default_factory=dict)
     shift: tuple[float, float] = (0.0, 0.0)
+    passages: tuple[tuple[shapely.Polygon, float], ...] = ()

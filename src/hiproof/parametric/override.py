@@ -275,7 +275,7 @@ def overridden(
         return dataclasses.replace(building, status=Status.LEFT_OUT, detail=override.told)
     try:
         if override.parts is not None or override.block_height is not None:
-            result = build_given(override, points, building, terrain, settings)
+            result = build_given(override, points, building, terrain, settings, footprint)
         else:
             result = fit_within(override, points, footprint, terrain, settings, id, ground)
     except HiproofError as error:
@@ -318,9 +318,16 @@ def remark_given_ground(building: Building, z_ground: float | None, terrain: Any
 
 
 def build_given(
-    override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings
+    override: Override,
+    points: np.ndarray,
+    building: Building,
+    terrain: Any,
+    settings: Settings,
+    given: shapely.Polygon | Footprint | None = None,
 ) -> Building:
     """Return the building of the given parts or block.
+
+    `given` is its footprint with passages.
 
     It is measured on its points where there are any, and its footprint is moved as a run moves it.
     """
@@ -375,6 +382,7 @@ def build_given(
     )
     created = measure_building(created, local) if len(local) else created
     created = stages.reach_terrain(created, ground, settings)
+    created = stages.open_passages(created, ground, given)
     return stages.add_remark(created, of_footprint)
 
 

@@ -21,6 +21,7 @@ from ..write.attribute_list import (
     INSTALLATION,
     PARAMETERS,
     PART,
+    PASSAGE,
     Attribute,
 )
 from ..write.parameters import VERSION
@@ -60,6 +61,7 @@ BUILDING_KINDS = {
     "z_ground": NUMBER_OR_NULL,
     "ground_source": TEXT_OR_NULL,
     "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},
+    "passages": {"type": "array", "items": {"$ref": "#/$defs/passage"}},
     "installations": {"type": "array", "items": {"$ref": "#/$defs/installation"}},
     "walls": {"enum": ["level", "terrain"]},
     "attributes": {"type": "object"},
@@ -106,6 +108,7 @@ PART_KINDS = {
     "sigma": NUMBERS,
     "outlines": {"type": "array", "items": POLYGON_SCHEMA},
 }
+PASSAGE_KINDS = {"outline": POLYGON_SCHEMA, "ceiling": NUMBER_SCHEMA}
 INSTALLATION_KINDS = {
     "type": {"enum": [CHIMNEY, ROOF_OBJECT]},
     "parameters": {
@@ -134,6 +137,7 @@ def schema() -> dict[str, Any]:
             required=("type", "parameters", "position"),
         )
         | {"allOf": parameters_by_type()},
+        "passage": describe_attributes(PASSAGE, PASSAGE_KINDS, required=("outline", "ceiling")),
         "installation": describe_attributes(
             INSTALLATION, INSTALLATION_KINDS, required=("type", "parameters", "position")
         ),

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..compose.settle import PLAN_DIGITS, round_number
 from ..errors import InputError
-from ..model import Building, Roof, Underside
+from ..model import Building, Passage, Roof, Underside
 from ..read.damage import excerpt
+from ..write.attribute_list import PASSAGE
+from .record import list_at, measure, on_grid, polygon, refuse_other_keys, require_mapping
 
 
 def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
@@ -19,4 +22,19 @@ def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) ->
     if walls not in ("level", "terrain"):
         raise InputError(f"expected walls of level or terrain, got {excerpt(walls)}; choose one")
     lines = building.terrain_intersection if walls == "terrain" else ()
-    return Underside(terrain=tuple(line - roof.frame.origin for line in lines))
+    return Underside(
+        terrain=tuple(line - roof.frame.origin for line in lines),
+        passages=tuple(
+            read_passage(item, f"passage {k}", float(roof.frame.origin[2]))
+            for k, item in enumerate(list_at(record, "passages"))
+        ),
+    )
+
+
+def read_passage(record: Any, where: str, z_origin: float) -> Passage:
+    """Read a passage; its ceiling is in the world, `z_origin` the height of the frame."""
+    names = [attribute.name for attribute in PASSAGE]
+    refuse_other_keys(require_mapping(record, where), names, where)
+    outline = on_grid(polygon(record.get("outline"), f"the outline of {where}"))
+    ceiling = measure(record.get("ceiling"), f"the ceiling of {where}")
+    return Passage(outline, round_number(ceiling, PLAN_DIGITS) - z_origin)

@@ -400,6 +400,12 @@ PARAMETERS = (
         "",
         "terrain, where walls reach down to terrain_line; left out: they end at z_ground",
     ),
+    Attribute(
+        "passages",
+        "list",
+        "",
+        "passages below the building, as below; left out where there are none",
+    ),
     Attribute("attributes", "object", "", "the input's own"),
     Attribute("points", "count", "", "points that the building was judged by"),
     Attribute(
@@ -495,6 +501,11 @@ PART = (
         "m",
         "polygons that the part roofs, about the origin; left out: its rectangle's share",
     ),
+)
+
+PASSAGE = (
+    Attribute("outline", "list", "m", "rings of its outline, the outer first, about the origin"),
+    Attribute("ceiling", "number", "m", "height of its ceiling in the world"),
 )
 
 INSTALLATION = (
@@ -703,6 +714,9 @@ TABLES = (
         "Parameters: an installation",
         "`installations` of a building in `parameters.jsonl`",
         INSTALLATION,
+    ),
+    AttributeTable(
+        "Parameters: a passage", "`passages` of a building in `parameters.jsonl`", PASSAGE
     ),
     AttributeTable("Parameters: a change", "`change` of a building in `parameters.jsonl`", CHANGE),
     AttributeTable(

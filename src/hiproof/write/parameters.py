@@ -156,6 +156,15 @@ def further_record(model: Model) -> dict[str, Any]:
         record["installations"] = [installation_record(item) for item in model.installations]
     if model.underside.terrain:
         record["walls"] = "terrain"
+    if model.underside.passages:
+        z_origin = float(model.roof.frame.origin[2])
+        record["passages"] = [
+            {
+                "outline": outline_record(passage.outline),
+                "ceiling": number(passage.ceiling + z_origin),
+            }
+            for passage in model.underside.passages
+        ]
     return record
 
 
