@@ -1,5 +1,6 @@
 """The same run on a real Dask cluster: worker processes on this machine, killed in mid-work."""
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -10,7 +11,11 @@ import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, OutputError
+from hiproof.update import run as update_run
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
 from run_records import records
+from tiny_town import make_town, write_cloud
 
 distributed = pytest.importorskip("distributed", reason="needs dask[distributed], the extra `city`")
 
@@ -39,6 +44,28 @@ def test_a_cluster_whose_worker_is_killed_changes_no_byte(
     )
     assert (tmp_path / ".hiproof" / "killed").exists()
     assert records(tmp_path) == records(reference_run)
+
+
+def test_an_update_on_a_cluster_whose_worker_is_killed_changes_no_byte(
+    town_files, cluster, tmp_path, monkeypatch
+):
+    run, later = tmp_path / "run", make_town(seed=7)
+    later.xyz[later.classification == 6, 2] += 1.5
+    cloud = str(write_cloud(tmp_path / "later.laz", later.xyz, later.classification))
+    reconstruct_area(Request((town_files[0],), run, town_files[1]))
+    monkeypatch.setattr("hiproof.update.plan.limit_buildings_per_tile", lambda _: 1)
+    parameters = str(run / "parameters.jsonl")
+    outs = tmp_path / "alone", tmp_path / "cluster"
+    for out, address in zip(outs, (None, cluster.scheduler_address), strict=True):
+        request = UpdateRequest(
+            (cloud,), out, run=run, run_parameters=parameters, scheduler=address
+        )
+        update_area(dataclasses.replace(request, date="2024-05-01"))
+        monkeypatch.setattr(update_run, "update_tile", planted.update_killed_once)
+    assert (outs[1] / ".hiproof" / "killed").exists()
+    assert records(outs[0]) == records(outs[1])
+    tables = [[(out / f"changes.{kind}").read_bytes() for kind in ("csv", "gpkg")] for out in outs]
+    assert tables[0] == tables[1]
 
 
 def test_a_building_that_kills_dask_workers_is_left_out_alone(

@@ -1,0 +1,91 @@
+"""An update that is interrupted goes on, and gives the bytes of one that never was."""
+
+import pytest
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.update import before
+from hiproof.update import run as update_run
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+from hiproof.update.tile import update_tile
+from run_records import RECORDS
+from tiny_town import make_town, write_cloud
+
+FILES = (*RECORDS, "buildings.gpkg", "changes.csv", "changes.gpkg")
+
+
+@pytest.fixture(autouse=True)
+def small_tiles(monkeypatch):
+    monkeypatch.setattr("hiproof.update.plan.limit_buildings_per_tile", lambda _: 1)
+
+
+@pytest.fixture(scope="module")
+def request_of(town_files, tmp_path_factory):
+    folder, later = tmp_path_factory.mktemp("update"), make_town(seed=7)
+    later.xyz[later.classification == 6, 2] += 1.5
+    cloud = str(write_cloud(folder / "later.laz", later.xyz, later.classification))
+    reconstruct_area(Request((town_files[0],), folder / "run", town_files[1]))
+    parameters = str(folder / "run" / "parameters.jsonl")
+
+    def make(out, **options):
+        run = {"run": folder / "run", "run_parameters": parameters, "date": "2024-05-01"}
+        return UpdateRequest((cloud,), out, **run, **options)
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def whole(request_of, tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole")
+    update_area(request_of(out))
+    return read_files(out)
+
+
+def read_files(out):
+    return {name: (out / name).read_bytes() for name in FILES}
+
+
+def stop(*_):
+    raise KeyboardInterrupt
+
+
+def stop_at(count):
+    """The task that is interrupted when it comes to its work tile of that number."""
+    done = []
+
+    def solve(*arguments):
+        done.append(arguments)
+        return update_tile(*arguments) if len(done) < count else stop()
+
+    return solve
+
+
+def test_an_update_stopped_between_tiles_goes_on(request_of, whole, tmp_path, monkeypatch):
+    for count in (1, 3):
+        monkeypatch.setattr(update_run, "update_tile", stop_at(count))
+        with pytest.raises(KeyboardInterrupt):
+            update_area(request_of(tmp_path))
+    monkeypatch.setattr(update_run, "update_tile", update_tile)
+    update_area(request_of(tmp_path))
+    assert read_files(tmp_path) == whole
+
+
+@pytest.mark.parametrize("step", ["sort_earlier", "save_roofs_outside", "register_surveys"])
+def test_an_update_stopped_before_its_tiles_goes_on(step, request_of, whole, tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(before, step, stop)
+        with pytest.raises(KeyboardInterrupt):
+            update_area(request_of(tmp_path))
+    update_area(request_of(tmp_path))
+    assert read_files(tmp_path) == whole
+
+
+def test_an_update_stopped_at_its_tables_goes_on(request_of, whole, tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(update_run, "write_changes", stop)
+        with pytest.raises(KeyboardInterrupt):
+            update_area(request_of(tmp_path))
+    update_area(request_of(tmp_path))
+    assert read_files(tmp_path) == whole
+    assert not (tmp_path / ".hiproof" / "earlier").exists()
