@@ -221,6 +221,22 @@ def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path
     assert not summary.surveys.has_earlier
 
 
+def test_overrides_of_the_run_hold_for_what_changed(town_files, cloud, tmp_path):
+    known = tmp_path / "known.jsonl"
+    known.write_text('{"id": "house-1", "type": "hip"}\n{"id": "house-2", "type": "hip"}\n')
+    overrides = str(known)
+    reconstruct_area(
+        Request((town_files[0],), tmp_path / "run", town_files[1], overrides=overrides)
+    )
+    summary = update_area(make_request(tmp_path / "run", cloud, tmp_path / "out"))
+    assert summary.by_change == {"unchanged": 2, "changed": 1, "gone": 1}
+    house = by_id(tmp_path / "out")["house-1"]
+    assert house["type"] == "hip" and "overridden: type hip" in house["detail"]
+    known.rename(tmp_path / "lost.jsonl")
+    with pytest.warns(UserWarning, match=r"known\.jsonl, are not there"):
+        update_area(make_request(tmp_path / "run", cloud, tmp_path / "without"))
+
+
 def test_the_command_prints_the_result(update, run, cloud):
     _, out, _ = update
     words = ["update", str(run), cloud, "--out", str(out), "--date", DATE, "--jobs", "1"]

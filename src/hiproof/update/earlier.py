@@ -31,7 +31,7 @@ class EarlierRun:
     Its head and settings come with them.
 
     `footprint_shift` (m) is how far the run moved all footprints. `clouds` are those that the run
-    was made of, empty where not all of them exist.
+    was made of, empty where not all of them exist, `overrides` the file of its overrides.
     """
 
     head: FileHead
@@ -39,6 +39,7 @@ class EarlierRun:
     settings: Settings
     clouds: tuple[str, ...]
     footprint_shift: tuple[float, float] = (0.0, 0.0)
+    overrides: str | None = None
 
 
 def find_parameters(folder: Path) -> Path:
@@ -78,7 +79,20 @@ def read_earlier(folder: Path) -> EarlierRun:
             "its models alone; changes that the models leave out are not told from their errors",
             InputWarning,
         )
-    return EarlierRun(head, records, settings, clouds, find_footprint_shift(record))
+    shift = find_footprint_shift(record)
+    return EarlierRun(head, records, settings, clouds, shift, find_overrides(folder, record))
+
+
+def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:
+    """Return the file of the run's overrides, None where it had none or lost it."""
+    named, found = (record.get("inputs") or {}).get("overrides"), found_inputs(record).overrides
+    if named and not found:
+        warnings.warn(
+            f"{folder}: the overrides of this run, {named}, are not there; buildings that changed "
+            "are fitted without them",
+            InputWarning,
+        )
+    return found
 
 
 def find_footprint_shift(record: dict[str, Any]) -> tuple[float, float]:

@@ -64,7 +64,9 @@ def update_area(
     earlier = read_earlier(request.run)
     settings = choose_read_settings(earlier.settings).replace(changes or {})
     date = find_survey_date(request.clouds, request.date)
-    request = dataclasses.replace(request, settings=settings, date=date)
+    request = dataclasses.replace(
+        request, settings=settings, date=date, overrides=request.overrides or earlier.overrides
+    )
     refuse_unusable(request)
     state = open_state(request.out)
 

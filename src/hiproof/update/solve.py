@@ -22,6 +22,7 @@ import shapely
 from ..city.bundles import keep_failure
 from ..city.found import FoundRoof
 from ..city.ledger import Outcome
+from ..city.overrides import load_overrides
 from ..city.plan import Job, WorkPlan, load_plan, neighbourhood
 from ..city.solve import Surroundings, open_terrain, record_failure, solve_buildings, solve_one
 from ..city.sort import load_points
@@ -29,6 +30,7 @@ from ..errors import report_error
 from ..log import LOGGER
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
+from ..parametric.override import Override
 from ..parametric.record import read_building
 from ..read.thin import without_repeats
 from ..status import Change, ChangeKind, Doubt, Status
@@ -145,7 +147,8 @@ def update_tile(
     epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
     keep = functools.partial(keep_failure, root, tile, plan)
 
-    updater = Updater(plan, epochs, surveys, keep, load_texts(surveys.texts, tile))
+    texts, overrides = load_texts(surveys.texts, tile), load_overrides(root)
+    updater = Updater(plan, epochs, surveys, keep, texts, overrides)
 
     def solve(job: Job) -> tuple[Building, Fragments]:
         building = updater.update(job, UpdateMember.read(members[job.index], job))
@@ -165,6 +168,7 @@ class Updater:
     surveys: Surveys
     keep: Callable[..., None]
     texts: dict[bytes, Fragments]
+    overrides: dict[int, Override]
 
     def update(self, job: Job, member: UpdateMember) -> Building:
         """Return a building brought up to date, whatever happens to it."""
@@ -205,8 +209,9 @@ class Updater:
         )
 
     def reconstruct(self, job: Job, member: UpdateMember) -> Building:
-        """Return a building made of the new points alone."""
-        new, _ = solve_one(self.plan, job, self.epochs.new, None, self.keep)
+        """Return a building made of the new points and its override."""
+        override = self.overrides.get(job.index)
+        new, _ = solve_one(self.plan, job, self.epochs.new, override, self.keep)
         return dataclasses.replace(new, shift=member.shift)
 
     def follow_verdict(
