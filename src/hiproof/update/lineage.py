@@ -6,32 +6,99 @@ keeps that part's number where it can: parts that continue others come first, in
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
+import numpy as np
+import shapely
+
+from ..compose.settle import PLAN_DIGITS
+from ..errors import HiproofError
 from ..model import Building, Roof
 from ..model.heights import find_highest
 from ..parametric.building import build
-from ..write.parameters import building_record
+from ..write.parameters import LENGTH_DIGITS, building_record
 
 PART_GRID_M = 0.5  # of the places where parts are compared
 
 SAME_PLACE = 0.5
 """Intersection over union of the places of two parts from which on one continues the other."""
 
+SAME_OUTLINE_SHARE = 0.9
+"""The same of their outlines, from which on both may be one part that did not change."""
 
-def continue_parts(old: Building, new: Building) -> tuple[Building, list[int | None]]:
+LARGEST_GAP_M2 = 0.05
+"""Area (m2) between parts, beyond which parts of two epochs do not fit each other."""
+
+
+def continue_parts(
+    old: Building, new: Building, near_m: float
+) -> tuple[Building, list[int | None]]:
     """Return the new building with its parts in the earlier order.
 
-    The numbers of the parts that they continue come with it, None for new parts.
+    A part that the test does not tell from the part it continues keeps that part's parameters:
+    their heights differ by no more than `near_m`. The numbers of the parts that they continue come
+    with the building, None for new parts.
     """
     pairs = match_parts(old, new)
     order = sorted(range(len(new.parts)), key=lambda k: (k not in pairs, pairs.get(k, k), k))
     lineage = [pairs.get(k) for k in order]
+    before, record = building_record(old), building_record(new)
+    move_record(record, np.array(before["origin"]))
+    same = {k: before["parts"][j] for k, j in pairs.items() if is_same_part(old, j, new, k, near_m)}
+    if same:
+        parts = [same.get(k, record["parts"][k]) for k in order]
+        try:
+            result = build(record | {"parts": parts}, new.model.compose)
+        except HiproofError:
+            result = new
+        if result is not new and covers_outline(result.roof):
+            return result, lineage
     if order == list(range(len(order))):
         return new, lineage
     record = building_record(new)
     record["parts"] = [record["parts"][k] for k in order]
     return build(record, new.model.compose), lineage
+
+
+def move_record(record: dict[str, Any], origin: np.ndarray) -> None:
+    """Move an object of parameters.jsonl to another `origin` (3,)."""
+    shift = np.array(record["origin"]) - origin
+
+    def move_rings(rings: list[Any]) -> list[Any]:
+        return [np.round(np.array(ring) + shift[:2], PLAN_DIGITS).tolist() for ring in rings]
+
+    record["origin"], record["outline"] = origin.tolist(), move_rings(record["outline"])
+    for part in record["parts"]:
+        part["position"] = np.round(np.array(part["position"]) + shift, LENGTH_DIGITS).tolist()
+        part["outlines"] = [move_rings(rings) for rings in part["outlines"]]
+
+
+def is_same_part(old: Building, j: int, new: Building, k: int, near_m: float) -> bool:
+    """Return whether part `k` of the new roof does not differ from part `j` of the old one."""
+    before, after = old.parts[j], new.parts[k]
+    shift = old.roof.frame.origin - new.roof.frame.origin
+    first = shapely.union_all([piece.outline for piece in before.pieces])
+    second = shapely.union_all([piece.move(-shift).outline for piece in after.pieces])
+    common = shapely.intersection(first, second)
+    if before.type != after.type or common.area < SAME_OUTLINE_SHARE * first.union(second).area:
+        return False
+    xy = make_grid(common)
+    heights = np.stack([before.height_at(xy) + shift[2], after.height_at(xy + shift[:2])])
+    heights = heights[:, np.isfinite(heights).all(axis=0)]
+    return heights.size > 0 and bool(np.abs(heights[1] - heights[0]).max() <= near_m)
+
+
+def covers_outline(roof: Roof) -> bool:
+    """Return whether the parts leave no gap in the outline."""
+    pieces = shapely.union_all([piece.outline for piece in roof.pieces])
+    return bool(shapely.difference(roof.outline, pieces).area < LARGEST_GAP_M2)
+
+
+def make_grid(area: shapely.Geometry) -> np.ndarray:
+    """Return places (n, 2) every PART_GRID_M in the bounds of an area."""
+    x0, y0, x1, y1 = area.bounds
+    x, y = np.meshgrid(np.arange(x0, x1, PART_GRID_M), np.arange(y0, y1, PART_GRID_M))
+    return np.column_stack([x.ravel(), y.ravel()])
 
 
 def match_parts(old: Building, new: Building) -> dict[int, int]:
@@ -40,9 +107,7 @@ def match_parts(old: Building, new: Building) -> dict[int, int]:
     Both have to show at the same places of a grid. Pairs of the largest overlap go first, and every
     part is taken once.
     """
-    x0, y0, x1, y1 = old.roof.outline.bounds
-    x, y = np.meshgrid(np.arange(x0, x1, PART_GRID_M), np.arange(y0, y1, PART_GRID_M))
-    xy = np.column_stack([x.ravel(), y.ravel()])
+    xy = make_grid(old.roof.outline)
     shift = old.roof.frame.origin - new.roof.frame.origin
     before, after = show_parts(old.roof, xy), show_parts(new.roof, xy + shift[:2])
     pairs, counts = np.unique(np.column_stack([after, before]), axis=0, return_counts=True)

@@ -36,6 +36,7 @@ from ..read.thin import without_repeats
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
 from ..write.run_files import fragments
+from .cells import SAME_SIGMAS
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
@@ -170,6 +171,12 @@ class Updater:
     texts: dict[bytes, Fragments]
     overrides: dict[int, Override]
 
+    @property
+    def near_m(self) -> float:
+        """Largest difference (m) of heights between unchanged roofs."""
+        noise = self.surveys.shift.noise
+        return SAME_SIGMAS * math.hypot(noise.cell, noise.roof)
+
     def update(self, job: Job, member: UpdateMember) -> Building:
         """Return a building brought up to date, whatever happens to it."""
         try:
@@ -232,19 +239,22 @@ class Updater:
             places = record_places(name_doubts(verdict), frame)
             return self.mark(earlier, verdict, places, member)
         new = self.reconstruct(job, member)
-        roof = None if new.built is None else move_to_frame(new.roof, earlier.roof)
-        if roof is not None and not explains(roof, earlier.roof, verdict):
-            roof = None
-        places = self.name_places(earlier, roof, verdict)
-        if roof is None:
-            return self.mark(earlier, verdict, places, member)
-        result, lineage = continue_parts(earlier, new)
+        if new.built is None or not explains(
+            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict
+        ):
+            return self.mark(earlier, verdict, self.name_places(earlier, None, verdict), member)
+        result, lineage = continue_parts(earlier, new, self.near_m)
+        places = self.name_places(earlier, result, verdict)
         return self.mark(result, verdict, places, member, lineage)
 
     def name_places(
-        self, earlier: Building, roof: Roof | None, verdict: ChangeVerdict
+        self, earlier: Building, result: Building | None, verdict: ChangeVerdict
     ) -> list[dict[str, Any]]:
-        """Return the places where a building changed, as its record has them."""
+        """Return the places where a building changed, as its record has them.
+
+        `result` is its new model, None where no new model explains the points.
+        """
+        roof = None if result is None else move_to_frame(result.roof, earlier.roof)
         z_ground = earlier.z_ground - earlier.roof.frame.origin[2]
         sigma = self.surveys.shift.sigma[2]
         found = name_differences(verdict, earlier.roof, roof, z_ground, sigma)
@@ -258,15 +268,14 @@ class Updater:
         if new.built is None:
             verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
             return self.mark(earlier, verdict, [], member)
-        roof = move_to_frame(new.roof, earlier.roof)
+        result, lineage = continue_parts(earlier, new, self.near_m)
         is_changed = verdict.change is Change.CHANGED
-        places = self.name_places(earlier, roof, verdict) if is_changed else []
+        places = self.name_places(earlier, result, verdict) if is_changed else []
         before = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
         apart = shapely.symmetric_difference(before, job.area)
         outline = Difference(
             ChangeKind.OUTLINE_CHANGED, math.nan, math.nan, job.area.area - before.area, apart
         )
-        result, lineage = continue_parts(earlier, new)
         places += record_places([outline])
         return self.mark(
             result, dataclasses.replace(verdict, change=Change.CHANGED), places, member, lineage

@@ -1,0 +1,88 @@
+"""Parts that did not change keep their parameters, and their place in the list."""
+
+import copy
+
+import pytest
+
+from hiproof.compose import check_solid
+from hiproof.parametric.building import build
+from hiproof.update.lineage import continue_parts
+from hiproof.write.parameters import building_record
+
+NEAR_M = 0.1
+RING = [[0, 0], [20, 0], [20, 8], [0, 8]]
+WEST, EAST = [[0, 0], [12, 0], [12, 8], [0, 8]], [[12, 0], [20, 0], [20, 8], [12, 8]]
+HOUSE = {
+    "id": "a",
+    "origin": [1000.0, 2000.0, 3.0],
+    "z_ground": 3.0,
+    "outline": [RING],
+    "parts": [
+        {
+            "type": "gable",
+            "parameters": {"width": 8, "length": 12, "height": 3},
+            "position": [6, 4, 5],
+            "outlines": [[WEST]],
+        },
+        {
+            "type": "flat",
+            "parameters": {"width": 8, "length": 8},
+            "position": [16, 4, 3],
+            "outlines": [[EAST]],
+        },
+    ],
+}
+
+
+def build_new(rise_west=0.0, rise_east=0.0, east=EAST):
+    """The house from a later survey: another origin, its parts the other way round."""
+    record = copy.deepcopy(HOUSE)
+    gable, flat = record["parts"]
+    gable["position"][2] += rise_west
+    flat["position"][2] += rise_east
+    flat["outlines"] = [[east]]
+    record["parts"] = [flat, gable]
+    shift = (2.5, -1.25, 0.5)
+    record["origin"] = [a + b for a, b in zip(record["origin"], shift, strict=True)]
+    for part in record["parts"]:
+        part["position"] = [a - b for a, b in zip(part["position"], shift, strict=True)]
+        part["outlines"] = [[move(ring, shift) for ring in rings] for rings in part["outlines"]]
+    record["outline"] = [move(ring, shift) for ring in record["outline"]]
+    return build(record)
+
+
+def move(ring, shift):
+    return [[x - shift[0], y - shift[1]] for x, y in ring]
+
+
+def find_tops(building):
+    return building.roof.height_at([[6.0, 4.0], [16.0, 4.0]]) + building.roof.frame.origin[2]
+
+
+def test_an_unchanged_part_keeps_its_parameters_beside_one_that_was_raised():
+    old, new = build(HOUSE), build_new(rise_west=0.03, rise_east=2.0)
+    result, lineage = continue_parts(old, new, NEAR_M)
+    assert lineage == [0, 1]
+    before, after = building_record(old), building_record(result)
+    assert after["origin"] == before["origin"] and after["outline"] == before["outline"]
+    assert after["parts"][0] == before["parts"][0]
+    assert find_tops(result) == pytest.approx([11.0, 8.0], abs=1e-6)
+    assert not check_solid(result.solid)
+
+
+def test_a_part_that_moved_by_more_than_the_surveys_differ_is_new():
+    old, new = build(HOUSE), build_new(rise_west=0.3, rise_east=2.0)
+    result, lineage = continue_parts(old, new, NEAR_M)
+    assert lineage == [0, 1]
+    local = result.roof.frame.origin[:2] - [1000.0, 2000.0]
+    tops = result.roof.height_at([[6.0, 4.0], [16.0, 4.0]] - local) + result.roof.frame.origin[2]
+    assert tops == pytest.approx([11.3, 8.0], abs=1e-6)
+
+
+def test_a_part_that_would_leave_a_gap_is_not_kept():
+    """The flat part now begins half a metre away from the earlier gable."""
+    narrow = [[12.5, 0], [20, 0], [20, 8], [12.5, 8]]
+    old, new = build(HOUSE), build_new(rise_east=2.0, east=narrow)
+    result, _ = continue_parts(old, new, NEAR_M)
+    assert len(result.parts) == 2
+    assert result.roof.frame.origin.tolist() == new.roof.frame.origin.tolist()
