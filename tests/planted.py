@@ -103,7 +103,7 @@ def solve_without_compiling(folder, tile, terrain=None, avoid=()):
     return solve.solve_tile(folder, tile, terrain, avoid)
 
 
-def update_killed_once(folder, tile, terrain=None, avoid=()):
+def kill_once_and_update(folder, tile, terrain=None, avoid=()):
     """The worker that comes first is killed, as if from outside."""
     mark = Path(folder) / "killed"
     if not mark.exists():

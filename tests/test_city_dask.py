@@ -61,7 +61,7 @@ def test_an_update_on_a_cluster_whose_worker_is_killed_changes_no_byte(
             (cloud,), out, run=run, run_parameters=parameters, scheduler=address
         )
         update_area(dataclasses.replace(request, date="2024-05-01"))
-        monkeypatch.setattr(update_run, "update_tile", planted.update_killed_once)
+        monkeypatch.setattr(update_run, "update_tile", planted.kill_once_and_update)
     assert (outs[1] / ".hiproof" / "killed").exists()
     assert records(outs[0]) == records(outs[1])
     tables = [[(out / f"changes.{kind}").read_bytes() for kind in ("csv", "gpkg")] for out in outs]

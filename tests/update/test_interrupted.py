@@ -21,7 +21,7 @@ def small_tiles(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def request_of(town_files, tmp_path_factory):
+def make_update(town_files, tmp_path_factory):
     folder, later = tmp_path_factory.mktemp("update"), make_town(seed=7)
     later.xyz[later.classification == 6, 2] += 1.5
     cloud = str(write_cloud(folder / "later.laz", later.xyz, later.classification))
@@ -36,9 +36,9 @@ def request_of(town_files, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def whole(request_of, tmp_path_factory):
+def whole(make_update, tmp_path_factory):
     out = tmp_path_factory.mktemp("whole")
-    update_area(request_of(out))
+    update_area(make_update(out))
     return read_files(out)
 
 
@@ -61,31 +61,33 @@ def stop_at(count):
     return solve
 
 
-def test_an_update_stopped_between_tiles_goes_on(request_of, whole, tmp_path, monkeypatch):
+def test_an_update_stopped_between_tiles_goes_on(make_update, whole, tmp_path, monkeypatch):
     for count in (1, 3):
         monkeypatch.setattr(update_run, "update_tile", stop_at(count))
         with pytest.raises(KeyboardInterrupt):
-            update_area(request_of(tmp_path))
+            update_area(make_update(tmp_path))
     monkeypatch.setattr(update_run, "update_tile", update_tile)
-    update_area(request_of(tmp_path))
+    update_area(make_update(tmp_path))
     assert read_files(tmp_path) == whole
 
 
 @pytest.mark.parametrize("step", ["sort_earlier", "save_roofs_outside", "register_surveys"])
-def test_an_update_stopped_before_its_tiles_goes_on(step, request_of, whole, tmp_path, monkeypatch):
+def test_an_update_stopped_before_its_tiles_goes_on(
+    step, make_update, whole, tmp_path, monkeypatch
+):
     with monkeypatch.context() as patch:
         patch.setattr(before, step, stop)
         with pytest.raises(KeyboardInterrupt):
-            update_area(request_of(tmp_path))
-    update_area(request_of(tmp_path))
+            update_area(make_update(tmp_path))
+    update_area(make_update(tmp_path))
     assert read_files(tmp_path) == whole
 
 
-def test_an_update_stopped_at_its_tables_goes_on(request_of, whole, tmp_path, monkeypatch):
+def test_an_update_stopped_at_its_tables_goes_on(make_update, whole, tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(update_run, "write_changes", stop)
         with pytest.raises(KeyboardInterrupt):
-            update_area(request_of(tmp_path))
-    update_area(request_of(tmp_path))
+            update_area(make_update(tmp_path))
+    update_area(make_update(tmp_path))
     assert read_files(tmp_path) == whole
     assert not (tmp_path / ".hiproof" / "earlier").exists()

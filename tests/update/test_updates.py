@@ -20,6 +20,7 @@ from hiproof.parametric.run import build_file
 from hiproof.update.dates import find_survey_date
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
+from hiproof.write.fragments import load_fragments, save_fragments
 from run_records import RECORDS, by_id, records
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
@@ -192,6 +193,20 @@ def test_texts_kept_of_the_run_are_those_made_anew(update, run, cloud, tmp_path)
     rows = by_id(tmp_path / "out")
     assert "change" not in rows["house-0"] and rows["house-0"]["attributes"]["door"] == "green"
     assert b"green" in records(tmp_path / "out")["buildings.gml"]
+
+
+def test_texts_that_other_code_made_are_made_anew(update, run, cloud, tmp_path):
+    _, out, _ = update
+    other = shutil.copytree(run, tmp_path / "run")
+    (tile,) = (other / ".hiproof" / "tiles").glob("*.npz")
+    parts = [
+        part | {"citygml.version2": dataclasses.replace(part["citygml.version2"], text=b"<old/>")}
+        for part in load_fragments(tile)
+    ]
+    with tile.open("wb") as file:
+        save_fragments(file, parts)
+    update_area(make_request(other, cloud, tmp_path / "out"))
+    assert records(tmp_path / "out") == records(out)
 
 
 def test_the_same_call_again_keeps_what_is_done(update, run, cloud):

@@ -74,7 +74,7 @@ def move_record(record: dict[str, Any], origin: np.ndarray) -> None:
 
 
 def is_same_part(old: Building, j: int, new: Building, k: int, near_m: float) -> bool:
-    """Return whether part `k` of the new roof does not differ from part `j` of the old one."""
+    """Return whether part `k` of the new roof is part `j` of the old one."""
     before, after = old.parts[j], new.parts[k]
     shift = old.roof.frame.origin - new.roof.frame.origin
     first = shapely.union_all([piece.outline for piece in before.pieces])

@@ -148,7 +148,7 @@ def update_tile(
     epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
     keep = functools.partial(keep_failure, root, tile, plan)
 
-    texts, overrides = load_texts(surveys.texts, tile), load_overrides(root)
+    texts, overrides = load_texts(surveys.texts, tile, plan.head), load_overrides(root)
     updater = Updater(plan, epochs, surveys, keep, texts, overrides)
 
     def solve(job: Job) -> tuple[Building, Fragments]:

@@ -16,12 +16,16 @@ from .. import __version__
 from ..city.merge import tile_parts
 from ..city.plan import PLAN_FILE, WorkPlan
 from ..city.resume import STATE_FOLDER
-from ..errors import OutputError
+from ..errors import HiproofError
 from ..evaluate.run import run_record
 from ..model import Building
+from ..parametric.building import build
 from ..write.fragments import Fragments, load_fragments
+from ..write.head import FileHead
 from ..write.json_text import dump
+from ..write.naming import gml_name
 from ..write.parameters import head_record
+from ..write.run_files import fragments
 from .earlier import RUN_PARAMETERS
 
 LINES = "parameters"  # the module whose texts are the lines of parameters.jsonl
@@ -58,13 +62,21 @@ def find_texts(run: Path, plan: WorkPlan) -> str:
     return str(state.absolute()) if is_same and run_record(run)["hiproof"] == __version__ else ""
 
 
-def load_texts(state: str, tile: str) -> dict[bytes, Fragments]:
-    """Return the texts of a tile's buildings by their line, none where they are lost."""
+def load_texts(state: str, tile: str, head: FileHead) -> dict[bytes, Fragments]:
+    """Return the texts of a tile's buildings by their line.
+
+    There are none where they are lost, or where those of the first building are no longer what is
+    made of it: then the code is another.
+    """
     if not state or not tile_parts(Path(state), tile).is_file():
         return {}
     try:
-        return {part[LINES].text: part for part in load_fragments(tile_parts(Path(state), tile))}
-    except OutputError:
+        texts = {part[LINES].text: part for part in load_fragments(tile_parts(Path(state), tile))}
+        line, first = next(iter(texts.items()))
+        building = build(json.loads(line), head.compose)
+        names = building.id, gml_name(building.id)
+        return texts if fragments(building, names, head)[1] == first else {}
+    except (HiproofError, ValueError, KeyError, StopIteration):
         return {}
 
 
