@@ -123,6 +123,18 @@ def test_an_interrupted_command_goes_on(run, tmp_path, monkeypatch):
     assert not (run / "enriched" / ".enrich").exists()
 
 
+def test_an_interrupted_second_call_leaves_the_files_of_the_first(run, monkeypatch):
+    def fail(*arguments):
+        raise KeyboardInterrupt
+
+    enrich_run(run, settings=EnrichSettings(touch_m=0.0))
+    first = read_files(run / "enriched")
+    monkeypatch.setattr(enrich_module, "enrich_block", fail)
+    with pytest.raises(KeyboardInterrupt):
+        enrich_run(run, processes=1)
+    assert read_files(run / "enriched") == first
+
+
 def test_a_folder_without_a_run_is_refused(tmp_path):
     with pytest.raises(InputError, match="expected the output folder of `hiproof reconstruct`"):
         enrich_run(tmp_path)

@@ -10,6 +10,7 @@ from hiproof.cli.app import app
 from hiproof.enrich import far
 from hiproof.enrich.cadastre import Cadastre
 from hiproof.enrich.far import MIDDLES_DEG, TerrainHorizon, read_horizon
+from hiproof.enrich.run import enrich_run
 from hiproof.errors import InputError
 from hiproof.settings import EnrichSettings
 from streets import WORLD, open_street, place_house, write_street
@@ -60,9 +61,10 @@ def test_a_hill_stands_where_it_is(tmp_path):
 
 def test_terrain_that_is_elsewhere_is_refused(tmp_path):
     far = place_house("a", 100_000.0, 0)
-    records = open_street(tmp_path / "run", [far]).records
+    folder = write_street(tmp_path / "run", [far])
+    settings = EnrichSettings(sun=True, terrain=write_hill(tmp_path / "hill.tif"))
     with pytest.raises(InputError, match="expected a terrain model around the buildings, got terr"):
-        TerrainHorizon(records, write_hill(tmp_path / "hill.tif"))
+        enrich_run(folder, settings=settings)
 
 
 @pytest.mark.parametrize("convergence", [0.0, 10.0])

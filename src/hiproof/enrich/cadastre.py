@@ -14,7 +14,7 @@ from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.values import round_value
 from .areas import measure_faces
-from .far import TerrainHorizon, read_horizon
+from .far import TerrainHorizon, open_terrain, read_horizon
 from .horizon import SECTORS
 from .panels import estimate_yield, measure_panels
 from .place import locate
@@ -42,8 +42,13 @@ class Cadastre:
         self.town, self.settings = town, settings
         self.edges = ShadingEdges(town)
         self.locate = functools.lru_cache(16)(functools.partial(locate, town.records.head))
-        self.terrain = TerrainHorizon(town.records, settings.terrain) if settings.terrain else None
         self.read_horizon = functools.lru_cache(16)(read_horizon)
+
+    @functools.cached_property
+    def terrain(self) -> TerrainHorizon | None:
+        """The horizon of the terrain model, None without one."""
+        path = self.settings.terrain
+        return TerrainHorizon(self.town.records, path) if path else None
 
     def find_sky(self, number: int) -> Sky:
         """Return the sky over a building: that of the middle of its square of SKY_CELL_M."""
@@ -174,3 +179,5 @@ def refuse_unfit(records: Records, settings: EnrichSettings) -> None:
     modelled = np.flatnonzero(records.index.modelled)
     if settings.sun and len(modelled):
         Cadastre(Town(records), settings).find_sky(int(modelled[0]))
+        if settings.terrain:
+            open_terrain(records, settings.terrain)

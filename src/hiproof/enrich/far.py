@@ -56,10 +56,9 @@ class TerrainHorizon:
     """The horizon that a terrain model makes around places of a run."""
 
     def __init__(self, records: Records, path: str) -> None:
-        crs = parse_crs(records.head.crs)
-        terrain = read_terrain(path, crs, find_units(crs, unit_name=records.head.unit))
-        boxes = records.index.boxes[np.isfinite(records.index.boxes[:, 0])]
-        self.corner, self.spacing, self.heights = sample_terrain(terrain, boxes)
+        terrain, low, high = open_terrain(records, path)
+        self.corner = low
+        self.spacing, self.heights = sample_terrain(terrain, low, high)
         count = np.log(TERRAIN_REACH_M / (2 * self.spacing)) / np.log(RAY_GROWTH)
         self.distances = 2 * self.spacing * RAY_GROWTH ** np.arange(int(np.ceil(count)))
         self.sink = self.distances**2 * (1.0 - REFRACTION) / (2000.0 * EARTH_RADIUS_KM)
@@ -82,23 +81,32 @@ class TerrainHorizon:
         return np.maximum(rise.max(axis=1), 0.0)
 
 
-def sample_terrain(
-    terrain: RasterTerrain, boxes: np.ndarray
-) -> tuple[np.ndarray, float, np.ndarray]:
-    """Return heights of a terrain on a grid, -inf where they are unknown.
+def open_terrain(records: Records, path: str) -> tuple[RasterTerrain, np.ndarray, np.ndarray]:
+    """Open a terrain model around the buildings of a run.
 
-    They come after the grid's low corner and the distance of its places. The grid is as fine as
-    MOST_PLACES allow, in the box in which the terrain may shade buildings of `boxes` (n, 4). Raises
-    InputError where the terrain covers nothing of it.
+    The corners of the box in which it is known follow. Raises InputError where it cannot be read,
+    and where it covers none of them.
     """
-    low, high = find_known_box(terrain, boxes)
+    crs = parse_crs(records.head.crs)
+    terrain = read_terrain(path, crs, find_units(crs, unit_name=records.head.unit))
+    boxes = records.index.boxes[np.isfinite(records.index.boxes[:, 0])]
+    return terrain, *find_known_box(terrain, boxes)
+
+
+def sample_terrain(
+    terrain: RasterTerrain, low: np.ndarray, high: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Return heights of a terrain on a grid in a box, -inf where they are unknown.
+
+    They come after the distance of the grid's places, which is as small as MOST_PLACES allow.
+    """
     spacing = max(FINEST_M, float(np.sqrt(np.prod(high - low) / MOST_PLACES)))
     x, y = (np.arange(a, b + spacing, spacing) for a, b in zip(low, high, strict=True))
     # row by row: a terrain model is read in tiles
     heights = np.stack(
         [terrain.height_at(np.column_stack([x, np.full(len(x), row)])) for row in y]
     ).astype(np.float32)
-    return low, spacing, np.where(np.isfinite(heights), heights, np.float32(-np.inf))
+    return spacing, np.where(np.isfinite(heights), heights, np.float32(-np.inf))
 
 
 def find_known_box(terrain: RasterTerrain, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
