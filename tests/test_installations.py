@@ -61,6 +61,11 @@ def test_a_house_has_none_without_the_option_or_without_objects():
     assert with_leaves.model.installations == ()
 
 
+def test_a_strip_of_wall_is_no_object():
+    wall = (6.0, 2.5, 4.0, 0.3, 8.5)
+    assert reconstruct(wall, density=20.0).model.installations == ()
+
+
 def test_the_roof_is_the_same_with_the_option():
     plain, found = (reconstruct(CHIMNEY, installations=value) for value in (False, True))
     record = building_record(found)

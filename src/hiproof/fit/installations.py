@@ -25,6 +25,7 @@ BESIDE_OBJECT_M = 0.3  # around a point, the roof has to be lower: nearer ones l
 # Between points of one object: metres, or spacings of points if they are more.
 OBJECT_GAP_M, OBJECT_GAP_SPACINGS = 0.75, 1.5
 MOST_OBJECT_RISE_M, MOST_OBJECT_SIDE_M = 5.0, 6.0  # larger ones are parts of the roof, or trees
+MOST_OBJECT_RATIO = 5.0  # of an object's sides; a thinner one is a wall that the roof lacks
 OBJECT_TOP_M, OBJECT_TOP_SHARE = 0.4, 0.5  # how much of an object's points lie so near its top
 LEAST_OBJECT_SIDE_M = 0.3  # of an object; no smaller one returns four points
 OFF_NEIGHBOUR_M = 0.3  # from the outline to an object's middle; nearer is a neighbour's wall
@@ -89,12 +90,8 @@ def make_installation(roof: Roof, group: np.ndarray) -> Installation | None:
     height = float(np.quantile(group[:, 2], 0.9)) - base
     edge = shapely.distance(shapely.Point(xy), shapely.boundary(roof.outline))
     is_inside = shapely.contains_xy(roof.outline, *xy) and edge >= OFF_NEIGHBOUR_M
-    if not (
-        is_inside
-        and math.isfinite(base)
-        and height <= MOST_OBJECT_RISE_M
-        and sides[0] <= MOST_OBJECT_SIDE_M
-    ):
+    is_small = 0.0 < height <= MOST_OBJECT_RISE_M and sides[0] <= MOST_OBJECT_SIDE_M
+    if not (is_inside and is_small and sides[0] <= MOST_OBJECT_RATIO * sides[1]):
         return None
     is_chimney = bool((sides <= CHIMNEY_SIDES_M).all())
     return round_installation(
