@@ -17,9 +17,11 @@ from hiproof.city.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
+from hiproof.frames import METRES
 from hiproof.model import CEILING, GROUND, Footprint
 from hiproof.settings import Settings
-from hiproof.write import roof_figures
+from hiproof.write import building_attributes, roof_figures
+from hiproof.write.meshes.viewed import view_building
 from hiproof.write.parameters import building_record
 from tiny_town import CRS, ORIGIN, gable
 from written_run import require_valid_files, write_run
@@ -93,6 +95,15 @@ def test_every_file_is_valid_and_built_again(tmp_path, parts_as):
     assert ["OuterCeilingSurface" in text for text in texts] == [True, True, True, False]
     records = map(json.loads, (tmp_path / "parameters.jsonl").read_text().splitlines()[1:])
     assert ["passages" in record for record in records] == [True, True, True, False]
+
+
+def test_viewers_and_tables_get_the_passage():
+    house = reconstruct((GATE, 3.0))
+    looks = view_building(house, {}, METRES).faces_by_look()
+    assert sum(map(len, looks.values())) == len(house.solid.faces)
+    assert {look.name for look in looks} == {"roof gable", "WallSurface", "GroundSurface"}
+    assert building_attributes(house)["hiproof_passages"] == 1
+    assert "hiproof_passages" not in building_attributes(reconstruct())
 
 
 @pytest.mark.parametrize(

@@ -175,6 +175,12 @@ HIPROOF = (
         "",
         "only where there are some (`--installations`): chimneys and other objects on the roof",
     ),
+    Attribute(
+        "passages",
+        "count",
+        "",
+        "only where there are some (`--underpasses`): passages below the building",
+    ),
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
     Attribute(
         "change", "text", "", "only after an update, where not unchanged: changed, new, gone, ..."

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..frames import METRES, Units
-from ..model import Building, Solid
+from ..model import Building, Model, Solid
 from ..status import Status
 from .attribute_list import OWN, PREFIX
 from .osm_tags import osm_tags
@@ -57,8 +57,8 @@ def building_attributes(
     }
     if osm:
         computed |= osm_tags(building, figures)
-    if building.built is not None and building.built.installations:
-        computed[OWN + "installations"] = len(building.built.installations)
+    if building.built is not None:
+        computed |= {OWN + name: n for name, n in count_further(building.built).items() if n}
     if building.change is not None:
         computed |= {
             OWN + name: value for name, value in change_attributes(building.change).items()
@@ -142,6 +142,14 @@ def hiproof_attributes(
         "iso19107_lod22": None
         if building.built is None
         else check_as_written(building.solid, units),
+    }
+
+
+def count_further(model: Model) -> dict[str, int]:
+    """Return how many objects stand on a roof, and how many passages lead below it."""
+    return {
+        "installations": len(model.installations),
+        "passages": len(model.underside.passages),
     }
 
 

@@ -94,11 +94,13 @@ def merge_values(members: dict[str, Any], attributes: dict[str, Any]) -> dict[st
 def choose_look(face: Face, part_types: Mapping[int, str]) -> Look:
     """Return the look of a face: a roof's is that of its part's type.
 
+    A ceiling looks like the ground.
+
     >>> choose_look(Face(((0, 1, 2),), ROOF, part=1), {0: "gable", 1: "hip"})
     Look(name='roof hip', colour='#05429b')
     """
     if face.kind != ROOF:
-        return Look(face.kind, WALL_COLOUR if face.kind == WALL else GROUND_COLOUR)
+        return Look(WALL, WALL_COLOUR) if face.kind == WALL else Look(GROUND, GROUND_COLOUR)
     known_values = part_types.get(face.part)
     return Look(
         f"roof {known_values if known_values in type_colours() else 'unknown'}",
