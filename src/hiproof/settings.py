@@ -353,7 +353,7 @@ class EnrichSettings:
 
     touch_m: float = setting(
         0.3,
-        "distance up to which walls of neighbours touch",
+        "distance in metres up to which walls of neighbours touch",
         "m",
         0.0,
         2.0,
