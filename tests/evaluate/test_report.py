@@ -22,7 +22,7 @@ from hiproof.evaluate.report_pictures import (
     residual_bins,
 )
 from hiproof.evaluate.run import evaluate_run
-from hiproof.write.colours import RESIDUAL_STOPS, type_colour
+from hiproof.write.colours import CHANGE_COLOURS, RESIDUAL_STOPS, type_colour
 from pages import BROWSER, needs_browser
 from sample_models import sample_points, two_parts, write_sample_run
 
@@ -252,3 +252,13 @@ def test_a_histogram_of_one_value_is_told_and_one_that_is_cut_says_so():
     )
     assert "and more" in histogram(np.array([*range(100), 1000.0]), "x", "m")
     assert "and more" not in histogram(np.array([1.0, 2.0, 2.0, 2.0]), "x", "m")
+
+
+def test_changes_of_an_update_have_a_colour_of_their_own(run):
+    models = [run.models[0], *run.models[1:]]
+    changed = {**models[0].attributes, "hiproof_change": "gone"}
+    models[0] = replace(models[0], attributes=changed)
+    data = report_data(replace(run, models=models), [None] * len(models))
+    changes = [building["change"] for building in data["buildings"]]
+    assert changes == ["gone", *[None] * (len(models) - 1)]
+    assert data["colours"]["change"]["gone"] == CHANGE_COLOURS["gone"]

@@ -13,7 +13,7 @@ import shapely
 
 from ..status import Status
 from ..write.attribute_list import OWN
-from ..write.colours import GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, page_colours
+from ..write.colours import CHANGE_COLOURS, GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, page_colours
 from ..write.meshes.page_mesh import pack_values, solid_mesh
 from .evaluation import TEXT_COLUMNS
 from .metrics import plan_outline, psd
@@ -36,7 +36,8 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     )
     return {
         "buildings": buildings,
-        "colours": page_colours() | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS},
+        "colours": page_colours()
+        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "change": CHANGE_COLOURS},
         "types": types,
         "mesh": mesh_data(run, types, origin),
         "points": point_data(run, origin),
@@ -77,6 +78,7 @@ def building_data(
         "outcome": status.value if status else model.status,
         "residual": finite(residual),
         "sun": finite(mean_sun(model)),
+        "change": model.attributes.get(f"{OWN}change"),
         "measured": {
             name: finite(value) for name, value in measured.items() if finite(value) is not None
         },

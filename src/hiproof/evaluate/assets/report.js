@@ -146,6 +146,8 @@ function show(index) {
 viewer.onpick = select;
 // Only a run of `hiproof enrich --sun` has the sun.
 if (mesh.sun.length) document.getElementById("mode").append(new Option("sun on roofs", "sun"));
+// Only a run of `hiproof update` has changes.
+if (data.buildings.some(building => building.change)) document.getElementById("mode").append(new Option("change", "change"));
 document.getElementById("mode").addEventListener("change", event => { mode = event.target.value; recolour(); });
 document.getElementById("show-points").addEventListener("change", event => { cloud.visible = event.target.checked; viewer.draw(); });
 document.getElementById("find").addEventListener("change", event => {
