@@ -11,7 +11,7 @@ from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.model import PointCloud
 from hiproof.settings import ReadSettings
-from hiproof.update.outside import SurveyCells, load_cells
+from hiproof.update.outside import SurveyCells, load_survey
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
@@ -84,7 +84,26 @@ def test_cells_do_not_depend_on_how_points_are_cut(tmp_path):
         halves.add(PointCloud(points[half], classes[half]))
     whole.save(tmp_path / "whole" / "0.npz")
     halves.save(tmp_path / "halves" / "0.npz")
+    box = shapely.box(0, 0, 9, 9)
+    surveys = [load_survey(tmp_path / name, box) for name in ("whole", "halves")]
     for kind in ("roof", "ground"):
-        cells = [load_cells(tmp_path / name, kind) for name in ("whole", "halves")]
+        cells = [survey[kind] for survey in surveys]
         assert len(cells[0]) > 70
         np.testing.assert_allclose(*cells, atol=1e-9)
+
+
+def test_without_a_building_class_level_places_high_above_ground_are_roofs(tmp_path):
+    town = make_town()
+    for block in (BUILT, TREE):
+        put_block(town, block, 6.0, scatter=2.0 if block == TREE else 0.02)
+    classes = np.where(town.classification == 6, 1, town.classification).astype(np.uint8)
+    cells = SurveyCells(ReadSettings(roofs="shape"))
+    cells.add(PointCloud(town.xyz, classes))
+    cells.save(tmp_path / "0.npz")
+    everywhere = shapely.box(*(ORIGIN[:2] - 10), *(ORIGIN[:2] + 200))
+    xy = load_survey(tmp_path, everywhere)["roof"][:, :2] - ORIGIN[:2]
+    built, tree = (
+        shapely.intersects_xy(shapely.box(*corners), *xy.T).sum() for corners in (BUILT, TREE)
+    )
+    assert built > 70 and tree < 20
+    assert len(xy) < 600

@@ -2,12 +2,13 @@
 
 Both surveys are compared in cells of a metre, wherever the clouds have points of the building
 classes. Cells along outlines and along roofs of the other survey start nothing, since gutters and
-misfits lie there. Clouds without building classes tell no roofs from trees, and show none.
+misfits lie there. In clouds without building classes, level cells high above the ground are roofs.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,18 @@ FEWEST_OUTSIDE = 8
 MOSTLY = 0.5
 """Share of the cells that show what stood there in the other survey."""
 
+NO_ROOFS = (7, 9, 18)  # classes of ASPRS: noise and water
+LEVEL_M = 0.5
+"""Scatter (m) of the heights of a cell below which they lie on a roof: one of 60 degrees has it,
+crowns have metres."""
+
+HIGH_OVER_GROUND_M = 2.0
+"""Height (m) of a roof over the nearest ground: cars and hedges are lower."""
+
+BLOCK_M, REACH_M = 1000.0, 200.0
+"""Side (m) of the squares that are searched one after the other, and how far around each cells are
+loaded: roofs that are longer are cut."""
+
 ROUNDING_M = 1e-6  # far above the errors of a mean, far below the millimetres of coordinates
 
 AROUND = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)])
@@ -47,7 +60,12 @@ class SurveyCells:
     """The roof and the ground of a survey in cells of a metre."""
 
     def __init__(self, read: ReadSettings):
-        self.classes = {"roof": read.building_classes, "ground": read.ground_classes}
+        roofs = tuple(set(range(256)) - set(read.ground_classes) - set(NO_ROOFS))
+        self.classes = {
+            "roof": read.building_classes if read.by_class else roofs,
+            "ground": read.ground_classes,
+        }
+        self.has_classes = read.by_class
         self.found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"roof": [], "ground": []}
 
     def add(self, cloud: PointCloud) -> None:
@@ -55,23 +73,27 @@ class SurveyCells:
         for kind, classes in self.classes.items():
             points = cloud.xyz[np.isin(cloud.classes, classes)]
             if len(points):
-                self.found[kind].append(average_cells(points, np.ones(len(points))))
+                squared = np.column_stack([points, points[:, 2] ** 2])
+                self.found[kind].append(average_cells(squared, np.ones(len(points))))
 
     def save(self, path: Path) -> None:
         """Write the cells of a file."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        arrays: dict[str, Any] = {}
+        arrays: dict[str, Any] = {"has_classes": self.has_classes}
         for kind, chunks in self.found.items():
             means, counts = join_cells(chunks)
             arrays |= {kind: means, f"{kind}_count": counts}
+        arrays["bounds"] = shapely.total_bounds(
+            shapely.points(np.concatenate([arrays["roof"], arrays["ground"]])[:, :2])
+        )
         with atomic_file(path) as file:
             np.savez(file, **arrays)
 
 
 def average_cells(points: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean point (k, 3) and the number of points (k,) of each cell.
+    """Return the mean (k, 4) and the number of points (k,) of each cell.
 
-    `points` (n, 3) stand for so many points, `counts` (n,), each.
+    `points` (n, 4), x y z and the square of z, stand for so many points, `counts` (n,), each.
     """
     cells, number = number_cells(find_cells(points))
     total = np.bincount(number, weights=counts, minlength=len(cells))
@@ -91,18 +113,49 @@ def find_cells(points: np.ndarray) -> np.ndarray:
 def join_cells(chunks: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
     """Join the cells of several chunks."""
     if not chunks:
-        return np.zeros((0, 3)), np.zeros(0)
+        return np.zeros((0, 4)), np.zeros(0)
     return average_cells(*(np.concatenate(arrays) for arrays in zip(*chunks, strict=True)))
 
 
-def load_cells(folder: Path, kind: str) -> np.ndarray:
-    """Load the mean points (k, 3) of all cells of a kind, in the order of their cells."""
-    chunks = []
-    for path in sorted(folder.glob("[0-9]*.npz")):
+def load_survey(folder: Path, box: shapely.Polygon) -> dict[str, np.ndarray]:
+    """Load the roof and ground cells (k, 3) of a survey in a box, as mean points."""
+    chunks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"roof": [], "ground": []}
+    has_classes = True
+    for path in list_files(folder, box):
         with np.load(path) as arrays:
-            if len(arrays[kind]):
-                chunks.append((arrays[kind], arrays[f"{kind}_count"]))
-    return join_cells(chunks)[0]
+            has_classes &= bool(arrays["has_classes"])
+            for kind, found in chunks.items():
+                inside = shapely.intersects_xy(box, arrays[kind][:, 0], arrays[kind][:, 1])
+                if inside.any():
+                    found.append((arrays[kind][inside], arrays[f"{kind}_count"][inside]))
+    roof, ground = (join_cells(found)[0] for found in chunks.values())
+    if not has_classes:
+        roof = roof[is_level_and_high(roof, ground)]
+    return {"roof": roof[:, :3], "ground": ground[:, :3]}
+
+
+def list_files(folder: Path, box: shapely.Polygon | None = None) -> list[Path]:
+    """Return the files of a survey's cells, those that meet a box."""
+    paths = sorted(folder.glob("[0-9]*.npz"))
+    return [path for path in paths if box is None or shapely.intersects(read_box(path), box)]
+
+
+def read_box(path: Path) -> shapely.Polygon:
+    """Return the box around the cells of a file, which may be empty."""
+    with np.load(path) as arrays:
+        bounds = arrays["bounds"]
+    return shapely.box(*bounds) if np.isfinite(bounds).all() else shapely.Polygon()
+
+
+def is_level_and_high(cells: np.ndarray, ground: np.ndarray) -> np.ndarray:
+    """Return whether (k,) the points of cells (k, 4) lie together, high above the ground (m, 4)."""
+    if not len(ground):
+        return np.zeros(len(cells), bool)
+    from scipy.spatial import KDTree  # only where classes mark no roofs
+
+    scatter = np.sqrt(np.maximum(cells[:, 3] - cells[:, 2] ** 2, 0.0))
+    nearest = KDTree(ground[:, :2]).query(cells[:, :2])[1]
+    return (scatter < LEVEL_M) & (cells[:, 2] - ground[nearest, 2] > HIGH_OVER_GROUND_M)
 
 
 @dataclass(frozen=True)
@@ -128,17 +181,36 @@ class RoofOutside:
 def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     """Find the roofs outside all outlines, and keep them in the folder `state`."""
     folders = state / CELLS_FOLDER, state / EARLIER_FOLDER / CELLS_FOLDER
-    new, old = ({kind: load_cells(f, kind) for kind in ("roof", "ground")} for f in folders)
     jobs = [job for job in plan.jobs if not job.area.is_empty]
-    outlines = shapely.STRtree([job.area for job in jobs])
-    found = find_unmapped(new["roof"], old["roof"] if has_earlier else new["roof"], outlines)
-    if has_earlier:
-        names = [job.id for job in jobs]
-        found += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
-        found += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
+    outlines, names = shapely.STRtree([job.area for job in jobs]), [job.id for job in jobs]
+    found = []
+    for block in list_blocks([*list_files(folders[0]), *list_files(folders[1])]):
+        corner = BLOCK_M * np.array(block)
+        box = shapely.box(*(corner - REACH_M), *(corner + BLOCK_M + REACH_M))
+        new, old = (load_survey(folder, box) for folder in folders)
+        roofs = find_unmapped(new["roof"], old["roof"] if has_earlier else new["roof"], outlines)
+        if has_earlier:
+            roofs += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
+            roofs += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
+        found += [roof for roof in roofs if find_block(roof.place.bounds) == block]
     with atomic(state / OUTSIDE_FILE) as temporary:
         records = [roof.to_record() for roof in found]
         Path(temporary).write_text(json.dumps(records) + "\n", encoding="utf-8")
+
+
+def list_blocks(files: list[Path]) -> list[tuple[int, int]]:
+    """Return the squares of BLOCK_M in which files have cells."""
+    blocks = set()
+    for box in map(read_box, files):
+        if not box.is_empty:
+            (i0, j0), (i1, j1) = find_block(box.bounds[:2]), find_block(box.bounds[2:])
+            blocks |= {(i, j) for i in range(i0, i1 + 1) for j in range(j0, j1 + 1)}
+    return sorted(blocks)
+
+
+def find_block(xy: Sequence[float]) -> tuple[int, int]:
+    """Return the square of BLOCK_M that a place (x, y) lies in."""
+    return math.floor(xy[0] / BLOCK_M), math.floor(xy[1] / BLOCK_M)
 
 
 def load_roofs_outside(state: Path) -> list[dict[str, Any]]:

@@ -13,10 +13,7 @@ def sort_survey(folder: str, number: int, address: str) -> dict:
     from ..city.sort import sort_cloud
     from .outside import CELLS_FOLDER, SurveyCells
 
-    read = load_plan(Path(folder)).settings.read
-    if not read.by_class:
-        return sort_cloud(folder, number, address)
-    cells = SurveyCells(read)
+    cells = SurveyCells(load_plan(Path(folder)).settings.read)
     result = sort_cloud(folder, number, address, cells.add)
     cells.save(Path(folder) / CELLS_FOLDER / f"{number}.npz")
     return result
