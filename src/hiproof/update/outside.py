@@ -39,7 +39,7 @@ FEWEST_OUTSIDE = 8
 MOSTLY = 0.5
 """Share of the cells that show what stood there in the other survey."""
 
-NO_ROOFS = (7, 9, 18)  # classes of ASPRS: noise and water
+NOISE_AND_WATER = (7, 9, 18)  # classes of ASPRS: noise and water
 LEVEL_M = 0.5
 """Scatter (m) of the heights of a cell below which they lie on a roof: one of 60 degrees has it,
 crowns have metres."""
@@ -47,7 +47,7 @@ crowns have metres."""
 HIGH_OVER_GROUND_M = 2.0
 """Height (m) of a roof over the nearest ground: cars and hedges are lower."""
 
-BLOCK_M, REACH_M = 1000.0, 200.0
+BLOCK_M, BLOCK_REACH_M = 1000.0, 200.0
 """Side (m) of the squares that are searched one after the other, and how far around each cells are
 loaded: roofs that are longer are cut."""
 
@@ -60,7 +60,7 @@ class SurveyCells:
     """The roof and the ground of a survey in cells of a metre."""
 
     def __init__(self, read: ReadSettings):
-        roofs = tuple(set(range(256)) - set(read.ground_classes) - set(NO_ROOFS))
+        roofs = tuple(set(range(256)) - set(read.ground_classes) - set(NOISE_AND_WATER))
         self.classes = {
             "roof": read.building_classes if read.by_class else roofs,
             "ground": read.ground_classes,
@@ -148,7 +148,7 @@ def read_box(path: Path) -> shapely.Polygon:
 
 
 def is_level_and_high(cells: np.ndarray, ground: np.ndarray) -> np.ndarray:
-    """Return whether (k,) the points of cells (k, 4) lie together, high above the ground (m, 4)."""
+    """Return whether (k,) cells (k, 4) are level and high above the ground (m, 4)."""
     if not len(ground):
         return np.zeros(len(cells), bool)
     from scipy.spatial import KDTree  # only where classes mark no roofs
@@ -186,7 +186,7 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     found = []
     for block in list_blocks([*list_files(folders[0]), *list_files(folders[1])]):
         corner = BLOCK_M * np.array(block)
-        box = shapely.box(*(corner - REACH_M), *(corner + BLOCK_M + REACH_M))
+        box = shapely.box(*(corner - BLOCK_REACH_M), *(corner + BLOCK_M + BLOCK_REACH_M))
         new, old = (load_survey(folder, box) for folder in folders)
         roofs = find_unmapped(new["roof"], old["roof"] if has_earlier else new["roof"], outlines)
         if has_earlier:
