@@ -26,8 +26,10 @@ def sample_roof(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=
     half = np.array([theta[HALF_LENGTH], theta[HALF_WIDTH]])
     uv = rng.uniform(-half, half, (round(density * 4 * half.prod()), 2))
     c, s = np.cos(theta[2]), np.sin(theta[2])
-    xy = uv @ np.array([[c, s], [-s, c]]) + theta[:2]
     primitive = CATALOGUE[name].variant({"teeth": teeth}) if name == "shed" else CATALOGUE[name]
+    plan = shapely.MultiPolygon([shapely.Polygon(ring) for ring in primitive.plan_rings(theta)])
+    uv = uv[shapely.intersects_xy(plan.buffer(1e-9), *uv.T)]
+    xy = uv @ np.array([[c, s], [-s, c]]) + theta[:2]
     z = primitive.height_at(theta, xy) + rng.normal(0, noise_m, len(xy))
     points = np.column_stack([xy, z])
     outlier = rng.random(len(points)) < outlier_share

@@ -41,7 +41,7 @@ from run_records import records
 
 REQUEST = Request(("a.laz",), Path("out"))
 NO_MATTER = {"out", "overrides", "processes", "scheduler", "restart"}
-WHICH = {"footprints", "layer", "id_attribute", "where", "bbox"}
+WHICH = {"footprints", "layer", "id_attribute", "where", "bbox", "underpasses"}
 
 
 @pytest.fixture
@@ -115,10 +115,23 @@ def test_every_text_is_known_to_name_files_or_not():
         if "str" in str(d.type) and not d.metadata.get("choices")
     }
     files = {name for name, declared in texts.items() if declared.metadata.get("names") == "files"}
-    assert files == {"clouds", "footprints", "terrain", "settings.segment.weights"}
+    shading = {f"settings.enrich.{name}" for name in ("weather", "horizon", "shading_terrain")}
+    assert files == {
+        "clouds",
+        "footprints",
+        "terrain",
+        "underpasses",
+        "settings.segment.weights",
+        *shading,
+    }
     names = {
         "settings.read.crs",
         "settings.read.override_columns",
+        "settings.read.fallback_roof_height",
+        "settings.read.fallback_ground_height",
+        "settings.read.clearance_column",
+        "settings.read.raised_column",
+        "settings.enrich.use_attribute",
         "settings.read.overture_catalogue",
         "settings.fit.types",
         "settings.write.out_crs",

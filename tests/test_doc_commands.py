@@ -101,6 +101,19 @@ def write_passages(path, outline):
     )
 
 
+def write_register(path, footprints):
+    """Write footprints with the heights that a register knows."""
+    heights = {"id": [f.id for f in footprints], "hoogte": 6.0, "maaiveld": 0.5}
+    pyogrio.raw.write(
+        path,
+        np.array([shapely.to_wkb(f.polygon) for f in footprints]),
+        [np.array(np.broadcast_to(values, len(footprints))) for values in heights.values()],
+        list(heights),
+        geometry_type="Polygon",
+        crs="EPSG:28992",
+    )
+
+
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory):
     """A folder with the files that the pages name: a tile, footprints, terrain, overrides."""
@@ -116,6 +129,7 @@ def inputs(tmp_path_factory):
     shutil.copy(folder / "tile.laz", folder / "tiles/tile.laz")
     shutil.copy(files["footprints"], folder / "footprints.gpkg")
     shutil.copy(files["terrain"], folder / "dtm.tif")
+    write_register(folder / "register.gpkg", footprints)
     write_passages(folder / "passages.gpkg", footprints[0].polygon)
     for name in ("known.jsonl", "city/edits.jsonl"):
         (folder / name).parent.mkdir(exist_ok=True)

@@ -379,7 +379,7 @@ class EnrichSettings:
         option="--horizon",
         names="files",
     )
-    terrain: str = setting(
+    shading_terrain: str = setting(
         "",
         "terrain model (GeoTIFF; extra `terrain`), which shades up to 20 km away, for --sun; "
         "`hiproof reconstruct --enrich --sun` takes that of the run",

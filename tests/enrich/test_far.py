@@ -62,7 +62,7 @@ def test_a_hill_stands_where_it_is(tmp_path):
 def test_terrain_that_is_elsewhere_is_refused(tmp_path):
     far = place_house("a", 100_000.0, 0)
     folder = write_street(tmp_path / "run", [far])
-    settings = EnrichSettings(sun=True, terrain=write_hill(tmp_path / "hill.tif"))
+    settings = EnrichSettings(sun=True, shading_terrain=write_hill(tmp_path / "hill.tif"))
     with pytest.raises(InputError, match="expected a terrain model around the buildings, got terr"):
         enrich_run(folder, settings=settings)
 
@@ -114,7 +114,10 @@ def test_a_high_horizon_leaves_the_light_of_the_sky_above_it(tmp_path):
 
 def test_a_hill_in_the_south_shades(tmp_path):
     town = open_street(tmp_path / "run", [place_house("a", 0, 0)])
-    free, shaded = describe_roof(town), describe_roof(town, terrain=write_hill(tmp_path / "h.tif"))
+    free, shaded = (
+        describe_roof(town),
+        describe_roof(town, shading_terrain=write_hill(tmp_path / "h.tif")),
+    )
     assert shaded[0] < 0.99 * free[0] and free[1] == 0.0 and 0.005 < shaded[1] < 0.1
 
 

@@ -15,8 +15,10 @@ each_variant = pytest.mark.parametrize("primitive", VARIANTS, ids=IDS)
 
 
 def random_roofs(primitive, count=20, seed=3):
-    """(theta_p, kappa, T_L) of ordinary roofs: typical proportions, each length varied by a
-    tenth.
+    """Yield (variant, theta_p, kappa, T_L) of ordinary roofs.
+
+    Proportions are typical, each length varied by a tenth. The variant has as many facets as the
+    size asks for.
     """
     rng = np.random.default_rng(seed)
     for _ in range(count):
@@ -25,7 +27,14 @@ def random_roofs(primitive, count=20, seed=3):
         theta_p = {
             k: v if k == "teeth" else v * rng.uniform(0.95, 1.05) for k, v in theta_p.items()
         }
-        yield theta_p, rng.uniform(-1.5, 1.5), rng.normal(0, 20, 3)
+        yield primitive.variant(theta_p), theta_p, rng.uniform(-1.5, 1.5), rng.normal(0, 20, 3)
+
+
+def compute_plan_area(primitive, theta_p):
+    """Return the area of the plan."""
+    return sum(
+        shapely.Polygon(ring).area for ring in primitive.plan_rings(primitive.to_theta(theta_p))
+    )
 
 
 def plane_by_svd(polygon):
@@ -38,33 +47,33 @@ def plane_by_svd(polygon):
 
 @each_variant
 def test_planes_of_the_term_table_are_those_of_the_vertices(primitive):
-    for theta_p, _, _ in random_roofs(primitive):
-        vertices = primitive.vertices(theta_p)
-        planes = primitive.plane_values(primitive.to_theta(theta_p))
-        assert len(planes) == len(primitive.faces)
-        for face, plane in zip(primitive.faces, planes, strict=True):
+    for shape, theta_p, _, _ in random_roofs(primitive):
+        vertices = shape.vertices(theta_p)
+        planes = shape.plane_values(shape.to_theta(theta_p))
+        assert len(planes) == len(shape.faces)
+        for face, plane in zip(shape.faces, planes, strict=True):
             np.testing.assert_allclose(plane_by_svd(vertices[list(face)]), plane, atol=1e-9)
 
 
 @each_variant
 def test_theta_and_named_parameters_are_inverse(primitive):
-    for theta_p, kappa, translation in random_roofs(primitive):
-        theta = primitive.to_theta(theta_p, kappa, translation)
-        parameters, kappa_back, translation_back = primitive.from_theta(theta)
+    for shape, theta_p, kappa, translation in random_roofs(primitive):
+        theta = shape.to_theta(theta_p, kappa, translation)
+        parameters, kappa_back, translation_back = shape.from_theta(theta)
         assert parameters == pytest.approx(theta_p)
         assert kappa_back == pytest.approx(kappa)
         np.testing.assert_allclose(translation_back, translation, atol=1e-9)
-        assert primitive.is_proper(theta)
+        assert shape.is_proper(theta)
 
 
 @each_variant
 def test_faces_tile_the_plan_counter_clockwise_with_eave_at_zero(primitive):
-    for theta_p, _, _ in random_roofs(primitive):
-        vertices = primitive.vertices(theta_p)
-        rings = [shapely.LinearRing(vertices[list(face), :2]) for face in primitive.faces]
+    for shape, theta_p, _, _ in random_roofs(primitive):
+        vertices = shape.vertices(theta_p)
+        rings = [shapely.LinearRing(vertices[list(face), :2]) for face in shape.faces]
         assert all(ring.is_ccw for ring in rings)
         areas = sum(shapely.Polygon(ring).area for ring in rings)
-        assert areas == pytest.approx(theta_p["width"] * theta_p["length"])
+        assert areas == pytest.approx(compute_plan_area(shape, theta_p))
         assert shapely.union_all([shapely.Polygon(ring) for ring in rings]).area == pytest.approx(
             areas
         )
@@ -76,17 +85,17 @@ def test_faces_tile_the_plan_counter_clockwise_with_eave_at_zero(primitive):
 
 @each_variant
 def test_vertices_lie_on_the_surface_and_on_the_part(primitive):
-    for theta_p, kappa, translation in random_roofs(primitive, 5):
-        theta = primitive.to_theta(theta_p, kappa, translation)
-        vertices = primitive.vertices(theta_p)
-        inside = [np.mean(vertices[list(face)], axis=0) for face in primitive.faces]
+    for shape, theta_p, kappa, translation in random_roofs(primitive, 5):
+        theta = shape.to_theta(theta_p, kappa, translation)
+        vertices = shape.vertices(theta_p)
+        inside = [np.mean(vertices[list(face)], axis=0) for face in shape.faces]
         centroids = place_vertices(np.array(inside), kappa, translation)
         np.testing.assert_allclose(
-            primitive.height_at(theta, centroids[:, :2]), centroids[:, 2], atol=1e-9
+            shape.height_at(theta, centroids[:, :2]), centroids[:, 2], atol=1e-9
         )
-        part = primitive.part(theta)
-        assert part.type == primitive.name
-        assert part.area == pytest.approx(theta_p["width"] * theta_p["length"])
+        part = shape.part(theta)
+        assert part.type == shape.name
+        assert part.area == pytest.approx(compute_plan_area(shape, theta_p))
         for xy, z in zip(centroids[:, :2], centroids[:, 2], strict=True):
             (piece,) = [
                 piece
@@ -99,17 +108,17 @@ def test_vertices_lie_on_the_surface_and_on_the_part(primitive):
 @each_variant
 def test_canonical_theta_is_the_same_surface_and_idempotent(primitive):
     rng = np.random.default_rng(5)
-    for theta_p, kappa, translation in random_roofs(primitive):
-        theta = primitive.to_theta(theta_p, kappa + rng.uniform(-9, 9), translation)
+    for shape, theta_p, kappa, translation in random_roofs(primitive):
+        theta = shape.to_theta(theta_p, kappa + rng.uniform(-9, 9), translation)
         theta[HALF_WIDTH : HALF_WIDTH + 2] *= rng.uniform(0.7, 1.4, 2)
-        canonical = primitive.canonical_theta(theta)
+        canonical = shape.canonical_theta(theta)
         xy = translation[:2] + rng.uniform(-3, 3, (40, 2))
         np.testing.assert_allclose(
-            primitive.height_at(canonical, xy), primitive.height_at(theta, xy), atol=1e-9
+            shape.height_at(canonical, xy), shape.height_at(theta, xy), atol=1e-9
         )
-        np.testing.assert_allclose(primitive.canonical_theta(canonical), canonical, atol=1e-9)
-        assert primitive.part(canonical).pieces[0].outline.area == pytest.approx(
-            primitive.part(theta).pieces[0].outline.area
+        np.testing.assert_allclose(shape.canonical_theta(canonical), canonical, atol=1e-9)
+        assert shape.part(canonical).pieces[0].outline.area == pytest.approx(
+            shape.part(theta).pieces[0].outline.area
         )
 
 
@@ -120,6 +129,39 @@ def test_codes_bounds_and_signs_are_complete(primitive):
     assert all(lower < upper for lower, upper in primitive.bounds)
     assert all(start.source in CATALOGUE for start in primitive.starts)
     assert all(len(start.q) == 1 + len(primitive.bounds) for start in primitive.starts)
+
+
+def test_round_plans_have_the_area_of_their_ellipse():
+    for kind in ("cone", "dome"):
+        for width, length in ((1.5, 1.5), (7.0, 9.0), (40.0, 40.0)):
+            theta_p = {"width": width, "length": length, "height": width / 3}
+            shape = CATALOGUE[kind].variant(theta_p)
+            assert compute_plan_area(shape, theta_p) == pytest.approx(np.pi / 4 * width * length)
+            farthest = np.linalg.norm(np.array(shape.rim), axis=1).max() * length / 2
+            assert farthest - length / 2 <= 0.1
+
+
+@pytest.mark.parametrize("kind", ["dome", "barrel"])
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 1.0])
+def test_vaults_hold_what_circular_arcs_do(kind, share):
+    """A spherical cap over its circle, and a segment of a cylinder over its rectangle."""
+    radius, length = 4.0, 11.0
+    height = share * radius
+    sphere = (radius**2 + height**2) / (2 * height)
+    theta_p = {"width": 2 * radius, "length": 2 * radius, "height": height}
+    if kind == "barrel":
+        theta_p["length"] = length
+    shape = CATALOGUE[kind].variant(theta_p)
+    ring = shape.plan_rings(shape.to_theta(theta_p))[0]
+    step = 0.02
+    grid = np.arange(-6.0, 6.0, step) + step / 2
+    xy = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    xy = xy[shapely.contains_xy(shapely.Polygon(ring), *xy.T)]
+    volume = shape.height_at(shape.to_theta(theta_p), xy).sum() * step**2
+    half_angle = np.arcsin(min(radius / sphere, 1.0))
+    segment = sphere**2 * (half_angle - np.sin(half_angle) * np.cos(half_angle))
+    true = np.pi * height * (3 * radius**2 + height**2) / 6 if kind == "dome" else segment * length
+    assert volume == pytest.approx(true, rel=0.01)
 
 
 def test_gable_is_the_papers_figure_3():
@@ -157,7 +199,7 @@ def test_formula_cancels_and_divides_by_monomials_only():
 
 def test_unknown_type_is_named_with_the_known_ones():
     with pytest.raises(
-        SettingsError, match=r"expected a roof type \(flat, .*corner_mansard\), got 'onion'"
+        SettingsError, match=r"expected a roof type \(flat, .*barrel\), got 'onion'"
     ):
         get("onion")
 

@@ -26,8 +26,6 @@ class Surfaces:
 
     `voxel` (n,) is the voxel of each point given.
 
-    `voxel` (n,) is the one of each point given.
-
     `neighbours` (v, k) are the nearest voxels, itself first; `roughness_m` (v,) is the residual of
     the smoothest plane among those through a neighbour's neighbours, `normal` (v, 3) that plane's,
     `is_smooth` (v,) whether the voxel lies on it, and `extent_m2` (v,) the size of the surface that

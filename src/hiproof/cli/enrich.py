@@ -50,7 +50,7 @@ def enrich(
 
 def with_terrain(settings: EnrichSettings, terrain: str | None) -> EnrichSettings:
     """Return settings with a terrain model, unless they name one."""
-    return dataclasses.replace(settings, terrain=settings.terrain or terrain or "")
+    return dataclasses.replace(settings, shading_terrain=settings.shading_terrain or terrain or "")
 
 
 def enrich_folder(run: Path, out: Path | None, settings: EnrichSettings, jobs: int | None) -> int:

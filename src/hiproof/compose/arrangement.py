@@ -98,8 +98,6 @@ def turn(a, b, c):
     """Return twice the signed area of triangle abc.
 
     It is positive when c lies left of ab, and exact for integers.
-
-    Exact for integers.
     """
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
@@ -589,8 +587,6 @@ def dissolve(xy, edges, side):
     """Drop edges with one label on both sides, then straight vertices.
 
     Returns (xy, edges, side), compacted.
-
-    (xy, edges, side) compacted.
 
     `side` (e, 2) holds the labels left and right of each edge. A vertex goes when it lies within
     COLLINEAR_UNITS of the line between its two neighbours, counting what was already dropped along

@@ -59,9 +59,10 @@ def typical_parameters(kind: str) -> dict[str, float]:
 
 def make_typical_building(kind: str) -> Building:
     """Make an ordinary roof of a type on low walls."""
-    u, v = DRAWN_LENGTH / 2, DRAWN_WIDTH / 2
-    part = {"type": kind, "parameters": typical_parameters(kind), "position": [0.0, 0.0, 0.0]}
-    ring = [[-u, -v], [u, -v], [u, v], [-u, v], [-u, -v]]
+    parameters = typical_parameters(kind)
+    part = {"type": kind, "parameters": parameters, "position": [0.0, 0.0, 0.0]}
+    rim = np.array(CATALOGUE[kind].variant(parameters).rim) * (DRAWN_LENGTH / 2, DRAWN_WIDTH / 2)
+    ring = [*rim.tolist(), rim[0].tolist()]
     return build(
         {
             "id": kind,

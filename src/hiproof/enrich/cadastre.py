@@ -28,8 +28,13 @@ from .weather import import_pvlib
 
 SKY_CELL_M = 10_000.0  # side (m) of a square that has one sky: its sun differs by 0.1 degrees
 LEVEL_ROOF = 1e-3  # least share of a roof face that plan shows: steeper ones are walls
-FOR_SUN = ("weather", "horizon", "terrain", "sun_on_walls")
-"""Settings that say something of the sun alone."""
+FOR_SUN = {
+    "weather": "--weather",
+    "horizon": "--horizon",
+    "shading_terrain": "--terrain",
+    "sun_on_walls": "--sun-on-walls",
+}
+"""Settings that say something of the sun alone, and their options."""
 
 Surfaces = dict[int, dict[str, Any]]
 """Attributes of faces by number."""
@@ -47,7 +52,7 @@ class Cadastre:
     @functools.cached_property
     def terrain(self) -> TerrainHorizon | None:
         """The horizon of the terrain model, None without one."""
-        path = self.settings.terrain
+        path = self.settings.shading_terrain
         return TerrainHorizon(self.town.records, path) if path else None
 
     def find_sky(self, number: int) -> Sky:
@@ -165,9 +170,8 @@ def refuse_unusable(settings: EnrichSettings) -> None:
         if settings.horizon:
             read_horizon(settings.horizon)
         return
-    for name in FOR_SUN:
+    for name, option in FOR_SUN.items():
         if getattr(settings, name):
-            option = f"--{name.replace('_', '-')}"
             raise InputError(f"expected {option} with --sun, got it alone; add --sun")
 
 
@@ -179,5 +183,5 @@ def refuse_unfit(records: Records, settings: EnrichSettings) -> None:
     modelled = np.flatnonzero(records.index.modelled)
     if settings.sun and len(modelled):
         Cadastre(Town(records), settings).find_sky(int(modelled[0]))
-        if settings.terrain:
-            open_terrain(records, settings.terrain)
+        if settings.shading_terrain:
+            open_terrain(records, settings.shading_terrain)

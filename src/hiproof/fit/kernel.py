@@ -26,7 +26,7 @@ import numpy as np
 
 from ..compiled import compiled
 
-MAX_PLANES = 6  # of a primitive: a saw-tooth's teeth
+MAX_PLANES = 64  # of a primitive: a dome's facets
 # places in theta (9,); after the last come q1, q2, q3
 CENTRE_X, CENTRE_Y, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0 = range(6)
 SIZE = 9  # numbers of theta

@@ -229,6 +229,19 @@ def fit_likelihood(
     return min(first, estimate(MORE_POINTS * COARSE_POINTS), key=lambda one: min(one.bics.values()))
 
 
+def fit_heights(
+    points: np.ndarray, primitive: Primitive, theta: np.ndarray
+) -> tuple[np.ndarray, Noise]:
+    """Fit heights and slopes of one shape to `points` (n, 4) over the plan of `theta`.
+
+    Returns theta (9,) and the noise learnt.
+    """
+    search = new_search(points, (primitive.name,), False, COARSE_POINTS)
+    kind = search.shapes.index(primitive)
+    candidates, noises = learn(search, Candidates(np.array([kind]), theta[None], np.zeros(1)))
+    return candidates.thetas[0], Noise(*noises[0])
+
+
 def search_types(
     search: Search,
     types: tuple[str, ...],

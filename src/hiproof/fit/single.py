@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -12,14 +13,18 @@ from ..frames import LocalFrame
 from ..log import count_things
 from ..model import Fit
 from ..primitives import CATALOGUE, get
-from ..primitives.contract import HALF_WIDTH, KAPPA, place_vertices
+from ..primitives.contract import HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, RECTANGLE, place_vertices
 from ..read.plausible import is_plausible
 from ..settings import Settings
-from .likelihood import Estimate, fit_likelihood, plan_extents
+from .direction import outline_rectangle
+from .likelihood import Estimate, fit_heights, fit_likelihood, plan_extents
 
 FEWEST_POINTS = 4  # points; a plane and one to contradict it
 THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
 UNTOLD = 100.0  # m, rad; a deviation as large is none: heights tell no direction of a level roof
+# Points of a round roof lie so near its axis (shares of the first radius), and to its surface.
+HULL_REACH, HULL_SIGMAS = 1.3, 4.0
+HULL_SPACINGS = 0.3  # The hull of points lies so much inside of what they are drawn from.
 
 
 def fit_roof(
@@ -66,10 +71,31 @@ def fit_roof(
     frame = LocalFrame.around(cloud)
     local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
     outline_local = None if outline is None else shapely.transform(outline, frame.to_local)
-    estimate = fit_likelihood(
-        local, names, outline_local, settings.fit.side_softness_m, type_log_prior
-    )
+    taus = settings.fit.side_softness_m
+    estimate = fit_likelihood(local, names, outline_local, taus, type_log_prior)
+    if outline is None and estimate.primitive.rim != RECTANGLE:
+        estimate = fit_within_hull(local, estimate)
     return as_fit(estimate, frame, len(local))
+
+
+def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
+    """Fit a round roof's heights again, over the hull of the points (n, 4) on it.
+
+    A rectangle's sides are too narrow for it: hardly any points lie where a circle touches them.
+    The covariance stays that of the free plan.
+    """
+    theta = estimate.theta.copy()
+    reach = np.hypot(*(cloud[:, :2] - theta[:2]).T) <= HULL_REACH * theta[HALF_LENGTH]
+    distance = np.abs(cloud[:, 2] - estimate.primitive.height_at(theta, cloud[:, :2]))
+    on_roof = cloud[reach & (distance <= HULL_SIGMAS * estimate.noise.sigma)]
+    hull = shapely.convex_hull(shapely.multipoints(on_roof[:, :2]))
+    if not isinstance(hull, shapely.Polygon):
+        return estimate
+    hull = shapely.buffer(hull, HULL_SPACINGS * math.sqrt(hull.area / len(on_roof)))
+    inside = cloud[shapely.contains_xy(hull, *cloud[:, :2].T)]
+    theta[:Q0] = outline_rectangle(hull, theta[KAPPA])
+    theta, noise = fit_heights(inside, estimate.primitive, theta)
+    return replace(estimate, theta=theta, noise=noise)
 
 
 def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
@@ -148,8 +174,8 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
 
     They are theta_p, kappa, T_L, T_G, standard deviations, vertices and faces.
     """
-    shape = estimate.primitive
-    theta_p, kappa, translation = shape.from_theta(estimate.theta)
+    theta_p, kappa, translation = estimate.primitive.from_theta(estimate.theta)
+    shape = estimate.primitive.variant(theta_p)
     sigma = standard_deviations(estimate)
     vertices = place_vertices(shape.vertices(theta_p), kappa, translation)
     return Fit(

@@ -19,8 +19,16 @@ PLAN_LOW, PLAN_HIGH = (-np.inf, -np.inf, -np.inf, 0.6, 0.6), (np.inf, np.inf, np
 
 @cache
 def variants(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[Primitive, ...]:
-    """Return all variants of the primitives `names`, in the tables' order."""
-    return tuple(variant for name in names for variant in CATALOGUE[name].variants)
+    """Return the fitted variants of the primitives `names`, in the tables' order.
+
+    They vote or have starts. Those with more facets do not: they follow from the size.
+    """
+    return tuple(
+        variant
+        for name in names
+        for variant in CATALOGUE[name].variants
+        if variant.vote or variant.starts
+    )
 
 
 @cache

@@ -88,8 +88,6 @@ class Building:
 
     `solid` and `terrain_intersection` are in world coordinates.
 
-    `solid` and `terrain_intersection` in world coordinates.
-
     `built` is its model, None when `status.is_model` is false; `model`, `roof` and `solid` are
     there without asking, or raise NoModelError. `detail` is the sentence that explains the status
     for this building. `grade` says how good the model is by its points, None where it was not

@@ -43,8 +43,6 @@ class Fit:
         """Return the roof height (n,) at `xy` (n, 2), in the frame of the points.
 
         It is NaN outside the outline.
-
-        NaN outside the outline.
         """
         frame = LocalFrame(self.global_translation)
         roof = Roof((self.part,), self.part.pieces[0].outline, frame)

@@ -172,30 +172,33 @@ def read_part_outlines(
 ) -> list[shapely.Polygon]:
     """Return the area that a part roofs.
 
-    It is the outlines given, else its rectangle's share of the building's outline.
+    It is the outlines given, else its plan's share of the building's outline.
     """
     if record.get("outlines") is None:
-        return clip_rectangle(parameters, position, kappa, outline, where)
+        return clip_plan(text_at(record, "type"), parameters, position, kappa, outline, where)
     return [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
 
 
-def clip_rectangle(
+def clip_plan(
+    kind: str,
     parameters: Mapping[str, float],
     position: np.ndarray,
     kappa: float,
     outline: shapely.Polygon,
     where: str,
 ) -> list[shapely.Polygon]:
-    """Return the polygons that the rectangle of a part covers of the outline."""
+    """Return the polygons that the plan of a part covers of the outline.
+
+    It is a rectangle, or that of a round type.
+    """
     if "width" not in parameters or "length" not in parameters:
         raise InputError(
             f"expected width and length, or outlines, of {where}, got neither; give the rectangle"
         )
     u, v = 0.5 * parameters["length"], 0.5 * parameters["width"]
     c, s = math.cos(kappa), math.sin(kappa)
-    corners = (
-        np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
-    )
+    rim = CATALOGUE[kind].variant(parameters).rim
+    corners = np.array(rim) * (u, v) @ np.array([[c, s], [-s, c]]) + position[:2]
     covered = shapely.intersection(
         shapely.Polygon(corners), repair_polygons(outline), grid_size=1e-4
     )

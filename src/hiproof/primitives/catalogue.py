@@ -6,6 +6,7 @@ A new shape is one file with its `PRIMITIVE` and its name here; every test cover
 from ..errors import SettingsError
 from . import (
     asymmetric_gable,
+    cone,
     corner,
     flat,
     gable,
@@ -18,6 +19,7 @@ from . import (
     pyramid,
     shed,
     truncated_gable,
+    vault,
 )
 from .contract import Primitive
 
@@ -41,8 +43,14 @@ SHAPES = (
     halves.SIDE_MANSARD,
     corner.PRIMITIVE,
     halves.CORNER_MANSARD,
+    cone.CONE,
+    cone.BROACH,
+    vault.DOME,
+    vault.BARREL,
 )
 CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
+ROUND = ("cone", "broach", "dome")  # over a round or many-sided plan
+CURVED = (*ROUND, "barrel")  # whose facets stand for a curved surface, or are more than a volume's
 
 
 def get(name: str) -> Primitive:

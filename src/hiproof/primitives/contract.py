@@ -20,6 +20,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -33,6 +34,7 @@ from .drawing import drawn_slope
 # places in theta (9,): centre, rotation, half sizes, and four numbers of the shape
 CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
 SLOPE_MIN, SLOPE_MAX = 0.04, 2.75  # 2 and 70 degrees: steeper planes swallow facade points
+SPIRE_SLOPE_MAX = 5.7  # 80 degrees, of spires alone
 SHORTEST_LENGTH_M = 1e-3  # Shortest length (m) of a parameter. Shorter ones are numerical noise.
 WRITTEN_DIGITS = 6  # Digits of a length (m) in files of parameters: micrometres.
 SLOPE_SHARE = 1e-3  # Largest error of a slope or a share that rounded parameters may cause.
@@ -40,6 +42,8 @@ LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: 
 
 Plane = tuple[Formula | float, Formula | float, Formula | float]
 Shape = tuple[float, ...]  # V, U, q0..q3
+# The corners of a plan as shares of its half extents.
+RECTANGLE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 Corners = Sequence[tuple[float, float, float]] | np.ndarray  # (n, 3)
 
 
@@ -66,18 +70,20 @@ class DerivedStart:
     """Start values from the fit of a simpler type.
 
     `q` are formulas of the `source`'s V, U and q, in axes that are turned by so many quarters from
-    its own.
+    its own, and by `turn` (rad) besides.
     """
 
     source: str
     q: tuple[Formula | float, ...]
     quarters: int = 0
+    turn: float = 0.0
 
     def theta(self, source_theta: np.ndarray) -> np.ndarray:
         """Return theta (9,) with the plan of `source_theta` (9,) and q by formulas."""
         theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
         for _ in range(self.quarters):
             theta = turn_quarter(theta)
+        theta[KAPPA] += self.turn
         theta[Q0 : Q0 + len(self.q)] = [
             q.at(shape) if isinstance(q, Formula) else q for q in self.q
         ]
@@ -127,8 +133,11 @@ class Primitive:
     canonical    theta -> the one theta chosen among those of the same surface
     strips       number of teeth: planes are then chosen by equal strips across instead of by the
                  minimum
-    more         the same roof type with other strips or other parameters
-    of_member    a member of the family with planes on the same sides -> q of the shape with its
+    more         the same roof type with other strips, other parameters or more facets
+    choose       theta_p -> the place in `variants` of that with as many facets as its size asks
+                 for
+    rim          corners (n, 2) of the plan, counter-clockwise, as shares of U and V
+    read_member  a member of the family with planes on the same sides -> q of the shape with its
                  front's and right's slopes
     osm_shape    the nearest value of OpenStreetMap's roof:shape
     legend       entry of legends that lists the type; its colour stands in write/colours.py
@@ -152,6 +161,8 @@ class Primitive:
     half_turn_symmetric: bool = True
     strips: int = 1
     more: tuple[Primitive, ...] = ()
+    choose: Callable[[Mapping[str, float]], int] | None = None
+    rim: tuple[tuple[float, float], ...] = RECTANGLE
     draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
     read_member: Callable[[Sides], tuple[float, ...]] | None = None
     osm_shape: str | None = None
@@ -164,7 +175,7 @@ class Primitive:
 
     @property
     def variants(self) -> tuple[Primitive, ...]:
-        """This shape and its other tooth counts."""
+        """This shape, and those with other counts or parameters."""
         return (self, *self.more)
 
     @property
@@ -190,13 +201,16 @@ class Primitive:
 
         Then a volume can have its shape.
         """
-        return self.strips == 1 and len(set(self.sides)) == len(self.sides)
+        is_rectangular = self.strips == 1 and self.rim == RECTANGLE
+        return is_rectangular and len(set(self.sides)) == len(self.sides)
 
     def variant(self, theta_p: Mapping[str, float]) -> Primitive:
-        """Return the variant with the number of teeth or the parameters of `theta_p`.
+        """Return the variant with the teeth, facets or parameters of `theta_p`.
 
         Returns the primitive itself where these name no other.
         """
+        if self.choose is not None:
+            return self.variants[self.choose(theta_p)]
         if self.strips == 1:
             matching = [
                 variant for variant in self.variants if set(variant.parameters) <= set(theta_p)
@@ -351,27 +365,29 @@ class Primitive:
     def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
         """Return the roof part of `theta` (9,), in theta's own frame.
 
-        It has one plan rectangle a tooth, and planes over x, y.
+        It has one plan rectangle a tooth, or the shape's own plan, and planes over x, y.
         """
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
         planes = self.planes_at(theta)
-        half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
-        breaks = np.linspace(-half_width, half_width, self.strips + 1)
         groups = [planes] if self.strips == 1 else [plane[None] for plane in planes]
         pieces = []
-        for lower, upper, group in zip(breaks[:-1], breaks[1:], groups, strict=True):
-            uv = np.array(
-                [
-                    (-half_length, lower),
-                    (half_length, lower),
-                    (half_length, upper),
-                    (-half_length, upper),
-                ]
-            )
-            xy = translation[:2] + uv @ np.array([[c, s], [-s, c]])
+        for ring, group in zip(self.plan_rings(theta), groups, strict=True):
+            xy = translation[:2] + ring @ np.array([[c, s], [-s, c]])
             pieces.append(Piece(shapely.polygons(xy), group))
         return Part(self.name, tuple(pieces), theta_p, kappa, translation, dict(sigma or {}))
+
+    def plan_rings(self, theta: np.ndarray) -> list[np.ndarray]:
+        """Return the corners (n, 2) over u, v of the plan, one rectangle a tooth."""
+        half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
+        ring = np.array(self.rim) * (half_length, half_width)
+        breaks = np.linspace(-half_width, half_width, self.strips + 1)
+        if self.strips == 1:
+            return [ring]
+        return [
+            np.column_stack([ring[:, 0], [lower, lower, upper, upper]])
+            for lower, upper in pairwise(breaks)
+        ]
 
 
 def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:

@@ -54,6 +54,10 @@ names       from volumes to named parts of the family of roof shapes
 teeth       rows of equal monopitches as saw-teeth
 larger      gambrels combined from their parts
 own         custom shapes instead of neighbouring parts
+judged      roofs judged by points, with one shape in place of several parts
+round_tops  cones, spires and domes around the tops of parts
+barrels     barrel vaults over parts with slopes to two sides
+curved      these shapes where points follow them better
 shown       hidden parts removed
 clamp       heights limited to the range of the points
 fit         the outcome
@@ -75,6 +79,7 @@ from .apart import split_volumes
 from .bays import add_bays
 from .cants import Cache
 from .clamp import clamp_parts
+from .curved import fit_curved_shapes
 from .fit import BuildingFit
 from .groups import draw_in_groups, run_in_groups
 from .larger import combine_parts
@@ -145,6 +150,7 @@ def fit_building(
     ]
     visible = keep_visible(parts, plan, scene)
     parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
+    parts = fit_curved_shapes(parts, points_local, outline, settings)
     parts = [restrict_type(part, types, points_local) for part in parts]
     z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
     parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))

@@ -6,6 +6,7 @@ package has none, but you may add one.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,7 +15,7 @@ import shapely
 from ...errors import FitError
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
-from ...primitives.catalogue import CATALOGUE
+from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.contract import Primitive
 from ...primitives.family import COMPONENTS
 from ...settings import Settings
@@ -49,7 +50,7 @@ def list_custom_names(allowed: tuple[str, ...]) -> list[str]:
     names = [
         name
         for name, shape in CATALOGUE.items()
-        if not shape.is_of_family and name not in COMPONENTS
+        if not shape.is_of_family and name not in COMPONENTS and name not in CURVED
     ]
     return [name for name in names if not allowed or name in allowed]
 
@@ -81,33 +82,42 @@ def fit_shape(
     shape: Primitive, points: np.ndarray, outline: shapely.Polygon, settings: Settings
 ) -> Part | None:
     """Fit a part of `shape` that roofs `outline`, None if there are too few points."""
+    part = fit_types(points, outline, (shape.name,), settings)
+    return None if part is None else cut_part(part, outline)
+
+
+def fit_types(
+    points: np.ndarray, outline: shapely.Polygon | None, names: tuple[str, ...], settings: Settings
+) -> Part | None:
+    """Fit a part of one of the types `names`, None if there are too few points.
+
+    Its plan is that of its type over the rectangle of `outline`, free without one.
+    """
     from ..single import fit_roof
 
+    choice = {"fit": {"types": list(names), "objective": "likelihood"}}
     try:
-        fit = fit_roof(
-            points,
-            outline,
-            settings.replace({"fit": {"types": [shape.name], "objective": "likelihood"}}),
-        )
+        fit = fit_roof(points, outline, settings.replace(choice))
     except FitError:
         return None
-    variant = shape.variant(fit.parameters)
+    variant = CATALOGUE[fit.type].variant(fit.parameters)
     theta = variant.to_theta(fit.parameters, fit.kappa, fit.translation + fit.global_translation)
-    part = variant.part(theta, fit.sigma)
+    return variant.part(theta, fit.sigma)
+
+
+def cut_part(part: Part, outline: shapely.Polygon) -> Part:
+    """Return the part over `outline`, or the share of each piece of several."""
     if len(part.pieces) == 1:
-        pieces = [Piece(outline, part.pieces[0].planes)]
-    else:
-        cut = [
-            (
-                list_polygons(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)),
-                p.planes,
-            )
-            for p in part.pieces
-        ]
-        pieces = [Piece(polygon, planes) for polygons, planes in cut for polygon in polygons]
-    return Part(
-        shape.name, tuple(pieces), part.parameters, part.kappa, part.translation, part.sigma
-    )
+        return replace(part, pieces=(Piece(outline, part.pieces[0].planes),))
+    cut = [
+        (
+            list_polygons(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)),
+            p.planes,
+        )
+        for p in part.pieces
+    ]
+    pieces = [Piece(polygon, planes) for polygons, planes in cut for polygon in polygons]
+    return replace(part, pieces=tuple(pieces))
 
 
 def measure_misfit(parts: list[Part], points: np.ndarray) -> float:

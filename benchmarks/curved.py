@@ -1,0 +1,141 @@
+"""Measure how well cones, spires, domes and barrel vaults are found.
+
+usage: python -m benchmarks.curved [--seeds 16] [--first-seed 100] [--densities 8 2]
+
+Each kind stands alone over its own outline, on a square or rectangular base that is a little larger
+(a tower), and as a turret in the corner of a house with a gable. Sizes are those that are built
+(`draw` of the catalogue): spires of 55 to 78 degrees, cones of 25 to 72, arcs of a third to a whole
+half circle, 3 to 10 m wide. A scene counts as right if the roof has a part of its kind. Heights are
+those of the highest point, and volumes those under the shape.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from hiproof.fit.union import fit_building
+from hiproof.model.heights import find_highest
+from hiproof.primitives import CATALOGUE
+from hiproof.primitives.catalogue import CURVED
+
+SETTINGS = ("alone", "tower", "turret")
+HOUSE_LENGTH_M, HOUSE_WIDTH_M = 14.0, 9.0  # Of the house with a turret.
+HOUSE_EAVE_M, HOUSE_SLOPE = 6.0, 0.9
+SHAPE_EAVE_M = 10.0  # Height of the curved shape's eave.
+BASE_WIDER = 1.02  # A tower is so much wider than its spire.
+NOISE_M, PLAN_NOISE_M = 0.03, 0.05
+GRID_M = 0.1  # Distance between the places at which heights are compared.
+
+
+@dataclass(frozen=True)
+class CurvedScene:
+    """A simulated building with one curved shape.
+
+    It has its points (n, 3) and outline, the plan of the shape, and the true roof at places.
+    """
+
+    kind: str
+    points: np.ndarray
+    outline: shapely.Polygon
+    plan: shapely.Polygon
+    theta: np.ndarray
+    has_house: bool
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        """Return the true heights (n,) at places (n, 2) of the outline."""
+        z = np.full(len(xy), SHAPE_EAVE_M)
+        if self.has_house:
+            from_ridge = np.abs(xy[:, 1] - HOUSE_WIDTH_M / 2)
+            z = HOUSE_EAVE_M + HOUSE_SLOPE * (HOUSE_WIDTH_M / 2 - from_ridge)
+            z[~shapely.contains_xy(make_house(), *xy.T)] = -np.inf
+        inside = shapely.contains_xy(self.plan, *xy.T)
+        shape = CATALOGUE[self.kind]
+        theta_p, _, _ = shape.from_theta(self.theta)
+        curved = shape.variant(theta_p).height_at(self.theta, xy[inside])
+        z[inside] = np.maximum(z[inside], curved)
+        return z
+
+
+def make_house() -> shapely.Polygon:
+    return shapely.box(0.0, 0.0, HOUSE_LENGTH_M, HOUSE_WIDTH_M)
+
+
+def draw_scene(kind: str, setting: str, seed: int, density: float) -> CurvedScene:
+    """Draw the scene of a `seed`, scanned at `density` (points/m2)."""
+    rng = np.random.default_rng(seed)
+    width = rng.uniform(3.0, 6.0 if setting == "turret" else 10.0)
+    theta_p = CATALOGUE[kind].draw_parameters(rng, width)
+    shape, kappa = CATALOGUE[kind].variant(theta_p), rng.uniform(0.0, 0.5 * math.pi)
+    theta = shape.to_theta(theta_p, kappa, (0.0, 0.0, SHAPE_EAVE_M))
+    plan = outline = shape.part(theta).pieces[0].outline
+    if setting == "tower":
+        u, v = (BASE_WIDER * 0.5 * theta_p[name] for name in ("length", "width"))
+        c, s = math.cos(kappa), math.sin(kappa)
+        ring = np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]])
+        outline = shapely.union(shapely.Polygon(ring), plan)
+    elif setting == "turret":
+        outline = shapely.union(make_house(), plan)
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    scene = CurvedScene(kind, np.zeros((0, 3)), outline, plan, theta, setting == "turret")
+    z = scene.height_at(xy) + rng.normal(0.0, NOISE_M, len(xy))
+    points = np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
+    return CurvedScene(kind, points, outline, plan, theta, setting == "turret")
+
+
+@dataclass(frozen=True)
+class CurvedOutcome:
+    """Whether the kind is right, and the errors of height (m) and volume (share)."""
+
+    is_right: bool
+    height_error_m: float
+    volume_error: float
+
+
+def judge_scene(scene: CurvedScene) -> CurvedOutcome:
+    """Fit the building of a scene, and compare it with the truth."""
+    parts = fit_building(scene.points, scene.outline).roof_parts
+    x0, y0, x1, y1 = scene.plan.bounds
+    grid = np.stack(np.meshgrid(np.arange(x0, x1, GRID_M), np.arange(y0, y1, GRID_M)), axis=-1)
+    xy = grid.reshape(-1, 2)
+    xy = xy[shapely.contains_xy(scene.plan.intersection(scene.outline), *xy.T)]
+    true, found = scene.height_at(xy), find_highest(parts, xy)[0]
+    return CurvedOutcome(
+        any(part.type == scene.kind for part in parts),
+        float(found.max() - true.max()),
+        float(found.sum() / true.sum() - 1.0),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, default=16)
+    parser.add_argument("--first-seed", type=int, default=100)
+    parser.add_argument("--densities", type=float, nargs="*", default=[8.0, 2.0])
+    request = parser.parse_args()
+    seeds = range(request.first_seed, request.first_seed + request.seeds)
+    print("| points/m2 | setting | kind | right | height within 0.2 m | volume within 3 % |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for density in request.densities:
+        for setting in SETTINGS:
+            for kind in CURVED if setting != "turret" else CURVED[:-1]:
+                outcomes = [judge_scene(draw_scene(kind, setting, s, density)) for s in seeds]
+                shares = [
+                    np.mean([one.is_right for one in outcomes]),
+                    np.mean([abs(one.height_error_m) <= 0.2 for one in outcomes]),
+                    np.mean([abs(one.volume_error) <= 0.03 for one in outcomes]),
+                ]
+                cells = " | ".join(f"{100 * share:.0f} %" for share in shares)
+                print(f"| {density:g} | {setting} | {kind} | {cells} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

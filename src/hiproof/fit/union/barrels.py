@@ -1,0 +1,66 @@
+"""Find barrel vaults over parts with slopes to two sides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+
+from ...model import Part
+from ...settings import Settings
+from .judged import COMPARED_M, JudgedRoof
+from .own import MOST_DISTANCE_M, cut_part, fit_types
+from .regions import list_polygons, unite_outlines
+from .round_tops import BENT
+
+BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel")  # What is made of one.
+ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
+
+
+def list_barrels(
+    roof: JudgedRoof, part: Part, own: np.ndarray, settings: Settings
+) -> Iterator[Part]:
+    """Yield barrel vaults over a part, alone and with those beside it along its ridge.
+
+    They are tried if a curve across the part is nearer to its points than its planes.
+    """
+    if part.type not in BARREL_LIKE or len(part.pieces) > 1:
+        return
+    beside = [other for other in roof.parts if is_parallel(part, other)]
+    for group in ([part], beside) if len(beside) > 1 else ([part],):
+        covered = list_polygons(unite_outlines(group))
+        numbers = [k for k, p in enumerate(roof.parts) if any(p is member for member in group)]
+        which = own | np.isin(roof.highest[1], numbers)
+        way = -math.sin(part.kappa), math.cos(part.kappa)
+        if len(covered) == 1 and is_bent(roof.points[:, :2] @ way, roof, which):
+            inside = shapely.contains_xy(covered[0], *roof.points[:, :2].T)
+            shape = fit_types(roof.points[inside], covered[0], ("barrel",), settings)
+            if shape is not None:
+                yield cut_part(shape, covered[0])
+
+
+def is_parallel(part: Part, other: Part) -> bool:
+    """Return whether another part touches a part, and is as long along its ridge."""
+    way = np.array([math.cos(part.kappa), math.sin(part.kappa)])
+    ends = [shapely.get_coordinates(piece.outline) @ way for piece in (*part.pieces, *other.pieces)]
+    first, rest = ends[0], np.concatenate(ends[len(part.pieces) :])
+    is_as_long = abs(first.min() - rest.min()) <= ENDS_M and abs(first.max() - rest.max()) <= ENDS_M
+    outlines = [unite_outlines([one]) for one in (part, other)] if is_as_long else []
+    return bool(is_as_long and shapely.dwithin(*outlines, ENDS_M))
+
+
+def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray) -> bool:
+    """Return whether an arc over x (n,) is clearly nearer to points than the roof.
+
+    `which` (n,) are these points.
+    """
+    x, z = x[which], roof.points[which, 2]
+    middle, wide = 0.5 * (x.min() + x.max()), max(0.5 * float(np.ptp(x)), COMPARED_M)
+    x = (x - middle) / wide
+    under = 1.0 - np.minimum(x * x, 1.0)
+    design = np.column_stack([np.ones_like(x), x, under, np.sqrt(under)])
+    curve = design @ np.linalg.lstsq(design, z, rcond=None)[0]
+    left = np.minimum(np.abs(z - curve), MOST_DISTANCE_M).mean()
+    return bool(left <= BENT * roof.measure_distances(MOST_DISTANCE_M)[which].mean())

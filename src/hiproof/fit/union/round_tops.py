@@ -1,0 +1,199 @@
+"""Find cones, spires and domes around the tops of parts.
+
+A top is round where heights fall alike in all directions, and points lie nearer to a curve of the
+distance from it, or to eight facets, than to the roof.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+
+from ...geometry.rings import OVERLAY_GRID_M
+from ...model import Part
+from ...primitives.cants import list_cants
+from ...primitives.catalogue import CATALOGUE
+from ...primitives.cone import BROACH_SIDES
+from ...primitives.contract import Q0
+from ...settings import Settings
+from ..direction import outline_rectangle
+from .judged import COMPARED_M, JudgedRoof, scale_cap
+from .own import cut_part, fit_types
+from .regions import list_polygons
+
+RADII = (0.6, 0.85, 1.15, 1.5)  # Of discs around a part's top, in radii of a circle of its area.
+BEYOND = 1.15  # Points so much further off than the disc's radius show where the shape ends.
+FEWEST_AROUND = 12  # Points around a top from which heights by direction are known.
+TURN_SECTORS = 8  # Directions around a top in which heights are compared.
+FEWEST_SECTORS = 7  # Of these must hold points: a whole turn, but for a gap.
+# Largest deviation of heights by sector, as a share of their fall from the middle; and from the
+# highest point, which lies beside it.
+ALL_ROUND, LOOSELY = 0.25, 0.5
+LEAST_FALL_M = 0.3  # Least fall (m) from the top: less is a level roof.
+CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
+ROTATIONS = 6  # Rotations of a spire that are tried within one of its facets.
+BENT = 0.85  # Share of the misfit that a curve leaves of the roof's, at most.
+GROWTH_ROUNDS = 2  # Rounds in which a spire is fitted to all points that follow it.
+FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
+LIKE_OUTLINE = 0.85  # Share of an outline and of a disc in common from which they are the same.
+
+
+def list_round_shapes(
+    roof: JudgedRoof, part: Part, own: np.ndarray, names: tuple[str, ...], settings: Settings
+) -> Iterator[Part]:
+    """Yield round shapes fitted to discs of points around the top of a part.
+
+    `own` (n,) are the points at which the part is visible.
+    """
+    xy, z = roof.points[:, :2], roof.points[:, 2]
+    own_xy, wide = roof.points[own, :2], math.sqrt(part.area / math.pi)
+    starts = own_xy[np.argmax(z[own])], own_xy.mean(axis=0)
+    round_starts = (s for s in starts if measure_fall(xy - s, z, wide, LOOSELY) is not None)
+    start = next(round_starts, None) if names else None
+    if start is None:
+        return
+    for radius in (share * wide for share in RADII):
+        centre = find_centre(xy, z, start, radius)
+        fall = measure_fall(xy - centre, z, radius, ALL_ROUND)
+        if fall is None:
+            continue
+        cap = scale_cap(fall / radius)
+        disc = np.hypot(*(xy - centre).T) <= radius
+        centre, left = fit_radially(roof.points[disc], centre, cap)
+        if left > BENT * roof.measure_distances(cap)[disc].mean() and not list_cants(
+            part.parameters
+        ):
+            continue
+        near = roof.points[np.hypot(*(xy - centre).T) <= BEYOND * radius]
+        shape = fit_round(roof, near, names, settings)
+        if shape is not None:
+            yield shape
+
+
+def find_centre(xy: np.ndarray, z: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
+    """Return the middle (2,) of what rises above the rest of a disc."""
+    centre = start
+    for _ in range(CENTRE_ROUNDS):
+        near = np.hypot(*(xy - centre).T) <= radius
+        if not near.any():
+            break
+        above = np.maximum(z[near] - z[near].mean(), COMPARED_M)
+        centre = above @ xy[near] / above.sum()
+    return centre
+
+
+def measure_fall(way: np.ndarray, z: np.ndarray, radius: float, alike: float) -> float | None:
+    """Return how far (m) heights fall from a disc's middle to its outer half.
+
+    `way` (n, 2) leads from the middle to the points. Returns None where they hardly fall, or not
+    `alike` in all directions.
+    """
+    near = (np.abs(way) <= radius).all(axis=1)
+    way, z = way[near], z[near]
+    distances = np.hypot(*way.T)
+    outer = (distances > 0.5 * radius) & (distances <= radius)
+    inner = distances <= 0.25 * radius
+    if np.count_nonzero(outer) < FEWEST_AROUND or not inner.any():
+        return None
+    turns = np.arctan2(way[outer, 1], way[outer, 0]) / (2.0 * math.pi) % 1.0
+    sectors = np.minimum((turns * TURN_SECTORS).astype(int), TURN_SECTORS - 1)
+    counts = np.bincount(sectors, minlength=TURN_SECTORS)
+    means = np.bincount(sectors, z[outer], TURN_SECTORS)[counts > 0] / counts[counts > 0]
+    fall = float(z[inner].mean() - means.mean())
+    is_alike = len(means) >= FEWEST_SECTORS and means.std() <= alike * fall
+    return fall if is_alike and fall >= LEAST_FALL_M else None
+
+
+def fit_radially(points: np.ndarray, centre: np.ndarray, cap_m: float) -> tuple[np.ndarray, float]:
+    """Fit heights a + b r + c r^2 around a centre (2,) to points (n, 3).
+
+    Returns the centre that fits best, and the mean distance (m) left, each at most `cap_m`.
+    """
+    xy, z = points[:, :2], points[:, 2]
+    used, slopes = np.ones(len(z), bool), np.zeros(len(z))
+    for _ in range(CENTRE_ROUNDS + 1):
+        way = xy - centre
+        r = np.maximum(np.hypot(*way.T), COMPARED_M)
+        design = np.column_stack([np.ones_like(r), r, r * r, -(way.T * (slopes / r)).T])
+        columns = 5 if slopes.any() else 3
+        solution = np.linalg.lstsq(design[used, :columns], z[used], rcond=None)[0]
+        distances = np.abs(z - design[:, :3] @ solution[:3])
+        used = distances <= 2.0 * max(cap_m, float(np.median(distances)))
+        slopes = solution[1] + 2.0 * solution[2] * r
+        if columns == 5:
+            centre = centre + np.clip(solution[3:], -cap_m, cap_m)
+    left = np.minimum(distances, cap_m).mean()
+    return centre, float(min(left, *measure_broaches(points, centre, cap_m)))
+
+
+def measure_broaches(points: np.ndarray, centre: np.ndarray, cap_m: float) -> list[float]:
+    """Measure how far (m, mean) points lie from spires of eight sides.
+
+    There is one value for each rotation.
+    """
+    way = points[:, :2] - centre
+    r, turns = np.hypot(*way.T), np.arctan2(way[:, 1], way[:, 0])
+    facet = 2.0 * math.pi / BROACH_SIDES
+    lefts = []
+    for rotation in np.arange(ROTATIONS) * facet / ROTATIONS:
+        from_middle = (turns - rotation + 0.5 * facet) % facet - 0.5 * facet
+        design = np.column_stack([np.ones_like(r), r * np.cos(from_middle)])
+        solution = np.linalg.lstsq(design, points[:, 2], rcond=None)[0]
+        distances = np.abs(points[:, 2] - design @ solution)
+        lefts.append(float(np.minimum(distances, cap_m).mean()))
+    return lefts
+
+
+def select_followers(roof: JudgedRoof, part: Part) -> np.ndarray | None:
+    """Select the points (k, 3) out to where they leave the slopes of a spire.
+
+    A dome is not continued: it returns None.
+    """
+    if part.type == "dome":
+        return None
+    shape = CATALOGUE[part.type]
+    theta = shape.to_theta(part.parameters, part.kappa, part.translation)
+    slope = 2.0 * part.parameters["height"] / part.parameters["width"]
+    xy, z = roof.points[:, :2], roof.points[:, 2]
+    follows = np.abs(z - shape.height_at(theta, xy)) <= FOLLOW_M * math.hypot(1.0, slope)
+    order = np.argsort(np.hypot(*(xy - part.translation[:2]).T), kind="stable")
+    last = int(np.argmax(np.cumsum(np.where(follows[order], 1, -1))))
+    return roof.points[np.sort(order[: last + 1])]
+
+
+def fit_round(
+    roof: JudgedRoof, near: np.ndarray, names: tuple[str, ...], settings: Settings
+) -> Part | None:
+    """Fit a round shape to the points `near` (n, 3) a top, None if none fits.
+
+    Where it covers the outline, and hardly more, the outline is its plan.
+    """
+    part = fit_types(near, None, names, settings)
+    for _ in range(GROWTH_ROUNDS):
+        wider = None if part is None else select_followers(roof, part)
+        if part is None or wider is None or len(wider) <= len(near):
+            break
+        near, part = wider, fit_types(wider, None, (part.type,), settings)
+    if part is None:
+        return None
+    ring, outline = part.pieces[0].outline, roof.outline
+    common = shapely.intersection(ring, outline, grid_size=OVERLAY_GRID_M)
+    if common.area >= LIKE_OUTLINE * max(ring.area, outline.area):
+        return fit_over(outline, part, roof.points)
+    polygons = list_polygons(common)
+    return cut_part(part, max(polygons, key=lambda p: p.area)) if polygons else None
+
+
+def fit_over(outline: shapely.Polygon, part: Part, points: np.ndarray) -> Part:
+    """Fit the heights of a round part again, over all of an outline."""
+    from ..likelihood import fit_heights  # compiled code that most roofs never need
+
+    shape = CATALOGUE[part.type]
+    theta = shape.to_theta(part.parameters, part.kappa, part.translation)
+    theta[:Q0] = outline_rectangle(outline, part.kappa)
+    theta, _ = fit_heights(np.column_stack([points, np.ones(len(points))]), shape, theta)
+    parameters, _, _ = shape.from_theta(theta)
+    return cut_part(shape.variant(parameters).part(theta, part.sigma), outline)

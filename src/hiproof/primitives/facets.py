@@ -1,0 +1,121 @@
+"""Make facets of round shapes: polygons for circles, chords for profiles.
+
+A circle is written as the regular polygon of the same area, so that facets lie about the surface
+and volumes hold. Stretched in one axis, it is an ellipse.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+from .algebra import Formula, U, V, q1
+from .contract import Plane
+
+CHORD_M = 0.1  # Farthest (m) that a facet's edge may lie off the circle that it stands for.
+SIDE_COUNTS = (16, 8, 32, 64)  # Sides of a circle, first those of an ordinary turret.
+# Angles (degrees) on a quarter circle between which chords stand for it.
+PROFILE_DEG = (0.0, 20.0, 40.0, 60.0, 90.0)
+NUMERICAL_ZERO = 1e-12  # A smaller share is none.
+
+
+def count_sides(p: Mapping[str, float]) -> int:
+    """Return the place in SIDE_COUNTS of the fewest sides that keep CHORD_M.
+
+    >>> [SIDE_COUNTS[count_sides({"length": x})] for x in (2.0, 8.0, 30.0, 400.0)]
+    [8, 16, 32, 64]
+    """
+    radius = p["length"] / 2
+    close = [n for n in SIDE_COUNTS if radius * (1.0 - math.cos(math.pi / n)) <= CHORD_M]
+    return SIDE_COUNTS.index(min(close, default=max(SIDE_COUNTS)))
+
+
+def find_apothem(sides: int) -> float:
+    """Return the inner radius of the regular polygon with the area of the unit circle."""
+    return math.sqrt(math.pi / sides / math.tan(math.pi / sides))
+
+
+def list_directions(sides: int) -> list[tuple[float, float]]:
+    """Return which way each of so many facets faces, the first to +u."""
+    angles = [2.0 * math.pi * k / sides for k in range(sides)]
+    pairs = [(math.cos(angle), math.sin(angle)) for angle in angles]
+    return [
+        (0.0 if abs(x) < NUMERICAL_ZERO else x, 0.0 if abs(y) < NUMERICAL_ZERO else y)
+        for x, y in pairs
+    ]
+
+
+def make_rim(sides: int, apothem: float) -> tuple[tuple[float, float], ...]:
+    """Return the corners of the polygon, the first facet's own first.
+
+    They are shares of the half extents, counter-clockwise.
+    """
+    radius = apothem / math.cos(math.pi / sides)
+    angles = [math.pi * (2 * k - 1) / sides for k in range(sides)]
+    return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
+
+
+def make_facet_planes(sides: int, apothem: float, fall: Formula, top: Formula) -> tuple[Plane, ...]:
+    """Return one plane a side, each from `top` at the axis down by `fall` at the rim."""
+    steep = fall * (1.0 / apothem)
+    return tuple((-(steep / U) * x, -(steep / V) * y, top) for x, y in list_directions(sides))
+
+
+class ArcProfile(NamedTuple):
+    """A vault's profile in chords, as formulas of half the width V and the rise q1 V.
+
+    `knots` (k,) are shares of the radius, and `heights` (k,) those above the eave there. Of every
+    chord between two of them, `chords` have the height at the axis and the fall from there to the
+    rim.
+    """
+
+    knots: list[float]
+    heights: list[Formula]
+    chords: list[tuple[Formula, Formula]]
+
+
+def draw_profile(around_axis: bool) -> ArcProfile:
+    """Draw a vault's profile in chords, `around_axis` or along a ridge.
+
+    With k = q1 the height over the half width V, the profile at the share r of the radius is
+
+        z = k V ((1 - k^2) (1 - r^2) + k^2 sqrt(1 - r^2))
+
+    It is within a hundredth of a circular arc up to the half circle (k = 1). Chords meet a little
+    outside of it, so that they hold as much as it does.
+    """
+    knots = [math.sin(math.radians(angle)) for angle in PROFILE_DEG[:-1]] + [1.0]
+    volumes = (1 / 4, 1 / 3) if around_axis else (2 / 3, math.pi / 4)
+    parabola = raise_knots(knots, lambda r: 1.0 - r * r, volumes[0], around_axis)
+    circle = raise_knots(knots, lambda r: math.sqrt(1.0 - r * r), volumes[1], around_axis)
+    cube = q1 * q1 * q1 * V
+    heights = [(q1 * V - cube) * x + cube * y for x, y in zip(parabola, circle, strict=True)]
+    chords = []
+    for (a, b), (z, z_next) in zip(pairwise(knots), pairwise(heights), strict=True):
+        fall = (z - z_next) * (1.0 / (b - a))
+        chords.append((z + fall * a, fall))
+    return ArcProfile(knots, heights, chords)
+
+
+def raise_knots(
+    knots: list[float], profile: Callable[[float], float], volume: float, around_axis: bool
+) -> list[float]:
+    """Return the profile's values at the knots, those between its ends raised.
+
+    Chords between them hold the `volume` of the profile: its integral over r, or over r dr
+    `around_axis`.
+    """
+
+    def integrate(values: list[float]) -> float:
+        total = 0.0
+        for (a, b), (x, y) in zip(pairwise(knots), pairwise(values), strict=True):
+            mean = (a * (2 * x + y) + b * (x + 2 * y)) / 6 if around_axis else (x + y) / 2
+            total += (b - a) * mean
+        return total
+
+    values = [profile(r) for r in knots]
+    inner = [0.0, *values[1:-1], 0.0]
+    share = (volume - integrate(values)) / integrate(inner)
+    return [value + share * part for value, part in zip(values, inner, strict=True)]

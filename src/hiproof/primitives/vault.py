@@ -1,0 +1,132 @@
+"""Domes and barrel vaults: chords of an arc around an axis or along a ridge.
+
+facets.py says how an arc is written.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from .algebra import U, V, q0, q1
+from .cone import typical
+from .contract import Corners, DerivedStart, Plane, Primitive, Shape, at_quarters
+from .drawing import drawn_plan
+from .facets import (
+    SIDE_COUNTS,
+    count_sides,
+    draw_profile,
+    find_apothem,
+    make_facet_planes,
+    make_rim,
+)
+
+LOWEST, HIGHEST = 0.1, 1.0  # Height over half the width: flatter is level, and higher no arc.
+CROWN = q1 * V  # height of the crown above the eave
+STARTS = (0.5, 0.9)  # Shares of a gable's or a pyramid's slope at which an arc begins.
+
+
+def shape(p: Mapping[str, float]) -> Shape:
+    return p["width"] / 2, p["length"] / 2, p["height"], 2 * p["height"] / p["width"], 0.0, 0.0
+
+
+def make_starts(source: str) -> tuple[DerivedStart, ...]:
+    """Return starts from the fit of a `source` with straight slopes, along and across."""
+    return tuple(
+        start
+        for share in STARTS
+        for start in at_quarters(source, (q0 - 0.2 * q1 * V, share * q1), (0, 1))
+    )
+
+
+def make_dome(sides: int) -> Primitive:
+    """Return the dome of so many facets around."""
+    apothem, profile = find_apothem(sides), draw_profile(around_axis=True)
+    rim = make_rim(sides, apothem)
+    planes: tuple[Plane, ...] = ()
+    for height, fall in profile.chords:
+        planes += make_facet_planes(sides, apothem, fall, q0 - CROWN + height)
+
+    def corners(p: Mapping[str, float]) -> Corners:
+        """Return the apex, then ring by ring the corners of the facets, last the eave's."""
+        values, ring = shape(p), np.array(rim) * (p["length"] / 2, p["width"] / 2)
+        rings = [
+            np.column_stack([share * ring, np.full(sides, height.at(values))])
+            for share, height in zip(profile.knots[1:], profile.heights[1:], strict=True)
+        ]
+        return np.vstack([[[0.0, 0.0, p["height"]]], *rings])
+
+    def list_faces() -> list[tuple[int, ...]]:
+        places = [(k, (k + 1) % sides) for k in range(sides)]
+        faces: list[tuple[int, ...]] = [(1 + k, 1 + after, 0) for k, after in places]
+        for ring in range(1, len(profile.chords)):
+            lower, upper = 1 + ring * sides, 1 + (ring - 1) * sides
+            faces += [(lower + k, lower + after, upper + after, upper + k) for k, after in places]
+        return faces
+
+    return Primitive(
+        name="dome",
+        citygml_code="1090",
+        adv_code="3700",
+        osm_shape="dome",
+        legend="other",
+        measures={"width": 2 * V, "length": 2 * U, "height": CROWN},
+        eave=q0 - CROWN,
+        planes=planes,
+        shape=shape,
+        corners=corners,
+        faces=tuple(list_faces()),
+        typical=lambda width, length, height: typical(width, length, min(height, width / 2)),
+        bounds=((LOWEST, HIGHEST),),
+        starts=make_starts("pyramid"),
+        rim=rim,
+        draw=lambda rng, width: typical(width, width, width / 2 * float(rng.uniform(0.3, 1.0))),
+    )
+
+
+def make_barrel() -> Primitive:
+    """Return the barrel vault: an arc across the width, straight along the length."""
+    profile = draw_profile(around_axis=False)
+    shares = [-r for r in profile.knots[:0:-1]] + profile.knots
+    heights = profile.heights[:0:-1] + profile.heights
+    chords = [(fall, q0 - CROWN + height) for height, fall in profile.chords]
+
+    def corners(p: Mapping[str, float]) -> Corners:
+        """Return pairs at -u and +u, from the eave at -v to the eave at +v."""
+        u, v, values = p["length"] / 2, p["width"] / 2, shape(p)
+        return [
+            (x, share * v, height.at(values))
+            for share, height in zip(shares, heights, strict=True)
+            for x in (-u, u)
+        ]
+
+    def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+        return drawn_plan(rng, width, 1.0, 2.5) | {"height": width / 2 * float(rng.uniform(0.3, 1))}
+
+    strips = [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(len(shares) - 1)]
+    front, back = strips[: len(chords)], strips[len(chords) :]
+    return Primitive(
+        name="barrel",
+        citygml_code="1110",
+        adv_code="3900",
+        osm_shape="round",
+        legend="other",
+        measures={"width": 2 * V, "length": 2 * U, "height": CROWN},
+        eave=q0 - CROWN,
+        planes=(
+            *((0, fall / V, top) for fall, top in chords),
+            *((0, -(fall / V), top) for fall, top in chords),
+        ),
+        shape=shape,
+        corners=corners,
+        faces=(*front[::-1], *back),
+        typical=lambda width, length, height: typical(width, length, min(height, width / 2)),
+        bounds=((LOWEST, HIGHEST),),
+        starts=make_starts("gable"),
+        draw=draw,
+    )
+
+
+first, *others = (make_dome(sides) for sides in SIDE_COUNTS)
+DOME = replace(first, more=tuple(replace(dome, starts=()) for dome in others), choose=count_sides)
+BARREL = make_barrel()
