@@ -26,7 +26,7 @@ from ..model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Roof
 from ..read.cityjson import documents, reference_system
 from ..read.crs import find_units, parse_crs
 from ..read.damage import Damaged, refuse
-from ..read.solids import CITYGML_SUFFIXES, find_citygml_crs, read_solids
+from ..read.solids import CITYGML_SUFFIXES, find_citygml_crs, read_building_solids
 from ..settings import ComposeSettings
 from ..status import Status
 from ..write.building_attributes import building_attributes, measure_figures
@@ -151,7 +151,8 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[De
 
 def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[BuildingModel]:
     if path.suffix.lower() in CITYGML_SUFFIXES:
-        return (BuildingModel(id, {}, solid) for id, solid in read_solids(path, damaged))
+        solids = read_building_solids(path, damaged)
+        return (BuildingModel(id, {}, solid) for id, solid in solids)
     units = find_units(head.crs) if head.crs is not None else head.units.cityjson
     return read_models(path, units, damaged=damaged, must_be_valid=True)
 

@@ -29,6 +29,10 @@ from .shells import read_geometries, read_shell, require_list
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
 CITYGML_SUFFIXES = (".gml", ".xml", ".citygml")
+BUILDING_OBJECT = "BuildingInstallation"
+OWNERS = ("Building", "BuildingPart", BUILDING_OBJECT)
+"""City objects whose shells come out by themselves."""
+
 SURFACES = {
     "RoofSurface",
     "WallSurface",
@@ -71,6 +75,14 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
     if not path.is_file():
         raise InputError(f"expected a file at {path}, got none; check the name")
     yield from readers[suffix](path, damaged)
+
+
+def read_building_solids(path: Path, damaged: Damaged) -> Iterator[tuple[str, Solid]]:
+    """Yield (id, Solid) for each shell of the buildings in a CityGML file.
+
+    Installations are left out; see `read_solids`.
+    """
+    return citygml_solids(path, damaged, without=BUILDING_OBJECT)
 
 
 def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
@@ -158,8 +170,12 @@ def local_name(element: Any) -> str:
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
 
 
-def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
+def citygml_solids(
+    path: Path, damaged: Damaged = refuse, without: str = ""
+) -> Iterator[tuple[str, Solid]]:
     """Yield the shells of all solids of a CityGML file, member by member.
+
+    City objects of the kind `without` are left out.
 
     An object without a gml:Solid gives its boundary surfaces as one shell.
     """
@@ -176,7 +192,7 @@ def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str,
                 continue
             members += 1
             try:
-                solids = list(member_solids(element, path))
+                solids = list(member_solids(element, path, without))
             except InputError as error:
                 damaged(error)
                 solids = []
@@ -219,23 +235,25 @@ def gml_id(element: Any) -> str | None:
     return None
 
 
-def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
+def member_solids(member: Any, path: Path, without: str) -> Iterator[tuple[str, Solid]]:
     """Yield the shells of one cityObjectMember.
 
-    A building and each of its parts have their own id.
+    A building, each of its parts and each installation with a solid have their own id.
     """
     polygons = {
         gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"
     }
     owners = [
-        element for element in member.iter() if local_name(element) in ("Building", "BuildingPart")
+        element
+        for element in member.iter()
+        if local_name(element) in OWNERS and local_name(element) != without
     ]
     for owner in owners or list(member)[:1]:
         solids, place = [], f"{gml_id(owner) or 'a building without an id'} in {path}"
         for element in iterate_own_descendants(owner):
             if local_name(element) == "Solid":
                 solids += gml_shells(element, polygons, place)
-        if not solids:
+        if not solids and local_name(owner) != BUILDING_OBJECT:
             loose = [element for element in iterate_own_descendants(owner) if is_loose(element)]
             solids = [polygons_solid(loose, place)] if loose else []
         yield from number_solids(gml_id(owner) or "unnamed", solids)
@@ -252,9 +270,9 @@ def is_loose(element: Any) -> bool:
 
 
 def iterate_own_descendants(owner: Any) -> Iterator[Any]:
-    """Yield the elements below `owner` outside its building parts."""
+    """Yield the elements below `owner` outside its parts and installations."""
     for child in owner:
-        if local_name(child) != "BuildingPart":
+        if local_name(child) not in OWNERS:
             yield child
             yield from iterate_own_descendants(child)
 
