@@ -511,3 +511,29 @@ def test_names_that_sql_does_not_like_are_columns(database, tmp_path):
         5,
     ]
     assert row[columns.index("run_2")] == 7 and row[0] == "a"
+
+
+def test_models_that_ended_have_a_table_of_their_own(database, tmp_path):
+    house = replace(reconstruct_gable(), id="house")
+    ended = {
+        "id": "barn",
+        "valid_from": None,
+        "valid_to": "2024-05-01",
+        "type": "gable",
+        "z_ground": 0.0,
+        "z_top": 8.0,
+        "outline": [RING],
+        "origin": [85000.0, 446000.0, 0.0],
+        "parts": [{}],
+    }
+    change = {"class": "changed", "places": [], "history": [ended]}
+    write_all(tmp_path, [replace(house, change=change)], "EPSG:7415")
+    for _ in range(2):
+        assert load_postgis(tmp_path, database, prefix="ended") == 1
+    with psycopg.connect(database) as connection:
+        rows = connection.execute(
+            "select id, successor, valid_to, z_top, GeometryType(geom), ST_Area(geom) "
+            "from ended_history"
+        ).fetchall()
+    area = shapely.Polygon(RING).area
+    assert rows == [("barn", "house", "2024-05-01", 8.0, "MULTIPOLYGON", area)]
