@@ -11,6 +11,7 @@ from lxml import etree
 import hiproof
 from hiproof.errors import InputError
 from hiproof.evaluate.models import read_models
+from hiproof.parametric.override import overridden, read_override
 from hiproof.settings import Settings
 from hiproof.write import building_attributes
 from hiproof.write.parameters import building_record
@@ -23,8 +24,8 @@ FOOTPRINT = shapely.box(*CORNER, *(CORNER + [12, 8]))
 CHIMNEY = (3.0, 2.5, 1.2, 0.8, 8.0)  # middle, sides and top
 
 
-def reconstruct(*boxes, installations=True, leaves=0, id="house", density=8.0):
-    """A gable of 12 by 8 m with boxes on it, and leaves above."""
+def scan(*boxes, leaves=0, density=8.0):
+    """Points of a gable of 12 by 8 m with boxes on it, and leaves above."""
     rng = np.random.default_rng(100)
     xy = rng.uniform((0, 0), (12, 8), (round(96 * density), 2))
     z = gable(xy[:, 0], xy[:, 1], 8.0, 12.0, 5.0, 3.0)
@@ -32,11 +33,19 @@ def reconstruct(*boxes, installations=True, leaves=0, id="house", density=8.0):
         z[(np.abs(xy - [x, y]) <= [length / 2, width / 2]).all(axis=1)] = top
     crown = rng.uniform((6, 3, 8.5), (11, 7, 13), (leaves, 3))
     points = np.vstack([np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))]), crown])
-    settings = Settings.from_dict(
+    points[:, :2] += CORNER
+    return points
+
+
+def make_settings(installations):
+    return Settings.from_dict(
         {"segment": {"network": "never"}, "reconstruct": {"installations": installations}}
     )
-    points[:, :2] += CORNER
-    return hiproof.reconstruct(points, FOOTPRINT, None, settings, id)
+
+
+def reconstruct(*boxes, installations=True, id="house", **scanned):
+    points = scan(*boxes, **scanned)
+    return hiproof.reconstruct(points, FOOTPRINT, None, make_settings(installations), id)
 
 
 def test_a_chimney_is_a_box_of_its_size():
@@ -114,6 +123,13 @@ def test_citygml_stays_within_its_schema(tmp_path, schema, name):
 def test_an_edited_house_keeps_its_chimney():
     house = reconstruct(CHIMNEY)
     assert len(house.with_part(0, eave_height=4.9).model.installations) == 1
+
+
+def test_a_house_of_given_parts_has_its_chimney():
+    house = reconstruct(CHIMNEY)
+    override = read_override(building_record(house))
+    again = overridden(override, scan(CHIMNEY), FOOTPRINT, None, make_settings(True))
+    assert again.model.installations[0].type == "chimney"
 
 
 @pytest.mark.parametrize(

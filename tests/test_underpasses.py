@@ -19,6 +19,7 @@ from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
 from hiproof.frames import METRES
 from hiproof.model import CEILING, GROUND, Footprint
+from hiproof.parametric.override import overridden, read_override
 from hiproof.settings import Settings
 from hiproof.write import building_attributes, roof_figures
 from hiproof.write.meshes.viewed import view_building
@@ -177,6 +178,17 @@ def test_a_column_of_the_footprints_raises_buildings():
     request = Request(("a.laz",), Path("out"), settings=settings)
     passages = [f.passages for f in add_passages(footprints, request, None)]
     assert passages == [((FOOTPRINT, 2.5),), ((FOOTPRINT, 3.0),), (), (), ()]
+
+
+def test_a_building_of_given_parts_keeps_its_passage_and_its_walls_on_the_terrain():
+    house = reconstruct((GATE, 3.0), walls="terrain")
+    settings = PLAIN.replace({"reconstruct": {"walls": "terrain"}})
+    given = house.footprint, Footprint("house", FOOTPRINT, passages=((GATE, 3.0),))
+    override = read_override(building_record(house))
+    copies = [overridden(override, np.zeros((0, 3)), f, FlatSite(), settings) for f in given]
+    assert [len(copy.model.underside.passages) for copy in copies] == [0, 1]
+    assert all(copy.model.underside.terrain for copy in copies)
+    assert copies[1].volume == pytest.approx(house.volume)
 
 
 def test_a_passage_moves_with_its_footprint():

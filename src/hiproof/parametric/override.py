@@ -383,6 +383,7 @@ def build_given(
     created = measure_building(created, local) if len(local) else created
     created = stages.reach_terrain(created, ground, settings)
     created = stages.open_passages(created, ground, given)
+    created = stages.add_installations(created, local, settings)
     return stages.add_remark(created, of_footprint)
 
 
