@@ -2,6 +2,9 @@
 
 usage: python -m benchmarks.curved [--seeds 16] [--first-seed 100] [--densities 8 2]
 
+The last lines count slim towers of 3 by 3 m, 3 to 15 m above the ridge of such a house, that the
+roof has within 0.3 m of their height.
+
 Each kind stands alone over its own outline, on a square or rectangular base that is a little larger
 (a tower), and as a turret in the corner of a house with a gable. Sizes are those that are built
 (`draw` of the catalogue): spires of 55 to 78 degrees, cones of 25 to 72, arcs of a third to a whole
@@ -29,6 +32,7 @@ HOUSE_EAVE_M, HOUSE_SLOPE = 6.0, 0.9
 SHAPE_EAVE_M = 10.0  # Height of the curved shape's eave.
 BASE_WIDER = 1.02  # A tower is so much wider than its spire.
 NOISE_M, PLAN_NOISE_M = 0.03, 0.05
+TOWER_M = 3.0  # Side of a slim tower.
 GRID_M = 0.1  # Distance between the places at which heights are compared.
 
 
@@ -113,6 +117,23 @@ def judge_scene(scene: CurvedScene) -> CurvedOutcome:
     )
 
 
+def is_slim_tower_found(seed: int, density: float) -> bool:
+    """Return whether the roof of a house has a level tower of 3 by 3 m somewhere on it."""
+    rng = np.random.default_rng(seed)
+    house, ridge = make_house(), HOUSE_EAVE_M + HOUSE_SLOPE * HOUSE_WIDTH_M / 2
+    x, y = rng.uniform((0.0, 0.0), (HOUSE_LENGTH_M - TOWER_M, HOUSE_WIDTH_M - TOWER_M))
+    tower, top = shapely.box(x, y, x + TOWER_M, y + TOWER_M), ridge + rng.uniform(3.0, 15.0)
+    count = rng.poisson(density * house.area)
+    xy = rng.uniform((0.0, 0.0), (HOUSE_LENGTH_M, HOUSE_WIDTH_M), (count, 2))
+    z = ridge - HOUSE_SLOPE * np.abs(xy[:, 1] - HOUSE_WIDTH_M / 2)
+    z[shapely.contains_xy(tower, *xy.T)] = top
+    z += rng.normal(0.0, NOISE_M, count)
+    points = np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
+    parts = fit_building(points, house).roof_parts
+    middle = shapely.get_coordinates(tower.centroid)
+    return bool(abs(find_highest(parts, middle)[0][0] - top) <= 0.3)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -135,6 +156,9 @@ def main() -> None:
                 ]
                 cells = " | ".join(f"{100 * share:.0f} %" for share in shares)
                 print(f"| {density:g} | {setting} | {kind} | {cells} |", flush=True)
+    for density in request.densities:
+        share = np.mean([is_slim_tower_found(seed, density) for seed in seeds])
+        print(f"slim towers at {density:g} points/m2: {100 * share:.0f} % found", flush=True)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from .regions import list_polygons, unite_outlines
 from .round_tops import BENT
 
 BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel")  # What is made of one.
+AS_NEAR = 1.05  # Share of the misfit that an arc may leave if it replaces several parts.
 ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
 
 
@@ -28,33 +29,34 @@ def list_barrels(
     """
     if part.type not in BARREL_LIKE or len(part.pieces) > 1:
         return
-    beside = [other for other in roof.parts if is_parallel(part, other)]
+    beside = [other for other in roof.parts if is_as_long(part, other)]
     for group in ([part], beside) if len(beside) > 1 else ([part],):
         covered = list_polygons(unite_outlines(group))
         numbers = [k for k, p in enumerate(roof.parts) if any(p is member for member in group)]
         which = own | np.isin(roof.highest[1], numbers)
         way = -math.sin(part.kappa), math.cos(part.kappa)
-        if len(covered) == 1 and is_bent(roof.points[:, :2] @ way, roof, which):
+        most_left = BENT if len(group) == 1 else AS_NEAR
+        if len(covered) == 1 and is_bent(roof.points[:, :2] @ way, roof, which, most_left):
             inside = shapely.contains_xy(covered[0], *roof.points[:, :2].T)
             shape = fit_types(roof.points[inside], covered[0], ("barrel",), settings)
             if shape is not None:
                 yield cut_part(shape, covered[0])
 
 
-def is_parallel(part: Part, other: Part) -> bool:
-    """Return whether another part touches a part, and is as long along its ridge."""
+def is_as_long(part: Part, other: Part) -> bool:
+    """Return whether another part begins and ends where a part does along its ridge."""
     way = np.array([math.cos(part.kappa), math.sin(part.kappa)])
-    ends = [shapely.get_coordinates(piece.outline) @ way for piece in (*part.pieces, *other.pieces)]
-    first, rest = ends[0], np.concatenate(ends[len(part.pieces) :])
-    is_as_long = abs(first.min() - rest.min()) <= ENDS_M and abs(first.max() - rest.max()) <= ENDS_M
-    outlines = [unite_outlines([one]) for one in (part, other)] if is_as_long else []
-    return bool(is_as_long and shapely.dwithin(*outlines, ENDS_M))
+    ends = []
+    for one in (part, other):
+        along = np.concatenate([shapely.get_coordinates(p.outline) @ way for p in one.pieces])
+        ends.append((along.min(), along.max()))
+    return bool(np.abs(np.subtract(*ends)).max() <= ENDS_M)
 
 
-def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray) -> bool:
-    """Return whether an arc over x (n,) is clearly nearer to points than the roof.
+def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray, most_left: float) -> bool:
+    """Return whether an arc over x (n,) leaves little of the misfit of the roof.
 
-    `which` (n,) are these points.
+    `which` (n,) are the points that count, and `most_left` the largest share that may be left.
     """
     x, z = x[which], roof.points[which, 2]
     middle, wide = 0.5 * (x.min() + x.max()), max(0.5 * float(np.ptp(x)), COMPARED_M)
@@ -63,4 +65,4 @@ def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray) -> bool:
     design = np.column_stack([np.ones_like(x), x, under, np.sqrt(under)])
     curve = design @ np.linalg.lstsq(design, z, rcond=None)[0]
     left = np.minimum(np.abs(z - curve), MOST_DISTANCE_M).mean()
-    return bool(left <= BENT * roof.measure_distances(MOST_DISTANCE_M)[which].mean())
+    return bool(left <= most_left * roof.measure_distances(MOST_DISTANCE_M)[which].mean())
