@@ -8,7 +8,6 @@ misfits lie there. In clouds without building classes, level cells high above th
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -184,33 +183,34 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     jobs = [job for job in plan.jobs if not job.area.is_empty]
     outlines, names = shapely.STRtree([job.area for job in jobs]), [job.id for job in jobs]
     found = []
-    for block in list_blocks([*list_files(folders[0]), *list_files(folders[1])]):
-        corner = BLOCK_M * np.array(block)
+    for corner in list_corners([*list_files(folders[0]), *list_files(folders[1])]):
         box = shapely.box(*(corner - BLOCK_REACH_M), *(corner + BLOCK_M + BLOCK_REACH_M))
         new, old = (load_survey(folder, box) for folder in folders)
         roofs = find_unmapped(new["roof"], old["roof"] if has_earlier else new["roof"], outlines)
         if has_earlier:
             roofs += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
             roofs += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
-        found += [roof for roof in roofs if find_block(roof.place.bounds) == block]
+        square = np.array([corner, corner + BLOCK_M])
+        found += [roof for roof in roofs if begins_in(square, roof.place)]
     with atomic(state / OUTSIDE_FILE) as temporary:
         records = [roof.to_record() for roof in found]
         Path(temporary).write_text(json.dumps(records) + "\n", encoding="utf-8")
 
 
-def list_blocks(files: list[Path]) -> list[tuple[int, int]]:
-    """Return the squares of BLOCK_M in which files have cells."""
-    blocks = set()
-    for box in map(read_box, files):
-        if not box.is_empty:
-            (i0, j0), (i1, j1) = find_block(box.bounds[:2]), find_block(box.bounds[2:])
-            blocks |= {(i, j) for i in range(i0, i1 + 1) for j in range(j0, j1 + 1)}
-    return sorted(blocks)
+def list_corners(files: list[Path]) -> list[np.ndarray]:
+    """Return the lower left corners (2,) of the squares that hold all cells."""
+    bounds = shapely.total_bounds([read_box(path) for path in files])
+    if not np.isfinite(bounds).all():
+        return []
+    first = np.floor(bounds[:2])
+    columns, rows = np.floor((bounds[2:] - first) / BLOCK_M).astype(int) + 1
+    return [first + BLOCK_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
 
 
-def find_block(xy: Sequence[float]) -> tuple[int, int]:
-    """Return the square of BLOCK_M that a place (x, y) lies in."""
-    return math.floor(xy[0] / BLOCK_M), math.floor(xy[1] / BLOCK_M)
+def begins_in(square: np.ndarray, place: shapely.Geometry) -> bool:
+    """Return whether the lower left corner of a place lies in a square (2, 2)."""
+    corner = np.array(place.bounds[:2])
+    return bool((square[0] <= corner).all() and (corner < square[1]).all())
 
 
 def load_roofs_outside(state: Path) -> list[dict[str, Any]]:
