@@ -18,8 +18,8 @@ import shapely
 
 from ..city.plan import WorkPlan
 from ..geometry.components import label_components
-from ..geometry.grid import number_cells
 from ..model import PointCloud
+from ..read.thin import occupied_cells
 from ..settings import ReadSettings
 from ..status import ChangeKind
 from ..write.files import atomic, atomic_file
@@ -94,8 +94,11 @@ def average_cells(points: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, n
 
     `points` (n, 4), x y z and the square of z, stand for so many points, `counts` (n,), each.
     """
-    cells, number = number_cells(find_cells(points))
-    total = np.bincount(number, weights=counts, minlength=len(cells))
+    cells = find_cells(points)
+    column, row = (cells - cells.min(axis=0)).T
+    keys = column * (int(row.max()) + 1) + row
+    number = occupied_cells(keys, int(keys.max()) + 1)[1]
+    total = np.bincount(number, weights=counts)
     offset = points.min(axis=0)
     sums = [np.bincount(number, weights=counts * values) for values in (points - offset).T]
     return np.column_stack(sums) / total[:, None] + offset, total
