@@ -118,7 +118,7 @@ def judge_scene(scene: CurvedScene) -> CurvedOutcome:
 
 
 def is_slim_tower_found(seed: int, density: float) -> bool:
-    """Return whether the roof of a house has a level tower of 3 by 3 m somewhere on it."""
+    """Return whether the fitted roof of a house has its tower of 3 by 3 m."""
     rng = np.random.default_rng(seed)
     house, ridge = make_house(), HOUSE_EAVE_M + HOUSE_SLOPE * HOUSE_WIDTH_M / 2
     x, y = rng.uniform((0.0, 0.0), (HOUSE_LENGTH_M - TOWER_M, HOUSE_WIDTH_M - TOWER_M))

@@ -16,6 +16,7 @@ import hiproof
 from hiproof.compose import check_solid
 from hiproof.fit.union import fit_building
 from hiproof.parametric.arrange import merged_parts, split_part
+from hiproof.primitives.catalogue import CATALOGUE, CURVED
 from points_of_roofs import sample_heights
 
 EAVE = 3.0
@@ -23,6 +24,10 @@ OCTAGON = shapely.Polygon(
     [(5 * math.cos(a), 5 * math.sin(a)) for a in np.arange(8) * math.pi / 4 + math.pi / 8]
 )
 CANTED_END = shapely.Polygon([(0, 0), (12, 0), (14.5, 2.5), (14.5, 5.5), (12, 8), (0, 8)])
+
+WITHOUT_SPIRES = hiproof.Settings.from_dict(
+    {"fit": {"types": [name for name in CATALOGUE if name not in CURVED]}}
+)
 
 
 def make_height(outline, slope, gable=()):
@@ -69,11 +74,20 @@ def compute_misfit(parts, outline, height):
 )
 def test_a_roof_that_rises_from_every_wall_is_one_part(name, kind, count, seed):
     outline, height = make_house(name)
-    (part,) = fit_building(sample_heights(height, outline, 8.0, 0.02, seed), outline).roof_parts
+    points = sample_heights(height, outline, 8.0, 0.02, seed)
+    (part,) = fit_building(points, outline, WITHOUT_SPIRES).roof_parts
     assert part.type == kind
     assert len(list_cants(part)) == count
     assert compute_misfit([part], outline, height) < 0.03
     assert all(0.0 < part.sigma[f"pitch_cant{k + 1}"] < 3.0 for k in range(count))
+
+
+def test_a_regular_tower_has_a_spire():
+    height = make_height(OCTAGON, 1.0)
+    (part,) = fit_building(sample_heights(height, OCTAGON, 8.0, 0.02), OCTAGON).roof_parts
+    assert part.type == "broach"
+    assert part.parameters["height"] == pytest.approx(5.0 * math.cos(math.pi / 8), abs=0.05)
+    assert compute_misfit([part], OCTAGON, height) < 0.03
 
 
 @pytest.mark.parametrize("degrees", [33.0, 117.0, 250.0])

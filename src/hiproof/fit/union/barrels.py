@@ -50,7 +50,7 @@ def is_as_long(part: Part, other: Part) -> bool:
     for one in (part, other):
         along = np.concatenate([shapely.get_coordinates(p.outline) @ way for p in one.pieces])
         ends.append((along.min(), along.max()))
-    return bool(np.abs(np.subtract(*ends)).max() <= ENDS_M)
+    return bool(np.abs(np.diff(ends, axis=0)).max() <= ENDS_M)
 
 
 def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray, most_left: float) -> bool:
