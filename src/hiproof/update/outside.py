@@ -234,8 +234,8 @@ def find_fresh(
     `roofs` (k, 3) are the cells of one survey, `other` those of the other one. A roof beside a
     building extends it where `names` of the buildings are known.
     """
-    points = roofs[~touches(roofs, outlines, 0.0)]
-    points = points[~np.isin(number_places(points), number_places(other["roof"]))]
+    points = roofs[~np.isin(number_places(roofs), number_places(other["roof"]))]
+    points = points[~touches(points, outlines, 0.0)]
     near = touches(points, outlines, BESIDE_M) | is_beside(points, other["roof"])
     ground = number_places(other["ground"])
     result = []
