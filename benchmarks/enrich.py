@@ -45,7 +45,7 @@ HEAD = {
     "compose": {},
     "write": {},
 }
-EVERY_HOUR = 97  # every so many hours of the year are cast as rays
+EVERY_HOUR = 13  # every so many hours of the year are cast as rays
 NEAR_M = 120.0  # distance (m) up to which triangles may stop rays: roofs are 15 m high at most
 
 
