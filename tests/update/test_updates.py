@@ -100,6 +100,25 @@ def test_the_raised_house_keeps_its_parts_and_is_as_high_as_its_points(update, r
     assert by_id(out)["house-2"]["status"] == "no_building"
 
 
+def test_a_changed_house_keeps_its_passage(run, cloud, tmp_path):
+    run = shutil.copytree(run, tmp_path / "run")
+    lines = (run / "parameters.jsonl").read_text().splitlines()
+    number = next(n for n, line in enumerate(lines) if '"id":"house-1"' in line)
+    old = json.loads(lines[number])
+    x0, y0, x1, y1 = shapely.bounds(shapely.Polygon(old["outline"][0]))
+    middle = 0.5 * (y0 + y1)
+    ring = [[x0 - 1, middle - 1], [x1 + 1, middle - 1], [x1 + 1, middle + 1], [x0 - 1, middle + 1]]
+    ceiling = old["z_ground"] + 2.5
+    old["passages"] = [{"outline": [[*ring, ring[0]]], "ceiling": ceiling}]
+    lines[number] = json.dumps(old)
+    (run / "parameters.jsonl").write_text("\n".join(lines) + "\n")
+    update_area(make_request(run, cloud, tmp_path / "out"))
+    new = by_id(tmp_path / "out")["house-1"]
+    assert new["change"]["class"] == "changed"
+    (passage,) = new["passages"]
+    assert passage["ceiling"] - new["z_ground"] == pytest.approx(2.5, abs=0.002)
+
+
 def test_tables_and_attributes_say_what_changed(update):
     _, out, _ = update
     rows = (out / "changes.csv").read_text().splitlines()

@@ -61,8 +61,24 @@ class UpdateMember:
         )
 
     def make_job(self, index: int) -> Job:
-        """Make the job of the member."""
-        return make_job(index, Footprint(self.id, self.outline, self.attributes), (0.0, 0.0))
+        """Make the job of the member, with the passages that led through it before."""
+        passages = read_passages(self.record or {})
+        footprint = Footprint(self.id, self.outline, self.attributes, passages=passages)
+        return make_job(index, footprint, (0.0, 0.0))
+
+
+def read_passages(record: dict[str, Any]) -> tuple[tuple[shapely.Polygon, float], ...]:
+    """Read the passages of an earlier object: polygons in the world, and clearances (m)."""
+    items = record.get("passages") or ()
+    return tuple(
+        (
+            shapely.transform(
+                polygon(item["outline"], "a passage"), lambda xy: xy + record["origin"][:2]
+            ),
+            item["ceiling"] - record["z_ground"],
+        )
+        for item in items
+    )
 
 
 def make_members(
