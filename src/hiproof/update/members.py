@@ -68,7 +68,7 @@ class UpdateMember:
 
 
 def read_passages(record: dict[str, Any]) -> tuple[tuple[shapely.Polygon, float], ...]:
-    """Read the passages of an earlier object: polygons in the world, and clearances (m)."""
+    """Read the passages of an earlier object: polygons in the world, clearances."""
     items = record.get("passages") or ()
     return tuple(
         (
