@@ -72,7 +72,9 @@ def replace_parts(roof: JudgedRoof, shape: Part) -> tuple[float, JudgedRoof]:
             numbers.append(k)
     replaced = [roof.parts[k] for k in numbers]
     kept = [part for k, part in enumerate(roof.parts) if k not in numbers]
-    judged, options = within | np.isin(top, numbers), []
+    judged, options = within | np.isin(top, numbers), [(0.0, roof)]
+    if not judged.any():
+        return options[0]
     for parts in cover_bare_places(roof, [*kept, shape], replaced):
         new = JudgedRoof(parts, roof.points, roof.outline)
         left = (before[judged].mean(), new.measure_distances(cap)[judged].mean())
