@@ -11,33 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from .algebra import Formula, U, V, q0, q1
-from .contract import (
-    HALF_LENGTH,
-    HALF_WIDTH,
-    Q1,
-    SLOPE_MIN,
-    SPIRE_SLOPE_MAX,
-    DerivedStart,
-    Primitive,
-    turn_quarter,
-)
+from .contract import SLOPE_MIN, SPIRE_SLOPE_MAX, DerivedStart, Primitive
 from .drawing import drawn_slope
 from .facets import SIDE_COUNTS, count_sides, find_apothem, make_facet_planes, make_rim
+from .gable import shape, typical
+from .pyramid import canonical
 
 BROACH_SIDES = 8  # Sides of the spire of most church towers that have one.
-
-
-def canonical(theta: np.ndarray) -> np.ndarray:
-    """Turn the shape so that its longer axis is the length."""
-    if theta[HALF_WIDTH] <= theta[HALF_LENGTH]:
-        return theta
-    turned = turn_quarter(theta)
-    turned[Q1] = theta[Q1] * theta[HALF_WIDTH] / theta[HALF_LENGTH]
-    return turned
-
-
-def typical(width: float, length: float, height: float) -> dict[str, float]:
-    return {"width": width, "length": length, "height": height}
 
 
 def make_pointed(
@@ -68,14 +48,7 @@ def make_pointed(
         measures={"width": 2 * V, "length": 2 * U, "height": fall},
         eave=q0 - fall,
         planes=make_facet_planes(sides, apothem, fall, q0),
-        shape=lambda p: (
-            p["width"] / 2,
-            p["length"] / 2,
-            p["height"],
-            2 * p["height"] / p["width"],
-            0.0,
-            0.0,
-        ),
+        shape=shape,
         corners=corners,
         faces=tuple((k, (k + 1) % sides, sides) for k in range(sides)),
         typical=typical,

@@ -11,7 +11,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from .algebra import U, V, q0, q1, q2
-from .contract import BACK, FRONT, KAPPA, Q2, SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive, Vote
+from .contract import (
+    BACK,
+    FRONT,
+    KAPPA,
+    Q2,
+    SLOPE_MAX,
+    SLOPE_MIN,
+    DerivedStart,
+    Primitive,
+    Shape,
+    Vote,
+)
 from .drawing import drawn_plan, drawn_slope
 
 # the planes on the -v and the +v side, shared by the shapes with a ridge
@@ -24,6 +35,11 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     u, v, h, offset = p["length"] / 2, p["width"] / 2, p["height"], p.get("ridge_offset", 0)
     step = 2 * offset * h / (v + offset)
     return [(u, -v, 0), (-u, -v, 0), (-u, offset, h), (u, offset, h), (u, v, step), (-u, v, step)]
+
+
+def shape(p: Mapping[str, float]) -> Shape:
+    """Return V, U and q of slopes that rise to `height` over half the width."""
+    return p["width"] / 2, p["length"] / 2, p["height"], 2 * p["height"] / p["width"], 0.0, 0.0
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
@@ -87,14 +103,7 @@ PRIMITIVE = Primitive(
     measures={"width": 2 * V, "length": 2 * U, "height": q1 * V},
     eave=q0 - q1 * V,
     planes=SLOPES,
-    shape=lambda p: (
-        p["width"] / 2,
-        p["length"] / 2,
-        p["height"],
-        2 * p["height"] / p["width"],
-        0.0,
-        0.0,
-    ),
+    shape=shape,
     corners=corners,
     faces=FACES,
     typical=typical,

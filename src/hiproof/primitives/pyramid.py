@@ -18,7 +18,7 @@ from .contract import (
     turn_quarter,
 )
 from .drawing import drawn_plan, drawn_slope
-from .gable import SLOPES
+from .gable import SLOPES, shape, typical
 
 END_SLOPE = q1 * V / U
 
@@ -50,17 +50,10 @@ PRIMITIVE = Primitive(
     measures={"width": 2 * V, "length": 2 * U, "height": q1 * V},
     eave=q0 - q1 * V,
     planes=(*SLOPES, (-END_SLOPE, 0, q0), (END_SLOPE, 0, q0)),
-    shape=lambda p: (
-        p["width"] / 2,
-        p["length"] / 2,
-        p["height"],
-        2 * p["height"] / p["width"],
-        0.0,
-        0.0,
-    ),
+    shape=shape,
     corners=corners,
     faces=((1, 0, 4), (3, 2, 4), (0, 3, 4), (2, 1, 4)),
-    typical=lambda width, length, height: {"width": width, "length": length, "height": height},
+    typical=typical,
     bounds=((SLOPE_MIN, SLOPE_MAX),),
     vote=Vote(),
     canonical=canonical,

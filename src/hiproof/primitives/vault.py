@@ -5,12 +5,12 @@ facets.py says how an arc is written.
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from .algebra import U, V, q0, q1
-from .cone import typical
-from .contract import Corners, DerivedStart, Plane, Primitive, Shape, at_quarters
+from .contract import Corners, DerivedStart, Plane, Primitive, at_quarters
 from .drawing import drawn_plan
 from .facets import (
     SIDE_COUNTS,
@@ -20,14 +20,33 @@ from .facets import (
     make_facet_planes,
     make_rim,
 )
+from .gable import shape, typical
 
 LOWEST, HIGHEST = 0.1, 1.0  # Height over half the width: flatter is level, and higher no arc.
 CROWN = q1 * V  # height of the crown above the eave
 STARTS = (0.5, 0.9)  # Shares of a gable's or a pyramid's slope at which an arc begins.
 
 
-def shape(p: Mapping[str, float]) -> Shape:
-    return p["width"] / 2, p["length"] / 2, p["height"], 2 * p["height"] / p["width"], 0.0, 0.0
+def make_vault(
+    name: str, codes: tuple[str, str, str], starts: tuple[DerivedStart, ...], **own: Any
+) -> Primitive:
+    """Return a vault with its `own` planes, corners, faces and plan.
+
+    `codes` are those of CityGML, AdV and OpenStreetMap.
+    """
+    return Primitive(
+        name=name,
+        citygml_code=codes[0],
+        adv_code=codes[1],
+        osm_shape=codes[2],
+        measures={"width": 2 * V, "length": 2 * U, "height": CROWN},
+        eave=q0 - CROWN,
+        shape=shape,
+        typical=lambda width, length, height: typical(width, length, min(height, width / 2)),
+        bounds=((LOWEST, HIGHEST),),
+        starts=starts,
+        **own,
+    )
 
 
 def make_starts(source: str) -> tuple[DerivedStart, ...]:
@@ -64,21 +83,13 @@ def make_dome(sides: int) -> Primitive:
             faces += [(lower + k, lower + after, upper + after, upper + k) for k, after in places]
         return faces
 
-    return Primitive(
-        name="dome",
-        citygml_code="1090",
-        adv_code="3700",
-        osm_shape="dome",
-        legend="other",
-        measures={"width": 2 * V, "length": 2 * U, "height": CROWN},
-        eave=q0 - CROWN,
+    return make_vault(
+        "dome",
+        ("1090", "3700", "dome"),
+        make_starts("pyramid"),
         planes=planes,
-        shape=shape,
         corners=corners,
         faces=tuple(list_faces()),
-        typical=lambda width, length, height: typical(width, length, min(height, width / 2)),
-        bounds=((LOWEST, HIGHEST),),
-        starts=make_starts("pyramid"),
         rim=rim,
         draw=lambda rng, width: typical(width, width, width / 2 * float(rng.uniform(0.3, 1.0))),
     )
@@ -105,24 +116,16 @@ def make_barrel() -> Primitive:
 
     strips = [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(len(shares) - 1)]
     front, back = strips[: len(chords)], strips[len(chords) :]
-    return Primitive(
-        name="barrel",
-        citygml_code="1110",
-        adv_code="3900",
-        osm_shape="round",
-        legend="other",
-        measures={"width": 2 * V, "length": 2 * U, "height": CROWN},
-        eave=q0 - CROWN,
+    return make_vault(
+        "barrel",
+        ("1110", "3900", "round"),
+        make_starts("gable"),
         planes=(
             *((0, fall / V, top) for fall, top in chords),
             *((0, -(fall / V), top) for fall, top in chords),
         ),
-        shape=shape,
         corners=corners,
         faces=(*front[::-1], *back),
-        typical=lambda width, length, height: typical(width, length, min(height, width / 2)),
-        bounds=((LOWEST, HIGHEST),),
-        starts=make_starts("gable"),
         draw=draw,
     )
 

@@ -16,6 +16,7 @@ from ..city.plan import Job, make_job
 from ..city.prepare import read_requested_footprints
 from ..model import Footprint
 from ..parametric.record import polygon, read_outline, read_shift
+from ..parametric.underside import read_passage
 from ..write.files import atomic
 from ..write.json_text import dump
 from .earlier import EarlierRun
@@ -69,15 +70,13 @@ class UpdateMember:
 
 def read_passages(record: dict[str, Any]) -> tuple[tuple[shapely.Polygon, float], ...]:
     """Read the passages of an earlier object: polygons in the world, clearances."""
-    items = record.get("passages") or ()
+    above_ground = [
+        read_passage(item, f"passage {k}", record["z_ground"])
+        for k, item in enumerate(record.get("passages") or ())
+    ]
     return tuple(
-        (
-            shapely.transform(
-                polygon(item["outline"], "a passage"), lambda xy: xy + record["origin"][:2]
-            ),
-            item["ceiling"] - record["z_ground"],
-        )
-        for item in items
+        (shapely.transform(p.outline, lambda xy: xy + record["origin"][:2]), p.ceiling)
+        for p in above_ground
     )
 
 
