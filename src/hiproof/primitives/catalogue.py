@@ -51,6 +51,7 @@ SHAPES = (
 CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
 ROUND = ("cone", "broach", "dome")  # over a round or many-sided plan
 CURVED = (*ROUND, "barrel")  # whose facets stand for a curved surface, or are more than a volume's
+SMOOTH = ("cone", "dome", "barrel")  # of which all facets stand for one curved surface
 
 
 def get(name: str) -> Primitive:

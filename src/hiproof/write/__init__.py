@@ -7,6 +7,7 @@ Contents that formats share:
 attribute_list         every attribute and table, declared once
 building_attributes    the attributes of one building
 roof_figures           heights, slopes, ridge and volume of a solid
+surfaces               faces that are one surface, such as the facets of a cone
 terrain_figures        heights of the terrain along an outline
 installations          codes of chimneys and other objects on roofs
 roof_levels            heights below which a share of a roof lies, compiled

@@ -331,12 +331,18 @@ OSM = (
 )
 
 ROOF_SURFACE = (
-    Attribute("rf_slope", "number", "deg", "slope of the face (in CityGML: slope)"),
+    Attribute(
+        "rf_slope",
+        "number",
+        "deg",
+        "slope of the surface, of a curved one the mean by area (in CityGML: slope)",
+    ),
     Attribute(
         "rf_azimuth",
         "number",
         "deg",
-        "compass direction in which it falls, null where level (in CityGML: azimuth)",
+        "compass direction in which it falls, null where level or where it falls to all sides "
+        "(in CityGML: azimuth)",
     ),
     Attribute("hiproof_part", "count", "", "number of its roof part, from 0"),
     Attribute("hiproof_part_type", "text", "", "type of its roof part"),
@@ -601,14 +607,20 @@ PARTS_LAYER = (
 
 SURFACES_LAYER = (
     Attribute("building_id", "text", "", "id of the building"),
-    Attribute("number", "count", "", "number of the surface within its building, from 0"),
+    Attribute(
+        "number",
+        "count",
+        "",
+        "number of the surface within its building, from 0; the facets of a curved surface, a row "
+        "each, have one number",
+    ),
     Attribute("part", "count", "", "number of its roof part, as in the layer parts"),
     Attribute("type", "text", "", "roof type of that part"),
-    Attribute("slope_deg", "number", "deg", "slope of the surface"),
+    Attribute("slope_deg", "number", "deg", "slope of the face"),
     Attribute(
         "azimuth_deg", "number", "deg", "compass direction in which it falls, null where level"
     ),
-    Attribute("area_m2", "number", "m2", "true area of the surface"),
+    Attribute("area_m2", "number", "m2", "true area of the face"),
 )
 
 HISTORY_LAYER = (

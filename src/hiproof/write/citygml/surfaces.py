@@ -7,14 +7,15 @@ solid is told more than once.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ...frames import Units
-from ...model import CEILING, GROUND, ROOF, WALL, Face, Solid
+from ...model import CEILING, GROUND, ROOF, WALL, Face, Part, Solid
 from ..roof_figures import RoofFigures
+from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
 from ..values import round_value
 from ..xml_text import generic_attribute
 
@@ -93,35 +94,44 @@ def terrain_element(lines: list[np.ndarray], level: int) -> str:
 
 def boundary_surfaces(
     solid: Solid,
+    parts: Sequence[Part],
     figures: RoofFigures,
     polygon_ids: list[str],
     rings: list[str],
     attributes: dict[int, dict[str, Any]] | None = None,
 ) -> list[str]:
-    """Return a RoofSurface, WallSurface or GroundSurface for every face.
+    """Return the RoofSurfaces, WallSurfaces and GroundSurfaces of a solid.
 
-    Roofs have their slope and azimuth in degrees; `attributes` has others by face.
+    There is one for every face, but one for all facets of a curved one of the roof's `parts`. Roofs
+    have their slope and azimuth in degrees; `attributes` has others by face.
     """
+    numbers = number_surfaces(solid.faces, parts)
+    values = join_values(attributes or {}, numbers, figures)
     surfaces = []
-    for index, (face, polygon_id, of_face) in enumerate(
-        zip(solid.faces, polygon_ids, rings, strict=True)
-    ):
-        tag = f"bldg:{face.kind}"
-        generic = angle_attributes(figures, index) if face.kind == ROOF else ""
-        for name, value in (attributes or {}).get(index, {}).items():
+    for number, faces in group_faces(numbers).items():
+        tag, id = f"bldg:{solid.faces[number].kind}", polygon_ids[number]
+        generic = angle_attributes(figures, faces) if solid.faces[number].kind == ROOF else ""
+        for name, value in values.get(number, {}).items():
             generic += generic_attribute(name, value)
+        members = "".join(
+            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_ids[face]}">{rings[face]}'
+            "</gml:Polygon></gml:surfaceMember>"
+            for face in faces
+        )
         surfaces.append(
-            f"<bldg:boundedBy><{tag} "
-            f'gml:id="{polygon_id}">{generic}<bldg:lod2MultiSurface><gml:MultiSurface>'
-            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{of_face}</gml:Polygon>'
-            f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
+            f'<bldg:boundedBy><{tag} gml:id="{id}">{generic}<bldg:lod2MultiSurface>'
+            f"<gml:MultiSurface>{members}</gml:MultiSurface></bldg:lod2MultiSurface></{tag}>"
+            "</bldg:boundedBy>"
         )
     return surfaces
 
 
-def angle_attributes(figures: RoofFigures, index: int) -> str:
-    """Return slope and azimuth of roof face `index`, as far as they are known."""
-    angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
+def angle_attributes(figures: RoofFigures, faces: list[int]) -> str:
+    """Return slope and azimuth of a roof surface, as far as they are known.
+
+    `faces` are the numbers of its faces.
+    """
+    angles = dict(zip(("slope", "azimuth"), measure_angles(figures, faces), strict=True))
     return "".join(
         generic_attribute(key, round_value(angle, 3))
         for key, angle in angles.items()

@@ -188,7 +188,7 @@ def building_element(sheet: Sheet) -> str:
         )
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
         text += installation_elements(sheet)
-        text += boundary_surfaces(solid, figures, ids, rings, sheet.surfaces)
+        text += boundary_surfaces(solid, building.parts, figures, ids, rings, sheet.surfaces)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, sheet.extension, "</bldg:Building>"])
 
@@ -241,7 +241,7 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
         text.append(lod2_solid(ids, f"shell-{name}"))
         rings = list_face_rings(part.solid.faces, in_file(sheet, part.solid))
         text += [lod2_surfaces(rings)] if sheet.head.write.gml_surfaces else []
-        text += boundary_surfaces(part.solid, part.figures, ids, rings)
+        text += boundary_surfaces(part.solid, sheet.building.parts, part.figures, ids, rings)
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
 
 

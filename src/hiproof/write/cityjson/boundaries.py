@@ -6,6 +6,7 @@ It is footprint and roof edge, blocks, and Solids with semantics.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ...model import GROUND, ROOF, Building, Face, Solid
 from ..building_attributes import OWN
 from ..roof_figures import RoofFigures
 from ..shapes import PartShape, Shapes
+from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
 from ..values import plain, round_value
 
 LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
@@ -73,11 +75,13 @@ def building_geometry(
         )
     solids = []
     if "2.2" in lods and not shapes.parts:
-        surfaces = roof_surfaces(building, building.solid, figures, prefix)
-        for index, more in (attributes or {}).items():
-            kind = {"type": building.solid.faces[index].kind}
-            surfaces[index] = surfaces.get(index, kind) | more
-        solids = [solid_geometry(building.solid, vertices, LOD_SOLID, surfaces)]
+        solid = building.solid
+        numbers = number_surfaces(solid.faces, building.parts)
+        surfaces = roof_surfaces(building, solid, numbers, figures, prefix)
+        for number, more in join_values(attributes or {}, numbers, figures).items():
+            kind = {"type": solid.faces[number].kind}
+            surfaces[number] = surfaces.get(number, kind) | more
+        solids = [solid_geometry(solid, vertices, LOD_SOLID, surfaces, numbers)]
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
     return [
         *level_surfaces(building, shapes, vertices),
@@ -93,8 +97,9 @@ def part_geometry(
     block = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
     if "2.2" not in lods:
         return block
-    surfaces = roof_surfaces(building, part.solid, part.figures, prefix)
-    return [*block, solid_geometry(part.solid, vertices, LOD_SOLID, surfaces)]
+    numbers = number_surfaces(part.solid.faces, building.parts)
+    surfaces = roof_surfaces(building, part.solid, numbers, part.figures, prefix)
+    return [*block, solid_geometry(part.solid, vertices, LOD_SOLID, surfaces, numbers)]
 
 
 def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
@@ -133,51 +138,58 @@ def named_surfaces(surface: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 def solid_geometry(
-    solid: Solid, vertices: Vertices, lod: str, described: dict[int, dict[str, Any]] | None = None
+    solid: Solid,
+    vertices: Vertices,
+    lod: str,
+    described: dict[int, dict[str, Any]] | None = None,
+    numbers: Sequence[int] | None = None,
 ) -> dict[str, Any]:
     """Return the Solid with its semantics.
 
-    A face in `described` is a semantic surface of its own; all others of a kind share one.
+    A surface in `described` is a semantic surface of its own; all other faces of a kind share one.
+    `numbers` are those of the faces' surfaces.
     """
-    number = vertices.add(solid.vertices)
+    described = described or {}
+    vertex_numbers = vertices.add(solid.vertices)
     surfaces: list[dict[str, Any]] = []
-    shared: dict[str, int] = {}
+    places: dict[int | str, int] = {}
     values = []
     for index, face in enumerate(solid.faces):
-        if described and index in described:
-            values.append(len(surfaces))
-            surfaces.append(described[index])
-        else:
-            if face.kind not in shared:
-                shared[face.kind] = len(surfaces)
-                surfaces.append({"type": face.kind})
-            values.append(shared[face.kind])
+        number = numbers[index] if numbers else index
+        is_described = number in described
+        key = number if is_described else face.kind
+        if key not in places:
+            places[key] = len(surfaces)
+            surfaces.append(described[number] if is_described else {"type": face.kind})
+        values.append(places[key])
     boundaries = [
-        [[number[vertex] for vertex in ring] for ring in face.rings] for face in solid.faces
+        [[vertex_numbers[vertex] for vertex in ring] for ring in face.rings] for face in solid.faces
     ]
     semantics = {"surfaces": surfaces, "values": [values]}
     return {"type": "Solid", "lod": lod, "boundaries": [boundaries], "semantics": semantics}
 
 
 def roof_surfaces(
-    building: Building, solid: Solid, figures: RoofFigures, prefix: str
+    building: Building, solid: Solid, numbers: Sequence[int], figures: RoofFigures, prefix: str
 ) -> dict[int, dict[str, Any]]:
-    """Return the semantics of a solid's roof faces by index.
+    """Return the semantics of a solid's roof surfaces by number.
 
-    `solid` is the building's or a part's. They are slope, azimuth (degrees), and the roof part to
-    which a face belongs.
+    `solid` is the building's or a part's, and `numbers` are those of its faces' surfaces. They are
+    slope, azimuth (degrees), and the roof part to which a surface belongs.
     """
     result = {}
-    for index, face in enumerate(solid.faces):
+    for number, faces in group_faces(numbers).items():
+        face = solid.faces[number]
         if face.kind != ROOF:
             continue
-        result[index] = {
+        slope, azimuth = measure_angles(figures, faces)
+        result[number] = {
             "type": ROOF,
-            f"{prefix}slope": plain(round_value(figures.face_slope_deg[index], 3)),
-            f"{prefix}azimuth": plain(round_value(figures.face_azimuth_deg[index], 3)),
+            f"{prefix}slope": plain(round_value(slope, 3)),
+            f"{prefix}azimuth": plain(round_value(azimuth, 3)),
         }
         if 0 <= face.part < len(building.parts):
-            result[index] |= {
+            result[number] |= {
                 f"{OWN}part": int(face.part),
                 f"{OWN}part_type": building.parts[face.part].type,
             }

@@ -19,6 +19,7 @@ from ...model import ROOF, Building, Face, Part
 from ...primitives.cants import CANTED, MEASURES, list_cants
 from ..attribute_list import HISTORY_LAYER, SHAPE
 from ..roof_figures import RoofFigures
+from ..surfaces import number_surfaces
 from ..values import metres, plain_text, round_value
 
 ENCODER = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
@@ -185,22 +186,25 @@ def surface_rows(
     units: Units = METRES,
     attributes: dict[int, dict[str, Any]] | None = None,
 ) -> tuple[Row, ...]:
-    """Return a row a roof surface of the solid.
+    """Return a row a roof face of the solid.
 
-    It has its polygon, slope, azimuth, area and part, and its `attributes`, given by face.
+    It has its polygon, slope, azimuth, area and part, and its `attributes`, given by face. Facets
+    of one curved surface have one number.
     """
     if figures is None:
         return ()
     vertices = np.round(units.from_metres(building.solid.vertices), 4)
     roofs = [(index, face) for index, face in enumerate(building.solid.faces) if face.kind == ROOF]
     polygons = shapely.to_wkb(make_polygons(vertices, [face for _, face in roofs]))
+    numbers = number_surfaces(building.solid.faces, building.parts)
+    place = {index: k for k, (index, _) in enumerate(roofs)}
     rows: list[Row] = []
     for (index, face), polygon in zip(roofs, polygons, strict=True):
         azimuth = float(figures.face_azimuth_deg[index])
         mask = 0 <= face.part < len(building.parts)
         values = {
             "building_id": plain_text(building.id),
-            "number": len(rows),
+            "number": place[numbers[index]],
             "part": face.part if mask else None,
             "type": building.parts[face.part].type if mask else None,
             "slope_deg": round_value(figures.face_slope_deg[index], 3),
