@@ -96,7 +96,7 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
         epochs = Epochs(state, tile, terrain, np.zeros(3))
         for index in inside:
             try:
-                roof = read_building(members[index]["record"])[1]
+                roof = read_building(members[index]["record"] | {"terrain_line": []})[1]
             except HiproofError:
                 continue
             if roof is None:

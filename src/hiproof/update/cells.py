@@ -187,6 +187,7 @@ def select_inner(
     roof: Roof, inner: shapely.Geometry, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the points (m, 3) inside `inner`, and their heights (m,) over the roof."""
+    shapely.prepare(inner)
     points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
     residuals = measure_residuals(roof, points)
     known = np.isfinite(residuals)
@@ -200,15 +201,26 @@ def summarise_cells(
 
     The scatter is 1.48 times the median deviation, and at least `least`. Empty cells have NaN.
     """
-    order = np.lexsort([values, number])
-    number, values = number[order], values[order]
+    number, values = sort_in_cells(number, values, count)
     n = np.bincount(number, minlength=count)
     start = np.concatenate([[0], np.cumsum(n)])[:-1]
     median = take_middle(values, start, n)
-    deviation = np.abs(values - median[number])
-    deviation = deviation[np.lexsort([deviation, number])]
+    deviation = sort_in_cells(number, np.abs(values - median[number]), count)[1]
     scatter = np.maximum(1.4826 * take_middle(deviation, start, n), least)
     return median, scatter, n
+
+
+def sort_in_cells(
+    number: np.ndarray, values: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return cells (n,) in order, and their values (n,), ascending in each cell.
+
+    It is a lexsort; NumPy counts rather than compares the few cells of a building.
+    """
+    order = np.argsort(values)
+    cells = number[order].astype(np.min_scalar_type(count))
+    order = order[np.argsort(cells, kind="stable")]
+    return number[order], values[order]
 
 
 def take_middle(values: np.ndarray, start: np.ndarray, n: np.ndarray) -> np.ndarray:

@@ -80,8 +80,10 @@ def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> lis
     result = []
     for sign in (1.0, -1.0):
         chosen = np.flatnonzero(is_other & (sign * c.difference > 0))
+        if not len(chosen):
+            continue
         labels = label_components(len(chosen), link_neighbours(c.cells[chosen]))
-        for label in range(labels.max(initial=-1) + 1):
+        for label in range(labels.max() + 1):
             result.append(describe_cluster(c, chosen[labels == label], cells, stray))
     return sorted(result, key=lambda cluster: (-len(cluster.members), cluster.members[0]))
 
@@ -92,7 +94,8 @@ def flag_cells(comparison: CellComparison) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         score = np.where(c.is_compared, np.abs(c.difference) / c.sigma, 0.0)
     result = (score > CELL_SIGMAS) & (np.maximum(c.kept, c.known) <= KEPT_SHARE)
-    result[result] = ~is_known_around(c, np.flatnonzero(result))
+    if result.any():
+        result[result] = ~is_known_around(c, np.flatnonzero(result))
     return result
 
 

@@ -111,6 +111,8 @@ def is_gone(comparison: CellComparison, roof: Roof, z_ground: float) -> bool:
     """Return whether bare ground lies where the roof was."""
     c = comparison
     chosen = c.is_compared
+    if (c.new < c.old - OVER_GROUND_M).sum() < FEWEST_COMPARED:
+        return False  # hardly a building is: its heights need not be looked up
     heights = find_heights(roof, c)
     was_roof = chosen & (heights + c.old > z_ground + 2 * OVER_GROUND_M)
     on_ground = was_roof & (heights + c.new < z_ground + OVER_GROUND_M)

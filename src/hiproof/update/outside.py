@@ -56,7 +56,10 @@ AROUND = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)])
 
 
 class SurveyCells:
-    """The roof and the ground of a survey in cells of a metre."""
+    """The roof and the ground of a survey in cells of a metre.
+
+    Where classes mark roofs, the ground's heights do not matter: its cells alone are kept.
+    """
 
     def __init__(self, read: ReadSettings):
         roofs = tuple(set(range(256)) - set(read.ground_classes) - set(NOISE_AND_WATER))
@@ -70,10 +73,16 @@ class SurveyCells:
     def add(self, cloud: PointCloud) -> None:
         """Take the points of a chunk."""
         for kind, classes in self.classes.items():
-            points = cloud.xyz[np.isin(cloud.classes, classes)]
-            if len(points):
+            is_kind = np.zeros(256, bool)
+            is_kind[list(classes)] = True
+            points = cloud.xyz.compress(is_kind[cloud.classes], axis=0)
+            if not len(points):
+                continue
+            if kind == "ground" and self.has_classes:
+                self.found[kind].append(find_places(points))
+            else:
                 squared = np.column_stack([points, points[:, 2] ** 2])
-                self.found[kind].append(average_cells(squared, np.ones(len(points))))
+                self.found[kind].append(average_cells(squared))
 
     def save(self, path: Path) -> None:
         """Write the cells of a file."""
@@ -82,26 +91,53 @@ class SurveyCells:
         for kind, chunks in self.found.items():
             means, counts = join_cells(chunks)
             arrays |= {kind: means, f"{kind}_count": counts}
-        arrays["bounds"] = shapely.total_bounds(
-            shapely.points(np.concatenate([arrays["roof"], arrays["ground"]])[:, :2])
-        )
+        x, y = np.concatenate([arrays["roof"], arrays["ground"]])[:, :2].T
+        if len(x):
+            arrays["bounds"] = [x.min(), y.min(), x.max(), y.max()]
         with atomic_file(path) as file:
             np.savez(file, **arrays)
 
 
-def average_cells(points: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def average_cells(
+    points: np.ndarray, counts: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the mean (k, 4) and the number of points (k,) of each cell.
 
-    `points` (n, 4), x y z and the square of z, stand for so many points, `counts` (n,), each.
+    `points` (n, 4), x y z and the square of z, stand for so many points, `counts` (n,), each; None
+    is for one.
     """
-    cells = find_cells(points)
-    column, row = (cells - cells.min(axis=0)).T
-    keys = column * (int(row.max()) + 1) + row
-    number = occupied_cells(keys, int(keys.max()) + 1)[1]
+    offset, number = find_lowest(points), list_occupied(find_cells(points))[1]
     total = np.bincount(number, weights=counts)
-    offset = points.min(axis=0)
-    sums = [np.bincount(number, weights=counts * values) for values in (points - offset).T]
-    return np.column_stack(sums) / total[:, None] + offset, total
+    columns = (values - low for values, low in zip(points.T, offset, strict=True))
+    weights = columns if counts is None else (counts * values for values in columns)
+    sums = [np.bincount(number, weights=values) for values in weights]
+    return np.column_stack(sums) / total[:, None] + offset, total.astype(float)
+
+
+def find_places(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middles (k, 4) of cells that hold points (n, 3), at no height.
+
+    Each counts as one point."""
+    middles = list_occupied(find_cells(points))[0] + 0.5
+    return np.column_stack([middles, np.zeros_like(middles)]), np.ones(len(middles))
+
+
+def list_occupied(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distinct `cells` (k, 2) of (n, 2), and the number (n,) of each."""
+    low = find_lowest(cells)
+    column, row = (cells - low).T
+    rows = int(row.max()) + 1
+    keys = column * rows + row
+    occupied, number, _ = occupied_cells(keys, int(keys.max()) + 1)
+    return np.column_stack(np.divmod(occupied, rows)) + low, number
+
+
+def find_lowest(rows: np.ndarray) -> np.ndarray:
+    """Return the lowest value (c,) of each column of rows (n, c).
+
+    NumPy is slow at many rows of a few columns.
+    """
+    return np.array([column.min() for column in rows.T])
 
 
 def find_cells(points: np.ndarray) -> np.ndarray:
@@ -116,20 +152,24 @@ def join_cells(chunks: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndar
     """Join the cells of several chunks."""
     if not chunks:
         return np.zeros((0, 4)), np.zeros(0)
+    if len(chunks) == 1:
+        return chunks[0]
     return average_cells(*(np.concatenate(arrays) for arrays in zip(*chunks, strict=True)))
 
 
 def load_survey(folder: Path, box: shapely.Polygon) -> dict[str, np.ndarray]:
     """Load the roof and ground cells (k, 3) of a survey in a box, as mean points."""
     chunks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"roof": [], "ground": []}
-    has_classes = True
+    has_classes, (west, south, east, north) = True, box.bounds
     for path in list_files(folder, box):
         with np.load(path) as arrays:
             has_classes &= bool(arrays["has_classes"])
             for kind, found in chunks.items():
-                inside = shapely.intersects_xy(box, arrays[kind][:, 0], arrays[kind][:, 1])
+                means, counts = arrays[kind], arrays[f"{kind}_count"]
+                x, y = means[:, :2].T
+                inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
                 if inside.any():
-                    found.append((arrays[kind][inside], arrays[f"{kind}_count"][inside]))
+                    found.append((means[inside], counts[inside]))
     roof, ground = (join_cells(found)[0] for found in chunks.values())
     if not has_classes:
         roof = roof[is_level_and_high(roof, ground)]
@@ -145,8 +185,7 @@ def list_files(folder: Path, box: shapely.Polygon | None = None) -> list[Path]:
 def read_box(path: Path) -> shapely.Polygon:
     """Return the box around the cells of a file, which may be empty."""
     with np.load(path) as arrays:
-        bounds = arrays["bounds"]
-    return shapely.box(*bounds) if np.isfinite(bounds).all() else shapely.Polygon()
+        return shapely.box(*arrays["bounds"]) if "bounds" in arrays else shapely.Polygon()
 
 
 def is_level_and_high(cells: np.ndarray, ground: np.ndarray) -> np.ndarray:
@@ -234,13 +273,13 @@ def find_fresh(
     `roofs` (k, 3) are the cells of one survey, `other` those of the other one. A roof beside a
     building extends it where `names` of the buildings are known.
     """
-    points = roofs[~np.isin(number_places(roofs), number_places(other["roof"]))]
+    points = roofs[~is_among(find_cells(roofs), find_cells(other["roof"]))]
     points = points[~touches(points, outlines, 0.0)]
     near = touches(points, outlines, BESIDE_M) | is_beside(points, other["roof"])
-    ground = number_places(other["ground"])
+    on_ground = is_among(find_cells(points), find_cells(other["ground"]))
     result = []
     for members in group_cells(points, ~near):
-        if np.isin(number_places(points[members]), ground).mean() < MOSTLY:
+        if on_ground[members].mean() < MOSTLY:
             continue
         place = draw_places(points[members])
         beside = outlines.query(place, predicate="dwithin", distance=BESIDE_M)
@@ -257,7 +296,7 @@ def find_unmapped(
 ) -> list[RoofOutside]:
     """Return roofs away from all outlines that both surveys show."""
     points = roofs[~touches(roofs, outlines, BESIDE_M)]
-    points = points[np.isin(number_places(points), number_places(other))]
+    points = points[is_among(find_cells(points), find_cells(other))]
     groups = group_cells(points, np.ones(len(points), bool))
     places = [(len(members), draw_places(points[members])) for members in groups]
     return [
@@ -277,14 +316,13 @@ def group_cells(points: np.ndarray, is_core: np.ndarray) -> list[np.ndarray]:
     cells = find_cells(points)
     labels = label_components(len(core), link_neighbours(cells[core]))
     numbers, sizes = np.unique(labels, return_counts=True)
-    places = number_places(points)
     result = []
     for label in numbers[sizes >= FEWEST_OUTSIDE]:
         members = core[labels == label]
         if is_strip(points[members]) or measure_roughness(points[members]) > ROUGH_M:
             continue
         around = (cells[members][:, None] + AROUND).reshape(-1, 2)
-        grown = np.isin(places, number_places(around)) & ~is_core
+        grown = is_among(cells, around) & ~is_core
         result.append(np.union1d(members, np.flatnonzero(grown)))
     return result
 
@@ -299,15 +337,23 @@ def touches(points: np.ndarray, outlines: shapely.STRtree, distance_m: float) ->
 
 def is_beside(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether (k,) cells have one of `others` around them."""
-    cells = find_cells(points)
-    known = number_places(others)
-    return np.any([np.isin(number_places(cells + step), known) for step in AROUND], axis=0)
+    around = (find_cells(points)[:, None] + AROUND).reshape(-1, 2)
+    is_known = is_among(around, find_cells(others)).reshape(-1, len(AROUND))
+    return np.asarray(is_known.any(axis=1))
 
 
-def number_places(points: np.ndarray) -> np.ndarray:
-    """Return one whole number (k,) for the cell of each of the points (k, 2 or 3)."""
-    column, row = find_cells(points).T
-    return (column << 32) + row
+def is_among(cells: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return whether (k,) `cells` (k, 2) are among `others` (m, 2)."""
+    result = np.zeros(len(cells), bool)
+    if not len(others):
+        return result
+    low = find_lowest(others)
+    table = np.zeros(-find_lowest(-others) - low + 1, bool)
+    table[tuple((others - low).T)] = True
+    column, row = (cells - low).T
+    inside = (column >= 0) & (row >= 0) & (column < table.shape[0]) & (row < table.shape[1])
+    result[inside] = table[column[inside], row[inside]]
+    return result
 
 
 def draw_places(points: np.ndarray) -> shapely.Geometry:

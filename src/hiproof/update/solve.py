@@ -31,7 +31,7 @@ from ..log import LOGGER
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
 from ..parametric.override import Override
-from ..parametric.record import read_building
+from ..parametric.record import read_building, read_terrain_lines
 from ..read.thin import without_repeats
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
@@ -182,7 +182,8 @@ class Updater:
         try:
             if member.record is None:
                 return self.replace_earlier(job, member)
-            earlier, roof = read_building(member.record)
+            # lines of terrain judge nothing, and reading them takes long
+            earlier, roof = read_building(member.record | {"terrain_line": []})
             if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
                 return self.revisit_empty(job, member)
             verdict = self.judge(job, earlier, roof)
@@ -190,6 +191,8 @@ class Updater:
                 kept = keep_texts(earlier, member.record, self.texts)
                 if kept is not None:
                     return kept
+            lines = tuple(read_terrain_lines(member.record))
+            earlier = dataclasses.replace(earlier, terrain_intersection=lines)
             earlier = with_model(earlier, roof, self.plan.settings.compose)
             return self.follow_verdict(job, member, earlier, verdict)
         except MemoryError:
