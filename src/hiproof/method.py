@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ def reconstruct(
     id: str = "building",
     ground: np.ndarray | None = None,
     unused: np.ndarray | None = None,
+    neighbours: Sequence[shapely.Polygon] = (),
 ) -> Building:
     """Reconstruct one building from its roof points.
 
@@ -39,7 +41,8 @@ def reconstruct(
     at the foot of walls that are seen. ground: (m, 3) ground points in and around the footprint, by
     which bare ground inside it is cut out (`footprint_trust`). unused: further points (m, 3) of the
     building that are not fitted, thinned out or of a noise class; the verdict on the model names
-    them where they lie together off the roof. What the data hold never raises: the outcome is the
+    them where they lie together off the roof. neighbours: outlines of other buildings, which
+    overhangs (LoD2.3) do not cross. What the data hold never raises: the outcome is the
     Building's `status`, and its `detail` says why. Raises InputError for points of another shape,
     for a footprint, a terrain or settings of another kind, and for settings that ask the network
     where the extra `network` is not installed.
@@ -53,7 +56,7 @@ def reconstruct(
     points, settings = as_xyz(points), settings or Settings()
     stages.refuse_without_network(settings)
     building = stages.start_building(footprint, id)
-    given = footprint
+    given, surroundings = footprint, points
     building, footprint, of_footprint = stages.align_footprint(building, points, settings)
     points, outline, status = stages.usable(points, footprint)
     if status is not Status.MODELLED:
@@ -78,6 +81,7 @@ def reconstruct(
     building = stages.reach_terrain(building, base, settings)
     building = stages.open_passages(building, base, given)
     building = stages.add_installations(building, points, settings)
+    building = stages.add_overhangs(building, surroundings, neighbours, settings)
     for text in (of_footprint, site.remark):
         building = stages.add_remark(building, text)
     return building

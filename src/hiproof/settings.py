@@ -262,6 +262,30 @@ class ReconstructSettings:
         "also find chimneys and other objects on roofs, and write them as building installations",
         option="--installations",
     )
+    footprint_kind: str = setting(
+        "walls",
+        "what footprints outline, for --lods 2.3: walls, which roofs reach beyond as far as their "
+        "points show; roof, within which walls stand by --assumed-overhang; auto takes roof where "
+        "points end at three quarters of a footprint",
+        choices=("walls", "roof", "auto"),
+        option="--footprint-kind",
+    )
+    assumed_overhang_m: float = setting(
+        0.0,
+        "distance of walls from footprints of roofs, for --lods 2.3",
+        "m",
+        0.0,
+        3.0,
+        option="--assumed-overhang",
+    )
+    roof_thickness_m: float = setting(
+        0.2,
+        "thickness of roofs beyond walls, measured upright, for --lods 2.3",
+        "m",
+        0.02,
+        2.0,
+        option="--roof-thickness",
+    )
 
 
 @dataclass(frozen=True)
@@ -297,9 +321,9 @@ class WriteSettings:
     lods: tuple[str, ...] = setting(
         ("2.2",),
         "levels of detail: 0 is footprint and roof edge, 1.2 one block, 1.3 a block for each "
-        "building part, 2.2 the roof; CityJSON always has the footprint, and CityGML has only the "
-        "finer LoD1",
-        choices=("0", "1.2", "1.3", "2.2"),
+        "building part, 2.2 the roof, 2.3 the roof with overhangs; CityJSON always has the "
+        "footprint, and CityGML has only the finer LoD1 and LoD2",
+        choices=("0", "1.2", "1.3", "2.2", "2.3"),
         minimum=1,
         option="--lods",
     )
@@ -345,6 +369,11 @@ class WriteSettings:
         "GDAL and QGIS, which follow no links",
         option="--gml-surfaces",
     )
+
+    @property
+    def has_lod2(self) -> bool:
+        """Whether roofs are written, with or without overhangs."""
+        return "2.2" in self.lods or "2.3" in self.lods
 
 
 @dataclass(frozen=True)

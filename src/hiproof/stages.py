@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -765,6 +766,32 @@ def add_installations(building: Building, points: np.ndarray, settings: Settings
     return dataclasses.replace(
         building, built=dataclasses.replace(building.model, installations=found)
     )
+
+
+def add_overhangs(
+    building: Building,
+    points: np.ndarray,
+    neighbours: Sequence[shapely.Geometry],
+    settings: Settings,
+) -> Building:
+    """Return the building with its overhangs (LoD2.3), where settings ask for them.
+
+    Its `points` (n, 3), also those around it, and the outlines of its `neighbours` are in the
+    world. A remark says where overhangs were left out, and why.
+    """
+    if building.built is None or "2.3" not in settings.write.lods:
+        return building
+    from .compose.eaves import add_eaves, remove_eaves
+    from .fit.overhang import find_eaves
+
+    frame, model = building.roof.frame, building.model
+    area = shapely.union_all([shapely.transform(n, frame.to_local) for n in neighbours])
+    eaves = find_eaves(building, frame.to_local(finite(points)), area, settings.reconstruct)
+    try:
+        return dataclasses.replace(building, built=add_eaves(model, eaves))
+    except CompositionError as error:
+        bare = dataclasses.replace(building, built=remove_eaves(model, eaves))
+        return add_remark(bare, f"its overhangs were left out ({error})")
 
 
 def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:

@@ -70,7 +70,10 @@ CHANGED = {
     "valid_to": None,
     "history": [],
 }
-FURTHER = {"installations", "passages", "walls"}  # keys that only some buildings have
+FURTHER = {
+    *("installations", "passages", "walls", "overhangs", "roof_thickness", "footprint_kind"),
+    "volume_lod23",
+}  # keys that only some buildings have
 OF_A_CHANGE = {"change", "change_kind", "change_m", "change_sigma_m", "valid_from", "valid_to"}
 
 

@@ -98,6 +98,7 @@ def digest_building(plan: WorkPlan, index: int) -> str:
         plan.list_names(job),
         find_row_outlines(plan, index),
         encode_passages(job),
+        *find_neighbours(plan, index),
     ]
     return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()
 
@@ -105,6 +106,12 @@ def digest_building(plan: WorkPlan, index: int) -> str:
 def find_row_outlines(plan: WorkPlan, index: int) -> list[str]:
     """Return the outlines with which a building's footprint is moved."""
     return [polygon.wkb_hex for polygon in plan.outlines.row(index)] if plan.moves_rows else []
+
+
+def find_neighbours(plan: WorkPlan, index: int) -> list[str]:
+    """Return the outlines that a building's overhangs do not cross."""
+    near = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
+    return [polygon.wkb_hex for polygon in near]
 
 
 def find_stored_texts(plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, StoredText]:

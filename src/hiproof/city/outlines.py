@@ -37,10 +37,14 @@ class Outlines:
         self.rows: dict[int, list[shapely.Polygon]] = {}  # by label, those that were asked for
 
     @functools.cached_property
+    def tree(self) -> shapely.STRtree:
+        """The outlines by place."""
+        return shapely.STRtree(self.polygons)
+
+    @functools.cached_property
     def labels(self) -> np.ndarray:
         """The number (n,) of the row that each outline is in."""
-        tree = shapely.STRtree(self.polygons)
-        pairs = tree.query(self.polygons, predicate="dwithin", distance=TOUCH_M)
+        pairs = self.tree.query(self.polygons, predicate="dwithin", distance=TOUCH_M)
         return label_components(len(self.polygons), pairs)
 
     @functools.cached_property
@@ -64,6 +68,11 @@ class Outlines:
         """The numbers of the outlines of each row."""
         order = np.argsort(self.labels, kind="stable")
         return np.split(order, np.cumsum(np.bincount(self.labels))[:-1])
+
+    def select_near(self, index: int, reach_m: float) -> list[shapely.Polygon]:
+        """Return the outlines of others within `reach_m` of outline `index`."""
+        near = self.tree.query(self.polygons[index], predicate="dwithin", distance=reach_m)
+        return sorted(self.polygons[near[near != index]], key=shapely.to_wkb)
 
     def row(self, index: int) -> list[shapely.Polygon]:
         """Return the outlines of the row of outline `index`, itself among them.

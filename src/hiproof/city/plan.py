@@ -33,6 +33,9 @@ from .outlines import Outlines
 
 PLAN_FILE = "plan.jsonl"
 AROUND_M = 4.0  # of roof points around a footprint: as fit/align.py asks, without its compiler here
+OVERHANG_REACH_M = (
+    1.5  # of points beyond a footprint that may show an overhang, as in fit/overhang.py
+)
 SHIFT_M = 3.0  # that a row may be moved, as in fit/align.py
 # m around a building in which its ground is looked for: where points have the class, a street's
 # width; where it is found by shape, twice that
@@ -103,6 +106,11 @@ class WorkPlan:
         return AROUND_M if sees else 0.0
 
     @functools.cached_property
+    def beyond_m(self) -> float:
+        """How far beyond its footprint a building's own roof may reach (LoD2.3)."""
+        return OVERHANG_REACH_M if "2.3" in self.settings.write.lods else 0.0
+
+    @functools.cached_property
     def moves_rows(self) -> bool:
         """Whether rows of footprints are moved onto their roofs."""
         return self.around_m > 0 and self.settings.reconstruct.align != "off"
@@ -125,7 +133,8 @@ class WorkPlan:
         if self.moves_rows:
             boxes, reach_m = self.outlines.boxes[: len(self.jobs)], self.around_m + SHIFT_M
         else:
-            boxes, reach_m = shapely.bounds([job.area for job in self.jobs]), self.around_m
+            boxes = shapely.bounds([job.area for job in self.jobs])
+            reach_m = max(self.around_m, self.beyond_m)
         return np.hstack([np.floor(boxes[:, :2] - reach_m), np.ceil(boxes[:, 2:] + reach_m) + 1.0])
 
     @functools.cached_property

@@ -149,9 +149,27 @@ class Surroundings:
             )
         nearby = self.select_points(job, 0.0)
         if read.roofs == "alone":
-            return find_lone_roof(nearby, job.area)
+            return self.add_outer_points(job, find_lone_roof(nearby, job.area))
         height = nearby[:, 2] - self.ground_to_leave_out(job).height_at(nearby)
-        return found_roof(nearby, job.area, height, job.footprint is not None)
+        found = found_roof(nearby, job.area, height, job.footprint is not None)
+        return self.add_outer_points(job, found)
+
+    def add_outer_points(self, job: Job, found: FoundRoof) -> FoundRoof:
+        """Return the roof with the points beyond a footprint that may show overhangs."""
+        if not self.plan.beyond_m or job.footprint is None:
+            return found
+        around = self.select_points(job, self.plan.beyond_m)
+        outside = around[~shapely.intersects_xy(job.area, around[:, 0], around[:, 1])]
+        return dataclasses.replace(found, points=np.concatenate([found.points, outside]))
+
+    def select_neighbours(self, job: Job) -> list[shapely.Polygon]:
+        """Return the outlines that a building's overhangs do not cross, moved with it."""
+        if not self.plan.beyond_m or job.area.is_empty:
+            return []
+        planned = self.plan.jobs[job.index].area
+        shift = np.subtract(job.area.bounds[:2], planned.bounds[:2])
+        near = self.plan.outlines.select_near(job.index, self.plan.beyond_m)
+        return [shapely.transform(polygon, lambda xy: xy + shift) for polygon in near]
 
     def select_noise(self, job: Job, roof: np.ndarray) -> np.ndarray:
         """Return noise points (m, 3) over the job's area that lie high.
@@ -477,12 +495,13 @@ def reconstruct_job(
         job.id,
         bare,
     )
+    neighbours = surroundings.select_neighbours(job)
     if override is not None:
-        return overridden(override, *arguments)
+        return overridden(override, *arguments, neighbours)
     unused = np.concatenate(
         [find_thinned_out(points, used_points), surroundings.select_noise(job, points)]
     )
-    return reconstruct(*arguments, unused=unused)
+    return reconstruct(*arguments, unused=unused, neighbours=neighbours)
 
 
 def find_thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:

@@ -19,6 +19,8 @@ bends             which faces are bent (val3dity's 204)
 blocks            LoD1: prisms over the outline
 profile           heights of the terrain along an outline
 underside         walls down to the terrain, and passages below a solid
+overhang          slabs of a roof beyond walls
+eaves             a model with overhangs
 finish            a model with the underside that it is to have
 boxes             installations on roofs
 building_parts    a solid cut where its roofs meet, for formats that know building parts

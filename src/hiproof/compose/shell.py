@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
 from .cells import PlanCells, PlanProblem
 from .flat_corners import turn_flat_corners_in
 from .levels import first_saddle, split_at_crossings, stack_levels
+
+Item = TypeVar("Item")
 
 SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what makes two points one
 
@@ -121,11 +123,11 @@ def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
     return result
 
 
-def simple_loops(ring: list[int]) -> list[list[int]]:
+def simple_loops(ring: list[Item]) -> list[list[Item]]:
     """Cut a closed walk into loops that visit no vertex twice."""
-    loops: list[list[int]] = []
-    path: list[int] = []
-    position: dict[int, int] = {}
+    loops: list[list[Item]] = []
+    path: list[Item] = []
+    position: dict[Item, int] = {}
     for vertex in ring:
         if vertex in position:
             cut = position[vertex]

@@ -121,7 +121,8 @@ class Shell:
         self.z_base = self.grid[grounds[0][0]][2]
         rings = [[self.grid[vertex][:2] for vertex in reversed(ring)] for ring in grounds]
         self.profile = Profile(underside.terrain) if underside.terrain else None
-        self.cells = cut_cells(shapely.Polygon(rings[0], rings[1:]), underside.passages)
+        self.bends: set[Place] = set()
+        self.cells = self.cut_ground(rings, underside.passages)
         self.rings = self.node_cells(rings)
         self.ground = self.measure_ground(cap)
         self.cell_at = {
@@ -133,6 +134,26 @@ class Shell:
         self.refuse_unusable()
         self.levels = self.collect_levels()
 
+    def cut_ground(
+        self, rings: list[list[Place]], passages: tuple[Passage, ...]
+    ) -> list[GroundCell]:
+        """Return the cells of the ground, given by its `rings`.
+
+        Keeps where the feet of walls bend.
+        """
+        self.bends = self.find_bends(rings)
+        return cut_cells(shapely.Polygon(rings[0], rings[1:]), passages)
+
+    def find_bends(self, rings: list[list[Place]]) -> set[Place]:
+        """Return the places at which the feet of walls along rings bend."""
+        if self.profile is None:
+            return set()
+        bends: set[Place] = set()
+        for start, end in (edge for ring in rings for edge in list_edges(ring)):
+            knots = self.profile.place_knots(*(np.array([start, end]) * GRID_M))
+            bends |= {(x, y) for x, y in np.rint(knots / GRID_M).astype(int).tolist()}
+        return bends
+
     def node_cells(self, ground: list[list[Place]]) -> list[list[list[Place]]]:
         """Return the rings of all cells with every place that lies on their edges.
 
@@ -140,11 +161,7 @@ class Shell:
         """
         rings = [list_rings(cell.polygon) for cell in self.cells]
         pool = {place for ring in [*ground, *itertools.chain(*rings)] for place in ring}
-        if self.profile is not None:
-            for start, end in (edge for ring in ground for edge in list_edges(ring)):
-                knots = self.profile.place_knots(*(np.array([start, end]) * GRID_M))
-                pool |= {(x, y) for x, y in np.rint(knots / GRID_M).astype(int).tolist()}
-        self.pool = np.array(sorted(pool))
+        self.pool = np.array(sorted(pool | self.bends))
         return [[self.node_ring(ring) for ring in cell_rings] for cell_rings in rings]
 
     def node_ring(self, ring: list[Place]) -> list[Place]:
@@ -211,16 +228,23 @@ class Shell:
     def close(self) -> Solid:
         """Return the solid with its new faces."""
         faces: list[tuple[list[list[Corner]], str, int]] = []
-        for face in self.solid.faces:
+        for number, face in enumerate(self.solid.faces):
             if face.kind == WALL:
-                faces.append(([self.lower_ring(ring) for ring in face.rings], WALL, -1))
+                faces += [(rings, WALL, -1) for rings in self.lower_wall(number)]
             elif face.kind != GROUND:
-                rings = [[self.grid[vertex] for vertex in ring] for ring in face.rings]
-                faces.append((rings, face.kind, face.part))
+                faces.append(([self.keep_ring(ring) for ring in face.rings], face.kind, face.part))
         faces += [([ring], WALL, -1) for ring in self.list_inner_walls()]
         for number in range(len(self.cells)):
             faces += [(rings, kind, -1) for rings, kind in self.list_undersides(number)]
         return number_faces(faces)
+
+    def keep_ring(self, ring: tuple[int, ...]) -> list[Corner]:
+        """Return the ring of a roof face."""
+        return [self.grid[vertex] for vertex in ring]
+
+    def lower_wall(self, number: int) -> list[list[list[Corner]]]:
+        """Return the rings of a wall, a face of the solid, with its new foot."""
+        return [[self.lower_ring(ring) for ring in self.solid.faces[number].rings]]
 
     def lower_ring(self, ring: tuple[int, ...]) -> list[Corner]:
         """Return the ring of a wall with its new foot."""
@@ -266,9 +290,13 @@ class Shell:
             if other is None:
                 continue
             low = self.find_bottom(cell, a), self.find_bottom(cell, b)
-            high = self.find_bottom(other, a), self.find_bottom(other, b)
+            high = self.find_upper_end((a, b), other)
             if low[0] <= high[0] and low[1] <= high[1] and low != high:
                 yield self.pass_levels([(*a, low[0]), (*b, low[1]), (*b, high[1]), (*a, high[0])])
+
+    def find_upper_end(self, edge: tuple[Place, Place], other: int) -> tuple[int, int]:
+        """Return the heights at which a wall over an edge ends, up to the `other` cell's."""
+        return self.find_bottom(other, edge[0]), self.find_bottom(other, edge[1])
 
     def list_undersides(self, number: int) -> Iterable[tuple[list[list[Corner]], str]]:
         """Yield the faces below a cell: its ceiling, or the ground as level as it is."""

@@ -15,6 +15,7 @@ from ..model import GROUND, ROOF
 from ..settings import Settings
 from ..write.attribute_list import OWN
 from ..write.citygml.surfaces import surface_ids
+from ..write.citygml.version2 import choose_solid
 from ..write.fragments import Sheet
 from ..write.roof_figures import FLAT_SLOPE_DEG
 from ..write.values import round_value
@@ -72,7 +73,8 @@ def write_zone(sheet: Sheet, measures: str) -> str:
     It is heated unless the building is a shed or a garage.
     """
     name = sheet.gml_name
-    has_solid = "2.2" in sheet.head.write.lods
+    own = choose_solid(sheet)  # that of LoD2.3 has other faces
+    has_solid = sheet.head.write.has_lod2 and (own is None or own is sheet.building.solid)
     is_heated = str(is_house(sheet.building)).lower()
     text = f'<energy:thermalZone><energy:ThermalZone gml:id="zone-{name}">{measures}'
     text += "<energy:isCooled>false</energy:isCooled>"

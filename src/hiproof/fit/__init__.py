@@ -16,6 +16,7 @@ site           a footprint against the ground: the two that follow
 bare_ground    yards and lost wings inside a footprint, cut out
 standing       whether anything stands on a footprint
 installations  chimneys and other objects on a roof
+overhang       how far a roof reaches beyond its outline
 
 `fit_roof` is imported on first use, because it brings the compiler along.
 """

@@ -7,6 +7,7 @@ roof        pieces, parts, roofs: a roof is a max of mins of planes
 solid       faces, solids
 installation  objects on a roof
 underside   how a solid ends below: terrain, passages
+overhang    how far a roof reaches beyond its walls
 fit         one primitive fitted to points
 building    models and buildings
 shown       where each part of a roof shows from above
@@ -17,6 +18,7 @@ from .building import Building, Model, Quality
 from .fit import Fit
 from .inputs import Footprint, PointCloud, as_xyz
 from .installation import Installation
+from .overhang import Eaves, Overhang
 from .roof import Part, Piece, Roof
 from .solid import CEILING, GROUND, ROOF, WALL, Face, Solid
 from .underside import ONE_LEVEL, Passage, Underside
@@ -28,11 +30,13 @@ __all__ = [
     "ROOF",
     "WALL",
     "Building",
+    "Eaves",
     "Face",
     "Fit",
     "Footprint",
     "Installation",
     "Model",
+    "Overhang",
     "Part",
     "Passage",
     "Piece",

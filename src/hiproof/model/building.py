@@ -15,6 +15,7 @@ from ..log import count_things
 from ..settings import ComposeSettings
 from ..status import Grade, Status
 from .installation import Installation
+from .overhang import Eaves
 from .roof import Part, Roof
 from .shown import compute_visible_pieces, measure_visible_pieces, unite_visible_pieces
 from .solid import Solid
@@ -48,7 +49,8 @@ class Model:
 
     `compose` says how, None for the defaults: a changed building is composed as it was.
     `underside` says how the solid ends below. Where that is not one level, `level_solid` is the
-    solid that does stand on one. `installations` stand on the roof.
+    solid that does stand on one. `installations` stand on the roof. `eaves` tells how far
+    the roof reaches beyond the walls, None where nobody asked.
     """
 
     roof: Roof
@@ -57,6 +59,12 @@ class Model:
     underside: Underside = ONE_LEVEL
     level_solid: Solid | None = None
     installations: tuple[Installation, ...] = ()
+    eaves: Eaves | None = None
+
+    @property
+    def finest_solid(self) -> Solid:
+        """The solid of LoD2.3: with its overhangs, where there are some."""
+        return self.solid if self.eaves is None or self.eaves.solid is None else self.eaves.solid
 
     @property
     def on_one_level(self) -> Solid:

@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..model import ONE_LEVEL, Building, Model, Roof, Underside
 from ..settings import ComposeSettings, Settings
 from .installations import read_installations
+from .overhangs import read_eaves
 from .record import read_building, require_mapping
 from .underside import read_underside
 
@@ -36,10 +37,14 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
         return building
     underside = read_underside(parameters, building, roof)
     result = with_model(building, roof, compose, underside)
-    installations = read_installations(parameters)
-    if not installations:
+    installations, eaves = read_installations(parameters), read_eaves(parameters, roof)
+    if not installations and eaves is None:
         return result
     model = dataclasses.replace(result.model, installations=installations)
+    if eaves is not None:
+        from ..compose.eaves import add_eaves
+
+        model = add_eaves(model, eaves)
     return dataclasses.replace(result, built=model)
 
 

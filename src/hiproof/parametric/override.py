@@ -18,7 +18,7 @@ An override is an object with the building's `id` and any of
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -264,6 +264,7 @@ def overridden(
     settings: Settings | None = None,
     id: str = "building",
     ground: np.ndarray | None = None,
+    neighbours: Sequence[shapely.Polygon] = (),
 ) -> Building:
     """Reconstruct a building with its override.
 
@@ -282,6 +283,7 @@ def overridden(
         result = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
     if lies_under(result, override.z_ground):
         result = stages.add_remark(result, "the ground given lies above its lowest eave")
+    result = stages.add_overhangs(result, points, neighbours, settings)
     result = stages.add_remark(result, remark_given_ground(result, override.z_ground, terrain))
     return stages.add_remark(result, override.told)
 
@@ -435,7 +437,8 @@ def fit_within(
     changes = {"types": types} if types else {}
     # whoever says how a building is says that it stands
     settings = settings.replace({"fit": changes, "reconstruct": {"empty_footprints": "model"}})
-    building = reconstruct(points, footprint, terrain, settings, id, ground)
+    level = settings.replace({"write": {"lods": ("2.2",)}})  # overhangs follow the last change
+    building = reconstruct(points, footprint, terrain, level, id, ground)
     if building.built is None:
         return building
     changed = False

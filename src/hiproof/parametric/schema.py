@@ -9,6 +9,7 @@ import json
 from typing import Any
 
 from ..model.installation import CHIMNEY, ROOF_OBJECT
+from ..model.overhang import ROOF_EDGE, WALLS
 from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
@@ -19,6 +20,7 @@ from ..write.attribute_list import (
     ENDED_MODEL,
     HEAD,
     INSTALLATION,
+    OVERHANG,
     PARAMETERS,
     PART,
     PASSAGE,
@@ -64,6 +66,9 @@ BUILDING_KINDS = {
     "passages": {"type": "array", "items": {"$ref": "#/$defs/passage"}},
     "installations": {"type": "array", "items": {"$ref": "#/$defs/installation"}},
     "walls": {"enum": ["level", "terrain"]},
+    "overhangs": {"type": "array", "items": {"$ref": "#/$defs/overhang"}},
+    "roof_thickness": LENGTH_SCHEMA,
+    "footprint_kind": {"enum": [WALLS, ROOF_EDGE]},
     "attributes": {"type": "object"},
     "points": {"type": "integer", "minimum": 0},
     "residuals": SHARES,
@@ -109,6 +114,11 @@ PART_KINDS = {
     "outlines": {"type": "array", "items": POLYGON_SCHEMA},
 }
 PASSAGE_KINDS = {"outline": POLYGON_SCHEMA, "ceiling": NUMBER_SCHEMA}
+OVERHANG_KINDS = {
+    "edge": {"type": "integer", "minimum": 0},
+    "length": LENGTH_SCHEMA,
+    "sigma": NUMBER_OR_NULL,
+}
 INSTALLATION_KINDS = {
     "type": {"enum": [CHIMNEY, ROOF_OBJECT]},
     "parameters": {
@@ -141,6 +151,7 @@ def schema() -> dict[str, Any]:
         "installation": describe_attributes(
             INSTALLATION, INSTALLATION_KINDS, required=("type", "parameters", "position")
         ),
+        "overhang": describe_attributes(OVERHANG, OVERHANG_KINDS, required=("edge", "length")),
         "change": describe_attributes(CHANGE, CHANGE_KINDS, required=("class",)),
         "ended_model": describe_attributes(ENDED_MODEL, ENDED_KINDS, required=("id", "valid_to")),
         "change_place": describe_attributes(CHANGE_PLACE, PLACE_KINDS, required=("kind",)),

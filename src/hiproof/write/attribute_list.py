@@ -181,6 +181,12 @@ HIPROOF = (
         "",
         "only where there are some (`--underpasses`): passages below the building",
     ),
+    Attribute(
+        "volume_lod23",
+        "number",
+        "m3",
+        "only with LoD2.3: volume of the solid with overhangs",
+    ),
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
     Attribute(
         "change", "text", "", "only after an update, where not unchanged: changed, new, gone, ..."
@@ -418,6 +424,25 @@ PARAMETERS = (
         "",
         "passages below the building, as below; left out where there are none",
     ),
+    Attribute(
+        "overhangs",
+        "list",
+        "",
+        "edges at which the roof reaches beyond the walls, as below; left out without LoD2.3",
+    ),
+    Attribute(
+        "roof_thickness",
+        "number",
+        "m",
+        "thickness of the roof beyond the walls, measured upright; only with overhangs",
+    ),
+    Attribute(
+        "footprint_kind",
+        "text",
+        "",
+        "walls, where the roof reaches beyond the outline, or roof, where walls stand within it; "
+        "only with overhangs",
+    ),
     Attribute("attributes", "object", "", "the input's own"),
     Attribute("points", "count", "", "points that the building was judged by"),
     Attribute(
@@ -518,6 +543,17 @@ PART = (
 PASSAGE = (
     Attribute("outline", "list", "m", "rings of its outline, the outer first, about the origin"),
     Attribute("ceiling", "number", "m", "height of its ceiling in the world"),
+)
+
+OVERHANG = (
+    Attribute(
+        "edge",
+        "count",
+        "",
+        "number of an edge of the outline, counted from 0 along its rings as they are written",
+    ),
+    Attribute("length", "number", "m", "distance in plan from the roof's edge to the wall"),
+    Attribute("sigma", "number", "m", "its standard deviation; null where it was assumed"),
 )
 
 INSTALLATION = (
@@ -735,6 +771,9 @@ TABLES = (
     ),
     AttributeTable(
         "Parameters: a passage", "`passages` of a building in `parameters.jsonl`", PASSAGE
+    ),
+    AttributeTable(
+        "Parameters: an overhang", "`overhangs` of a building in `parameters.jsonl`", OVERHANG
     ),
     AttributeTable("Parameters: a change", "`change` of a building in `parameters.jsonl`", CHANGE),
     AttributeTable(

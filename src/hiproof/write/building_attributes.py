@@ -59,6 +59,9 @@ def building_attributes(
         computed |= osm_tags(building, figures)
     if building.built is not None:
         computed |= {OWN + name: n for name, n in count_further(building.built).items() if n}
+    if building.built is not None and building.built.eaves is not None:
+        volume = building.built.finest_solid.volume
+        computed[f"{OWN}volume_lod23"] = round_value(volume, 4)
     if building.change is not None:
         computed |= {
             OWN + name: value for name, value in change_attributes(building.change).items()

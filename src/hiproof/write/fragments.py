@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import OutputError
 from ..model import Building, Solid
 from .head import FileHead
-from .roof_figures import RoofFigures
+from .roof_figures import RoofFigures, roof_figures
 from .shapes import Shapes, make_shapes
 
 NOTHING = (np.nan,) * 6
@@ -52,13 +52,21 @@ class Sheet:
         return make_shapes(self.building, self.figures, self.head.write, self.head.prefix)
 
     @functools.cached_property
+    def finest(self) -> tuple[Solid, RoofFigures]:
+        """The solid of LoD2.3 with its figures; those of LoD2.2 where they are the same."""
+        solid = self.building.model.finest_solid
+        if self.figures is not None and solid is self.building.solid:
+            return solid, self.figures
+        return solid, roof_figures(solid)
+
+    @functools.cached_property
     def boxes(self) -> tuple[Solid, ...]:
         """The installations of the building as solids, in the world.
 
-        They belong to LoD2.2.
+        They belong to LoD2.
         """
         model = self.building.built
-        if model is None or not model.installations or "2.2" not in self.head.write.lods:
+        if model is None or not model.installations or not self.head.write.has_lod2:
             return ()
         from ..compose.boxes import make_box
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..model import Building, Installation, Model, Part
+from ..model import Building, Eaves, Installation, Model, Part
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
@@ -150,7 +150,7 @@ def building_record(building: Building) -> dict[str, Any]:
 
 
 def further_record(model: Model) -> dict[str, Any]:
-    """Return installations, and how a solid ends below; nothing where it is as usual."""
+    """Return what a building has beside its roof; nothing where it is as usual."""
     record: dict[str, Any] = {}
     if model.installations:
         record["installations"] = [installation_record(item) for item in model.installations]
@@ -165,7 +165,21 @@ def further_record(model: Model) -> dict[str, Any]:
             }
             for passage in model.underside.passages
         ]
+    if model.eaves is not None:
+        record |= eaves_record(model.eaves)
     return record
+
+
+def eaves_record(eaves: Eaves) -> dict[str, Any]:
+    overhangs = [
+        {"edge": item.edge, "length": number(item.length), "sigma": number(item.sigma)}
+        for item in eaves.overhangs
+    ]
+    return {
+        "overhangs": overhangs,
+        "roof_thickness": number(eaves.thickness),
+        "footprint_kind": eaves.footprint_kind,
+    }
 
 
 def installation_record(installation: Installation) -> dict[str, Any]:

@@ -71,7 +71,11 @@ def make_shapes(
     `figures` are those of its solid, None without one.
     """
     lods = set(write.lods)
-    if building.built is None or figures is None or (lods == {"2.2"} and write.parts_as == "one"):
+    if (
+        building.built is None
+        or figures is None
+        or (lods <= {"2.2", "2.3"} and write.parts_as == "one")
+    ):
         return NO_SHAPES
     solid = building.model.on_one_level
     ground = solid.select_faces(GROUND)[0]

@@ -151,7 +151,8 @@ def fragment(sheet: Sheet) -> Fragment:
     text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
     lines = terrain_lines(sheet)
     if sheet.figures is not None:
-        solids = [sheet.building.solid, *sheet.boxes]
+        own = choose_solid(sheet)
+        solids = [sheet.building.solid if own is None else own, *sheet.boxes]
         lines = [*lines, *(in_file(sheet, solid) for solid in solids)]
         lines += [undo_shift(sheet)] if sheet.shapes.outline is not None else []
     if not lines:
@@ -188,7 +189,10 @@ def building_element(sheet: Sheet) -> str:
         )
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
         text += installation_elements(sheet)
-        text += boundary_surfaces(solid, building.parts, figures, ids, rings, sheet.surfaces)
+        if solid is building.solid:
+            text += boundary_surfaces(solid, building.parts, figures, ids, rings, sheet.surfaces)
+        else:
+            text += boundary_surfaces(solid, building.parts, sheet.finest[1], ids, rings)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, sheet.extension, "</bldg:Building>"])
 
@@ -308,7 +312,7 @@ def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
     last, and is left out.
     """
     lines, is_last = terrain_lines(sheet), not sheet.head.write.gml_surfaces
-    has_lod2 = "2.2" in sheet.head.write.lods
+    has_lod2 = sheet.head.write.has_lod2
     first = terrain_element(lines, 1) if lines and not is_last and has_lod2 else ""
     last = terrain_element(lines, 2 if has_lod2 else 1) if lines and is_last else ""
     surfaces = lod2_surfaces(rings) if shell and sheet.head.write.gml_surfaces else ""
@@ -338,7 +342,12 @@ def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
 def choose_solid(sheet: Sheet) -> Solid | None:
     """Return the solid that is the building's own, or None.
 
-    There is none where its parts have solids, or where none is requested.
+    It is the finest requested. There is none where its parts have solids, or where none is
+    requested.
     """
-    is_own = "2.2" in sheet.head.write.lods and sheet.figures is not None and not sheet.shapes.parts
-    return sheet.building.solid if is_own else None
+    lods = sheet.head.write.lods
+    if sheet.figures is None or (sheet.shapes.parts and "2.2" in lods):
+        return None
+    if "2.3" in lods:
+        return sheet.finest[0]
+    return sheet.building.solid if "2.2" in lods else None

@@ -20,7 +20,7 @@ from ..shapes import PartShape, Shapes
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
 from ..values import plain, round_value
 
-LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
+LOD_SOLID, LOD_OVERHANGS, LOD_FOOTPRINT = "2.2", "2.3", "0"
 
 
 class Vertices:
@@ -58,13 +58,15 @@ def building_geometry(
     prefix: str,
     lods: tuple[str, ...],
     attributes: dict[int, dict[str, Any]] | None = None,
+    finest: tuple[Solid, RoofFigures] | None = None,
 ) -> list[dict[str, Any]]:
     """Return the geometry of the building itself, as far as `lods` ask.
 
     The footprint comes always, then roof edge, blocks, and solid.
 
     Vertices go to `vertices`. A building in parts has no solid of its own. `attributes` has further
-    ones of the solid's faces, by face.
+    ones of the solid's faces, by face. `finest` is the solid of LoD2.3, None where it is not asked
+    for.
     """
     if figures is None:
         footprint = level_footprint(building)
@@ -83,6 +85,11 @@ def building_geometry(
             surfaces[number] = surfaces.get(number, kind) | more
         solids = [solid_geometry(solid, vertices, LOD_SOLID, surfaces, numbers)]
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
+    if finest is not None:
+        solid, of_solid = finest
+        numbers = number_surfaces(solid.faces, building.parts)
+        surfaces = roof_surfaces(building, solid, numbers, of_solid, prefix)
+        solids.append(solid_geometry(solid, vertices, LOD_OVERHANGS, surfaces, numbers))
     return [
         *level_surfaces(building, shapes, vertices),
         *(solid_geometry(block, vertices, lod) for block, lod in blocks if block is not None),

@@ -30,6 +30,7 @@ from ..shapes import PartShape
 from ..values import WIDEST, metres, plain_text
 from ..writer import BuildingWriter
 from .boundaries import (
+    LOD_OVERHANGS,
     LOD_SOLID,
     Vertices,
     building_geometry,
@@ -203,8 +204,9 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
     Their vertices go to `vertices`.
     """
     name, prefix, lods = sheet.name, sheet.head.prefix, sheet.head.write.lods
+    finest = sheet.finest if LOD_OVERHANGS in lods and sheet.figures is not None else None
     geometry = building_geometry(
-        sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods, sheet.surfaces
+        sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods, sheet.surfaces, finest
     )
     whole: dict[str, Any] = {"type": "Building", "attributes": sheet.attributes}
     parts = {

@@ -1,0 +1,209 @@
+"""A model with overhangs: its roof over a larger outline, or its walls within it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from ..errors import CompositionError
+from ..geometry.outline_edges import OutlineEdges, list_outline_edges, make_strips
+from ..geometry.rings import with_area
+from ..model import GROUND, Eaves, Model, Piece, Roof, Solid
+from ..model.overhang import WALLS
+from ..settings import ComposeSettings, Settings
+from .arrangement import GRID_M
+from .check import check_solid
+from .overhang import OverhangingShell, to_grid
+from .settle import PLAN_DIGITS
+from .solid import compose
+from .underside import cap_by_place, cap_everywhere
+
+PIECE_ENDS_M = 0.01  # a piece of the roof so near to an edge of the outline ends there
+LEAST_STRETCH_M = 0.05  # of an edge that belongs to a piece; a shorter one is a corner
+JUST_INSIDE_M = 0.02  # from the edge, where it is asked which piece is seen
+UNSEEN_PIECE_M = 0.01  # below the roof, from which a piece is not seen
+LEAST_OVERLAP_M2 = 0.01  # of a strip and the outline; less is rounding
+THICKNESS_SHARES = (1.0, 0.95, 0.9)  # of a roof's thickness, tried until the solid is valid
+
+
+def add_eaves(model: Model, eaves: Eaves) -> Model:
+    """Return the model with `eaves`, its solid of LoD2.3 made.
+
+    Raises CompositionError where no valid solid comes out.
+    """
+    widths = np.zeros(len(list_outline_edges(model.roof.outline).starts))
+    for overhang in eaves.overhangs:
+        widths[overhang.edge] = overhang.length
+    if not widths.any():
+        return replace(model, eaves=replace(eaves, solid=None))
+    origin = model.roof.frame.origin
+    level = model.on_one_level
+    local = Solid(np.round(level.vertices - origin, PLAN_DIGITS), level.faces)
+    options = model.compose or ComposeSettings()
+    if eaves.footprint_kind == WALLS:
+        walls = model.roof.outline
+        local = compose_over(widen_roof(model.roof, widths), local, options)
+    else:
+        walls = set_walls_in(model.roof.outline, widths)
+    solid = close_solid(local, model, to_grid(walls), eaves.thickness)
+    return replace(model, eaves=replace(eaves, solid=solid.move(origin)))
+
+
+def remove_eaves(model: Model, eaves: Eaves) -> Model:
+    """Return the model without any overhang, `eaves` saying how they would be made."""
+    return replace(model, eaves=replace(eaves, overhangs=(), solid=None))
+
+
+def close_solid(level: Solid, model: Model, walls: shapely.Polygon, thickness_m: float) -> Solid:
+    """Return the solid over one level with walls and slabs.
+
+    All are in the roof's frame. Slabs get thinner where their undersides would touch a lower roof
+    along a line.
+    """
+    options = model.compose or ComposeSettings()
+    caps = [cap_by_place(level, options.ground_clearance_m)]
+    if model.underside.terrain:
+        caps.append(cap_everywhere(level, options.ground_clearance_m))
+    findings: tuple = ()
+    for cap, share in itertools.product(caps, THICKNESS_SHARES):
+        thickness = round(share * thickness_m / GRID_M)
+        solid = OverhangingShell(level, model.underside, cap, walls, thickness).close()
+        findings = check_solid(solid, planarity_m=options.planarity_m)
+        if not findings:
+            return solid
+    raise CompositionError(
+        f"expected a valid solid with overhangs, got: {findings[0].message}; leave them out"
+    )
+
+
+def compose_over(roof: Roof, level: Solid, options: ComposeSettings) -> Solid:
+    """Compose a wider roof on the ground of the solid over one level."""
+    z_ground = find_ground(level)
+    solid = compose(roof, z_ground, replace(Settings(), compose=options))
+    if find_ground(solid) < z_ground - GRID_M:
+        raise CompositionError(
+            "expected overhangs over the ground, got some that reach down to it; leave them out"
+        )
+    return solid
+
+
+def find_ground(solid: Solid) -> float:
+    """Return the height on which a solid over one level stands."""
+    return float(solid.vertices[solid.select_faces(GROUND)[0].rings[0][0], 2])
+
+
+def widen_roof(roof: Roof, widths: np.ndarray) -> Roof:
+    """Return the roof drawn out beyond the edges of its outline.
+
+    It is by `widths` (n,) in metres. Each piece goes on in its own planes beyond the stretches of
+    edges at which it is seen.
+    """
+    edges = list_outline_edges(roof.outline)
+    strips = make_strips(edges, widths)
+    number_of = np.flatnonzero(widths)
+    area = shapely.union_all(
+        [roof.outline, *(shapely.polygons(strips[k]) for k in number_of)], grid_size=GRID_M
+    )
+    if area.geom_type != "Polygon":
+        raise CompositionError(
+            "expected overhangs around one roof, got several areas; leave them out"
+        )
+    parts = tuple(
+        replace(
+            part,
+            pieces=tuple(
+                wider
+                for piece in part.pieces
+                for wider in widen_piece(piece, roof, edges, strips, number_of)
+            ),
+        )
+        for part in roof.parts
+    )
+    return Roof(parts, area, roof.frame)
+
+
+def widen_piece(
+    piece: Piece, roof: Roof, edges: OutlineEdges, strips: np.ndarray, number_of: np.ndarray
+) -> Iterable[Piece]:
+    """Yield a piece with the strips that continue it."""
+    near = shapely.buffer(piece.outline, PIECE_ENDS_M, join_style="mitre")
+    added = []
+    for k in number_of:
+        for start, end in find_stretches(near, edges.starts[k], edges.ends[k]):
+            if is_seen(piece, roof, edges, k, start, end):
+                added.append(cut_strip(strips[k], start, end, roof.outline))
+    if not added:
+        yield piece
+        return
+    union = shapely.union_all([piece.outline, *added], grid_size=GRID_M)
+    for outline in shapely.get_parts(with_area(union)):
+        yield Piece(outline, piece.planes)
+
+
+def find_stretches(
+    area: shapely.Geometry, start: np.ndarray, end: np.ndarray
+) -> list[tuple[float, float]]:
+    """Return the stretches of an edge within an area, as shares of its length.
+
+    The `area` was grown by PIECE_ENDS_M.
+    """
+    length = float(np.hypot(*(end - start)))
+    shared = shapely.intersection(shapely.linestrings([start, end]), area)
+    lines = [part for part in shapely.get_parts(shared) if part.geom_type == "LineString"]
+    stretches = []
+    for line in shapely.get_parts(shapely.line_merge(shapely.multilinestrings(lines))):
+        along = sorted((shapely.get_coordinates(line) - start) @ (end - start) / length)
+        first = 0.0 if along[0] <= PIECE_ENDS_M else along[0] + PIECE_ENDS_M
+        last = length if along[-1] >= length - PIECE_ENDS_M else along[-1] - PIECE_ENDS_M
+        if last - first >= min(LEAST_STRETCH_M, 0.5 * length):
+            stretches.append((first / length, last / length))
+    return stretches
+
+
+def is_seen(
+    piece: Piece, roof: Roof, edges: OutlineEdges, number: int, start: float, end: float
+) -> bool:
+    """Return whether a piece is the roof anywhere just inside a stretch of an edge."""
+    share = start + (end - start) * np.linspace(0.05, 0.95, 7)
+    xy = edges.starts[number] + share[:, None] * (edges.ends[number] - edges.starts[number])
+    xy = xy - JUST_INSIDE_M * edges.normals[number]
+    highest = roof.height_at(xy)
+    return bool(~(piece.height_at(xy) < highest - UNSEEN_PIECE_M).all())
+
+
+def cut_strip(
+    strip: np.ndarray, start: float, end: float, outline: shapely.Polygon
+) -> shapely.Geometry:
+    """Return what lies beyond a stretch of an edge in its strip (4, 2).
+
+    What lies inside the outline is left out.
+    """
+    a, b, outer_b, outer_a = strip
+    across = (outer_a - a) - ((outer_a - a) @ (b - a)) / ((b - a) @ (b - a)) * (b - a)
+    corners = [
+        a + start * (b - a),
+        a + end * (b - a),
+        outer_b if end == 1.0 else a + end * (b - a) + across,
+        outer_a if start == 0.0 else a + start * (b - a) + across,
+    ]
+    polygon = shapely.polygons(corners)
+    if shapely.intersection(polygon, outline).area > LEAST_OVERLAP_M2:
+        return with_area(shapely.difference(polygon, outline, grid_size=GRID_M))
+    return polygon
+
+
+def set_walls_in(outline: shapely.Polygon, widths: np.ndarray) -> shapely.Polygon:
+    """Return the outline of walls that stand `widths` (n,) within an outline."""
+    strips = make_strips(list_outline_edges(outline), widths, side=-1.0)
+    taken = [shapely.make_valid(shapely.polygons(strips[k])) for k in np.flatnonzero(widths)]
+    walls = with_area(shapely.difference(outline, shapely.union_all(taken), grid_size=GRID_M))
+    if walls.geom_type != "Polygon" or walls.is_empty:
+        raise CompositionError(
+            "expected walls in one piece within the roof, got none or several; assume a shorter "
+            "overhang"
+        )
+    return walls
