@@ -1,4 +1,4 @@
-"""Measure how well cones, spires, domes and barrel vaults are found.
+"""Measure how well cones, half cones, spires, domes and barrel vaults are found.
 
 usage: python -m benchmarks.curved [--seeds 16] [--first-seed 100] [--densities 8 2]
 
@@ -6,10 +6,12 @@ The last lines count slim towers of 3 by 3 m, 3 to 15 m above the ridge of such 
 roof has within 0.3 m of their height.
 
 Each kind stands alone over its own outline, on a square or rectangular base that is a little larger
-(a tower), and as a turret in the corner of a house with a gable. Sizes are those that are built
-(`draw` of the catalogue): spires of 55 to 78 degrees, cones of 25 to 72, arcs of a third to a whole
-half circle, 3 to 10 m wide. A scene counts as right if the roof has a part of its kind. Heights are
-those of the highest point, and volumes those under the shape.
+(a tower), and as a turret in the corner of a house with a gable. Half cones roof apses at the gable
+end of such a house. Sizes are those that are built (`draw` of the catalogue): spires of 55 to 78
+degrees, cones of 25 to 72, arcs of a third to a whole half circle, 3 to 10 m wide, and turrets and
+apses of at most 6 m. Outlines follow the plans, so turrets and apses show in them. A scene counts
+as right if the roof has a part of its kind. Heights are those of the highest point, and volumes
+those under the shape.
 """
 
 from __future__ import annotations
@@ -24,12 +26,17 @@ import shapely
 from hiproof.fit.union import fit_building
 from hiproof.model.heights import find_highest
 from hiproof.primitives import CATALOGUE
-from hiproof.primitives.catalogue import CURVED
+from hiproof.primitives.catalogue import ROUND
 
-SETTINGS = ("alone", "tower", "turret")
+KINDS = {
+    "alone": (*ROUND, "barrel"),
+    "tower": (*ROUND, "barrel"),
+    "turret": ROUND,
+    "apse": ("half_cone",),
+}
 HOUSE_LENGTH_M, HOUSE_WIDTH_M = 14.0, 9.0  # Of the house with a turret.
 HOUSE_EAVE_M, HOUSE_SLOPE = 6.0, 0.9
-SHAPE_EAVE_M = 10.0  # Height of the curved shape's eave.
+SHAPE_EAVE_M, APSE_EAVE_M = 10.0, 5.0  # Height of the curved shape's eave.
 BASE_WIDER = 1.02  # A tower is so much wider than its spire.
 NOISE_M, PLAN_NOISE_M = 0.03, 0.05
 TOWER_M = 3.0  # Side of a slim tower.
@@ -72,25 +79,29 @@ def make_house() -> shapely.Polygon:
 def draw_scene(kind: str, setting: str, seed: int, density: float) -> CurvedScene:
     """Draw the scene of a `seed`, scanned at `density` (points/m2)."""
     rng = np.random.default_rng(seed)
-    width = rng.uniform(3.0, 6.0 if setting == "turret" else 10.0)
+    has_house = setting in ("turret", "apse")
+    width = rng.uniform(3.0, 6.0 if has_house else 10.0)
     theta_p = CATALOGUE[kind].draw_parameters(rng, width)
     shape, kappa = CATALOGUE[kind].variant(theta_p), rng.uniform(0.0, 0.5 * math.pi)
     theta = shape.to_theta(theta_p, kappa, (0.0, 0.0, SHAPE_EAVE_M))
+    if setting == "apse":
+        place = HOUSE_LENGTH_M + 0.5 * theta_p["length"], 0.5 * HOUSE_WIDTH_M, APSE_EAVE_M
+        theta = shape.to_theta(theta_p, 0.0, place)
     plan = outline = shape.part(theta).pieces[0].outline
     if setting == "tower":
         u, v = (BASE_WIDER * 0.5 * theta_p[name] for name in ("length", "width"))
         c, s = math.cos(kappa), math.sin(kappa)
         ring = np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]])
         outline = shapely.union(shapely.Polygon(ring), plan)
-    elif setting == "turret":
+    elif has_house:
         outline = shapely.union(make_house(), plan)
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
-    scene = CurvedScene(kind, np.zeros((0, 3)), outline, plan, theta, setting == "turret")
+    scene = CurvedScene(kind, np.zeros((0, 3)), outline, plan, theta, has_house)
     z = scene.height_at(xy) + rng.normal(0.0, NOISE_M, len(xy))
     points = np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
-    return CurvedScene(kind, points, outline, plan, theta, setting == "turret")
+    return CurvedScene(kind, points, outline, plan, theta, has_house)
 
 
 @dataclass(frozen=True)
@@ -146,8 +157,8 @@ def main() -> None:
     print("| points/m2 | setting | kind | right | height within 0.2 m | volume within 3 % |")
     print("| --- | --- | --- | --- | --- | --- |")
     for density in request.densities:
-        for setting in SETTINGS:
-            for kind in CURVED if setting != "turret" else CURVED[:-1]:
+        for setting, kinds in KINDS.items():
+            for kind in kinds:
                 outcomes = [judge_scene(draw_scene(kind, setting, s, density)) for s in seeds]
                 shares = [
                     np.mean([one.is_right for one in outcomes]),

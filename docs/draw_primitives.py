@@ -23,6 +23,7 @@ HEAD = """# Roof types and their parameters
 - A cone, a broach (a spire of eight sides) and a dome are measured by the `width` and the `length`
   of a circle or an ellipse. Circles are written with as many facets as keep them within 0.1 m, and
   with the circle's area. A dome and a barrel follow a circular arc in four chords on each side.
+- A half cone roofs an apse. Its `width` runs along the wall, and its `length` away from it.
 - A gable with its ridge off the middle also has a `ridge_offset` (m, towards the back).
 - A roof that is less regular than its type gives each side's own values, such as `pitch_front` and
   `eave_front`, and the `height` of a level top.

@@ -5,14 +5,17 @@ import pytest
 import shapely
 from benchmarks.curved import draw_scene, judge_scene
 
+import hiproof
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
+from hiproof.fit.union.round_ends import find_round_ends
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import CURVED
 from hiproof.settings import Settings
-from points_of_roofs import sample_roof, typical_theta
+from hiproof.write.parameters import building_record
+from points_of_roofs import sample_heights, sample_roof, typical_theta
 
 PLANAR = [name for name in CATALOGUE if name not in CURVED]
 
@@ -24,7 +27,11 @@ PLANAR = [name for name in CATALOGUE if name not in CURVED]
         ("cone", "tower"),
         ("broach", "tower"),
         ("dome", "tower"),
+        ("barrel", "tower"),
         ("cone", "turret"),
+        ("broach", "turret"),
+        ("dome", "turret"),
+        ("half_cone", "apse"),
     ],
 )
 def test_a_curved_roof_is_found(kind, setting):
@@ -42,6 +49,46 @@ def test_planes_stay_planes(kind):
     outline = shapely.union_all([piece.outline for piece in shape.part(theta).pieces])
     parts = fit_building(points, shapely.convex_hull(outline)).roof_parts
     assert not {part.type for part in parts} & set(CURVED)
+
+
+def test_a_turret_is_found_from_two_points_a_square_metre():
+    """The outline gives the circle, so that two numbers are left to the points."""
+    found = [
+        judge_scene(draw_scene("cone", "turret", seed, 2.0)).is_right for seed in range(20, 26)
+    ]
+    assert all(found)
+
+
+def test_a_level_or_a_hipped_end_stays_so():
+    arc = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
+    ring = np.column_stack([10.0 + 3.0 * np.cos(arc), 4.0 + 3.0 * np.sin(arc)])
+    outline = shapely.union(shapely.box(0.0, 0.0, 10.0, 8.0), shapely.Polygon(ring))
+    (end,) = find_round_ends(outline)
+    assert (end.radius, end.span_deg) == pytest.approx((3.0, 180.0), rel=0.01)
+    assert end.centre == pytest.approx([10.0, 4.0], abs=0.01)
+    level = sample_heights(lambda x, y: np.full(len(x), 5.0), outline)
+    assert {part.type for part in fit_building(level, outline).roof_parts} == {"flat"}
+    hipped = sample_heights(lambda x, y: 8.0 - np.maximum(np.abs(y - 4.0), x - 9.0), outline)
+    assert not {part.type for part in fit_building(hipped, outline).roof_parts} & set(CURVED)
+
+
+def test_ordinary_outlines_have_no_round_ends():
+    canted = shapely.Polygon([(0, 0), (9, 0), (10, 1), (10, 5), (9, 6), (1, 6), (0, 5)])
+    bow = shapely.Polygon([(0, 0), (10, 0), *((10 - 2 * k, 6 + k * (5 - k) / 8) for k in range(6))])
+    assert find_round_ends(canted) == find_round_ends(bow) == []
+
+
+def test_an_apse_is_a_valid_solid_with_one_curved_surface():
+    scene = draw_scene("half_cone", "apse", 21, 8.0)
+    building = hiproof.reconstruct(scene.points, scene.outline)
+    types = [part.type for part in building.parts]
+    assert sorted(types) == ["gable", "half_cone"]
+    assert not check_solid(building.solid)
+    rebuilt = hiproof.build(building_record(building))
+    assert np.array_equal(rebuilt.solid.vertices, building.solid.vertices)
+    steeper = building.with_part(types.index("half_cone"), height=2.0)
+    assert steeper.parts[types.index("half_cone")].parameters["height"] == 2.0
+    assert not check_solid(steeper.solid)
 
 
 def test_a_type_that_is_not_allowed_is_not_found():

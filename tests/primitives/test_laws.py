@@ -199,9 +199,9 @@ def test_formula_cancels_and_divides_by_monomials_only():
 
 def test_unknown_type_is_named_with_the_known_ones():
     with pytest.raises(
-        SettingsError, match=r"expected a roof type \(flat, .*barrel\), got 'onion'"
+        SettingsError, match=r"expected a roof type \(flat, .*half_cone\), got 'zome'"
     ):
-        get("onion")
+        get("zome")
 
 
 def test_missing_parameter_is_named():

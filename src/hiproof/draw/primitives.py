@@ -54,14 +54,16 @@ class Measure:
 
 def typical_parameters(kind: str) -> dict[str, float]:
     """Return the parameters of an ordinary roof of a type."""
-    return CATALOGUE[kind].typical(DRAWN_WIDTH, DRAWN_LENGTH, DRAWN_RISE)
+    length = DRAWN_WIDTH / 2 if kind == "half_cone" else DRAWN_LENGTH
+    return CATALOGUE[kind].typical(DRAWN_WIDTH, length, DRAWN_RISE)
 
 
 def make_typical_building(kind: str) -> Building:
     """Make an ordinary roof of a type on low walls."""
     parameters = typical_parameters(kind)
     part = {"type": kind, "parameters": parameters, "position": [0.0, 0.0, 0.0]}
-    rim = np.array(CATALOGUE[kind].variant(parameters).rim) * (DRAWN_LENGTH / 2, DRAWN_WIDTH / 2)
+    half = 0.5 * parameters["length"], 0.5 * parameters["width"]
+    rim = np.array(CATALOGUE[kind].variant(parameters).rim) * half
     ring = [*rim.tolist(), rim[0].tolist()]
     return build(
         {

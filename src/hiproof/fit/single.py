@@ -24,6 +24,7 @@ THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
 UNTOLD = 100.0  # m, rad; a deviation as large is none: heights tell no direction of a level roof
 # Points of a round roof lie so near its axis (shares of the first radius), and to its surface.
 HULL_REACH, HULL_SIGMAS = 1.3, 4.0
+HULL_ROUNDS = 2  # The first plan of a half disc is far too narrow.
 HULL_SPACINGS = 0.3  # The hull of points lies so much inside of what they are drawn from.
 
 
@@ -84,17 +85,19 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
     A rectangle's sides are too narrow for it: hardly any points lie where a circle touches them.
     The covariance stays that of the free plan.
     """
-    theta = estimate.theta.copy()
-    reach = np.hypot(*(cloud[:, :2] - theta[:2]).T) <= HULL_REACH * theta[HALF_LENGTH]
-    distance = np.abs(cloud[:, 2] - estimate.primitive.height_at(theta, cloud[:, :2]))
-    on_roof = cloud[reach & (distance <= HULL_SIGMAS * estimate.noise.sigma)]
-    hull = shapely.convex_hull(shapely.multipoints(on_roof[:, :2]))
-    if not isinstance(hull, shapely.Polygon):
-        return estimate
-    hull = shapely.buffer(hull, HULL_SPACINGS * math.sqrt(hull.area / len(on_roof)))
-    inside = cloud[shapely.contains_xy(hull, *cloud[:, :2].T)]
-    theta[:Q0] = outline_rectangle(hull, theta[KAPPA])
-    theta, noise = fit_heights(inside, estimate.primitive, theta)
+    shape, theta, noise = estimate.primitive, estimate.theta.copy(), estimate.noise
+    for _ in range(HULL_ROUNDS):
+        farthest = np.hypot(*(np.array(shape.rim) * theta[[HALF_LENGTH, HALF_WIDTH]]).T).max()
+        reach = np.hypot(*(cloud[:, :2] - theta[:2]).T) <= HULL_REACH * farthest
+        distance = np.abs(cloud[:, 2] - shape.height_at(theta, cloud[:, :2]))
+        on_roof = cloud[reach & (distance <= HULL_SIGMAS * noise.sigma)]
+        hull = shapely.convex_hull(shapely.multipoints(on_roof[:, :2]))
+        if not isinstance(hull, shapely.Polygon):
+            break
+        hull = shapely.buffer(hull, HULL_SPACINGS * math.sqrt(hull.area / len(on_roof)))
+        inside = cloud[shapely.contains_xy(hull, *cloud[:, :2].T)]
+        theta[:Q0] = outline_rectangle(hull, theta[KAPPA])
+        theta, noise = fit_heights(inside, shape, theta)
     return replace(estimate, theta=theta, noise=noise)
 
 

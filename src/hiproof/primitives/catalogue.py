@@ -11,6 +11,7 @@ from . import (
     flat,
     gable,
     gambrel,
+    half_cone,
     half_hip,
     halves,
     hip,
@@ -47,11 +48,16 @@ SHAPES = (
     cone.BROACH,
     vault.DOME,
     vault.BARREL,
+    half_cone.HALF_CONE,
 )
 CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
 ROUND = ("cone", "broach", "dome")  # over a round or many-sided plan
-CURVED = (*ROUND, "barrel")  # whose facets stand for a curved surface, or are more than a volume's
-SMOOTH = ("cone", "dome", "barrel")  # of which all facets stand for one curved surface
+CURVED = (
+    *ROUND,
+    "barrel",
+    "half_cone",
+)  # whose facets stand for a curved surface, or are more than a volume's
+SMOOTH = ("cone", "half_cone", "dome", "barrel")  # of which all facets stand for one curved surface
 
 
 def get(name: str) -> Primitive:

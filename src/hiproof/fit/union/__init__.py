@@ -55,6 +55,7 @@ teeth       rows of equal monopitches as saw-teeth
 larger      gambrels combined from their parts
 own         custom shapes instead of neighbouring parts
 judged      roofs judged by points, with one shape in place of several parts
+round_ends  cones, spires, domes and half cones over round stretches of the outline
 round_tops  cones, spires and domes around the tops of parts
 barrels     barrel vaults over parts with slopes to two sides
 curved      these shapes where points follow them better

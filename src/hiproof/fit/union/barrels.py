@@ -17,6 +17,7 @@ from .round_tops import BENT
 
 BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel")  # What is made of one.
 AS_NEAR = 1.05  # Share of the misfit that an arc may leave if it replaces several parts.
+CURVE_ROUNDS = 2  # The second leaves out points beside the vault, such as those of a wall's top.
 ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
 
 
@@ -63,6 +64,9 @@ def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray, most_left: float
     x = (x - middle) / wide
     under = 1.0 - np.minimum(x * x, 1.0)
     design = np.column_stack([np.ones_like(x), x, under, np.sqrt(under)])
-    curve = design @ np.linalg.lstsq(design, z, rcond=None)[0]
-    left = np.minimum(np.abs(z - curve), MOST_DISTANCE_M).mean()
+    used = np.ones(len(z), bool)
+    for _ in range(CURVE_ROUNDS):
+        distances = np.abs(z - design @ np.linalg.lstsq(design[used], z[used], rcond=None)[0])
+        used = distances <= max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
+    left = np.minimum(distances, MOST_DISTANCE_M).mean()
     return bool(left <= most_left * roof.measure_distances(MOST_DISTANCE_M)[which].mean())

@@ -13,16 +13,22 @@ import numpy as np
 import shapely
 
 from ...model import Part
+from ...model.heights import find_highest
 from ...primitives.cants import list_cants
 from ...primitives.catalogue import CURVED, ROUND
 from ...settings import Settings
 from .barrels import list_barrels
-from .judged import JudgedRoof, replace_parts
+from .judged import JudgedRoof, measure_gain, measure_slope, replace_parts, scale_cap, trim_parts
 from .own import MOST_DISTANCE_M
-from .round_tops import list_round_shapes
+from .round_ends import RoundEnd, find_round_ends, list_end_shapes
+from .round_tops import LEAST_FALL_M, list_round_shapes
 
 LEAST_MISFIT_M = 0.03  # Nobody sees that a part lies nearer (m, mean) to its points than this.
 LEAST_NATS = 8.0  # A shape must be so much likelier (nats) than one part.
+LEAST_NATS_ON_ARC = 3.0  # The same over a round end of the outline, which speaks for it.
+# Over half a disc, a whole shape must be so much likelier (nats): its other half would be hidden.
+WHOLE_NATS = 8.0
+LEAST_VISIBLE = 0.4  # Smallest share of the points over a shape at which it is the highest part.
 FEWEST_CURVE_POINTS = 12  # A curve takes five numbers, and as many points again to check them.
 
 
@@ -36,12 +42,42 @@ def fit_curved_shapes(
         return parts
     inside = points[shapely.contains_xy(outline, points[:, 0], points[:, 1])]
     roof = JudgedRoof(parts, inside, outline)
+    for end in find_round_ends(outline):
+        roof = roof_round_end(roof, end, names)
     for _ in range(len(parts)):
         better = find_better_roof(roof, names, settings)
         if better is None:
             break
         roof = better
     return roof.parts
+
+
+def roof_round_end(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> JudgedRoof:
+    """Return the roof with the best curved shape over a round end, or as it is."""
+    shapes = [s for s in list_end_shapes(roof, end, names) if s.parameters["height"] > LEAST_FALL_M]
+    options = [
+        (shape, replace_parts(roof, shape, trimmed)[1])
+        for shape in shapes
+        for trimmed in (trim_parts(roof, shape), None)
+    ]
+    heights = [new.highest[0] for _, new in options]
+    judged = np.any([z != roof.highest[0] for z in heights], axis=0)
+    best, least = roof, LEAST_NATS_ON_ARC
+    for shape, new in options:
+        if new is roof or measure_visible_share(new) < LEAST_VISIBLE:
+            continue
+        price = WHOLE_NATS if end.is_half_disc and shape.type != "half_cone" else 0.0
+        gain = measure_gain(roof, new, judged, scale_cap(measure_slope(shape))) - price
+        if gain > least:
+            best, least = new, gain
+    return best
+
+
+def measure_visible_share(roof: JudgedRoof) -> float:
+    """Return at which share of the points over it the last part is the highest."""
+    (*_, last), (_, top) = roof.parts, roof.highest
+    within = np.isfinite(find_highest([last], roof.points[:, :2])[0])
+    return float(np.mean(top[within] == len(roof.parts) - 1)) if within.any() else 0.0
 
 
 def find_better_roof(roof: JudgedRoof, names: list[str], settings: Settings) -> JudgedRoof | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -51,18 +51,27 @@ def scale_cap(slope: float) -> float:
     return MOST_DISTANCE_M * math.hypot(1.0, slope)
 
 
-def replace_parts(roof: JudgedRoof, shape: Part) -> tuple[float, JudgedRoof]:
+def measure_slope(shape: Part) -> float:
+    """Return the rise of a curved shape over half of its width."""
+    return 2.0 * shape.parameters["height"] / shape.parameters["width"]
+
+
+def replace_parts(
+    roof: JudgedRoof, shape: Part, trimmed: JudgedRoof | None = None
+) -> tuple[float, JudgedRoof]:
     """Return the roof with `shape` in place of the parts that it explains as well.
 
-    With it comes what that gains (nats), by the points of those parts and of the shape.
+    With it comes what that gains (nats), by the points of those parts and of the shape. Parts of
+    the `trimmed` roof take the place of the roof's own beside the shape.
     """
-    z, top = roof.points[:, 2], roof.highest[1]
+    kept_roof = trimmed or roof
+    z, top = roof.points[:, 2], kept_roof.highest[1]
     over, _ = find_highest([shape], roof.points[:, :2])
     within = np.isfinite(over)
-    cap = scale_cap(2.0 * shape.parameters["height"] / shape.parameters["width"])
+    cap = scale_cap(measure_slope(shape))
     before, after = roof.measure_distances(cap), np.minimum(np.abs(z - over), cap)
     numbers = []
-    for k in range(len(roof.parts)):
+    for k in range(len(kept_roof.parts)):
         own, inside = top == k, (top == k) & within
         if (
             inside.any()
@@ -70,17 +79,45 @@ def replace_parts(roof: JudgedRoof, shape: Part) -> tuple[float, JudgedRoof]:
             and after[inside].mean() <= before[inside].mean() + AS_WELL_M
         ):
             numbers.append(k)
-    replaced = [roof.parts[k] for k in numbers]
-    kept = [part for k, part in enumerate(roof.parts) if k not in numbers]
+    replaced = [kept_roof.parts[k] for k in numbers]
+    kept = [part for k, part in enumerate(kept_roof.parts) if k not in numbers]
     judged, options = within | np.isin(top, numbers), [(0.0, roof)]
     if not judged.any():
         return options[0]
     for parts in cover_bare_places(roof, [*kept, shape], replaced):
         new = JudgedRoof(parts, roof.points, roof.outline)
-        left = (before[judged].mean(), new.measure_distances(cap)[judged].mean())
-        nats = np.count_nonzero(judged) * math.log((left[0] + COMPARED_M) / (left[1] + COMPARED_M))
-        options.append((nats + PART_NATS * (count_shapes(roof.parts) - count_shapes(parts)), new))
+        options.append((measure_gain(roof, new, judged, cap), new))
     return max(options, key=lambda option: option[0])
+
+
+def measure_gain(roof: JudgedRoof, new: JudgedRoof, judged: np.ndarray, cap_m: float) -> float:
+    """Measure how much likelier (nats) a new roof is, by the points `judged` (n,).
+
+    Their distances count up to `cap_m`. Fewer parts are worth something, too.
+    """
+    before, after = (one.measure_distances(cap_m)[judged].mean() for one in (roof, new))
+    nats = np.count_nonzero(judged) * math.log((before + COMPARED_M) / (after + COMPARED_M))
+    return nats + PART_NATS * (count_shapes(roof.parts) - count_shapes(new.parts))
+
+
+def trim_parts(roof: JudgedRoof, shape: Part) -> JudgedRoof:
+    """Return the roof without what its parts cover under a shape.
+
+    Parts that lie under it for the most part stay whole: it may replace them.
+    """
+    under, parts = unite_outlines([shape]), []
+    for part in roof.parts:
+        pieces = [
+            Piece(polygon, piece.planes)
+            for piece in part.pieces
+            for polygon in list_polygons(
+                shapely.difference(piece.outline, under, grid_size=OVERLAY_GRID_M)
+            )
+        ]
+        left = sum(piece.outline.area for piece in pieces)
+        is_under = left <= (1.0 - REPLACED_SHARE) * part.area
+        parts.append(part if is_under else replace(part, pieces=tuple(pieces)))
+    return JudgedRoof(parts, roof.points, roof.outline)
 
 
 def count_shapes(parts: list[Part]) -> int:

@@ -1,0 +1,194 @@
+"""Find cones, spires, domes and half cones over round stretches of an outline.
+
+Such a stretch is a run of short sides that turn alike. It gives the middle and the radius of the
+shape: of an apse from half a circle, and of a turret from more. Points give the heights.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ...geometry.rings import OVERLAY_GRID_M, counterclockwise
+from ...model import Part
+from ...primitives.catalogue import CATALOGUE
+from ...primitives.cone import BROACH_SIDES
+from ...primitives.contract import HALF_LENGTH, KAPPA, Q0, Q1, Primitive
+from ...primitives.facets import find_apothem
+from .judged import JudgedRoof
+from .own import cut_part
+from .regions import list_polygons
+from .round_tops import FOLLOW_M
+
+# Turns (degrees) between sides that follow a circle, or a polygon of six sides or more.
+LEAST_TURN_DEG, MOST_TURN_DEG = 3.0, 65.0
+FEWEST_ROUND_SIDES = 11  # A circle has as many sides or more.
+FEWEST_CORNERS = 4  # Fewer lie on some circle by chance.
+SHORTEST_ARC_DEG = 120.0  # Shorter arcs are round corners of a roof, not shapes of their own.
+APSE_DEG = (140.0, 220.0)  # Arcs of half discs.
+TURRET_DEG = 150.0  # Shortest arc of a whole disc.
+ON_CIRCLE = 0.03  # Farthest that a corner lies off its circle, in shares of the radius.
+LARGEST_RADIUS_M = 30.0  # Larger circles are bent facades.
+SLOPES_TRIED = 24  # Slopes, in equal ratios, from which the likeliest start is taken.
+FEWEST_HEIGHTS = 6  # A slope and a height, and as many points again to check them.
+
+
+@dataclass(frozen=True)
+class RoundEnd:
+    """An arc of an outline: the `centre` (2,) and `radius` (m) of its circle.
+
+    `kappa` (rad) leads from the centre to the middle of the arc, `span_deg` is its length, and the
+    polygon `area` lies between it and its chord. `sides` are those of a whole circle of its kind.
+    """
+
+    area: shapely.Polygon
+    centre: np.ndarray
+    radius: float
+    kappa: float
+    span_deg: float
+    sides: int
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the arc stands for a circle rather than for a polygon."""
+        return self.sides >= FEWEST_ROUND_SIDES
+
+    @property
+    def is_half_disc(self) -> bool:
+        """Whether it may be an apse, by the length of its arc."""
+        return self.is_round and APSE_DEG[0] <= self.span_deg <= APSE_DEG[1]
+
+    @property
+    def way(self) -> np.ndarray:
+        """The unit vector (2,) of `kappa`."""
+        return np.array([math.cos(self.kappa), math.sin(self.kappa)])
+
+
+def find_round_ends(outline: shapely.Polygon) -> list[RoundEnd]:
+    """Find the arcs of an outline that are long enough for a roof of their own."""
+    ring = counterclockwise(outline.exterior)
+    ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
+    sides = np.roll(ring, -1, axis=0) - ring
+    angles = np.arctan2(sides[:, 1], sides[:, 0])
+    turns = np.degrees((angles - np.roll(angles, 1) + math.pi) % (2.0 * math.pi) - math.pi)
+    is_bend = (turns >= LEAST_TURN_DEG) & (turns <= MOST_TURN_DEG)
+    ends = (fit_round_end(ring[run]) for run in list_runs(is_bend))
+    return [end for end in ends if end is not None]
+
+
+def list_runs(mask: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the places of each run of true values around a ring.
+
+    There is one more at each end.
+    """
+    if mask.all():
+        yield np.arange(len(mask) + 1) % len(mask)
+        return
+    start = int(np.argmin(mask))
+    order = (start + np.arange(len(mask))) % len(mask)
+    breaks = np.flatnonzero(~mask[order])
+    for first, last in zip(breaks, [*breaks[1:], len(mask)], strict=True):
+        if last - first - 1 >= FEWEST_CORNERS:
+            yield order[np.arange(first, last + 1) % len(mask)]
+
+
+def fit_round_end(corners: np.ndarray) -> RoundEnd | None:
+    """Return the arc of a run of corners (n, 2), None if they lie on none.
+
+    Its first and last corner may lie off the circle.
+    """
+    inner = corners[1:-1]
+    design = np.column_stack([2.0 * inner, np.ones(len(inner))])
+    origin = inner.mean(axis=0)
+    design[:, :2] -= 2.0 * origin
+    x, y, rest = np.linalg.lstsq(design, ((inner - origin) ** 2).sum(axis=1), rcond=None)[0]
+    radius = math.sqrt(max(rest + x * x + y * y, 0.0))
+    centre = origin + (x, y)
+    distances = np.abs(np.hypot(*(corners - centre).T) - radius)
+    if radius > LARGEST_RADIUS_M or distances[1:-1].max() > ON_CIRCLE * radius:
+        return None
+    arc = corners[distances <= ON_CIRCLE * radius]
+    way = np.unwrap(np.arctan2(*(arc - centre).T[::-1]))
+    span = math.degrees(way[-1] - way[0])
+    if span < SHORTEST_ARC_DEG:
+        return None
+    step = math.radians(span / (len(arc) - 1))
+    radius *= math.sqrt(math.sin(step) / step)  # of the circle with the same area
+    area = shapely.make_valid(shapely.Polygon(arc))
+    sides = round(2.0 * math.pi / step)
+    middle = float(0.5 * (way[0] + way[-1]))
+    if sides < FEWEST_ROUND_SIDES:
+        middle = float(0.5 * (way[0] + way[1]))  # in which a side faces
+    return RoundEnd(area, centre, radius, middle, span, sides)
+
+
+def list_end_shapes(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> Iterator[Part]:
+    """Yield shapes of the types `names` over a round end, fitted to the points there.
+
+    A half cone has its apex at the middle of the circle.
+    """
+    for name in names:
+        if name in ("cone", "dome") and end.is_round and end.span_deg >= TURRET_DEG:
+            yield from fit_over_circle(roof, end, name, end.radius)
+        elif name == "broach" and end.sides == BROACH_SIDES and end.span_deg >= TURRET_DEG:
+            yield from fit_over_circle(roof, end, name, end.radius * find_apothem(BROACH_SIDES))
+        elif name == "half_cone" and end.is_half_disc:
+            yield from fit_over_circle(roof, end, name, end.radius)
+
+
+def fit_over_circle(roof: JudgedRoof, end: RoundEnd, name: str, radius: float) -> Iterator[Part]:
+    """Yield a shape of the type `name` over the circle of a round end, or half of it.
+
+    Its plan in theta has the `radius`.
+    """
+    from ..likelihood import fit_heights  # compiled code that most roofs never need
+
+    shape = CATALOGUE[name]
+    theta = np.array([*end.centre, end.kappa, radius, radius, 0.0, 0.0, 0.0, 0.0])
+    if name == "half_cone":
+        theta[HALF_LENGTH] *= 0.5
+        theta[:KAPPA] += 0.5 * radius * end.way
+    plan = shape.part(theta).pieces[0].outline
+    points = roof.points[shapely.contains_xy(plan, *roof.points[:, :2].T)]
+    if len(points) < FEWEST_HEIGHTS:
+        return
+    theta[[Q0, Q1]], follows = find_start(points, shape, theta)
+    if np.count_nonzero(follows) < FEWEST_HEIGHTS:
+        return
+    points = points[follows]
+    theta, _ = fit_heights(np.column_stack([points, np.ones(len(points))]), shape, theta)
+    parameters, _, _ = shape.from_theta(theta)
+    yield from cut_to_outline(shape.variant(parameters).part(theta), end, roof.outline)
+
+
+def find_start(
+    points: np.ndarray, shape: Primitive, theta: np.ndarray
+) -> tuple[tuple[float, float], np.ndarray]:
+    """Return the height and the slope at which most points (n, 3) follow a shape.
+
+    `theta` has its plan. With them comes which points these are (n,).
+    """
+    best: tuple[int, tuple[float, float], np.ndarray] = (0, (0.0, 0.0), np.zeros(len(points), bool))
+    for slope in np.geomspace(*shape.bounds[0], SLOPES_TRIED).tolist():
+        theta[[Q0, Q1]] = 0.0, slope
+        above = points[:, 2] - shape.height_at(theta, points[:, :2])
+        lowest = np.sort(above)
+        reach = FOLLOW_M * math.hypot(1.0, slope)
+        counts = np.searchsorted(lowest, lowest + 2.0 * reach, side="right") - np.arange(len(above))
+        first = int(np.argmax(counts))
+        if counts[first] > best[0]:
+            follows = (above >= lowest[first]) & (above <= lowest[first] + 2.0 * reach)
+            best = int(counts[first]), (float(above[follows].mean()), slope), follows
+    return best[1:]
+
+
+def cut_to_outline(shape: Part, end: RoundEnd, outline: shapely.Polygon) -> Iterator[Part]:
+    """Yield the shape over its plan and up to the arc, as far as the outline reaches."""
+    plan = shapely.union(shape.pieces[0].outline, end.area, grid_size=OVERLAY_GRID_M)
+    polygons = list_polygons(shapely.intersection(plan, outline, grid_size=OVERLAY_GRID_M))
+    if polygons:
+        yield cut_part(shape, max(polygons, key=lambda polygon: polygon.area))
