@@ -7,7 +7,7 @@ import shapely
 from hiproof.errors import FitError, SettingsError
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.algebra import SYMBOLS, U, V, formula, q0, q1, q2
-from hiproof.primitives.contract import HALF_WIDTH, place_vertices
+from hiproof.primitives.contract import HALF_LENGTH, HALF_WIDTH, RECTANGLE, place_vertices
 
 VARIANTS = [variant for primitive in CATALOGUE.values() for variant in primitive.variants]
 IDS = [f"{variant.name}-{len(variant.parameters)}-{variant.strips}" for variant in VARIANTS]
@@ -78,9 +78,15 @@ def test_faces_tile_the_plan_counter_clockwise_with_eave_at_zero(primitive):
             areas
         )
         assert vertices[:, 2].min() == 0
-        np.testing.assert_allclose(
-            (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)) / 2, 0, atol=1e-12
-        )
+        plan = np.concatenate(shape.plan_rings(shape.to_theta(theta_p)))
+        for extreme in (np.min, np.max):
+            np.testing.assert_allclose(
+                extreme(vertices[:, :2], axis=0), extreme(plan, axis=0), atol=1e-12
+            )
+        if shape.rim == RECTANGLE:
+            half = shape.to_theta(theta_p)[[HALF_LENGTH, HALF_WIDTH]]
+            np.testing.assert_allclose(vertices[:, :2].max(axis=0), half, atol=1e-12)
+            np.testing.assert_allclose(vertices[:, :2].min(axis=0), -half, atol=1e-12)
 
 
 @each_variant

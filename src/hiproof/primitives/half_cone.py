@@ -27,15 +27,12 @@ def list_half_directions(sides: int) -> list[tuple[float, float]]:
 
 
 def make_half_cone(sides: int) -> Primitive:
-    """Return the half cone with half of so many facets.
-
-    The deepest corner of its plan lies at +u. Scaled across, its plan has the circle's area still.
-    """
+    """Return the half cone with half of so many facets."""
     apothem, fall = find_apothem(sides), q1 * V
     radius = apothem / math.cos(math.pi / sides)
     angles = [2.0 * math.pi * k / sides - 0.5 * math.pi for k in range(1, sides // 2)]
-    arc = [(2.0 * math.cos(a) - 1.0, radius * radius * math.sin(a)) for a in angles]
-    rim = ((-1.0, -radius * radius), *arc, (-1.0, radius * radius))
+    arc = [(2.0 * radius * math.cos(a) - 1.0, radius * math.sin(a)) for a in angles]
+    rim = ((-1.0, -radius), *arc, (-1.0, radius))
     steep: Formula = fall * (1.0 / apothem)
 
     def corners(p: Mapping[str, float]) -> Corners:
@@ -45,8 +42,7 @@ def make_half_cone(sides: int) -> Primitive:
 
     def make_plane(x: float, y: float) -> Plane:
         """Return the plane of the facet that faces to x, y."""
-        along, across = steep * (0.5 * radius * x), steep * (y / radius)
-        return -(along / U), -(across / V), q0 - along
+        return -(steep / U) * (0.5 * x), -(steep / V) * y, q0 - steep * (0.5 * x)
 
     def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
         return CONE.draw_parameters(rng, width) | {"length": width / 2}
