@@ -12,6 +12,7 @@ from ..progress import show_progress
 from .options import with_settings
 
 if TYPE_CHECKING:
+    from ..update.epochs import Surveys
     from ..update.run import UpdateSummary
 
 
@@ -34,6 +35,21 @@ def update(
         float,
         typer.Option(help="probability with which an unchanged building may be called changed"),
     ] = 0.001,
+    significance_over: Annotated[
+        str,
+        typer.Option(
+            help="what the significance holds for: `buildings`, each unchanged building alone, or "
+            "`city`, the share of false alarms among all changes (Benjamini and Hochberg)"
+        ),
+    ] = "buildings",
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine",
+            help="estimate the parameters of unchanged buildings from the points of both surveys, "
+            "where that makes them surer",
+        ),
+    ] = False,
     history: Annotated[
         bool,
         typer.Option("--history", help="keep models that ended, in GeoPackage and PostGIS"),
@@ -95,6 +111,8 @@ def update(
             run=run,
             run_parameters=str(find_parameters(run)),
             significance=significance,
+            significance_over=significance_over,
+            refine=refine,
             date=date,
             history=history,
         )
@@ -124,7 +142,7 @@ def print_update(summary: UpdateSummary) -> None:
     )
     typer.echo(f"survey of {surveys.date}, beside the earlier one by ({lies}) m")
     typer.echo(
-        f"chance of a false alarm: {surveys.significance:g} for each building; compared with the "
+        f"{describe_significance(surveys)}; compared with the "
         + ("earlier points" if surveys.has_earlier else "earlier models alone")
     )
     for name, reason in summary.run.broken_inputs:
@@ -135,3 +153,13 @@ def print_update(summary: UpdateSummary) -> None:
     typer.echo("files: " + ", ".join(map(str, files)))
     steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.run.seconds.items())
     typer.echo(f"time: {sum(summary.run.seconds.values()):.1f} s ({steps})")
+
+
+def describe_significance(surveys: Surveys) -> str:
+    """Describe how many false alarms are to be expected."""
+    if surveys.over == "buildings":
+        return f"chance of a false alarm: {surveys.significance:g} for each building"
+    return (
+        f"expected share of false alarms among all changes: {surveys.significance:g}, which is a "
+        f"chance of {surveys.largest_chance:.2g} for each building"
+    )

@@ -19,8 +19,11 @@ lineage    parts of the new roof that continue parts of the earlier one
 places     places that changed as parameters.jsonl holds them, roofs in one frame
 outside    roofs outside all outlines
 texts      texts of unchanged buildings, taken from the earlier run
+epochs     the surveys, and the points of both in a work tile
+refine     parameters of unchanged buildings, estimated by the points of both surveys
 solve      a work tile brought up to date
 tile       that, by name, for processes that have imported nothing yet
+rates      false alarms controlled over all buildings, before tiles are brought up to date
 tables     changes.csv and changes.gpkg
 run        the steps above, one after the other
 

@@ -5,6 +5,7 @@ Earlier points are sorted, and the surveys registered.
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,12 +21,13 @@ from ..errors import HiproofError, InputError
 from ..log import LOGGER
 from ..parametric.record import read_building
 from .earlier import EarlierRun
+from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys
 from .members import load_members
 from .outside import save_roofs_outside
 from .plan import EARLIER_FOLDER, save_earlier_plan
+from .rates import find_largest_chance, judge_city
 from .register import SampledRoof, register_surveys
-from .request import UpdateRequest
-from .solve import SURVEYS_FILE, Epochs, Surveys
+from .request import WHOLE_CITY, UpdateRequest
 from .texts import find_texts
 from .tile import sort_survey
 
@@ -59,8 +61,21 @@ def prepare_surveys(
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
     texts = find_texts(request.run, plan)
     surveys = Surveys(
-        shift, date, request.significance, bool(earlier.clouds), texts, request.history
+        shift,
+        date,
+        request.significance,
+        bool(earlier.clouds),
+        texts,
+        request.history,
+        request.significance_over,
+        request.significance,
+        request.refine,
     )
+    if request.significance_over == WHOLE_CITY:
+        surveys.save(state / JUDGING_FILE)
+        chances = judge_city(state, plan, request.terrain, executor)
+        largest = find_largest_chance(chances, request.significance)
+        surveys = dataclasses.replace(surveys, largest_chance=largest)
     surveys.save(state / SURVEYS_FILE)
 
 

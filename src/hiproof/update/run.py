@@ -16,17 +16,17 @@ from ..city.lock import hold_folder
 from ..city.plan import WorkPlan
 from ..city.resume import open_state
 from ..city.run import Steps, Summary, reconstruct_in_folder
-from ..errors import OutputError, SettingsError
+from ..errors import InputError, OutputError, SettingsError
 from ..garbage import collect_rarely
 from ..status import Change
 from ..write.files import atomic
 from .before import prepare_surveys, remove_earlier_points
 from .dates import find_survey_date
 from .earlier import EarlierRun, choose_read_settings, read_earlier
+from .epochs import SURVEYS_FILE, Surveys
 from .outside import CELLS_FOLDER, load_roofs_outside
 from .plan import make_update_plan
-from .request import UpdateRequest
-from .solve import SURVEYS_FILE, Surveys
+from .request import EACH_BUILDING, WHOLE_CITY, UpdateRequest
 from .tables import collect_changes, write_changes
 from .tile import sort_survey, update_tile
 
@@ -61,7 +61,17 @@ def update_area(
         raise SettingsError(
             f"expected --significance between 0 and 1, got {request.significance}; 0.001 is usual"
         )
+    if request.significance_over not in (EACH_BUILDING, WHOLE_CITY):
+        raise SettingsError(
+            f"expected --significance-over {EACH_BUILDING} or {WHOLE_CITY}, got "
+            f"{request.significance_over}; choose one"
+        )
     earlier = read_earlier(request.run)
+    if request.refine and not earlier.clouds:
+        raise InputError(
+            f"expected the clouds of {request.run} with --refine, which takes the points of both "
+            "surveys, got none; restore them where run.json names them, or leave out --refine"
+        )
     settings = choose_read_settings(earlier.settings).replace(changes or {})
     date = find_survey_date(request.clouds, request.date)
     request = dataclasses.replace(
@@ -133,6 +143,8 @@ def add_to_record(request: UpdateRequest, earlier: EarlierRun, result: UpdateSum
         "survey_date": surveys.date,
         "footprint_shift": list(earlier.footprint_shift),
         "significance": surveys.significance,
+        "significance_over": surveys.over,
+        "largest_chance": surveys.largest_chance,
         "compared_with": "points" if surveys.has_earlier else "models",
         "shift": surveys.shift.to_dict(),
         "by_change": result.by_change,

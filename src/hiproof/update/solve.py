@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,23 +19,21 @@ import numpy as np
 import shapely
 
 from ..city.bundles import keep_failure
-from ..city.found import FoundRoof
 from ..city.ledger import Outcome
 from ..city.overrides import load_overrides
-from ..city.plan import Job, WorkPlan, load_plan, neighbourhood
-from ..city.solve import Surroundings, open_terrain, record_failure, solve_buildings, solve_one
-from ..city.sort import load_points
-from ..errors import report_error
+from ..city.plan import Job, WorkPlan, load_plan
+from ..city.solve import record_failure, solve_buildings, solve_one
+from ..errors import HiproofError, report_error
 from ..log import LOGGER
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
 from ..parametric.override import Override
 from ..parametric.record import read_building, read_terrain_lines
-from ..read.thin import without_repeats
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
 from ..write.run_files import fragments
 from .cells import SAME_SIGMAS
+from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
@@ -50,90 +47,15 @@ from .places import (
     place_new,
     record_places,
 )
-from .plan import EARLIER_FOLDER
-from .register import SurveyShift
+from .refine import refine_building
 from .texts import KeptBuilding, keep_texts, load_texts
 
-SURVEYS_FILE = "surveys.json"
 BEGINNING = (Change.CHANGED, Change.NEW)  # the roof as it is begins with the survey
+TESTED = (Change.CHANGED, Change.UNCHANGED, Change.UNCERTAIN, Change.GONE)
+"""Classes of buildings that were tested; others have too few points."""
+
 BARE_SHARE = 0.5
 """Share of an outline that has to lie bare before, for a building to be built since."""
-
-
-@dataclass(frozen=True)
-class Surveys:
-    """The shift of the two surveys, the new one's date and the significance.
-
-    `texts` is the state folder of the earlier run, "" where its texts cannot be kept. `history`
-    says whether models that ended are kept.
-    """
-
-    shift: SurveyShift
-    date: str
-    significance: float
-    has_earlier: bool
-    texts: str = ""
-    history: bool = False
-
-    def save(self, path: Path) -> None:
-        """Write the surveys for the workers."""
-        record = dataclasses.asdict(self) | {"shift": self.shift.to_dict()}
-        path.write_text(json.dumps(record) + "\n", encoding="utf-8")
-
-    @staticmethod
-    def load(path: Path) -> Surveys:
-        """Read what `save` wrote."""
-        record = json.loads(path.read_text(encoding="utf-8"))
-        return Surveys(**record | {"shift": SurveyShift.from_dict(record["shift"])})
-
-
-class Epochs:
-    """The points of both surveys in a work tile, looked up building by building."""
-
-    def __init__(self, root: Path, tile: str, terrain: str | None, shift: np.ndarray):
-        self.root, self.plan = root, load_plan(root)
-        points = {kind: xyz - shift for kind, xyz in load_points(root, tile).items()}
-        self.new = Surroundings(points, open_terrain(self.plan, terrain), self.plan)
-        folder, self.old = root / EARLIER_FOLDER, None
-        if any((folder / "points").iterdir()):
-            self.old = Surroundings(load_points(folder, tile), None, load_plan(folder))
-
-    def select(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
-        """Return the old and new points (n, 3) of a building, roof and bare ground alike."""
-        old = None if self.old is None else select_points(self.old, job)
-        return old, select_points(self.new, job)
-
-    def select_roofs(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
-        """Return the old and new roof points (n, 3) of a building."""
-        old = None if self.old is None else select_roof(self.old, job).points
-        return old, select_roof(self.new, job).points
-
-
-def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:
-    """Return the points (n, 3) of a roof and of bare ground in its outline, each once."""
-    roof = select_roof(surroundings, job)
-    if not (len(roof.ground) or has_ground(surroundings, job)):
-        return roof.points
-    bare = surroundings.bare(job, roof, surroundings.select_other_points(job))
-    bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
-    return np.concatenate([roof.points, bare])
-
-
-def has_ground(surroundings: Surroundings, job: Job) -> bool:
-    """Return whether points of the ground class lie in a building's outline."""
-    ground = surroundings.ground.inside(neighbourhood(job, 0.0))
-    return bool(shapely.intersects_xy(job.area, ground[:, 0], ground[:, 1]).any())
-
-
-def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:
-    """Return the roof of a building, with the points inside its outline."""
-    if surroundings.plan.settings.read.by_class:
-        inside = surroundings.grid.inside(job.area)
-        return FoundRoof(without_repeats(surroundings.roof.take(inside, axis=0)))
-    found = surroundings.select_roof_points(job)
-    points = without_repeats(found.points)
-    inside = shapely.intersects_xy(job.area, points[:, 0], points[:, 1])
-    return dataclasses.replace(found, points=points[inside])
 
 
 def update_tile(
@@ -144,12 +66,8 @@ def update_tile(
     The arguments are those of `solve_tile`.
     """
     root = Path(folder)
-    plan, surveys, members = load_plan(root), Surveys.load(root / SURVEYS_FILE), load_members(root)
-    epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
-    keep = functools.partial(keep_failure, root, tile, plan)
-
-    texts, overrides = load_texts(surveys.texts, tile, plan.head), load_overrides(root)
-    updater = Updater(plan, epochs, surveys, keep, texts, overrides)
+    updater, members = make_updater(root, tile, terrain, SURVEYS_FILE), load_members(root)
+    plan = updater.plan
 
     def solve(job: Job) -> tuple[Building, Fragments]:
         building = updater.update(job, UpdateMember.read(members[job.index], job))
@@ -158,6 +76,35 @@ def update_tile(
         return fragments(building, plan.list_names(job), plan.head)
 
     return solve_buildings(root, plan, tile, solve, avoid)
+
+
+def make_updater(root: Path, tile: str, terrain: str | None, file: str) -> Updater:
+    """Make the updater of a work tile by the surveys in `file`."""
+    plan, surveys = load_plan(root), Surveys.load(root / file)
+    epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
+    keep = functools.partial(keep_failure, root, tile, plan)
+    texts = load_texts(surveys.texts, tile, plan.head)
+    return Updater(plan, epochs, surveys, keep, texts, load_overrides(root))
+
+
+def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float]:
+    """Return the chances of the buildings of `tile` that were tested.
+
+    One that cannot be read is left to `update_tile`.
+    """
+    root, chances = Path(folder), []
+    updater, members = make_updater(root, tile, terrain, JUDGING_FILE), load_members(root)
+    for index in updater.plan.tiles[tile]:
+        try:
+            earlier, roof = read_building(members[index]["record"] or {"id": ""})
+            if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
+                continue
+            verdict = updater.judge(updater.plan.jobs[index], earlier, roof)
+        except HiproofError:
+            continue
+        if verdict.change in TESTED:
+            chances.append(1.0 if verdict.change is Change.UNCERTAIN else verdict.chance)
+    return chances
 
 
 @dataclass(frozen=True)
@@ -188,7 +135,8 @@ class Updater:
                 return self.revisit_empty(job, member)
             verdict = self.judge(job, earlier, roof)
             if verdict.change is Change.UNCHANGED and member.is_same_outline:
-                kept = keep_texts(earlier, member.record, self.texts)
+                kept = self.refine(job, member.record) if self.surveys.refine else None
+                kept = kept or keep_texts(earlier, member.record, self.texts)
                 if kept is not None:
                     return kept
             lines = tuple(read_terrain_lines(member.record))
@@ -214,9 +162,20 @@ class Updater:
             earlier.z_ground - frame.origin[2],
             shift.noise,
             shift.sigma[2],
-            self.surveys.significance,
+            self.surveys.largest_chance,
             0.0 if math.isnan(unexplained) else unexplained,
         )
+
+    def refine(self, job: Job, record: dict[str, Any]) -> Building | None:
+        """Return an unchanged building fitted to both surveys.
+
+        None where it gains nothing.
+        """
+        old, new = self.epochs.select_roofs(job)
+        if old is None:
+            return None
+        earlier = build(record, self.plan.settings.compose)
+        return refine_building(earlier, old, new, self.surveys.date)
 
     def reconstruct(self, job: Job, member: UpdateMember) -> Building:
         """Return a building made of the new points and its override."""

@@ -26,3 +26,10 @@ def update_tile(
     from . import solve
 
     return solve.update_tile(folder, tile, terrain, avoid)
+
+
+def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float]:
+    """Return the chances of a work tile's buildings that were tested; see solve.py."""
+    from . import solve
+
+    return solve.judge_tile(folder, tile, terrain)

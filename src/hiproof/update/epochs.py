@@ -1,0 +1,104 @@
+"""The surveys of an update, and the points of both in a work tile."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from ..city.found import FoundRoof
+from ..city.plan import Job, load_plan, neighbourhood
+from ..city.solve import Surroundings, open_terrain
+from ..city.sort import load_points
+from ..read.thin import without_repeats
+from .plan import EARLIER_FOLDER
+from .register import SurveyShift
+from .request import EACH_BUILDING, SIGNIFICANCE
+
+SURVEYS_FILE, JUDGING_FILE = "surveys.json", "surveys.judging.json"
+"""The surveys for the workers, and what they are before all buildings were judged together."""
+
+
+@dataclass(frozen=True)
+class Surveys:
+    """The shift of the two surveys, the new one's date and the significance.
+
+    Of chances below `largest_chance` buildings count as changed. `over` says what the significance
+    holds for. `texts` is the state folder of the earlier run, "" where its texts cannot be kept.
+    `history` says whether models that ended are kept, `refine` whether unchanged buildings are
+    estimated anew.
+    """
+
+    shift: SurveyShift
+    date: str
+    significance: float
+    has_earlier: bool
+    texts: str = ""
+    history: bool = False
+    over: str = EACH_BUILDING
+    largest_chance: float = SIGNIFICANCE
+    refine: bool = False
+
+    def save(self, path: Path) -> None:
+        """Write the surveys for the workers."""
+        record = dataclasses.asdict(self) | {"shift": self.shift.to_dict()}
+        path.write_text(json.dumps(record) + "\n", encoding="utf-8")
+
+    @staticmethod
+    def load(path: Path) -> Surveys:
+        """Read what `save` wrote."""
+        record = json.loads(path.read_text(encoding="utf-8"))
+        return Surveys(**record | {"shift": SurveyShift.from_dict(record["shift"])})
+
+
+class Epochs:
+    """The points of both surveys in a work tile, looked up building by building."""
+
+    def __init__(self, root: Path, tile: str, terrain: str | None, shift: np.ndarray):
+        self.root, self.plan = root, load_plan(root)
+        points = {kind: xyz - shift for kind, xyz in load_points(root, tile).items()}
+        self.new = Surroundings(points, open_terrain(self.plan, terrain), self.plan)
+        folder, self.old = root / EARLIER_FOLDER, None
+        if any((folder / "points").iterdir()):
+            self.old = Surroundings(load_points(folder, tile), None, load_plan(folder))
+
+    def select(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
+        """Return the old and new points (n, 3) of a building, roof and bare ground alike."""
+        old = None if self.old is None else select_points(self.old, job)
+        return old, select_points(self.new, job)
+
+    def select_roofs(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
+        """Return the old and new roof points (n, 3) of a building."""
+        old = None if self.old is None else select_roof(self.old, job).points
+        return old, select_roof(self.new, job).points
+
+
+def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:
+    """Return the points (n, 3) of a roof and of bare ground in its outline, each once."""
+    roof = select_roof(surroundings, job)
+    if not (len(roof.ground) or has_ground(surroundings, job)):
+        return roof.points
+    bare = surroundings.bare(job, roof, surroundings.select_other_points(job))
+    bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
+    return np.concatenate([roof.points, bare])
+
+
+def has_ground(surroundings: Surroundings, job: Job) -> bool:
+    """Return whether points of the ground class lie in a building's outline."""
+    ground = surroundings.ground.inside(neighbourhood(job, 0.0))
+    return bool(shapely.intersects_xy(job.area, ground[:, 0], ground[:, 1]).any())
+
+
+def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:
+    """Return the roof of a building, with the points inside its outline."""
+    if surroundings.plan.settings.read.by_class:
+        inside = surroundings.grid.inside(job.area)
+        return FoundRoof(without_repeats(surroundings.roof.take(inside, axis=0)))
+    found = surroundings.select_roof_points(job)
+    points = without_repeats(found.points)
+    inside = shapely.intersects_xy(job.area, points[:, 0], points[:, 1])
+    return dataclasses.replace(found, points=points[inside])
