@@ -11,7 +11,7 @@ import shapely
 
 from ..errors import CompositionError
 from ..geometry.outline_edges import OutlineEdges, list_outline_edges, make_strips
-from ..geometry.rings import with_area
+from ..geometry.rings import OVERLAY_GRID_M, with_area
 from ..model import GROUND, Eaves, Model, Piece, Roof, Solid
 from ..model.overhang import WALLS
 from ..settings import ComposeSettings, Settings
@@ -26,7 +26,6 @@ PIECE_ENDS_M = 0.01  # a piece of the roof so near to an edge of the outline end
 LEAST_STRETCH_M = 0.05  # of an edge that belongs to a piece; a shorter one is a corner
 JUST_INSIDE_M = 0.02  # from the edge, where it is asked which piece is seen
 UNSEEN_PIECE_M = 0.01  # below the roof, from which a piece is not seen
-LEAST_OVERLAP_M2 = 0.01  # of a strip and the outline; less is rounding
 THICKNESS_SHARES = (1.0, 0.95, 0.9)  # of a roof's thickness, tried until the solid is valid
 
 
@@ -40,6 +39,17 @@ def add_eaves(model: Model, eaves: Eaves) -> Model:
         widths[overhang.edge] = overhang.length
     if not widths.any():
         return replace(model, eaves=replace(eaves, solid=None))
+    try:
+        solid = make_solid(model, eaves, widths)
+    except shapely.GEOSException as error:
+        raise CompositionError(
+            f"expected overhangs that can be drawn, got: {error}; leave them out"
+        ) from error
+    return replace(model, eaves=replace(eaves, solid=solid))
+
+
+def make_solid(model: Model, eaves: Eaves, widths: np.ndarray) -> Solid:
+    """Return the solid (world) with overhangs of `widths` (n,) at the outline's edges."""
     origin = model.roof.frame.origin
     level = model.on_one_level
     local = Solid(np.round(level.vertices - origin, PLAN_DIGITS), level.faces)
@@ -49,8 +59,7 @@ def add_eaves(model: Model, eaves: Eaves) -> Model:
         local = compose_over(widen_roof(model.roof, widths), local, options)
     else:
         walls = set_walls_in(model.roof.outline, widths)
-    solid = close_solid(local, model, to_grid(walls), eaves.thickness)
-    return replace(model, eaves=replace(eaves, solid=solid.move(origin)))
+    return close_solid(local, model, to_grid(walls), eaves.thickness).move(origin)
 
 
 def remove_eaves(model: Model, eaves: Eaves) -> Model:
@@ -105,9 +114,8 @@ def widen_roof(roof: Roof, widths: np.ndarray) -> Roof:
     edges = list_outline_edges(roof.outline)
     strips = make_strips(edges, widths)
     number_of = np.flatnonzero(widths)
-    area = shapely.union_all(
-        [roof.outline, *(shapely.polygons(strips[k]) for k in number_of)], grid_size=GRID_M
-    )
+    areas = [roof.outline, *(shapely.polygons(strips[k]) for k in number_of)]
+    area = with_area(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
     if area.geom_type != "Polygon":
         raise CompositionError(
             "expected overhangs around one roof, got several areas; leave them out"
@@ -139,7 +147,7 @@ def widen_piece(
     if not added:
         yield piece
         return
-    union = shapely.union_all([piece.outline, *added], grid_size=GRID_M)
+    union = shapely.union_all([piece.outline, *added], grid_size=OVERLAY_GRID_M)
     for outline in shapely.get_parts(with_area(union)):
         yield Piece(outline, piece.planes)
 
@@ -191,16 +199,16 @@ def cut_strip(
         outer_a if start == 0.0 else a + start * (b - a) + across,
     ]
     polygon = shapely.polygons(corners)
-    if shapely.intersection(polygon, outline).area > LEAST_OVERLAP_M2:
-        return with_area(shapely.difference(polygon, outline, grid_size=GRID_M))
-    return polygon
+    return with_area(shapely.difference(polygon, outline, grid_size=OVERLAY_GRID_M))
 
 
 def set_walls_in(outline: shapely.Polygon, widths: np.ndarray) -> shapely.Polygon:
     """Return the outline of walls that stand `widths` (n,) within an outline."""
     strips = make_strips(list_outline_edges(outline), widths, side=-1.0)
     taken = [shapely.make_valid(shapely.polygons(strips[k])) for k in np.flatnonzero(widths)]
-    walls = with_area(shapely.difference(outline, shapely.union_all(taken), grid_size=GRID_M))
+    walls = with_area(
+        shapely.difference(outline, shapely.union_all(taken), grid_size=OVERLAY_GRID_M)
+    )
     if walls.geom_type != "Polygon" or walls.is_empty:
         raise CompositionError(
             "expected walls in one piece within the roof, got none or several; assume a shorter "

@@ -16,7 +16,7 @@ import shapely
 
 from ..errors import CompositionError
 from ..model import CEILING, ROOF, WALL, Passage, Solid, Underside
-from .arrangement import GRID_M
+from .arrangement import COLLINEAR_UNITS, GRID_M
 from .building_parts import list_edges
 from .shell import simple_loops
 from .underside import (
@@ -33,7 +33,7 @@ from .underside import (
 
 SAME_PLACE_UNITS = 15.0  # 1.5 mm; composing a roof moves a corner of its outline by less
 SAME_HEIGHT_UNITS = 10  # 1 mm; heights over one place nearer than that are one
-STRIP_SLIVER_UNITS = 20.0  # 2 mm; strips between walls and roof edge thinner than that are rounding
+SLIVER_STRIP_UNITS = 20.0  # 2 mm; strips between walls and roof edge thinner than that are rounding
 
 
 class Step(NamedTuple):
@@ -53,6 +53,8 @@ class OverhangingShell(Shell):
 
     The walls' outline is in units of the grid, the `thickness` of slabs too.
     """
+
+    on_edge_units = COLLINEAR_UNITS + 1.0  # walls of a composed solid bend by that without a corner
 
     def __init__(
         self,
@@ -74,7 +76,7 @@ class OverhangingShell(Shell):
     ) -> list[GroundCell]:
         """Return the cells within the walls, then those of the slabs."""
         inside, outside = self.cut_plan(shapely.Polygon(rings[0], rings[1:]))
-        feet = list_rings(inside)
+        feet = [ring for part in shapely.get_parts(inside) for ring in list_rings(part)]
         self.steps = dict(self.find_steps())
         self.bends = self.find_bends(feet) | self.find_crossings()
         cells = cut_cells(inside, passages)
@@ -83,12 +85,11 @@ class OverhangingShell(Shell):
 
     def cut_plan(
         self, area: shapely.Polygon
-    ) -> tuple[shapely.Polygon, list[tuple[shapely.Polygon, int]]]:
+    ) -> tuple[shapely.Geometry, list[tuple[shapely.Polygon, int]]]:
         """Return the plan within the walls, and the slabs outside with their roof faces."""
         numbers = [n for n, face in enumerate(self.solid.faces) if face.kind == ROOF]
         roofs = np.array([to_grid(self.solid.project_face(self.solid.faces[n])) for n in numbers])
-        corners = shapely.get_coordinates(np.append(roofs, area))
-        walls = snap_places(self.walls, corners)
+        walls = weld_walls(self.walls, [area, *roofs])
         rings = [ring for polygon in (walls, area, *roofs) for ring in list_rings(polygon)]
         self.pool = np.unique(np.concatenate(rings).astype(int), axis=0)
         lines = shapely.union_all(
@@ -98,13 +99,8 @@ class OverhangingShell(Shell):
         middles = shapely.point_on_surface(cells)
         cells, middles = (a[shapely.contains(area, middles)] for a in (cells, middles))
         is_inside = shapely.contains(walls, middles)
-        is_inside |= shapely.is_empty(shapely.buffer(cells, -STRIP_SLIVER_UNITS / 2))
+        is_inside |= find_slivers(cells, shapely.boundary(walls))
         inside = shapely.union_all(cells[is_inside], grid_size=1.0)
-        if inside.geom_type != "Polygon":
-            raise CompositionError(
-                "expected walls that stand below the roof in one piece, got several; leave the "
-                "overhangs out"
-            )
         owners = shapely.distance(middles[:, None], roofs[None]).argmin(axis=1)
         return inside, [
             (cell, numbers[owner])
@@ -249,19 +245,59 @@ def to_grid(polygon: shapely.Polygon) -> shapely.Polygon:
     return shapely.transform(polygon, lambda xy: np.rint(xy / GRID_M))
 
 
-def snap_places(walls: shapely.Polygon, corners: np.ndarray) -> shapely.Polygon:
-    """Return the walls' outline with its corners on those that are the same places.
+def find_slivers(cells: np.ndarray, walls: shapely.Geometry) -> np.ndarray:
+    """Return whether cells (n,) are rounding along the walls' outline."""
+    is_thin = shapely.is_empty(shapely.buffer(cells, -SLIVER_STRIP_UNITS / 2))
+    shared = shapely.length(shapely.intersection(shapely.boundary(cells), walls))
+    return is_thin & (shared > 0.0)
 
-    These are among `corners` (n, 2).
+
+def weld_walls(walls: shapely.Polygon, roofs: list[shapely.Polygon]) -> shapely.Polygon:
+    """Return the walls' outline through all that is the same place of the roof's plan.
+
+    Its corners move onto corners and edges of `roofs`, and its edges pass through corners.
     """
+    rings = [np.array(ring, float) for polygon in roofs for ring in list_rings(polygon)]
+    corners = np.unique(np.concatenate(rings), axis=0)
+    lines = np.concatenate([np.stack([r, np.roll(r, -1, axis=0)], axis=1) for r in rings])
+    welded = [
+        weld_edges(np.array([weld_corner(place, corners, lines) for place in ring]), corners)
+        for ring in list_rings(walls)
+    ]
+    return shapely.Polygon(welded[0], welded[1:])
 
-    def snap(xy: np.ndarray) -> np.ndarray:
-        gaps = np.hypot(*(xy[:, None] - corners[None]).transpose(2, 0, 1))
-        nearest = gaps.argmin(axis=1)
-        is_same = gaps[np.arange(len(xy)), nearest] <= SAME_PLACE_UNITS
-        return np.where(is_same[:, None], corners[nearest], xy)
 
-    return shapely.transform(walls, snap)
+def weld_corner(place: Place, corners: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Return the corner (n, 2) or place on a line (m, 2, 2) that a place is.
+
+    It is the place itself where it is neither.
+    """
+    gaps = np.hypot(*(corners - place).T)
+    if gaps.min() <= SAME_PLACE_UNITS:
+        return corners[gaps.argmin()]
+    along = lines[:, 1] - lines[:, 0]
+    length2 = np.maximum((along**2).sum(axis=1), 1.0)
+    share = ((place - lines[:, 0]) * along).sum(axis=1) / length2
+    feet = lines[:, 0] + np.clip(share, 0.0, 1.0)[:, None] * along
+    gaps = np.hypot(*(feet - place).T)
+    return np.rint(feet[gaps.argmin()]) if gaps.min() <= SAME_PLACE_UNITS else np.array(place)
+
+
+def weld_edges(ring: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return a ring (k, 2) that passes through the `corners` (n, 2) beside its edges."""
+    result = []
+    for start, end in itertools.pairwise([*ring, ring[0]]):
+        along = end - start
+        length = float(np.hypot(*along))
+        if length == 0.0:
+            continue
+        offset = corners - start
+        t = offset @ along / length
+        aside = np.abs(offset @ [-along[1], along[0]]) / length
+        is_near = (t > SAME_PLACE_UNITS) & (t < length - SAME_PLACE_UNITS)
+        is_near &= aside <= SAME_PLACE_UNITS
+        result += [start, *corners[is_near][np.argsort(t[is_near])]]
+    return np.array(result)
 
 
 def make_step(ring: list[Corner]) -> Step:

@@ -108,7 +108,12 @@ def fit_plane(solid: Solid, face: Face) -> np.ndarray:
 
 
 class Shell:
-    """A solid while its underside is made."""
+    """A solid while its underside is made.
+
+    Places so near an edge lie on it: `on_edge_units`.
+    """
+
+    on_edge_units = ON_EDGE_UNITS
 
     def __init__(self, solid: Solid, underside: Underside, cap: Cap) -> None:
         self.solid = solid
@@ -178,7 +183,8 @@ class Shell:
         offset = self.pool - start
         t = offset @ along / length
         aside = np.abs(offset @ [-along[1], along[0]]) / length
-        inner = (t > ON_EDGE_UNITS) & (t < length - ON_EDGE_UNITS) & (aside <= ON_EDGE_UNITS)
+        reach = self.on_edge_units
+        inner = (t > reach) & (t < length - reach) & (aside <= reach)
         return [(x, y) for x, y in self.pool[inner][np.argsort(t[inner])].tolist()]
 
     def measure_ground(self, cap: Cap) -> dict[Place, int]:

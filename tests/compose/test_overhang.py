@@ -1,0 +1,89 @@
+"""Roofs that reach beyond their walls: valid solids of slabs, whatever the roof."""
+
+import numpy as np
+import pytest
+import shapely
+
+import hiproof
+from hiproof.compose import check_solid, compose
+from hiproof.compose.eaves import add_eaves
+from hiproof.compose.settle import settled_roof
+from hiproof.errors import CompositionError
+from hiproof.geometry.outline_edges import list_outline_edges
+from hiproof.model import CEILING, GROUND, Eaves, Model, Overhang
+from hiproof.simulate.compounds import COMPOUND_KINDS, random_compound
+
+THICKNESS_M = 0.2
+LEFT, RIGHT = ([[x, -4], [x + 6, -4], [x + 6, 4], [x, 4]] for x in (-6, 0))
+
+
+def make_eaves(lengths, thickness=THICKNESS_M, kind="walls"):
+    overhangs = tuple(Overhang(k, float(length)) for k, length in enumerate(lengths) if length)
+    return Eaves(overhangs, thickness, kind)
+
+
+def build_pair(rise, z=5.0, step=0.0):
+    """Two gables side by side, the right one by `step` higher and of another rise."""
+    parts = [
+        {
+            "type": "gable",
+            "parameters": {"width": 8, "length": 6, "height": height},
+            "position": [x, 0, eave],
+            "outlines": [[ring]],
+        }
+        for x, ring, height, eave in ((-3, LEFT, 3.0, z), (3, RIGHT, rise, z + step))
+    ]
+    ring = [[-6, -4], [6, -4], [6, 4], [-6, 4]]
+    record = {"id": "a", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0, "parts": parts}
+    return hiproof.build(record).model
+
+
+@pytest.mark.parametrize(("rise", "step"), [(3.0, 0.1), (3.0, 0.2), (3.0, 2.0), (2.2, 0.3)])
+def test_slabs_at_a_step_keep_their_thickness(rise, step):
+    model = build_pair(rise, step=step)
+    solid = add_eaves(model, make_eaves([0.5, 0.3, 0.5, 0.3])).eaves.solid
+    assert check_solid(solid) == ()
+    beyond = 12.6 * 9.0 - 12 * 8
+    # steps as high as a slab is thick make it a little thinner: it would touch along a line
+    assert solid.volume - model.solid.volume == pytest.approx(THICKNESS_M * beyond, rel=0.051)
+    assert sum(solid.project_face(f).area for f in solid.select_faces(CEILING)) == pytest.approx(
+        beyond, abs=0.01
+    )
+
+
+def test_ceilings_are_parallel_to_the_roof_above():
+    model = build_pair(3.0)  # one plane a side, over both parts
+    solid = add_eaves(model, make_eaves([0.5, 0.3, 0.5, 0.3])).eaves.solid
+    corners = {vertex for face in solid.select_faces(CEILING) for vertex in face.rings[0]}
+    xyz = solid.vertices[list(corners)]
+    roof = 8.0 - 0.75 * np.abs(xyz[:, 1])
+    assert xyz[:, 2] == pytest.approx(roof - THICKNESS_M, abs=2e-4)
+    assert xyz[:, 2].min() == pytest.approx(5.0 - 0.5 * 0.75 - THICKNESS_M, abs=2e-4)
+
+
+def test_edges_without_overhang_keep_their_wall():
+    model = build_pair(3.0, step=1.0)
+    solid = add_eaves(model, make_eaves([0.5, 0, 0, 0])).eaves.solid
+    assert check_solid(solid) == ()
+    x, y, _ = solid.vertices.T
+    assert (x.min(), x.max(), y.min(), y.max()) == (-6, 6, -4.5, 4)
+
+
+def test_roofs_near_the_ground_have_none():
+    with pytest.raises(CompositionError, match="leave them out"):
+        add_eaves(build_pair(3.0, z=0.3), make_eaves([0.5] * 4))
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_compounds_have_valid_overhangs(kind):
+    rng = np.random.default_rng(7)
+    roof = settled_roof(random_compound(rng, kind).roof)
+    model = Model(roof, compose(roof, 0.0))
+    count = len(list_outline_edges(roof.outline).starts)
+    for footprint_kind in ("walls", "roof"):
+        lengths = rng.choice([0.0, 0.3, 0.8], count)
+        solid = add_eaves(model, make_eaves(lengths, kind=footprint_kind)).finest_solid
+        assert check_solid(solid) == ()
+        ground = shapely.union_all([solid.project_face(f) for f in solid.select_faces(GROUND)])
+        if footprint_kind == "walls":
+            assert shapely.area(shapely.symmetric_difference(ground, roof.outline)) < 0.02
