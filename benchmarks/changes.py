@@ -9,7 +9,8 @@ One building in five (--share) changes, by each kind in turn, and the same numbe
 something that is no change: leaves over the roof in class 6, a crane, scaffolding, or no points on
 a side. Both surveys have their own noise; the second lies 5 cm higher and 20 cm aside. `hiproof
 reconstruct` runs on the first survey and `hiproof update` on the second. Changes count from 0.5 m
-over 4 m2 on.
+over 4 m2 on. Flight lines have errors of their own: how much higher the second survey lies on the
+whole is measured on its ground.
 
 With --refine, it prints how large the errors of the parameters of unchanged buildings are over
 their standard deviations (RMS), before and after they are estimated by both surveys. Both are about
@@ -167,7 +168,9 @@ def write_city(
                 cloud = cloud.move(SHIFT_M)
             scans.append(cloud)
         write_laz(folder / f"{name}.laz", iter(scans), np.array([*bounds[:2], 0.0]))
+    heights = [measure_height(folder / f"{name}.laz", stock) for name in ("first", "second")]
     truth = {
+        "height": heights[1] - heights[0],
         "kinds": kinds,
         "disturbed": disturbed,
         "ids": [lot.id for lot in lots],
@@ -180,6 +183,13 @@ def write_city(
     }
     (folder / "truth.json").write_text(json.dumps(truth))
     return truth
+
+
+def measure_height(path: Path, stock: Stock) -> float:
+    """Return how much higher (m) than the terrain a survey shows the ground."""
+    cloud = read_points(str(path))
+    ground = cloud.xyz[cloud.classes == 2]
+    return float(np.median(ground[:, 2] - stock.terrain.height_at(ground[:, :2])))
 
 
 def run_city(
@@ -250,9 +260,7 @@ def measure_refined(
     stock = Stock(City(count, seed, densities[0]))
     lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
     roofs = {lot.id: lot.building.roof for lot in lots}
-    ground = read_points(str(folder / "first.laz"))
-    xyz = ground.xyz[ground.classes == 2]
-    offset = np.array([0.0, 0.0, np.median(xyz[:, 2] - stock.terrain.height_at(xyz[:, :2]))])
+    offset = np.array([0.0, 0.0, measure_height(folder / "first.laz", stock)])
     models = {name: read_models(folder / name) for name in ("models", "refined")}
     changed = truth["kinds"].keys() | truth["disturbed"].keys()
     chosen = [
@@ -371,6 +379,8 @@ def main() -> None:
             print(
                 "shift", result["shift"].xyz, "sigma", result["shift"].sigma, result["shift"].noise
             )
+            error = result["shift"].xyz[2] - result["truth"]["height"]
+            print(f"common height {error:+.4f} m beside that of the ground")
             print(f"CPU: run {result['seconds'][0]:.1f} s, update {result['seconds'][1]:.1f} s")
         for name, value in score(results, given.verbose).items():
             print(f"{name:24s} {value:.4g}")

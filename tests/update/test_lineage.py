@@ -2,6 +2,7 @@
 
 import copy
 
+import numpy as np
 import pytest
 
 from hiproof.compose import check_solid
@@ -55,13 +56,23 @@ def move(ring, shift):
     return [[x - shift[0], y - shift[1]] for x, y in ring]
 
 
+def scan(building):
+    """Points on the roof of a building, in the world."""
+    x, y = np.meshgrid(np.arange(0.5, 20, 0.5), np.arange(0.5, 8, 0.5))
+    local = np.column_stack([x.ravel(), y.ravel()]) - (
+        building.roof.frame.origin[:2] - [1000, 2000]
+    )
+    xyz = np.column_stack([local, building.roof.height_at(local)])
+    return building.roof.frame.to_world(xyz[np.isfinite(xyz).all(axis=1)])
+
+
 def find_tops(building):
     return building.roof.height_at([[6.0, 4.0], [16.0, 4.0]]) + building.roof.frame.origin[2]
 
 
 def test_an_unchanged_part_keeps_its_parameters_beside_one_that_was_raised():
     old, new = build(HOUSE), build_new(rise_west=0.03, rise_east=2.0)
-    result, lineage = continue_parts(old, new, NEAR_M)
+    result, lineage = continue_parts(old, new, NEAR_M, scan(new))
     assert lineage == [0, 1]
     before, after = building_record(old), building_record(result)
     assert after["origin"] == before["origin"] and after["outline"] == before["outline"]
@@ -70,9 +81,18 @@ def test_an_unchanged_part_keeps_its_parameters_beside_one_that_was_raised():
     assert not check_solid(result.solid)
 
 
+def test_figures_of_a_building_with_kept_parts_are_those_of_its_own_roof():
+    old, new = build(HOUSE), build_new(rise_west=0.06, rise_east=2.0)
+    result, _ = continue_parts(old, new, NEAR_M, scan(new))
+    slope = 3 / 4  # points lie 0.06 m over a slope of the gable, and on the flat part
+    distance = 0.06 / np.hypot(1.0, slope)
+    assert result.quality.p95 == pytest.approx(distance, abs=2e-3)
+    assert 0.6 * distance < result.quality.rmse < 0.9 * distance
+
+
 def test_a_part_that_moved_by_more_than_the_surveys_differ_is_new():
     old, new = build(HOUSE), build_new(rise_west=0.3, rise_east=2.0)
-    result, lineage = continue_parts(old, new, NEAR_M)
+    result, lineage = continue_parts(old, new, NEAR_M, scan(new))
     assert lineage == [0, 1]
     local = result.roof.frame.origin[:2] - [1000.0, 2000.0]
     tops = result.roof.height_at([[6.0, 4.0], [16.0, 4.0]] - local) + result.roof.frame.origin[2]
@@ -83,6 +103,6 @@ def test_a_part_that_would_leave_a_gap_is_not_kept():
     """The flat part now begins half a metre away from the earlier gable."""
     narrow = [[12.5, 0], [20, 0], [20, 8], [12.5, 8]]
     old, new = build(HOUSE), build_new(rise_east=2.0, east=narrow)
-    result, _ = continue_parts(old, new, NEAR_M)
+    result, _ = continue_parts(old, new, NEAR_M, scan(new))
     assert len(result.parts) == 2
     assert result.roof.frame.origin.tolist() == new.roof.frame.origin.tolist()

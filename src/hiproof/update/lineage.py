@@ -6,6 +6,7 @@ keeps that part's number where it can: parts that continue others come first, in
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..errors import HiproofError
 from ..model import Building, Roof
 from ..model.heights import find_highest
 from ..parametric.building import build
+from ..parametric.refit import measure_building, select_inside
 from ..write.parameters import LENGTH_DIGITS, building_record
 
 PART_GRID_M = 0.5  # of the places where parts are compared
@@ -31,13 +33,14 @@ LARGEST_GAP_M2 = 0.05
 
 
 def continue_parts(
-    old: Building, new: Building, near_m: float
+    old: Building, new: Building, near_m: float, points: np.ndarray
 ) -> tuple[Building, list[int | None]]:
     """Return the new building with its parts in the earlier order.
 
     A part that the test does not tell from the part it continues keeps that part's parameters:
     their heights differ by no more than `near_m`. The numbers of the parts that they continue come
-    with the building, None for new parts.
+    with the building, None for new parts. With kept parts, the building is measured again on the
+    new `points` (n, 3), in world metres.
     """
     pairs = match_parts(old, new)
     order = sorted(range(len(new.parts)), key=lambda k: (k not in pairs, pairs.get(k, k), k))
@@ -52,12 +55,24 @@ def continue_parts(
         except HiproofError:
             result = new
         if result is not new and covers_outline(result.roof):
-            return result, lineage
+            return measure_again(result, new, points), lineage
     if order == list(range(len(order))):
         return new, lineage
     record = building_record(new)
     record["parts"] = [record["parts"][k] for k in order]
     return build(record, new.model.compose), lineage
+
+
+def measure_again(result: Building, new: Building, points: np.ndarray) -> Building:
+    """Return a building that keeps earlier parts with its own residuals and grade.
+
+    The numbers of points are those of the `new` building, which it takes the place of.
+    """
+    measured = measure_building(result, select_inside(result.roof, points))
+    quality = dataclasses.replace(
+        measured.quality, points=new.quality.points, density=new.quality.density
+    )
+    return dataclasses.replace(result, quality=quality, grade=measured.grade)
 
 
 def move_record(record: dict[str, Any], origin: np.ndarray) -> None:

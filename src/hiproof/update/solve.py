@@ -205,7 +205,8 @@ class Updater:
             move_to_frame(new.roof, earlier.roof), earlier.roof, verdict
         ):
             return self.mark(earlier, verdict, self.name_places(earlier, None, verdict), member)
-        result, lineage = continue_parts(earlier, new, self.near_m)
+        points = self.epochs.select_roofs(job)[1]
+        result, lineage = continue_parts(earlier, new, self.near_m, points)
         places = self.name_places(earlier, result, verdict)
         return self.mark(result, verdict, places, member, lineage)
 
@@ -230,7 +231,8 @@ class Updater:
         if new.built is None:
             verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
             return self.mark(earlier, verdict, [], member)
-        result, lineage = continue_parts(earlier, new, self.near_m)
+        points = self.epochs.select_roofs(job)[1]
+        result, lineage = continue_parts(earlier, new, self.near_m, points)
         is_changed = verdict.change is Change.CHANGED
         places = self.name_places(earlier, result, verdict) if is_changed else []
         before = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
