@@ -61,6 +61,7 @@ KINDS = (*CHANGES, "demolished", "built")
 DISTURBANCES = ("leaves", "crane", "scaffolding", "occlusion")
 LEAST_M, LEAST_M2 = 0.5, 4.0
 NOTHING = "unchanged"
+HELD = ("length", "width", "t_x", "t_y", "kappa")  # what no update estimates anew
 COST_SHARE, COST_ROUNDS = 0.02, 3
 
 
@@ -282,14 +283,14 @@ def read_models(folder: Path) -> dict[str, Building]:
 
 
 def report_refined(results: list[dict[str, list[dict[str, float]]]]) -> None:
-    """Print the RMS of errors over sigma, of all parameters and of each."""
+    """Print the RMS of errors over sigma, of estimated parameters and of each."""
     for name in ("models", "refined"):
         found = [errors for result in results for errors in result[name]]
         by_name: dict[str, list[float]] = {}
         for errors in found:
             for parameter, value in errors.items():
                 by_name.setdefault(parameter, []).append(value)
-        every = [value for values in by_name.values() for value in values]
+        every = [value for n, values in by_name.items() if n not in HELD for value in values]
         each = ", ".join(
             f"{parameter} {np.sqrt(np.mean(np.square(values))):.2f} ({len(values)})"
             for parameter, values in sorted(by_name.items())

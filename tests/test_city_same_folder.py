@@ -131,6 +131,8 @@ def test_every_text_is_known_to_name_files_or_not():
         "settings.read.fallback_ground_height",
         "settings.read.clearance_column",
         "settings.read.raised_column",
+        "settings.read.year_column",
+        "epochs",
         "settings.enrich.use_attribute",
         "settings.read.overture_catalogue",
         "settings.fit.types",

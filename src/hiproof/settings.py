@@ -115,6 +115,12 @@ class ReadSettings:
         "metres, such as one on columns or over a road; empty for none",
         option="--raised-column",
     )
+    year_column: str = setting(
+        "",
+        "column of the footprints that holds the year of construction; of surveys (--epoch), those "
+        "before that year are not taken",
+        option="--year-column",
+    )
     split_gap_m: float = setting(
         0.0,
         "without footprints: clear space that separates buildings; 0 adapts it to the density",

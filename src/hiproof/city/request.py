@@ -25,7 +25,8 @@ class Request:
     say which buildings there are; without footprints the clouds are split. `terrain` is a raster,
     `overrides` a file of what is known better, `underpasses` a layer of polygons; `processes` work
     on this machine (None: as many as pay, see cores.py), or those of the Dask `scheduler`;
-    `restart` begins anew in a folder that holds another run.
+    `restart` begins anew in a folder that holds another run. `epochs` names the survey of each of
+    the clouds, where there are several.
 
     >>> from pathlib import Path
     >>> Request(("tile.laz",), Path("models"), footprints="footprints.gpkg").settings.fit.objective
@@ -47,6 +48,7 @@ class Request:
     where: str | None = field(default=None, metadata=WHICH)
     bbox: Box | None = field(default=None, metadata=WHICH)
     underpasses: str | None = field(default=None, metadata=WHICH | FILES_FIELD)
+    epochs: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         remember(*self.clouds, self.footprints, self.terrain, self.overrides, self.scheduler)

@@ -222,18 +222,23 @@ class Gatherer:
 
 
 def sort_cloud(
-    folder: str, number: int, address: str, watch: Callable[[PointCloud], None] | None = None
+    folder: str,
+    number: int,
+    address: str,
+    watch: Callable[[PointCloud], None] | None = None,
+    epoch: str = "",
 ) -> dict:
     """Sort the point file at `address`, file `number` of the plan in `folder`.
 
     Returns {"points": read, "classes": {class: count}}. Of a file that breaks off, or is not what
     its header says, nothing is kept. Raises InputError for whatever reading it comes to, so that a
     file's failure is that file's alone; what writing comes to passes through. With `watch`, which
-    is called with each chunk, the whole file is read.
+    is called with each chunk, the whole file is read. The points of an `epoch` stand in a folder of
+    their own.
     """
     root = Path(folder)
     plan, reaches = load_plan(root), load_reaches(root, newest(root / PLAN_FILE, root / REDO))
-    gatherer = Gatherer(reaches, plan.settings.read, root / "points", number)
+    gatherer = Gatherer(reaches, plan.settings.read, root / "points" / epoch, number)
     noted = noted_file(root, number)
     result: list[np.ndarray] = []
     if places := take_places(address):
@@ -325,15 +330,15 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
             yield from iter_points(path, box=box, units=units)
 
 
-def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
+def load_points(root: Path, tile: str, epoch: str = "") -> dict[str, np.ndarray]:
     """Load the points (n, 3) of a work tile from all files, by kind.
 
-    Kinds are "roof", "ground", "low" and "noise".
+    They are those of an `epoch`, where the run has several. Kinds are "roof", "ground", "low" and
+    "noise".
     """
     # a name that starts with a dot is what a killed worker left unfinished
-    files = sorted(
-        path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith(".")
-    )
+    folder = root / "points" / epoch / tile
+    files = sorted(path for path in folder.glob("*.npz") if not path.name.startswith("."))
     result: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in POINT_KINDS}
     for path in files:
         with np.load(path) as part:

@@ -22,11 +22,20 @@ FURTHER = "Further options"  # heading of those that fewer people need
 
 @with_settings()
 def reconstruct(
-    clouds: Annotated[
-        list[str],
-        typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
-    ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
+    clouds: Annotated[
+        list[str] | None,
+        typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
+    ] = None,
+    epoch: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="instead of clouds, the clouds of several surveys: --epoch 2014=a/ --epoch "
+            "2020=b/; each building is made of the newest that covers it, and of others that show "
+            "the same roof",
+            rich_help_panel=FURTHER,
+        ),
+    ] = None,
     footprints: Annotated[
         str | None,
         typer.Option(
@@ -135,18 +144,21 @@ def reconstruct(
 
     @functools.cache
     def read_settings() -> Settings:
-        file = config or find_settings_file(*clouds, footprints)
+        paths = [text.partition("=")[2] for text in epoch or ()]
+        file = config or find_settings_file(*(clouds or ()), *paths, footprints)
         return (Settings.from_toml(file) if file else Settings()).replace(changes or {})
 
     def make_request() -> Any:
         from ..city.request import Request
-        from ..read.pointcloud import expand_paths
+        from ..update.named import choose_clouds
 
+        found, epochs = choose_clouds(clouds or (), epoch or ())
         settings = read_settings()
         if enrich:
             refuse_before(settings)
         return Request(
-            clouds=tuple(map(str, expand_paths(tuple(clouds)))),
+            clouds=found,
+            epochs=epochs,
             out=out,
             footprints=footprints,
             layer=layer,

@@ -26,7 +26,12 @@ def run_request(make_request: Callable[[], Request]) -> int:
         from ..city.run import reconstruct_area
 
         request = make_request()
-        summary = reconstruct_area(request, update)
+        if request.epochs:
+            from ..update.several import reconstruct_epochs
+
+            summary = reconstruct_epochs(request, update)
+        else:
+            summary = reconstruct_area(request, update)
     if console_level() is not Level.error:
         print_summary(summary, str(request.out))
     return summary.exit_code

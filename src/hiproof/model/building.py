@@ -104,7 +104,8 @@ class Building:
     after the fits, where a choice was made. `footprint` (world) and `attributes` are the input's
     own; `shift` (m) is how far the footprint was moved onto its roof.
     `change` is what the last update found of it, as in parameters.jsonl; None where it never was
-    anything but unchanged.
+    anything but unchanged. Of several surveys, `survey_date` is that which shows the building, and
+    `epochs_used` are those of whose points it is made.
     """
 
     id: str
@@ -123,6 +124,8 @@ class Building:
     shift: tuple[float, float] = (0.0, 0.0)
     grade: Grade | None = None
     change: dict[str, Any] | None = None
+    survey_date: str = ""
+    epochs_used: tuple[str, ...] = ()
 
     @property
     def model(self) -> Model:

@@ -76,6 +76,8 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
         attributes=dict(require_mapping(record.get("attributes") or {}, "attributes")),
         shift=read_shift(record),
         change=read_change(record),
+        survey_date=text_at(record, "survey_date"),
+        epochs_used=tuple(map(str, list_at(record, "epochs_used"))),
     )
     return building, roof
 

@@ -74,6 +74,8 @@ BUILDING_KINDS = {
     "residuals": SHARES,
     "recognised": SHARES,
     "types": SHARES,
+    "survey_date": TEXT_SCHEMA,
+    "epochs_used": {"type": "array", "items": TEXT_SCHEMA},
     "change": {"$ref": "#/$defs/change"},
 }
 CHANGE_KINDS = {

@@ -24,6 +24,9 @@ refine     parameters of unchanged buildings, estimated by the points of both su
 solve      a work tile brought up to date
 tile       that, by name, for processes that have imported nothing yet
 rates      false alarms controlled over all buildings, before tiles are brought up to date
+named      surveys as the user names them for a run of several
+several    such a run: its surveys registered, and its tiles solved
+best       the best survey of each building, and the model made of it
 tables     changes.csv and changes.gpkg
 run        the steps above, one after the other
 

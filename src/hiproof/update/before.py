@@ -12,10 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
 from ..city.plan import WorkPlan
-from ..city.registration import SAMPLE_CELL_M, hash_cell
 from ..city.run import absolute
 from ..errors import HiproofError, InputError
 from ..log import LOGGER
@@ -26,13 +24,10 @@ from .members import load_members
 from .outside import save_roofs_outside
 from .plan import EARLIER_FOLDER, save_earlier_plan
 from .rates import find_largest_chance, judge_city
-from .register import SampledRoof, register_surveys
+from .register import SampledRoof, draw_buildings, register_surveys
 from .request import WHOLE_CITY, UpdateRequest
 from .texts import find_texts
 from .tile import sort_survey
-
-ENOUGH_ROOFS = 60
-"""Sampled roofs: they tell the shift within a centimetre, and their noise to a tenth of it."""
 
 SORTED_MARK = "sorted"  # file in the earlier folder: its points are complete
 
@@ -119,17 +114,3 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
             old, new = epochs.select_roofs(plan.jobs[index])
             to_local = roof.frame.to_local
             yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))
-
-
-def draw_buildings(plan: WorkPlan) -> set[int]:
-    """Return the numbers of the sampled buildings.
-
-    Their order follows from their places alone: by the hash of their square, then by place.
-    """
-    jobs = [job for job in plan.jobs if not job.area.is_empty]
-    lower = shapely.bounds([job.area for job in jobs]).reshape(-1, 4)[:, :2]
-    squares = np.floor(lower / SAMPLE_CELL_M).astype(np.int64)
-    order = sorted(
-        range(len(jobs)), key=lambda k: (hash_cell(tuple(squares[k].tolist())), *lower[k].tolist())
-    )
-    return {jobs[k].index for k in order[:ENOUGH_ROOFS]}

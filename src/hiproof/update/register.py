@@ -2,7 +2,7 @@
 
 New points lie over the earlier roofs by dz - a dx - b dy, where (a, b) is the roof's slope and (dx,
 dy, dz) the shift. A robust least squares over a sample of buildings tells it; whole buildings that
-changed are outliers. A hash of places draws the sample (before.py): it does not depend on tiles.
+changed are outliers. A hash of places draws the sample: it does not depend on tiles.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 
+from ..city.plan import WorkPlan
+from ..city.registration import SAMPLE_CELL_M, hash_cell
 from ..model import Roof
 from .cells import SurveyNoise, compare_points, select_inner, shrink_outline
 from .clusters import flag_cells
@@ -42,6 +45,10 @@ CHANGED_SHARE = 0.3
 
 LEAST_M = 0.02
 """Least noise (m): coordinates come in centimetres."""
+
+
+ENOUGH_ROOFS = 60
+"""Sampled roofs: they tell the shift within a centimetre, and their noise to a tenth of it."""
 
 
 class SampledRoof(NamedTuple):
@@ -86,6 +93,20 @@ class SurveyShift:
         return SurveyShift(
             tuple(record["xyz"]), tuple(record["sigma"]), int(record["roofs"]), noise
         )
+
+
+def draw_buildings(plan: WorkPlan) -> set[int]:
+    """Return the numbers of the sampled buildings.
+
+    Their order follows from their places alone: by the hash of their square, then by place.
+    """
+    jobs = [job for job in plan.jobs if not job.area.is_empty]
+    lower = shapely.bounds([job.area for job in jobs]).reshape(-1, 4)[:, :2]
+    squares = np.floor(lower / SAMPLE_CELL_M).astype(np.int64)
+    order = sorted(
+        range(len(jobs)), key=lambda k: (hash_cell(tuple(squares[k].tolist())), *lower[k].tolist())
+    )
+    return {jobs[k].index for k in order[:ENOUGH_ROOFS]}
 
 
 def register_surveys(samples: Iterable[SampledRoof]) -> SurveyShift:

@@ -19,6 +19,29 @@ def sort_survey(folder: str, number: int, address: str) -> dict:
     return result
 
 
+def sort_epoch(epochs: tuple[str, ...], folder: str, number: int, address: str) -> dict:
+    """Sort a point file of a run of several surveys.
+
+    It is file `number` of those in `epochs`.
+    """
+    from ..city.sort import sort_cloud
+
+    return sort_cloud(folder, number, address, epoch=epochs[number])
+
+
+def solve_best_tile(
+    names: tuple[str, ...],
+    folder: str,
+    tile: str,
+    terrain: str | None = None,
+    avoid: tuple[int, ...] = (),
+) -> list[Outcome]:
+    """Reconstruct a work tile from several surveys; see best.py."""
+    from . import best
+
+    return best.solve_best_tile(names, folder, tile, terrain, avoid)
+
+
 def update_tile(
     folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
 ) -> list[Outcome]:

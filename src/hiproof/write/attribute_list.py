@@ -187,6 +187,13 @@ HIPROOF = (
         "m3",
         "only with LoD2.3: volume of the solid with overhangs",
     ),
+    Attribute(
+        "survey_date",
+        "text",
+        "",
+        "only in a run of several surveys (`--epoch`): name of the survey that shows the building",
+    ),
+    Attribute("epochs_used", "text", "", "names of all surveys of whose points its model is made"),
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
     Attribute(
         "change", "text", "", "only after an update, where not unchanged: changed, new, gone, ..."
@@ -459,6 +466,13 @@ PARAMETERS = (
         "recognised", "object", "", "probability by roof type, from the network where it was asked"
     ),
     Attribute("types", "object", "", "probability by roof type, after the fits"),
+    Attribute(
+        "survey_date",
+        "text",
+        "",
+        "only in a run of several surveys: name of the survey that shows the building",
+    ),
+    Attribute("epochs_used", "list", "", "names of all surveys of whose points its model is made"),
     Attribute(
         "change",
         "object",

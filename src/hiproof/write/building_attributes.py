@@ -62,6 +62,9 @@ def building_attributes(
     if building.built is not None and building.built.eaves is not None:
         volume = building.built.finest_solid.volume
         computed[f"{OWN}volume_lod23"] = round_value(volume, 4)
+    if building.epochs_used:
+        computed[OWN + "survey_date"] = building.survey_date
+        computed[OWN + "epochs_used"] = " ".join(building.epochs_used)
     if building.change is not None:
         computed |= {
             OWN + name: value for name, value in change_attributes(building.change).items()

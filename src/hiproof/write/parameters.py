@@ -116,6 +116,10 @@ def building_record(building: Building) -> dict[str, Any]:
     """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
     change = {} if building.change is None else {"change": building.change}
+    surveys: dict[str, Any] = {}
+    if building.epochs_used:
+        names = list(building.epochs_used)
+        surveys = {"survey_date": building.survey_date, "epochs_used": names}
     further = {} if building.built is None else further_record(building.built)
     return {
         "id": plain_text(building.id),
@@ -145,6 +149,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "objective": number(building.objective),
         "recognised": by_name(building.recognised),
         "types": by_name(building.types),
+        **surveys,
         **change,
     }
 

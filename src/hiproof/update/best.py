@@ -1,0 +1,172 @@
+"""The best survey of each building, and the buildings of a work tile made of it.
+
+The newest survey counts that covers a building well enough. Others join it where their points lie
+on the same roof by the test of an update: then all points make the model.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..city.bundles import keep_failure
+from ..city.ledger import Outcome
+from ..city.overrides import load_overrides
+from ..city.plan import Job, WorkPlan, load_plan
+from ..city.solve import Surroundings, open_terrain, record_failure, solve_buildings, solve_one
+from ..city.sort import POINT_KINDS, load_points
+from ..errors import DamagedRaster, report_error
+from ..model import Building
+from ..parametric.override import Override
+from ..stages import add_remark
+from ..status import Change
+from ..write.fragments import Fragments
+from ..write.run_files import fragments
+from .epochs import select_points, select_roof
+from .judge import judge_building
+from .register import SurveyShift
+from .request import SIGNIFICANCE
+
+EPOCHS_FILE = "epochs.json"  # shifts of the surveys, in the folder of a run
+
+COVER_CELL_M = 2.0
+"""Side (m) of the cells in which coverage is compared: at half a point a square metre most hold a
+point, so a sparse survey covers a roof as well as a dense one."""
+
+WELL_COVERED = 0.8
+"""Share of the cells of the survey that covers most, from which on a survey covers a roof well."""
+
+
+def solve_best_tile(
+    names: tuple[str, ...],
+    folder: str,
+    tile: str,
+    terrain: str | None = None,
+    avoid: tuple[int, ...] = (),
+) -> list[Outcome]:
+    """Reconstruct the buildings of `tile` from the surveys `names`, the newest first.
+
+    The other arguments are those of `solve_tile`.
+    """
+    root = Path(folder)
+    plan, overrides = load_plan(root), load_overrides(root)
+    keep = functools.partial(keep_failure, root, tile, plan)
+    surveys = TileSurveys(root, tile, terrain, names)
+
+    def solve(job: Job) -> tuple[Building, Fragments]:
+        return solve_best(plan, job, surveys, overrides.get(job.index), keep)
+
+    return solve_buildings(root, plan, tile, solve, avoid)
+
+
+def load_shifts(state: Path) -> dict[str, SurveyShift]:
+    """Load the shifts of the surveys, by name, without that of the newest."""
+    record = json.loads((state / EPOCHS_FILE).read_text(encoding="utf-8"))
+    return {name: SurveyShift.from_dict(shift) for name, shift in record.items()}
+
+
+class TileSurveys:
+    """The points of all surveys in a work tile, where the newest has them."""
+
+    def __init__(self, root: Path, tile: str, terrain: str | None, names: tuple[str, ...]):
+        self.names, self.plan = names, load_plan(root)
+        self.shifts, self.model = load_shifts(root), open_terrain(self.plan, terrain)
+        self.points = {
+            name: {
+                kind: xyz - self.shifts[name].clear_xyz if name in self.shifts else xyz
+                for kind, xyz in load_points(root, tile, name).items()
+            }
+            for name in names
+        }
+        self.views: dict[tuple[str, ...], Surroundings] = {}
+
+    def unite(self, names: tuple[str, ...]) -> Surroundings:
+        """Return the points of some surveys together."""
+        if names not in self.views:
+            united = {
+                kind: np.concatenate([self.points[name][kind] for name in names])
+                for kind in POINT_KINDS
+            }
+            self.views[names] = Surroundings(united, self.model, self.plan)
+        return self.views[names]
+
+    def select_roof(self, name: str, job: Job) -> np.ndarray:
+        """Return the roof points (n, 3) of a building in a survey."""
+        return select_roof(self.unite((name,)), job).points
+
+    def is_same(self, job: Job, building: Building, name: str, other: str) -> bool:
+        """Return whether another survey shows the roof that the survey `name` made."""
+        roof = building.roof
+        old, new = (
+            roof.frame.to_local(select_points(self.unite((survey,)), job))
+            for survey in (name, other)
+        )
+        steps = [self.shifts[survey] for survey in (name, other) if survey in self.shifts]
+        shift = max(steps, key=lambda step: step.noise.roof, default=SurveyShift())
+        z_ground = building.z_ground - roof.frame.origin[2]
+        verdict = judge_building(
+            roof, old, new, z_ground, shift.noise, shift.sigma[2], SIGNIFICANCE
+        )
+        return verdict.change is Change.UNCHANGED
+
+
+def solve_best(
+    plan: WorkPlan,
+    job: Job,
+    surveys: TileSurveys,
+    override: Override | None,
+    keep: Callable[..., None],
+) -> tuple[Building, Fragments]:
+    """Return a building made of its best survey, and of those that agree.
+
+    Whatever goes wrong becomes its status.
+    """
+    try:
+        year = read_year(job, plan.settings.read.year_column)
+        names = [name for name in surveys.names if year is None or int(name[:4]) >= year]
+        remark = "" if names else f"its year, {year}, is after that of every survey"
+        name, others = choose_survey(
+            {name: surveys.select_roof(name, job) for name in names or surveys.names}
+        )
+        building, texts = solve_one(plan, job, surveys.unite((name,)), override, keep)
+        if building.built is None:
+            return building, texts
+        used = (name, *(o for o in others if surveys.is_same(job, building, name, o)))
+        if len(used) > 1:
+            united, _ = solve_one(plan, job, surveys.unite(used), override, keep)
+            building, used = (building, used[:1]) if united.built is None else (united, used)
+        result = dataclasses.replace(building, survey_date=name, epochs_used=tuple(sorted(used)))
+        return fragments(add_remark(result, remark), plan.list_names(job), plan.head)
+    except (MemoryError, DamagedRaster):
+        raise
+    except Exception as error:
+        return record_failure(plan, job, report_error(error).detail)
+
+
+def choose_survey(points: dict[str, np.ndarray]) -> tuple[str, list[str]]:
+    """Return the newest survey that covers a roof well, and the others that show it.
+
+    `points` (n, 3) are those of the roof by survey, the newest first.
+    """
+    cells = {
+        name: len(np.unique(np.floor(xyz[:, :2] / COVER_CELL_M), axis=0))
+        for name, xyz in points.items()
+    }
+    least = WELL_COVERED * max(cells.values())
+    name = next(name for name, count in cells.items() if count >= least)
+    return name, [other for other, count in cells.items() if other != name and count]
+
+
+def read_year(job: Job, column: str) -> int | None:
+    """Return the year in which a building was built, None where it is unknown."""
+    value: Any = job.footprint.attributes.get(column) if column and job.footprint else None
+    try:
+        return int(float(str(value)[:4]))
+    except ValueError:
+        return None

@@ -1,0 +1,111 @@
+"""A run of several surveys.
+
+Each building is made of the best one, or of all that agree.
+
+The surveys are registered to the newest by sampled roofs of that one, before there are work tiles.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..city.checks import refuse_unusable
+from ..city.from_cloud import Progress
+from ..city.lock import hold_folder
+from ..city.plan import WorkPlan
+from ..city.request import Request
+from ..city.resume import open_state
+from ..city.run import Steps, Summary, reconstruct_in_folder
+from ..city.solve import Surroundings, open_terrain, solve_one
+from ..city.sort import load_points
+from ..errors import InputError
+from ..garbage import collect_rarely
+from ..write.files import atomic
+from .best import EPOCHS_FILE, load_shifts
+from .epochs import select_roof
+from .register import SampledRoof, SurveyShift, draw_buildings, register_surveys
+from .tile import solve_best_tile, sort_epoch
+
+
+def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -> Summary:
+    """Reconstruct every building of an area from the surveys of `request.epochs`.
+
+    Raises what `reconstruct_area` does, and InputError without footprints.
+    """
+    refuse_unusable(request)
+    if not request.footprints:
+        raise InputError(
+            "expected --footprints with --epoch, got none; outlines that are found in points of "
+            "several surveys would be those of none"
+        )
+    state = open_state(request.out)
+    names = tuple(sorted(set(request.epochs), reverse=True))
+
+    def prepare(plan: WorkPlan, _: Any, __: Progress) -> None:
+        shifts = register_epochs(state, plan, names, request.terrain)
+        record = {name: shift.to_dict() for name, shift in shifts.items()}
+        with atomic(state / EPOCHS_FILE) as temporary:
+            Path(temporary).write_text(json.dumps(record) + "\n", encoding="utf-8")
+
+    steps = Steps(
+        solve_tile=functools.partial(solve_best_tile, names),
+        sort_cloud=functools.partial(sort_epoch, request.epochs),
+        before=prepare,
+    )
+    with hold_folder(state), collect_rarely():
+        summary = reconstruct_in_folder(request, state, progress, steps)
+        add_to_record(request, names, load_shifts(state))
+        return summary
+
+
+def register_epochs(
+    state: Path, plan: WorkPlan, names: tuple[str, ...], terrain: str | None
+) -> dict[str, SurveyShift]:
+    """Return how far each survey but the newest lies beside that one."""
+    samples: dict[str, list[SampledRoof]] = {name: [] for name in names[1:]}
+    for roofs in draw_roofs(state, plan, names, terrain):
+        for name, sample in roofs.items():
+            samples[name].append(sample)
+    return {name: register_surveys(found) for name, found in samples.items()}
+
+
+def draw_roofs(
+    state: Path, plan: WorkPlan, names: tuple[str, ...], terrain: str | None
+) -> Iterator[dict[str, SampledRoof]]:
+    """Yield the sampled roofs of the newest survey, with the points of every other."""
+    chosen = draw_buildings(plan) if len(names) > 1 else set()
+    for tile, indices in plan.tiles.items():
+        jobs = [plan.jobs[index] for index in indices if index in chosen]
+        if not jobs:
+            continue
+        model = open_terrain(plan, terrain)
+        views = {name: Surroundings(load_points(state, tile, name), model, plan) for name in names}
+        for job in jobs:
+            building, _ = solve_one(plan, job, views[names[0]])
+            if building.built is None:
+                continue
+            to_local = building.roof.frame.to_local
+            points = {name: to_local(select_roof(view, job).points) for name, view in views.items()}
+            yield {
+                name: SampledRoof(building.roof, points[names[0]], points[name])
+                for name in names[1:]
+            }
+
+
+def add_to_record(request: Request, names: tuple[str, ...], shifts: dict[str, SurveyShift]) -> None:
+    """Add the surveys to run.json: their clouds, and how they lie to the newest."""
+    path = Path(request.out) / "run.json"
+    record = json.loads(path.read_text(encoding="utf-8"))
+    record["epochs"] = {
+        name: {
+            "clouds": request.epochs.count(name),
+            "shift": shifts[name].to_dict() if name in shifts else None,
+        }
+        for name in names
+    }
+    with atomic(path) as temporary:
+        Path(temporary).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")

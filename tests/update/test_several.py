@@ -1,0 +1,131 @@
+"""Runs of several surveys: the newest that covers a building, or all that show its roof."""
+
+import json
+
+import pyogrio
+import pytest
+import shapely
+from typer.testing import CliRunner
+
+from hiproof import InputError
+from hiproof.cli.app import app
+from hiproof.parametric.run import build_file
+from hiproof.update.named import choose_clouds
+from run_records import by_id, records
+from tiny_town import make_town, write_cloud, write_footprints
+
+RAISED_M = 2.0
+YEARS = {"house-0": "1990", "house-1": "2019", "house-2": "1990", "house-3": "2019"}
+
+
+@pytest.fixture(scope="module")
+def surveys(tmp_path_factory):
+    """Two surveys of the tiny town: house-1 was raised, and the later one misses house-2."""
+    folder, first, second = tmp_path_factory.mktemp("surveys"), make_town(), make_town(seed=7)
+    x, y = second.xyz[:, :2].T
+    raised, missed = (
+        shapely.intersects_xy(second.footprints[name], x, y) for name in ("house-1", "house-2")
+    )
+    second.xyz[raised & (second.classification == 6), 2] += RAISED_M
+    keep = ~missed
+    second.xyz[:, 2] += 0.3  # the later survey lies higher on the whole
+    for name, town, kept in (("2014", first, slice(None)), ("2020-05-01", second, keep)):
+        (folder / name).mkdir()
+        write_cloud(folder / name / "tile.laz", town.xyz[kept], town.classification[kept])
+    write_footprints(folder / "footprints.geojson", first.footprints)
+    collection = json.loads((folder / "footprints.geojson").read_text())
+    for feature in collection["features"]:
+        feature["properties"]["year"] = YEARS[next(iter(feature["properties"].values()))]
+    (folder / "footprints.geojson").write_text(json.dumps(collection))
+    return folder
+
+
+def run(surveys, out, *words):
+    epochs = [f"--epoch={name}={surveys / name}" for name in ("2014", "2020-05-01")]
+    paths = ["--footprints", str(surveys / "footprints.geojson"), "--out", str(out), "--jobs", "1"]
+    result = CliRunner().invoke(app, ["reconstruct", *epochs, *paths, *words])
+    assert result.exit_code == 0, result.output
+    return by_id(out)
+
+
+@pytest.fixture(scope="module")
+def houses(surveys, tmp_path_factory):
+    out = tmp_path_factory.mktemp("several")
+    return run(surveys, out), out
+
+
+def test_each_house_is_made_of_the_newest_survey_and_of_those_that_agree(houses):
+    found, _ = houses
+    both = ["2014", "2020-05-01"]
+    used = {id: (row["survey_date"], row["epochs_used"]) for id, row in found.items()}
+    assert used["house-0"] == used["house-3"] == ("2020-05-01", both)
+    assert used["house-1"] == ("2020-05-01", both[1:])
+    assert used["house-2"] == ("2014", both[:1])
+
+
+def test_points_of_both_surveys_count_and_lie_in_the_frame_of_the_newest(houses, surveys, tmp_path):
+    found, out = houses
+    alone = run(surveys, tmp_path, "--year-column", "year")
+    assert found["house-3"]["points"] > 1.8 * alone["house-3"]["points"]
+    record = json.loads((out / "run.json").read_text())["epochs"]
+    assert record["2014"]["shift"]["xyz"][2] == pytest.approx(-0.3, abs=0.03)
+    assert record["2020-05-01"]["shift"] is None
+
+
+def test_surveys_before_the_year_of_a_house_do_not_count(surveys, tmp_path):
+    found = run(surveys, tmp_path, "--year-column", "year")
+    assert found["house-3"]["epochs_used"] == ["2020-05-01"]
+    assert found["house-0"]["epochs_used"] == ["2014", "2020-05-01"]
+
+
+def test_the_files_say_which_surveys_were_used_and_build_makes_them_again(houses, tmp_path):
+    _, out = houses
+    feature = json.loads((out / "buildings.city.jsonl").read_text().splitlines()[1])
+    attributes = next(iter(feature["CityObjects"].values()))["attributes"]
+    assert attributes["hiproof_survey_date"] == "2020-05-01"
+    assert attributes["hiproof_epochs_used"] == "2014 2020-05-01"
+    fields = pyogrio.read_info(out / "buildings.gpkg", layer="buildings")["fields"]
+    assert {"hiproof_survey_date", "hiproof_epochs_used"} <= set(fields)
+    build_file(out / "parameters.jsonl", tmp_path)
+    assert records(tmp_path) == records(out)
+
+
+def test_the_same_call_again_keeps_what_is_done(houses, surveys):
+    found, out = houses
+    before = {name: data for name, data in records(out).items()}
+    assert run(surveys, out) == found
+    assert records(out) == before
+
+
+def test_bad_surveys_are_refused_in_a_sentence(surveys, tmp_path):
+    first = f"2014={surveys / '2014'}"
+    cases = [
+        ([first, first], "every --epoch once, got 2014 2 times"),
+        ([first, f"2020={surveys / '2014'}"], "other clouds in each --epoch"),
+        ([first, f"later={surveys / '2014'}"], "name each survey by its year or day"),
+        ([first, "2020="], "name each survey by its year or day"),
+        ([first, f"2020={tmp_path / 'nowhere'}"], "nowhere"),
+    ]
+    for epochs, text in cases:
+        with pytest.raises(InputError, match=text):
+            choose_clouds((), epochs)
+    with pytest.raises(InputError, match="expected clouds or --epoch"):
+        choose_clouds(("tile.laz",), [first])
+
+
+@pytest.mark.parametrize("crs", ["EPSG:25832", "EPSG:2225"])  # another place; feet
+def test_surveys_in_other_crs_or_units_are_refused(surveys, crs, tmp_path):
+    town = make_town()
+    write_cloud(tmp_path / "tile.laz", town.xyz, town.classification, crs=crs)
+    epochs = [f"--epoch=2014={surveys / '2014'}", f"--epoch=2020={tmp_path / 'tile.laz'}"]
+    paths = ["--footprints", str(surveys / "footprints.geojson"), "--out", str(tmp_path / "o")]
+    result = CliRunner().invoke(app, ["reconstruct", *epochs, *paths])
+    assert isinstance(result.exception, InputError)
+    assert f"expected all clouds in one CRS, got {crs}" in str(result.exception)
+    assert not list((tmp_path / "o").glob("buildings*"))
+
+
+def test_surveys_without_footprints_are_refused(surveys, tmp_path):
+    words = ["--epoch", f"2014={surveys / '2014'}", "--out", str(tmp_path / "o")]
+    result = CliRunner().invoke(app, ["reconstruct", *words])
+    assert "expected --footprints with --epoch" in str(result.exception)
