@@ -5,6 +5,7 @@ Plan cells become levels, levels a closed shell, and every solid is checked.
 settle            the roof made of exactly the numbers that are written of it
 simpler           parts given up one by one, where a roof cannot become a valid solid
 readable          whether a file of parameters can hold a roof
+facets            facets of curved parts, by the tolerance of chords
 solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid

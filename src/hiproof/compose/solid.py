@@ -13,6 +13,7 @@ from ..model import Roof, Solid
 from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
+from .facets import draw_facets
 from .shell import Saddle, raise_shell
 
 # factor on the snap distance, whether straight walls become one and whether flat corners are turned
@@ -64,7 +65,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
             f"expected a finite ground height, got {z_ground_local}; take the lowest terrain under "
             "the outline"
         )
-    problem = plan_problem(roof)
+    problem = plan_problem(draw_facets(roof, options.chord_tolerance_m))
     bent: list[Solid] = []
     failure = ""
     parts: tuple[int, ...] = ()

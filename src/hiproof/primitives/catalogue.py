@@ -57,7 +57,8 @@ CURVED = (
     "barrel",
     "half_cone",
 )  # whose facets stand for a curved surface, or are more than a volume's
-SMOOTH = ("cone", "half_cone", "dome", "barrel")  # of which all facets stand for one curved surface
+# whose facets all stand for one curved surface
+SMOOTH = tuple(name for name, shape in CATALOGUE.items() if shape.refine is not None)
 
 
 def get(name: str) -> Primitive:

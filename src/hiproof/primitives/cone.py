@@ -7,13 +7,21 @@ its size (facets.py).
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from .algebra import Formula, U, V, q0, q1
 from .contract import SLOPE_MIN, SPIRE_SLOPE_MAX, DerivedStart, Primitive
 from .drawing import drawn_slope
-from .facets import SIDE_COUNTS, count_sides, find_apothem, make_facet_planes, make_rim
+from .facets import (
+    SIDE_COUNTS,
+    count_sides,
+    find_apothem,
+    find_sides,
+    make_facet_planes,
+    make_rim,
+)
 from .gable import shape, typical
 from .pyramid import canonical
 
@@ -63,11 +71,17 @@ def make_pointed(
     )
 
 
+@cache
 def make_cone(sides: int) -> Primitive:
     """Return the cone of so many facets over a circle's area."""
     return make_pointed("cone", sides, find_apothem(sides), ("1080", "3600", "cone"), (25.0, 72.0))
 
 
 first, *others = (make_cone(sides) for sides in SIDE_COUNTS)
-CONE = replace(first, more=tuple(replace(cone, starts=()) for cone in others), choose=count_sides)
+CONE = replace(
+    first,
+    more=tuple(replace(cone, starts=()) for cone in others),
+    choose=count_sides,
+    refine=lambda p, chord_m: make_cone(find_sides(p["length"] / 2, chord_m)),
+)
 BROACH = make_pointed("broach", BROACH_SIDES, 1.0, ("1120", "4000", "pyramidal"), (55.0, 78.0))

@@ -136,6 +136,7 @@ class Primitive:
     more         the same roof type with other strips, other parameters or more facets
     choose       theta_p -> the place in `variants` of that with as many facets as its size asks
                  for
+    refine       theta_p, tolerance (m) -> the shape with as many facets as keep within it
     rim          corners (n, 2) of the plan, counter-clockwise, as shares of U and V
     read_member  a member of the family with planes on the same sides -> q of the shape with its
                  front's and right's slopes
@@ -162,6 +163,7 @@ class Primitive:
     strips: int = 1
     more: tuple[Primitive, ...] = ()
     choose: Callable[[Mapping[str, float]], int] | None = None
+    refine: Callable[[Mapping[str, float], float], Primitive] | None = None
     rim: tuple[tuple[float, float], ...] = RECTANGLE
     draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
     read_member: Callable[[Sides], tuple[float, ...]] | None = None

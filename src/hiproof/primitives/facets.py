@@ -11,11 +11,16 @@ from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
+
 from .algebra import Formula, U, V, q1
 from .contract import Plane
 
-CHORD_M = 0.1  # Farthest (m) that a facet's edge may lie off the circle that it stands for.
+# Farthest (m) that a facet's edge may lie off the circle that it stands for while it is fitted, the
+# default of the setting `compose.chord_tolerance_m`.
+CHORD_M = 0.1
 SIDE_COUNTS = (16, 8, 32, 64)  # Sides of a circle, first those of an ordinary turret.
+MOST_FACETS = 256  # Facets of a shape. A thousand take minutes to compose.
 # Angles (degrees) on a quarter circle between which chords stand for it.
 PROFILE_DEG = (0.0, 20.0, 40.0, 60.0, 90.0)
 NUMERICAL_ZERO = 1e-12  # A smaller share is none.
@@ -27,9 +32,27 @@ def count_sides(p: Mapping[str, float]) -> int:
     >>> [SIDE_COUNTS[count_sides({"length": x})] for x in (2.0, 8.0, 30.0, 400.0)]
     [8, 16, 32, 64]
     """
-    radius = p["length"] / 2
-    close = [n for n in SIDE_COUNTS if radius * (1.0 - math.cos(math.pi / n)) <= CHORD_M]
-    return SIDE_COUNTS.index(min(close, default=max(SIDE_COUNTS)))
+    return SIDE_COUNTS.index(min(find_sides(p["length"] / 2, CHORD_M), max(SIDE_COUNTS)))
+
+
+def find_sides(radius: float, chord_m: float) -> int:
+    """Return how many sides of a circle keep a tolerance: 8, 16, 32 or more."""
+    sides = min(SIDE_COUNTS)
+    while sides < MOST_FACETS and radius * (1.0 - math.cos(math.pi / sides)) > chord_m:
+        sides *= 2
+    return sides
+
+
+def find_splits(rise: float, chord_m: float, most: int) -> int:
+    """Return into how many parts a profile's chords are split for a tolerance.
+
+    The `rise` (m) is the radius of half a circle. Chords of flatter arcs are flatter, too.
+    There are at `most` so many parts.
+    """
+    splits, half_chord = 1, math.radians(0.5 * PROFILE_DEG[1])
+    while 2 * splits <= most and rise * (1.0 - math.cos(half_chord / splits)) > chord_m:
+        splits *= 2
+    return splits
 
 
 def find_apothem(sides: int) -> float:
@@ -76,8 +99,10 @@ class ArcProfile(NamedTuple):
     chords: list[tuple[Formula, Formula]]
 
 
-def draw_profile(around_axis: bool) -> ArcProfile:
+def draw_profile(around_axis: bool, splits: int = 1) -> ArcProfile:
     """Draw a vault's profile in chords, `around_axis` or along a ridge.
+
+    Each of four chords is split into so many.
 
     With k = q1 the height over the half width V, the profile at the share r of the radius is
 
@@ -86,7 +111,9 @@ def draw_profile(around_axis: bool) -> ArcProfile:
     It is within a hundredth of a circular arc up to the half circle (k = 1). Chords meet a little
     outside of it, so that they hold as much as it does.
     """
-    knots = [math.sin(math.radians(angle)) for angle in PROFILE_DEG[:-1]] + [1.0]
+    steps = np.arange(splits * (len(PROFILE_DEG) - 1)) / splits
+    angles = np.interp(steps, np.arange(len(PROFILE_DEG)), PROFILE_DEG).tolist()
+    knots = [math.sin(math.radians(angle)) for angle in angles] + [1.0]
     volumes = (1 / 4, 1 / 3) if around_axis else (2 / 3, math.pi / 4)
     parabola = raise_knots(knots, lambda r: 1.0 - r * r, volumes[0], around_axis)
     circle = raise_knots(knots, lambda r: math.sqrt(1.0 - r * r), volumes[1], around_axis)

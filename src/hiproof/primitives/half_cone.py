@@ -7,13 +7,14 @@ of the width over a half circle. Facets follow its size, as those of a cone (fac
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from .algebra import Formula, U, V, q0, q1
 from .cone import CONE
 from .contract import Corners, DerivedStart, Plane, Primitive, at_quarters
-from .facets import SIDE_COUNTS, count_sides, find_apothem
+from .facets import SIDE_COUNTS, count_sides, find_apothem, find_sides
 from .gable import shape, typical
 
 
@@ -26,6 +27,7 @@ def list_half_directions(sides: int) -> list[tuple[float, float]]:
     return [(math.cos(angle), math.sin(angle)) for angle in angles]
 
 
+@cache
 def make_half_cone(sides: int) -> Primitive:
     """Return the half cone with half of so many facets."""
     apothem, fall = find_apothem(sides), q1 * V
@@ -72,12 +74,15 @@ def make_half_cone(sides: int) -> Primitive:
     )
 
 
-def count_half_sides(p: Mapping[str, float]) -> int:
-    """Return the place in SIDE_COUNTS of the sides of the whole circle."""
-    return count_sides({"length": max(p["width"], 2.0 * p["length"])})
+def measure_extent(p: Mapping[str, float]) -> float:
+    """Return the longer diameter (m) of the whole ellipse."""
+    return max(p["width"], 2.0 * p["length"])
 
 
 first, *others = (make_half_cone(sides) for sides in SIDE_COUNTS)
 HALF_CONE = replace(
-    first, more=tuple(replace(cone, starts=()) for cone in others), choose=count_half_sides
+    first,
+    more=tuple(replace(cone, starts=()) for cone in others),
+    choose=lambda p: count_sides({"length": measure_extent(p)}),
+    refine=lambda p, chord_m: make_half_cone(find_sides(measure_extent(p) / 2, chord_m)),
 )

@@ -5,6 +5,7 @@ facets.py says how an arc is written.
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,22 @@ from .algebra import U, V, q0, q1
 from .contract import Corners, DerivedStart, Plane, Primitive, at_quarters
 from .drawing import drawn_plan
 from .facets import (
+    MOST_FACETS,
+    PROFILE_DEG,
     SIDE_COUNTS,
     count_sides,
     draw_profile,
     find_apothem,
+    find_sides,
+    find_splits,
     make_facet_planes,
     make_rim,
 )
 from .gable import shape, typical
 
 LOWEST, HIGHEST = 0.1, 1.0  # Height over half the width: flatter is level, and higher no arc.
+CHORDS = len(PROFILE_DEG) - 1  # of half a profile
+MOST_SPLITS = 8  # Parts of each chord of a barrel.
 CROWN = q1 * V  # height of the crown above the eave
 STARTS = (0.5, 0.9)  # Shares of a gable's or a pyramid's slope at which an arc begins.
 
@@ -58,9 +65,10 @@ def make_starts(source: str) -> tuple[DerivedStart, ...]:
     )
 
 
-def make_dome(sides: int) -> Primitive:
-    """Return the dome of so many facets around."""
-    apothem, profile = find_apothem(sides), draw_profile(around_axis=True)
+@cache
+def make_dome(sides: int, splits: int = 1) -> Primitive:
+    """Return the dome of so many facets around, each chord of its profile split."""
+    apothem, profile = find_apothem(sides), draw_profile(True, splits)
     rim = make_rim(sides, apothem)
     planes: tuple[Plane, ...] = ()
     for height, fall in profile.chords:
@@ -95,9 +103,13 @@ def make_dome(sides: int) -> Primitive:
     )
 
 
-def make_barrel() -> Primitive:
-    """Return the barrel vault: an arc across the width, straight along the length."""
-    profile = draw_profile(around_axis=False)
+@cache
+def make_barrel(splits: int = 1) -> Primitive:
+    """Return the barrel vault: an arc across the width, straight along the length.
+
+    Each chord of the arc is split into so many.
+    """
+    profile = draw_profile(False, splits)
     shares = [-r for r in profile.knots[:0:-1]] + profile.knots
     heights = profile.heights[:0:-1] + profile.heights
     chords = [(fall, q0 - CROWN + height) for height, fall in profile.chords]
@@ -130,6 +142,20 @@ def make_barrel() -> Primitive:
     )
 
 
+def refine_dome(p: Mapping[str, float], chord_m: float) -> Primitive:
+    """Return the dome with facets within a tolerance, at most MOST_FACETS."""
+    sides = min(find_sides(p["length"] / 2, chord_m), max(SIDE_COUNTS))
+    return make_dome(sides, find_splits(p["height"], chord_m, MOST_FACETS // sides // CHORDS))
+
+
 first, *others = (make_dome(sides) for sides in SIDE_COUNTS)
-DOME = replace(first, more=tuple(replace(dome, starts=()) for dome in others), choose=count_sides)
-BARREL = make_barrel()
+DOME = replace(
+    first,
+    more=tuple(replace(dome, starts=()) for dome in others),
+    choose=count_sides,
+    refine=refine_dome,
+)
+BARREL = replace(
+    make_barrel(),
+    refine=lambda p, chord_m: make_barrel(find_splits(p["height"], chord_m, MOST_SPLITS)),
+)
