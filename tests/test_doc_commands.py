@@ -125,8 +125,9 @@ def inputs(tmp_path_factory):
     las.write(folder / "tile.laz")
     write_epw(folder / "delft.epw")
     (folder / "horizon.txt").write_text("5\n20\n5\n0\n")
-    (folder / "tiles").mkdir()
-    shutil.copy(folder / "tile.laz", folder / "tiles/tile.laz")
+    for name in ("tiles", "old", "new"):
+        (folder / name).mkdir()
+        shutil.copy(folder / "tile.laz", folder / name / "tile.laz")
     shutil.copy(files["footprints"], folder / "footprints.gpkg")
     shutil.copy(files["terrain"], folder / "dtm.tif")
     write_register(folder / "register.gpkg", footprints)
