@@ -96,7 +96,9 @@ def judge_house(tally: OverhangTally, seed: int, density: float, is_compound: bo
         judge_lengths(tally, building, house, truth)
 
 
-def judge_lengths(tally: OverhangTally, building: Building, house: SimBuilding, truth: np.ndarray) -> None:
+def judge_lengths(
+    tally: OverhangTally, building: Building, house: SimBuilding, truth: np.ndarray
+) -> None:
     """Add the overhangs of a building to the tally, edge by edge of the true outline."""
     found = {item.edge: item for item in building.model.eaves.overhangs}
     if not truth.any():

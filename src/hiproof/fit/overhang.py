@@ -35,7 +35,9 @@ ALONG_STEP_M = 0.25  # the same along an edge
 TRIED_M = np.arange(-0.4, 1.4001, 0.02)  # m; those whose likelihood is compared
 EDGE_ERROR_M = 0.025  # standard deviation of a straight edge of the footprint or the points
 LEAST_EDGE_M = 1.0  # of an edge that is measured; shorter ones follow their side
-FEWEST_POINTS = 4  # behind an edge
+FEWEST_POINTS = 4  # behind an edge, or on the ground before it
+LOW_SHARE = 0.1  # of the points below the roof's plane; lower ones are ground, or noise
+CLEAR_ROOM_M = 0.3  # between the roof's plane and the ground, below which either may be meant
 OVERHANG_SIGMAS = 2.0  # that an overhang is long at least
 LEAST_FILL = 0.6  # of a strip along the edge, and of its density by that behind the edge
 POINTS_A_STRETCH = 3.0  # expected on each stretch of an edge that is to be filled
@@ -195,8 +197,27 @@ def measure_edge(
     chance /= chance.sum()
     length = float(chance @ TRIED_M)
     spread = float(chance @ (TRIED_M - length) ** 2)
-    sigma = math.sqrt(spread + EDGE_ERROR_M**2)
+    further, variance = measure_gaps(strip.across[strip.across < length])
+    length += further
+    sigma = math.sqrt(spread + variance + EDGE_ERROR_M**2)
     return Measurement(length, sigma, measure_fill(strip, length, density, edges.lengths[number]))
+
+
+def measure_gaps(across: np.ndarray) -> tuple[float, float]:
+    """Return how much farther a roof ends than evenly spread points show.
+
+    The variance of that comes second. Points at places `across` (n,) lie on scan lines, which may
+    run along the edge. From the last of them, the roof goes on by a part of the gap to the next: of
+    gaps g, E(g^2) / 2 E(g) on average, and E(g^3) / 3 E(g) in the square (renewal theory). What
+    evenly spread points have is part of their likelihood.
+    """
+    gaps = np.diff(np.sort(across))
+    if len(gaps) < FEWEST_POINTS:
+        return 0.0, 0.0
+    mean = float(gaps.mean())
+    rest = float((gaps**2).mean()) / (2.0 * mean)
+    variance = float((gaps**3).mean()) / (3.0 * mean) - rest**2
+    return max(rest - mean, 0.0), max(variance - mean**2, 0.0)
 
 
 def cut_strip(
@@ -221,10 +242,23 @@ def cut_strip(
         (points[:, :2] * planes[:, :2]).sum(axis=1) + planes[:, 2],
     )
     slack = ON_PLANE_M + PLAN_ERROR_M * np.hypot(planes[:, 0], planes[:, 1])
-    keep = (np.abs(points[:, 2] - z) <= slack) & (is_inside == (across < 0.0))
-    return Strip(
-        along[keep], across[keep], measure_free(roof.outline, start, end, normal, neighbours)
-    )
+    room_m = measure_room(points[:, 2], z - slack, np.where(is_inside, -np.inf, across))
+    keep = (np.abs(points[:, 2] - z) <= slack) & (is_inside == (across < 0.0)) & (across < room_m)
+    free = measure_free(roof.outline, start, end, normal, neighbours)
+    return Strip(along[keep], across[keep], np.where(room_m > ACROSS_M, free, 0.0))
+
+
+def measure_room(z: np.ndarray, lowest: np.ndarray, across: np.ndarray) -> float:
+    """Return the distance from an edge at which the plane reaches the ground.
+
+    Points before the edge have heights `z` (n,), continue the plane if not below `lowest` (n,),
+    and lie so far `across`, those behind it nowhere.
+    """
+    below = np.isfinite(across) & (z < lowest)
+    if below.sum() < FEWEST_POINTS:
+        return math.inf
+    ground = float(np.quantile(z[below], LOW_SHARE))
+    return float(across[np.isfinite(across) & (lowest < ground + CLEAR_ROOM_M)].min(initial=np.inf))
 
 
 def find_planes(roof: Roof, xy: np.ndarray) -> np.ndarray:
