@@ -280,6 +280,32 @@ def test_the_command_prints_the_result(update, run, cloud):
     assert "4 buildings: 2 unchanged, 1 changed, 1 gone" in result.output
 
 
+def test_the_report_draws_changed_buildings_before_and_after(update, tmp_path):
+    _, out, _ = update
+    page = tmp_path / "report.html"
+    result = CliRunner().invoke(app, ["report", str(out), "--out", str(page)])
+    assert result.exit_code == 0, result.output
+    cards = page.read_text().split('<figure class="change">')[1:]
+    names = [card.partition("<figcaption>")[2].partition("<")[0] for card in cards]
+    assert [name.partition(",")[0] for name in names] == ["house-2: gone", "house-1: changed"]
+    gone, raised = (card.partition("</figcaption>")[0] for card in cards)
+    assert gone.count("<svg") == 2 and "<p>no model</p>" in gone  # from above and from the side
+    assert raised.count("<svg") == 4 and "roof raised, +2.0" in raised
+    assert all(dots for dots in raised.split('<g class="dots">')[1:])
+    assert page.stat().st_size < 300_000
+
+
+def test_a_report_without_the_earlier_run_draws_no_changes(update, tmp_path):
+    out = shutil.copytree(update[1], tmp_path / "out")
+    record = json.loads((out / "run.json").read_text())
+    record["update"]["run"] = str(tmp_path / "gone")
+    (out / "run.json").write_text(json.dumps(record))
+    result = CliRunner().invoke(app, ["report", str(out)])
+    assert result.exit_code == 0, result.output
+    assert "<figure" in (out / "report.html").read_text()
+    assert 'class="change"' not in (out / "report.html").read_text()
+
+
 def test_bad_input_is_refused_in_a_sentence(run, cloud, tmp_path):
     run = shutil.copytree(run, tmp_path / "run")
     xyz, classes = make_later_survey()

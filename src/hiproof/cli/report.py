@@ -28,12 +28,14 @@ def report(
 ) -> None:
     """Write a self-contained HTML page about a run.
 
-    It shows a map, quality charts and the 20 worst buildings in 3D.
+    It shows a map, quality charts and the 20 worst buildings in 3D. Of an update it shows the 20
+    buildings that changed most, before and after.
 
     Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable
     input.
     """
     with show_progress("measure"):
+        from ..evaluate.before_after import evaluate_earlier
         from ..evaluate.report import write_report
         from ..evaluate.run import evaluate_run
         from ..read.damage import SkippedBuildings
@@ -45,7 +47,9 @@ def report(
         )
         left_out.refuse_all(model.is_damaged for model in run.models)
         try:
-            write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
+            earlier = evaluate_earlier(run.record, left_out)
+            title = f"hiproof: {Path(folder).resolve().name}"
+            write_report(path, run, title=title, earlier=earlier)
         except OutputError as error:
             raise (
                 elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error

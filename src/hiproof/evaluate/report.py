@@ -21,6 +21,7 @@ from .. import __version__
 from ..log import count_things
 from ..masking import masked_values
 from ..status import Grade, Status
+from .before_after import draw_changes
 from .evaluation import summarise
 from .metrics import psd
 from .overview import BuildingOutcome, Overview, show_command
@@ -44,17 +45,29 @@ TABLE_FIGURES = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "out
 
 
 def write_report(
-    path: Path, run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN
+    path: Path,
+    run: EvaluatedRun,
+    title: str = "hiproof",
+    most_shown: int = MOST_SHOWN,
+    earlier: EvaluatedRun | None = None,
 ) -> None:
-    """Write the page to `path`. Raises OutputError when the file cannot be written."""
+    """Write the page to `path`. Raises OutputError when the file cannot be written.
+
+    `earlier` is the run that an update began with.
+    """
     from ..write.files import atomic_file
 
-    page = report_html(run, title, most_shown)
+    page = report_html(run, title, most_shown, earlier)
     with atomic_file(path) as file:
         file.write(page.encode())
 
 
-def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> str:
+def report_html(
+    run: EvaluatedRun,
+    title: str = "hiproof",
+    most_shown: int = MOST_SHOWN,
+    earlier: EvaluatedRun | None = None,
+) -> str:
     """Return the page as text.
 
     Tables and distributions count every building; of more than `most_shown`, map and 3D view show
@@ -73,6 +86,7 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
         "qualities": grade_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
+        "changes": draw_changes(run, earlier),
         "worst": worst_buildings(run, worst, buildings),
         "record": f'<pre tabindex="0" role="region" aria-label="run.json">{escape(record)}</pre>',
         "data": embed_json(report_data(places, places_on_map(places))),

@@ -1,0 +1,91 @@
+"""Changed buildings before and after an update.
+
+Each model is drawn over the points of its survey.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..read.damage import Damaged, refuse
+from ..write.attribute_list import OWN
+from .inputs import locate_input
+from .metrics import psd
+from .models import BuildingModel
+from .report_pictures import building_pictures
+from .run import EvaluatedRun, evaluate_run
+
+MOST_DRAWN_CHANGES = 20  # buildings shown with pictures: as many as are read to the end
+SHOWN = ("changed", "gone")  # classes of buildings that have a model before
+
+
+def evaluate_earlier(record: dict[str, Any], damaged: Damaged = refuse) -> EvaluatedRun | None:
+    """Return the run that an update began with, None where there is none to be found.
+
+    `record` is run.json of the update.
+    """
+    named, inputs = (record.get("update") or {}).get("run"), record.get("inputs") or {}
+    found = locate_input(named, inputs.get("started_in"), None) if isinstance(named, str) else None
+    return None if found is None else evaluate_run(Path(found), damaged=damaged)
+
+
+def draw_changes(run: EvaluatedRun, earlier: EvaluatedRun | None) -> str:
+    """Return a section with the buildings that changed most.
+
+    It is empty where none is known.
+    """
+    if earlier is None:
+        return ""
+    before = {model.id: number for number, model in enumerate(earlier.models)}
+    changed = [
+        number
+        for number, model in enumerate(run.models)
+        if model.attributes.get(f"{OWN}change") in SHOWN and model.id in before
+    ]
+    changed.sort(key=lambda number: (-measure_change(run.models[number]), number))
+    cards = "".join(
+        draw_card(run, number, earlier, before[run.models[number].id])
+        for number in changed[:MOST_DRAWN_CHANGES]
+    )
+    if not cards:
+        return ""
+    heading = "What changed: before, over the earlier points, and after, over the new ones"
+    return f'<section><h2>{heading}</h2><div class="grid cards">{cards}</div></section>'
+
+
+def measure_change(model: BuildingModel) -> float:
+    """Return how much (m) a building changed at its largest place."""
+    value = model.attributes.get(f"{OWN}change_m")
+    return abs(value) if isinstance(value, (int, float)) else 0.0
+
+
+def draw_card(run: EvaluatedRun, after: int, earlier: EvaluatedRun, before: int) -> str:
+    """Return the card of a building with its pictures before and after."""
+    model = run.models[after]
+    words = [model.attributes.get(f"{OWN}{name}") for name in ("change", "change_kind")]
+    text = ", ".join(str(word).replace("_", " ") for word in words if word)
+    change = model.attributes.get(f"{OWN}change_m")
+    text += f", {change:+.2f} m" if isinstance(change, (int, float)) else ""
+    rows = "".join(
+        f"<div><p>{label}</p>{draw_model(*side)}</div>"
+        for label, side in (
+            ("before", (earlier.models[before], earlier.points[before])),
+            ("after", (model, run.points[after])),
+        )
+    )
+    caption = f"<figcaption>{escape(model.id)}: {escape(text)}</figcaption>"
+    return f'<figure class="change">{rows}{caption}</figure>'
+
+
+def draw_model(model: BuildingModel, points: np.ndarray) -> str:
+    """Return the pictures of a model with its points, or that there is none."""
+    if model.solid is None:
+        return "<p>no model</p>"
+    origin = model.solid.vertices.min(axis=0)
+    distances = psd(model.solid, points)
+    solid = model.solid.move(-origin)
+    return building_pictures(solid, points - origin, distances, model.part_types)
