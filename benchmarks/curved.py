@@ -29,9 +29,9 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import ROUND
 
 KINDS = {
-    "alone": (*ROUND, "barrel"),
+    "alone": (*ROUND, "hexagonal_spire", "barrel"),
     "tower": (*ROUND, "barrel"),
-    "turret": ROUND,
+    "turret": (*ROUND, "hexagonal_spire"),
     "apse": ("half_cone",),
 }
 HOUSE_LENGTH_M, HOUSE_WIDTH_M = 14.0, 9.0  # Of the house with a turret.

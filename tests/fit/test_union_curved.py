@@ -32,6 +32,7 @@ PLANAR = [name for name in CATALOGUE if name not in CURVED]
         ("broach", "turret"),
         ("dome", "turret"),
         ("half_cone", "apse"),
+        ("hexagonal_spire", "turret"),
     ],
 )
 def test_a_curved_roof_is_found(kind, setting):

@@ -205,7 +205,7 @@ def test_formula_cancels_and_divides_by_monomials_only():
 
 def test_unknown_type_is_named_with_the_known_ones():
     with pytest.raises(
-        SettingsError, match=r"expected a roof type \(flat, .*half_cone\), got 'zome'"
+        SettingsError, match=r"expected a roof type \(flat, .*hexagonal_spire\), got 'zome'"
     ):
         get("zome")
 

@@ -49,14 +49,12 @@ SHAPES = (
     vault.DOME,
     vault.BARREL,
     half_cone.HALF_CONE,
+    cone.HEXAGONAL_SPIRE,
 )
 CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
 ROUND = ("cone", "broach", "dome")  # over a round or many-sided plan
-CURVED = (
-    *ROUND,
-    "barrel",
-    "half_cone",
-)  # whose facets stand for a curved surface, or are more than a volume's
+# whose facets stand for a curved surface, or are more than a volume's
+CURVED = (*ROUND, "barrel", "half_cone", "hexagonal_spire")
 # whose facets all stand for one curved surface
 SMOOTH = tuple(name for name, shape in CATALOGUE.items() if shape.refine is not None)
 

@@ -1,6 +1,7 @@
 """Cones and spires: facets that rise from a round or many-sided plan to one apex.
 
-A broach is a spire of eight sides over its width across flats. A cone is round: its facets follow
+A broach is a spire of eight sides, and a hexagonal spire has six. Their length is measured across
+flats. A cone is round: its facets follow
 its size (facets.py).
 """
 
@@ -26,6 +27,7 @@ from .gable import shape, typical
 from .pyramid import canonical
 
 BROACH_SIDES = 8  # Sides of the spire of most church towers that have one.
+HEXAGON_SIDES = 6  # Sides of the spires of pavilions and turrets that have neither four nor eight.
 
 
 def make_pointed(
@@ -65,7 +67,8 @@ def make_pointed(
         starts=tuple(
             DerivedStart("pyramid", (q0, q1), turn=turn) for turn in (0.0, math.pi / sides)
         ),
-        canonical=canonical,
+        # A quarter turn would change what has no side at +v.
+        canonical=canonical if sides % 4 == 0 else lambda theta: theta,
         rim=rim,
         draw=draw,
     )
@@ -85,3 +88,9 @@ CONE = replace(
     refine=lambda p, chord_m: make_cone(find_sides(p["length"] / 2, chord_m)),
 )
 BROACH = make_pointed("broach", BROACH_SIDES, 1.0, ("1120", "4000", "pyramidal"), (55.0, 78.0))
+hexagon = make_pointed(
+    "hexagonal_spire", HEXAGON_SIDES, 1.0, ("1120", "4000", "pyramidal"), (55.0, 78.0)
+)
+# No quarter turn leaves a hexagon as it is.
+across = DerivedStart("pyramid", (q0, q1 * V / U), quarters=1)
+HEXAGONAL_SPIRE = replace(hexagon, starts=(*hexagon.starts, across))

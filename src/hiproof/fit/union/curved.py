@@ -26,6 +26,8 @@ from .round_tops import LEAST_FALL_M, list_round_shapes
 LEAST_MISFIT_M = 0.03  # Nobody sees that a part lies nearer (m, mean) to its points than this.
 LEAST_NATS = 8.0  # A shape must be so much likelier (nats) than one part.
 LEAST_NATS_ON_ARC = 3.0  # The same over a round end of the outline, which speaks for it.
+# The same over a regular polygon: all planes of a spire follow from two numbers.
+LEAST_NATS_OF_SPIRE = -4.0
 # Over half a disc, a whole shape must be so much likelier (nats): its other half would be hidden.
 WHOLE_NATS = 8.0
 LEAST_VISIBLE = 0.4  # Smallest share of the points over a shape at which it is the highest part.
@@ -62,7 +64,7 @@ def roof_round_end(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> JudgedR
     ]
     heights = [new.highest[0] for _, new in options]
     judged = np.any([z != roof.highest[0] for z in heights], axis=0)
-    best, least = roof, LEAST_NATS_ON_ARC
+    best, least = roof, LEAST_NATS_ON_ARC if end.is_round else LEAST_NATS_OF_SPIRE
     for shape, new in options:
         if new is roof or measure_visible_share(new) < LEAST_VISIBLE:
             continue

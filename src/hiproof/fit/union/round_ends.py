@@ -16,7 +16,7 @@ import shapely
 from ...geometry.rings import OVERLAY_GRID_M, counterclockwise
 from ...model import Part
 from ...primitives.catalogue import CATALOGUE
-from ...primitives.cone import BROACH_SIDES
+from ...primitives.cone import BROACH_SIDES, HEXAGON_SIDES
 from ...primitives.contract import HALF_LENGTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
 from .judged import JudgedRoof
@@ -27,6 +27,7 @@ from .round_tops import FOLLOW_M
 # Turns (degrees) between sides that follow a circle, or a polygon of six sides or more.
 LEAST_TURN_DEG, MOST_TURN_DEG = 3.0, 65.0
 FEWEST_ROUND_SIDES = 11  # A circle has as many sides or more.
+SIDES_OF_SPIRES = {"broach": BROACH_SIDES, "hexagonal_spire": HEXAGON_SIDES}
 FEWEST_CORNERS = 4  # Fewer lie on some circle by chance.
 SHORTEST_ARC_DEG = 120.0  # Shorter arcs are round corners of a roof, not shapes of their own.
 APSE_DEG = (140.0, 220.0)  # Arcs of half discs.
@@ -134,8 +135,8 @@ def list_end_shapes(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> Iterat
     for name in names:
         if name in ("cone", "dome") and end.is_round and end.span_deg >= TURRET_DEG:
             yield from fit_over_circle(roof, end, name, end.radius)
-        elif name == "broach" and end.sides == BROACH_SIDES and end.span_deg >= TURRET_DEG:
-            yield from fit_over_circle(roof, end, name, end.radius * find_apothem(BROACH_SIDES))
+        elif end.sides == SIDES_OF_SPIRES.get(name) and end.span_deg >= TURRET_DEG:
+            yield from fit_over_circle(roof, end, name, end.radius * find_apothem(end.sides))
         elif name == "half_cone" and end.is_half_disc:
             yield from fit_over_circle(roof, end, name, end.radius)
 
