@@ -11,7 +11,7 @@ import shapely
 
 from ..errors import CompositionError
 from ..geometry.outline_edges import OutlineEdges, list_outline_edges, make_strips
-from ..geometry.rings import OVERLAY_GRID_M, with_area
+from ..geometry.rings import OVERLAY_GRID_M, repair_polygons, with_area
 from ..model import GROUND, Eaves, Model, Piece, Roof, Solid
 from ..model.overhang import WALLS
 from ..settings import ComposeSettings, Settings
@@ -114,7 +114,7 @@ def widen_roof(roof: Roof, widths: np.ndarray) -> Roof:
     edges = list_outline_edges(roof.outline)
     strips = make_strips(edges, widths)
     number_of = np.flatnonzero(widths)
-    areas = [roof.outline, *(shapely.polygons(strips[k]) for k in number_of)]
+    areas = [roof.outline, *repair_polygons(shapely.polygons(strips[number_of]))]
     area = with_area(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
     if area.geom_type != "Polygon":
         raise CompositionError(
@@ -147,7 +147,7 @@ def widen_piece(
     if not added:
         yield piece
         return
-    union = shapely.union_all([piece.outline, *added], grid_size=OVERLAY_GRID_M)
+    union = shapely.union_all([repair_polygons(piece.outline), *added], grid_size=OVERLAY_GRID_M)
     for outline in shapely.get_parts(with_area(union)):
         yield Piece(outline, piece.planes)
 
@@ -198,7 +198,7 @@ def cut_strip(
         outer_b if end == 1.0 else a + end * (b - a) + across,
         outer_a if start == 0.0 else a + start * (b - a) + across,
     ]
-    polygon = shapely.polygons(corners)
+    polygon = repair_polygons(shapely.polygons(corners))  # mitres at a short edge may cross
     return with_area(shapely.difference(polygon, outline, grid_size=OVERLAY_GRID_M))
 
 

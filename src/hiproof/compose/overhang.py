@@ -20,7 +20,6 @@ from .arrangement import COLLINEAR_UNITS, GRID_M
 from .building_parts import list_edges
 from .shell import simple_loops
 from .underside import (
-    LEAST_ROOM_M,
     Cap,
     Corner,
     GroundCell,
@@ -32,6 +31,7 @@ from .underside import (
 )
 
 SAME_PLACE_UNITS = 15.0  # 1.5 mm; composing a roof moves a corner of its outline by less
+LEAST_CLEARANCE_M = 0.1  # between a slab and the ground; eaves of a shed may hang that low
 SAME_HEIGHT_UNITS = 10  # 1 mm; heights over one place nearer than that are one
 SLIVER_STRIP_UNITS = 20.0  # 2 mm; strips between walls and roof edge thinner than that are rounding
 
@@ -178,9 +178,9 @@ class OverhangingShell(Shell):
         """Raise CompositionError also where a slab all but lies on the ground."""
         super().refuse_unusable()
         room = min((z - self.ground[place] for (_, place), z in self.slabs.items()), default=10**9)
-        if room * GRID_M < LEAST_ROOM_M:
+        if room * GRID_M < LEAST_CLEARANCE_M:
             raise CompositionError(
-                f"expected overhangs at least {LEAST_ROOM_M:g} m over the ground, got one "
+                f"expected overhangs at least {LEAST_CLEARANCE_M:g} m over the ground, got one "
                 f"{room * GRID_M:.2f} m over it; leave them out"
             )
 
