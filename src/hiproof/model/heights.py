@@ -48,11 +48,18 @@ def raise_over(
     The polygon has edges from `starts` to `ends` (m, 2). Where z rises, `top` (n,) becomes
     `number`.
     """
-    inside = np.zeros(len(x), np.bool_)
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
     for e in range(len(starts)):
-        for i in range(len(x)):
-            inside[i] ^= flips(starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1], x[i], y[i])
-    for k in np.nonzero(inside)[0]:
+        low_x, high_x = min(low_x, starts[e, 0]), max(high_x, starts[e, 0])
+        low_y, high_y = min(low_y, starts[e, 1]), max(high_y, starts[e, 1])
+    near = np.nonzero((x >= low_x) & (x <= high_x) & (y >= low_y) & (y <= high_y))[0]
+    near_x, near_y, inside = x[near], y[near], np.zeros(len(near), np.bool_)
+    for e in range(len(starts)):
+        for i in range(len(near)):
+            inside[i] ^= flips(
+                starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1], near_x[i], near_y[i]
+            )
+    for k in near[inside]:
         lowest = np.inf
         for a, b, c in planes:
             lowest = min(lowest, a * x[k] + b * y[k] + c)

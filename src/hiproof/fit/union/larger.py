@@ -7,6 +7,7 @@ gambrel.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -47,8 +48,8 @@ def unite_gambrels(parts: list[Part]) -> list[Part]:
         if top is None:
             continue
         lower_parts = [part for part in parts if part is not upper]
-        for lower in [(part,) for part in lower_parts] + list(combinations(lower_parts, 2)):
-            gambrel = make_gambrel(upper, top, lower)
+        for lower, slopes in list_lower_slopes(upper, lower_parts):
+            gambrel = make_gambrel(upper, top, lower, slopes)
             if gambrel is not None:
                 return unite_gambrels([*exclude_parts(lower_parts, lower), gambrel])
     return parts
@@ -97,48 +98,59 @@ class GambrelSlope:
     slope: float
 
 
-def list_lower_slopes(upper: Part, lower: tuple[Part, ...]) -> list[GambrelSlope]:
-    """List the slopes on the two sides below the gable `upper`.
+def list_lower_slopes(
+    upper: Part, parts: list[Part]
+) -> Iterator[tuple[tuple[Part, ...], list[GambrelSlope]]]:
+    """Yield which parts may be the two sides below a gable, and their slopes.
 
-    They are those of a truncated gable, or of a monopitch on each side.
+    They are a truncated gable, or two monopitches, parallel to the gable `upper`.
     """
-    across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
-    slopes = []
-    for part in lower:
-        turn = math.remainder(part.kappa - upper.kappa, 2.0 * math.pi)
-        step, p = float(across @ (part.translation - upper.translation)[:2]), part.parameters
-        if part.type == "monopitch" and len(lower) == 2 and "height" in p:
-            side = -1.0 if abs(turn) < TURN_ALIKE_RAD else 1.0
-            if side > 0.0 and abs(abs(turn) - math.pi) > TURN_ALIKE_RAD:
-                return []
-            slopes.append(
-                GambrelSlope(
-                    step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"]
-                )
-            )
-        elif (
-            part.type == "truncated_gable"
-            and len(lower) == 1
-            and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD
-        ):
-            member = read_member(part.type, p, part.kappa, part.translation)
-            for sign, side in ((-1.0, FRONT), (1.0, BACK)):
-                offset = step + sign * 0.5 * p["width"]
-                slopes.append(GambrelSlope(offset, member.eaves[side], member.slopes[side]))
-        else:
-            return []
-    return sorted(slopes, key=lambda slope: slope.offset)
+    monopitches = []
+    for part in parts:
+        slopes = read_slopes(upper, part)
+        if len(slopes) == 2:
+            yield (part,), slopes
+        elif slopes:
+            monopitches.append((part, slopes[0]))
+    for (part, slope), (other, other_slope) in combinations(monopitches, 2):
+        yield (part, other), [slope, other_slope]
 
 
-def make_gambrel(upper: Part, top: GambrelTop, lower: tuple[Part, ...]) -> Part | None:
-    """Make one gambrel of the gable `upper` and the slopes on its two sides.
+def read_slopes(upper: Part, part: Part) -> list[GambrelSlope]:
+    """Return the slopes of a part that is parallel to the gable `upper`.
 
-    Returns None if they are none.
+    A truncated gable has two, a monopitch one, and other parts none that count.
     """
-    slopes = list_lower_slopes(upper, lower)
-    if len(slopes) != 2:
-        return None
-    front, back = slopes
+    turn, p = math.remainder(part.kappa - upper.kappa, 2.0 * math.pi), part.parameters
+    if abs(math.remainder(turn, math.pi)) > TURN_ALIKE_RAD:
+        return []
+    step = float(measure_across(upper) @ (part.translation - upper.translation)[:2])
+    if part.type == "monopitch" and "height" in p:
+        offset = step + math.copysign(0.5 * p["width"], abs(turn) - TURN_ALIKE_RAD)
+        return [GambrelSlope(offset, part.translation[2], p["height"] / p["width"])]
+    if part.type != "truncated_gable":
+        return []
+    member = read_member(part.type, p, part.kappa, part.translation)
+    return [
+        GambrelSlope(step + sign * 0.5 * p["width"], member.eaves[side], member.slopes[side])
+        for sign, side in ((-1.0, FRONT), (1.0, BACK))
+    ]
+
+
+def measure_across(upper: Part) -> np.ndarray:
+    """Return the unit vector (2,) across the ridge of a gable."""
+    return np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
+
+
+def make_gambrel(
+    upper: Part, top: GambrelTop, lower: tuple[Part, ...], slopes: list[GambrelSlope]
+) -> Part | None:
+    """Make one gambrel of a gable and the slopes on its two sides.
+
+    The gable is `upper`, and the two `slopes` are those of the `lower` parts. Returns None if they
+    are none.
+    """
+    front, back = sorted(slopes, key=lambda slope: slope.offset)
     slope, width = 0.5 * (front.slope + back.slope), back.offset - front.offset
     if abs(front.slope - back.slope) > SIZE_ALIKE * slope or slope < top.slope + STEEPER:
         return None
@@ -154,8 +166,8 @@ def make_gambrel(upper: Part, top: GambrelTop, lower: tuple[Part, ...]) -> Part 
         "break_width": 2.0 * half_break,
         "break_height": rise - top.slope * half_break,
     }
-    across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
-    centre = upper.translation[:2] + 0.5 * (front.offset + back.offset) * across
+    middle = 0.5 * (front.offset + back.offset)
+    centre = upper.translation[:2] + middle * measure_across(upper)
     shape = get("gambrel")
     planes = shape.planes_at(shape.to_theta(parameters, upper.kappa, np.array([*centre, eave])))
     if not is_same_surface(planes, (upper, *lower)):
