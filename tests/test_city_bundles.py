@@ -35,7 +35,7 @@ def set_failing_ids(monkeypatch):
     """
 
     def set_failing(*ids):
-        def failing(points, footprint, terrain, settings, id, ground, unused):
+        def failing(points, footprint, terrain, settings, id, ground, unused, neighbours):
             if id in ids:
                 corner = np.array([footprint.polygon.bounds[:2]]) if footprint else points[:1, :2]
                 raise KeyError(
