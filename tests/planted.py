@@ -47,7 +47,9 @@ def solve_quickly(folder, tile, terrain=None, avoid=()):
 def solve_killed_once(folder, tile, terrain=None, avoid=()):
     """The worker that first comes to the deadly building is killed, as if from outside."""
 
-    def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()):
+    def reconstruct(
+        points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()
+    ):
         mark = Path(folder) / "killed"
         if id == DEADLY and not mark.exists():
             mark.touch()
@@ -60,7 +62,9 @@ def solve_killed_once(folder, tile, terrain=None, avoid=()):
 def solve_deadly(folder, tile, terrain=None, avoid=()):
     """One building kills every worker that tries it."""
 
-    def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()):
+    def reconstruct(
+        points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()
+    ):
         if id == DEADLY:
             os.kill(os.getpid(), signal.SIGKILL)
         return count_points(points, footprint, terrain, settings, id)
@@ -71,7 +75,9 @@ def solve_deadly(folder, tile, terrain=None, avoid=()):
 def solve_hungry(folder, tile, terrain=None, avoid=()):
     """One building wants more memory than the worker may have."""
 
-    def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()):
+    def reconstruct(
+        points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()
+    ):
         if id == DEADLY:
             import resource  # Windows has none
 
