@@ -72,7 +72,7 @@ CHANGED = {
 }
 FURTHER = {
     *("installations", "passages", "walls", "overhangs", "roof_thickness", "footprint_kind"),
-    "volume_lod23",
+    *("volume_lod23", "survey_date", "epochs_used"),
 }  # keys that only some buildings have
 OF_A_CHANGE = {"change", "change_kind", "change_m", "change_sigma_m", "valid_from", "valid_to"}
 
