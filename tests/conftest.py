@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import signal
 import warnings
 
 import pytest
@@ -15,7 +16,13 @@ from tiny_town import write_town
 
 
 def pytest_configure(config):
-    """Compile before several processes test, so that no two compile the same."""
+    """Compile before several processes test, so that no two compile the same.
+
+    A shell has what it starts in the background ignore Ctrl-C, and processes that tests interrupt
+    would ignore it too.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         news.listener = news.Lines(print)
         make_ready(ALL)
