@@ -454,7 +454,17 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "broken_inputs": [list(pair) for pair in summary.broken_inputs],
         "seconds": summary.seconds,
     }
-    with atomic(Path(request.out) / "run.json") as temporary:
+    save_run_record(Path(request.out) / "run.json", record)
+
+
+def extend_run_record(request: Request, entries: dict[str, Any]) -> None:
+    """Add entries to the run.json that a run has written."""
+    path = Path(request.out) / "run.json"
+    save_run_record(path, json.loads(path.read_text(encoding="utf-8")) | entries)
+
+
+def save_run_record(path: Path, record: dict[str, Any]) -> None:
+    with atomic(path) as temporary:
         Path(temporary).write_text(
             json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import shutil
 from collections import Counter
 from dataclasses import dataclass
@@ -15,11 +14,10 @@ from ..city.from_cloud import Progress
 from ..city.lock import hold_folder
 from ..city.plan import WorkPlan
 from ..city.resume import open_state
-from ..city.run import Steps, Summary, reconstruct_in_folder
+from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..errors import InputError, OutputError, SettingsError
 from ..garbage import collect_rarely
 from ..status import Change
-from ..write.files import atomic
 from .before import prepare_surveys, remove_earlier_points
 from .dates import find_survey_date
 from .earlier import EarlierRun, choose_read_settings, read_earlier
@@ -135,10 +133,8 @@ def report_changes(
 
 def add_to_record(request: UpdateRequest, earlier: EarlierRun, result: UpdateSummary) -> None:
     """Add what is peculiar to an update to run.json."""
-    path = Path(request.out) / "run.json"
-    record = json.loads(path.read_text(encoding="utf-8"))
     surveys = result.surveys
-    record["update"] = {
+    entries = {
         "run": str(request.run),
         "survey_date": surveys.date,
         "footprint_shift": list(earlier.footprint_shift),
@@ -151,5 +147,4 @@ def add_to_record(request: UpdateRequest, earlier: EarlierRun, result: UpdateSum
         "by_kind": result.by_kind,
         "roofs_outside": result.outside,
     }
-    with atomic(path) as temporary:
-        Path(temporary).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    extend_run_record(request, {"update": entries})

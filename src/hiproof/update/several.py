@@ -19,7 +19,7 @@ from ..city.lock import hold_folder
 from ..city.plan import WorkPlan
 from ..city.request import Request
 from ..city.resume import open_state
-from ..city.run import Steps, Summary, reconstruct_in_folder
+from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..city.solve import Surroundings, open_terrain, solve_one
 from ..city.sort import load_points
 from ..errors import InputError
@@ -98,14 +98,11 @@ def draw_roofs(
 
 def add_to_record(request: Request, names: tuple[str, ...], shifts: dict[str, SurveyShift]) -> None:
     """Add the surveys to run.json: their clouds, and how they lie to the newest."""
-    path = Path(request.out) / "run.json"
-    record = json.loads(path.read_text(encoding="utf-8"))
-    record["epochs"] = {
+    surveys = {
         name: {
             "clouds": request.epochs.count(name),
             "shift": shifts[name].to_dict() if name in shifts else None,
         }
         for name in names
     }
-    with atomic(path) as temporary:
-        Path(temporary).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    extend_run_record(request, {"epochs": surveys})
