@@ -9,7 +9,7 @@ points say and, the less outline lies along it, up to the price of a loose edge.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -414,6 +414,14 @@ def find_corners(sides: list[Side]) -> np.ndarray:
     corners = []
     for i, j in CORNER_SIDES:
         a, b = sides[i], sides[j]
-        u = (a.offset + a.lean * b.offset) / (1.0 - a.lean * b.lean)
-        corners.append((u, b.offset + b.lean * u))
+        corners.append(cross_lines(a.offset, a.lean, b.offset, b.lean))
     return np.array(corners)
+
+
+def cross_lines(offset: Any, lean: Any, other_offset: Any, other_lean: Any) -> tuple[Any, Any]:
+    """Return x and y where the lines of two sides cross, as numbers or arrays.
+
+    They are x = offset + lean y, and y = other_offset + other_lean x.
+    """
+    x = (offset + lean * other_offset) / (1.0 - lean * other_lean)
+    return x, other_offset + other_lean * x

@@ -30,7 +30,7 @@ from .prices import CORNER_COST, PARAMETER_COST, REPAIR_UNITS
 from .regions import PlanSite, cut_regions, list_polygons
 from .repairs import Repair, find_repairs
 from .scene import Scene, select_points
-from .sides import Side
+from .sides import Side, cross_lines
 from .volumes import DIRECTION, U0, V0, V1
 
 WINDOW_M2 = 400.0  # A roof of so many square metres is one window.
@@ -297,8 +297,7 @@ def list_line_ends(
         (offsets[numbers, edges, None], leans[numbers, edges, None]),
         (line.offset, line.lean),
     ):
-        x = (offset + lean * offset_beside) / (1.0 - lean * lean_beside)
-        y = offset_beside + lean_beside * x
+        x, y = cross_lines(offset, lean, offset_beside, lean_beside)
         ends.append(np.stack([x, y] if edge < 2 else [y, x], axis=-1).reshape(-1, 2))
     c, s = problem.scene.turn[int(problem.volumes[k, DIRECTION])]
     return problem.plan.frame.xy_local(np.concatenate(ends) @ np.array([[c, s], [-s, c]]))
