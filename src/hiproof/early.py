@@ -32,13 +32,16 @@ def is_command() -> bool:
     )
 
 
+IS_COMMAND = is_command()  # now, for `python -m` changes sys.argv once packages are imported
+
+
 def end_at_once_on_interrupt() -> None:
     """Let Ctrl-C end the command at once, until `interrupt_as_usual`.
 
     Where Ctrl-C is ignored, it stays so.
     """
     is_main = threading.current_thread() is threading.main_thread()
-    if is_command() and is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if IS_COMMAND and is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from itertools import takewhile
 
-from ..early import INTERRUPTED
+from ..early import INTERRUPTED, end_at_once_on_interrupt
 from ..garbage import collect_rarely
 
 KEPT = (
@@ -19,9 +19,15 @@ KEPT = (
 
 
 def main() -> None:
-    """Run `hiproof`, which collects garbage rarely from its first import on."""
+    """Run `hiproof`, which collects garbage rarely from its first import on.
+
+    Once all is done, Ctrl-C ends the command at once, without a traceback.
+    """
     with collect_rarely():
-        run_command()
+        try:
+            run_command()
+        finally:
+            end_at_once_on_interrupt()
 
 
 def run_command() -> None:
