@@ -10,8 +10,10 @@ import dataclasses
 import functools
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import shapely
@@ -63,6 +65,11 @@ from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
 
 # corners that change an outline by less make the area beside it slow to draw and no truer
 COARSEST_THINNING_M = 0.05
+
+RecordTerrain: TypeAlias = Callable[[], TerrainRecorder | None]
+"""Solves a building again and records its terrain."""
+KeepFailure: TypeAlias = Callable[[Job, str, RecordTerrain], None]
+"""Keeps the input of a building that failed, with the traceback."""
 
 DIED = "the process died while it worked on this building"
 
@@ -382,7 +389,7 @@ def terrain_model(
     return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
 
 
-def keep_nothing(job: Job, trace: str, terrain: Callable[[], TerrainRecorder | None]) -> None:
+def keep_nothing(job: Job, trace: str, terrain: RecordTerrain) -> None:
     """Keep nothing of a building that failed."""
 
 
@@ -395,38 +402,70 @@ def solve_one(
     job: Job,
     surroundings: Surroundings,
     override: Override | None = None,
-    keep: Callable[[Job, str, Callable[[], TerrainRecorder | None]], None] = keep_nothing,
+    keep: KeepFailure = keep_nothing,
 ) -> tuple[Building, Fragments]:
     """Return one building and its texts, whatever happens.
 
     An exception becomes its status.
 
     `keep` is called with the traceback.
-
-    MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried
-    again alone. So is DamagedRaster, for the terrain model is the run's and not the building's.
     """
     record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
     if job.error is not None:
         keep(job, job.error.trace, no_terrain)
         return record_failure(plan, job, job.error.detail)
-    try:
+
+    def solve() -> tuple[Building, Fragments]:
         # first of all: a footprint is put where points are many
-        job, moved = surroundings.move(job)
-        building = solve_by_points(plan, job, moved, surroundings, override)
+        moved_job, remark = surroundings.move(job)
+        building = solve_by_points(plan, moved_job, remark, surroundings, override)
         if building.built is None and list_fallback_columns(plan.settings.read):
-            terrain = surroundings.choose_terrain(job)
+            terrain = surroundings.choose_terrain(moved_job)
             building = use_fallback(building, override, terrain, plan.settings)
         building, texts = fragments(building, plan.list_names(job), plan.head)
         if building.status is Status.INTERNAL_ERROR:
             keep(job, building.detail, record_terrain)
         return building, texts
+
+    return solve_safely(plan, job, solve, keep, record_terrain)
+
+
+def solve_safely(
+    plan: WorkPlan,
+    job: Job,
+    solve: Callable[[], tuple[Building, Fragments]],
+    keep: KeepFailure,
+    record_terrain: RecordTerrain = no_terrain,
+) -> tuple[Building, Fragments]:
+    """Return what `solve` makes of a building, so that it never stops the others.
+
+    An exception becomes its status, and `keep` is called with the traceback.
+
+    MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried
+    again alone. So is DamagedRaster, for the terrain model is the run's and not the building's.
+    """
+    try:
+        return solve()
     except DamagedRaster:
         raise
     except Exception as error:
         report = report_error(error)
         keep(job, report.trace, record_terrain)
         return record_failure(plan, job, report.detail)
+
+
+@contextmanager
+def pass_over_failure(job: Job) -> Iterator[None]:
+    """Pass over an error of a building in what precedes its solution.
+
+    It is logged. Errors that `solve_safely` raises are raised here, too.
+    """
+    try:
+        yield
+    except DamagedRaster:
+        raise
+    except Exception as error:
+        LOGGER.info("building %s is passed over:\n%s", job.id, report_error(error).trace)
 
 
 def solve_by_points(

@@ -15,7 +15,8 @@ import numpy as np
 
 from ..city.plan import WorkPlan
 from ..city.run import absolute
-from ..errors import HiproofError, InputError
+from ..city.solve import pass_over_failure
+from ..errors import InputError
 from ..log import LOGGER
 from ..parametric.record import read_building
 from .earlier import EarlierRun
@@ -105,12 +106,11 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
             continue
         epochs = Epochs(state, tile, terrain, np.zeros(3))
         for index in inside:
-            try:
+            job = plan.jobs[index]
+            with pass_over_failure(job):
                 roof = read_building(members[index]["record"] | {"terrain_line": []})[1]
-            except HiproofError:
-                continue
-            if roof is None:
-                continue
-            old, new = epochs.select_roofs(plan.jobs[index])
-            to_local = roof.frame.to_local
-            yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))
+                if roof is None:
+                    continue
+                old, new = epochs.select_roofs(job)
+                to_local = roof.frame.to_local
+                yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +18,15 @@ from ..city.bundles import keep_failure
 from ..city.ledger import Outcome
 from ..city.overrides import load_overrides
 from ..city.plan import Job, WorkPlan, load_plan
-from ..city.solve import Surroundings, open_terrain, record_failure, solve_buildings, solve_one
+from ..city.solve import (
+    KeepFailure,
+    Surroundings,
+    open_terrain,
+    solve_buildings,
+    solve_one,
+    solve_safely,
+)
 from ..city.sort import POINT_KINDS, load_points
-from ..errors import DamagedRaster, report_error
 from ..model import Building
 from ..parametric.override import Override
 from ..stages import add_remark
@@ -121,13 +126,14 @@ def solve_best(
     job: Job,
     surveys: TileSurveys,
     override: Override | None,
-    keep: Callable[..., None],
+    keep: KeepFailure,
 ) -> tuple[Building, Fragments]:
     """Return a building made of its best survey, and of those that agree.
 
     Whatever goes wrong becomes its status.
     """
-    try:
+
+    def solve() -> tuple[Building, Fragments]:
         year = read_year(job, plan.settings.read.year_column)
         names = [name for name in surveys.names if year is None or int(name[:4]) >= year]
         remark = "" if names else f"its year, {year}, is after that of every survey"
@@ -143,10 +149,8 @@ def solve_best(
             building, used = (building, used[:1]) if united.built is None else (united, used)
         result = dataclasses.replace(building, survey_date=name, epochs_used=tuple(sorted(used)))
         return fragments(add_remark(result, remark), plan.list_names(job), plan.head)
-    except (MemoryError, DamagedRaster):
-        raise
-    except Exception as error:
-        return record_failure(plan, job, report_error(error).detail)
+
+    return solve_safely(plan, job, solve, keep)
 
 
 def choose_survey(points: dict[str, np.ndarray]) -> tuple[str, list[str]]:

@@ -20,7 +20,7 @@ from ..city.plan import WorkPlan
 from ..city.request import Request
 from ..city.resume import open_state
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
-from ..city.solve import Surroundings, open_terrain, solve_one
+from ..city.solve import Surroundings, open_terrain, pass_over_failure, solve_one
 from ..city.sort import load_points
 from ..errors import InputError
 from ..garbage import collect_rarely
@@ -88,12 +88,15 @@ def draw_roofs(
             building, _ = solve_one(plan, job, views[names[0]])
             if building.built is None:
                 continue
-            to_local = building.roof.frame.to_local
-            points = {name: to_local(select_roof(view, job).points) for name, view in views.items()}
-            yield {
-                name: SampledRoof(building.roof, points[names[0]], points[name])
-                for name in names[1:]
-            }
+            with pass_over_failure(job):
+                to_local = building.roof.frame.to_local
+                points = {
+                    name: to_local(select_roof(view, job).points) for name, view in views.items()
+                }
+                yield {
+                    name: SampledRoof(building.roof, points[names[0]], points[name])
+                    for name in names[1:]
+                }
 
 
 def add_to_record(request: Request, names: tuple[str, ...], shifts: dict[str, SurveyShift]) -> None:

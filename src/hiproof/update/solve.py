@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,9 +21,13 @@ from ..city.bundles import keep_failure
 from ..city.ledger import Outcome
 from ..city.overrides import load_overrides
 from ..city.plan import Job, WorkPlan, load_plan
-from ..city.solve import record_failure, solve_buildings, solve_one
-from ..errors import HiproofError, report_error
-from ..log import LOGGER
+from ..city.solve import (
+    KeepFailure,
+    pass_over_failure,
+    solve_buildings,
+    solve_one,
+    solve_safely,
+)
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
 from ..parametric.override import Override
@@ -69,11 +72,14 @@ def update_tile(
     updater, members = make_updater(root, tile, terrain, SURVEYS_FILE), load_members(root)
     plan = updater.plan
 
-    def solve(job: Job) -> tuple[Building, Fragments]:
+    def update(job: Job) -> tuple[Building, Fragments]:
         building = updater.update(job, UpdateMember.read(members[job.index], job))
         if isinstance(building, KeptBuilding):
             return building, building.texts
         return fragments(building, plan.list_names(job), plan.head)
+
+    def solve(job: Job) -> tuple[Building, Fragments]:
+        return solve_safely(plan, job, functools.partial(update, job), updater.keep)
 
     return solve_buildings(root, plan, tile, solve, avoid)
 
@@ -90,20 +96,19 @@ def make_updater(root: Path, tile: str, terrain: str | None, file: str) -> Updat
 def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float]:
     """Return the chances of the buildings of `tile` that were tested.
 
-    One that cannot be read is left to `update_tile`.
+    One that fails is left to `update_tile`, which says so.
     """
     root, chances = Path(folder), []
     updater, members = make_updater(root, tile, terrain, JUDGING_FILE), load_members(root)
     for index in updater.plan.tiles[tile]:
-        try:
+        job = updater.plan.jobs[index]
+        with pass_over_failure(job):
             earlier, roof = read_building(members[index]["record"] or {"id": ""})
             if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
                 continue
-            verdict = updater.judge(updater.plan.jobs[index], earlier, roof)
-        except HiproofError:
-            continue
-        if verdict.change in TESTED:
-            chances.append(1.0 if verdict.change is Change.UNCERTAIN else verdict.chance)
+            verdict = updater.judge(job, earlier, roof)
+            if verdict.change in TESTED:
+                chances.append(1.0 if verdict.change is Change.UNCERTAIN else verdict.chance)
     return chances
 
 
@@ -114,7 +119,7 @@ class Updater:
     plan: WorkPlan
     epochs: Epochs
     surveys: Surveys
-    keep: Callable[..., None]
+    keep: KeepFailure
     texts: dict[bytes, Fragments]
     overrides: dict[int, Override]
 
@@ -125,30 +130,23 @@ class Updater:
         return SAME_SIGMAS * math.hypot(noise.cell, noise.roof)
 
     def update(self, job: Job, member: UpdateMember) -> Building:
-        """Return a building brought up to date, whatever happens to it."""
-        try:
-            if member.record is None:
-                return self.replace_earlier(job, member)
-            # lines of terrain judge nothing, and reading them takes long
-            earlier, roof = read_building(member.record | {"terrain_line": []})
-            if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
-                return self.revisit_empty(job, member)
-            verdict = self.judge(job, earlier, roof)
-            if verdict.change is Change.UNCHANGED and member.is_same_outline:
-                kept = self.refine(job, member.record) if self.surveys.refine else None
-                kept = kept or keep_texts(earlier, member.record, self.texts)
-                if kept is not None:
-                    return kept
-            lines = tuple(read_terrain_lines(member.record))
-            earlier = dataclasses.replace(earlier, terrain_intersection=lines)
-            earlier = with_model(earlier, roof, self.plan.settings.compose)
-            return self.follow_verdict(job, member, earlier, verdict)
-        except MemoryError:
-            raise
-        except Exception as error:
-            report = report_error(error)
-            LOGGER.info("building %s failed:\n%s", job.id, report.trace)
-            return record_failure(self.plan, job, report.detail)[0]
+        """Return a building brought up to date."""
+        if member.record is None:
+            return self.replace_earlier(job, member)
+        # lines of terrain judge nothing, and reading them takes long
+        earlier, roof = read_building(member.record | {"terrain_line": []})
+        if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
+            return self.revisit_empty(job, member)
+        verdict = self.judge(job, earlier, roof)
+        if verdict.change is Change.UNCHANGED and member.is_same_outline:
+            kept = self.refine(job, member.record) if self.surveys.refine else None
+            kept = kept or keep_texts(earlier, member.record, self.texts)
+            if kept is not None:
+                return kept
+        lines = tuple(read_terrain_lines(member.record))
+        earlier = dataclasses.replace(earlier, terrain_intersection=lines)
+        earlier = with_model(earlier, roof, self.plan.settings.compose)
+        return self.follow_verdict(job, member, earlier, verdict)
 
     def judge(self, job: Job, earlier: Building, roof: Roof) -> ChangeVerdict:
         """Return the verdict on an earlier building by the points of both surveys."""
