@@ -1,15 +1,20 @@
 """Roofs outside all outlines: built, extended, pulled down, and those that stood before."""
 
 import csv
+import json
 
 import numpy as np
 import pyogrio
 import pytest
 import shapely
+from jsonschema import Draft202012Validator
 
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
+from hiproof.errors import InputError
 from hiproof.model import PointCloud
+from hiproof.parametric.run import build_file
+from hiproof.parametric.schema import schema
 from hiproof.settings import ReadSettings
 from hiproof.update.outside import SurveyCells, load_survey
 from hiproof.update.request import UpdateRequest
@@ -67,6 +72,34 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
         assert common > 0.75, kind
     box = shapely.box(*(np.array(EXTENSION) + [*ORIGIN[:2], *ORIGIN[:2]]))
     assert places["extended"].intersection(box).area > 0.75 * box.area
+
+
+def test_build_makes_the_same_tables_of_the_parameters(update, tmp_path):
+    _, out = update
+    build_file(out / "parameters.jsonl", tmp_path)
+    for name in ("changes.csv", "changes.gpkg"):
+        assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
+    validator = Draft202012Validator(schema())
+    lines = (out / "parameters.jsonl").read_text().splitlines()
+    assert not [
+        error.message for line in lines for error in validator.iter_errors(json.loads(line))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ({"survey": 5}, "expected text as survey"),
+        ({"survey": DATE, "roofs": []}, "expected the keys survey, roofs_outside of update"),
+        ({"survey": DATE, "roofs_outside": [{"area": "x"}]}, "as area of roof 0 of roofs_outside"),
+    ],
+)
+def test_a_head_that_no_update_wrote_is_refused(value, words, update, tmp_path):
+    head, *rest = (update[1] / "parameters.jsonl").read_text().splitlines()
+    head = json.dumps(json.loads(head) | {"update": value})
+    (tmp_path / "parameters.jsonl").write_text("\n".join([head, *rest]) + "\n")
+    with pytest.raises(InputError, match=words):
+        build_file(tmp_path / "parameters.jsonl", tmp_path / "built")
 
 
 def test_buildings_inside_their_outlines_are_not_reported(update):

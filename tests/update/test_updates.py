@@ -84,7 +84,9 @@ def test_every_house_gets_its_class(update):
 def test_unchanged_houses_keep_their_bytes_and_the_run_stays(update, run):
     _, out, before = update
     old, new = ((f / "parameters.jsonl").read_bytes().splitlines() for f in (run, out))
-    assert [a == b for a, b in zip(old, new, strict=True)] == [True, True, False, False, True]
+    assert [a == b for a, b in zip(old, new, strict=True)] == [False, True, False, False, True]
+    heads = [json.loads(lines[0]) for lines in (old, new)]
+    assert heads[1] == {**heads[0], "update": {"survey": DATE, "roofs_outside": []}}
     solids = [(f / "buildings.city.jsonl").read_bytes().splitlines() for f in (run, out)]
     assert [a == b for a, b in zip(*solids, strict=True)][1:] == [True, False, False, True]
     assert read_all(run) == before
@@ -189,6 +191,18 @@ def test_build_makes_the_same_files_from_the_parameters(update, tmp_path):
     _, out, _ = update
     build_file(out / "parameters.jsonl", tmp_path / "built")
     assert records(tmp_path / "built") == records(out)
+    for name in ("changes.csv", "changes.gpkg"):
+        assert (tmp_path / "built" / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def test_a_change_that_cannot_be_read_is_left_out_of_the_tables(update, tmp_path):
+    _, out, _ = update
+    text = (out / "parameters.jsonl").read_text()
+    (tmp_path / "parameters.jsonl").write_text(text.replace('"roof_raised"', "[]"))
+    built = build_file(tmp_path / "parameters.jsonl", tmp_path / "built")
+    assert [id for id, _ in built.not_built] == ["house-1"]
+    rows = (tmp_path / "built" / "changes.csv").read_text().splitlines()[1:]
+    assert [row.partition(",")[0] for row in rows] == ["house-2"]
 
 
 def test_a_second_update_gives_the_same_bytes(update, run, cloud, tmp_path):
@@ -241,7 +255,10 @@ def test_an_update_of_an_update_starts_from_its_models(update, cloud, tmp_path):
     _, out, _ = update
     summary = update_area(make_request(out, cloud, tmp_path, date="2025-05-01"))
     assert summary.by_change == {"unchanged": 4}
-    assert records(tmp_path)["parameters.jsonl"] == records(out)["parameters.jsonl"]
+    lines = [(f / "parameters.jsonl").read_bytes().splitlines() for f in (tmp_path, out)]
+    assert lines[0][1:] == lines[1][1:]
+    assert json.loads(lines[0][0])["update"]["survey"] == "2025-05-01"
+    assert (tmp_path / "changes.csv").read_text().count("\n") == 1  # nothing changed since
 
 
 def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path):

@@ -17,6 +17,7 @@ from ..formats import (
     list_requested_tile_files,
 )
 from ..write.fragments import Fragments, load_fragments
+from ..write.head import FileHead
 from ..write.run_files import join_fragments
 from .plan import WorkPlan
 
@@ -25,9 +26,13 @@ TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: 
 
 
 def merge(
-    plan: WorkPlan, state: Path, out: Path, progress: Callable[[str, int, int], None]
+    plan: WorkPlan,
+    head: FileHead,
+    state: Path,
+    out: Path,
+    progress: Callable[[str, int, int], None],
 ) -> None:
-    """Write the files of the run, each whole or not at all.
+    """Write the files of the run, which begin by `head`, each whole or not at all.
 
     What a killed merge left unfinished is removed.
     """
@@ -35,7 +40,7 @@ def merge(
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
-    join_fragments(whole_files(plan, out), iterate_fragments(plan, state, progress), plan.head)
+    join_fragments(whole_files(plan, out), iterate_fragments(plan, state, progress), head)
 
 
 def iterate_fragments(

@@ -31,6 +31,7 @@ from ..read.decoded import forget_points, hold_points
 from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
+from ..write.head import FileHead
 from . import solved
 from .bundles import find_bundle_folder, remove_bundles
 from .checks import refuse_unusable
@@ -113,13 +114,15 @@ def reconstruct_area(request: Request, progress: Progress | None = None) -> Summ
 class Steps:
     """The steps in which a reconstruction and an update differ.
 
-    `before` is called with the plan, the executor and the progress before tiles are solved.
+    `before` is called with the plan, the executor and the progress before tiles are solved, and
+    `make_head` with the plan before their buildings are joined.
     """
 
     make_plan: Callable[[Any, Progress], WorkPlan] = make_plan
     solve_tile: Callable[..., Any] = solve_tile
     sort_cloud: Callable[..., Any] = sort_cloud
     before: Callable[[WorkPlan, Any, Progress], None] = lambda *_: None
+    make_head: Callable[[WorkPlan], FileHead] = lambda plan: plan.head
 
 
 def reconstruct_in_folder(
@@ -151,7 +154,7 @@ def reconstruct_in_folder(
         work_off(ledger, executor, "solve", steps.solve_tile, arguments, progress)
         clock.lap("solve")
         if ledger.get("merged") != "yes":
-            merge(plan, state, Path(request.out), progress)
+            merge(plan, steps.make_head(plan), state, Path(request.out), progress)
         remove_bundles(Path(request.out), ledger.failed_ids())
         summary = summarise(request, plan, ledger, clock)
         LOGGER.info(

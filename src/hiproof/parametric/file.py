@@ -22,6 +22,7 @@ from ..read.plausible import MOST_PLAN
 from ..settings import Settings
 from ..write.head import FileHead
 from ..write.parameters import VERSION
+from .record import read_update
 
 HEAD_KEY = "hiproof_parameters"
 # This very object stands for a line that cannot be read.
@@ -134,6 +135,7 @@ def read_head(first: tuple[int, Any] | None, path: str | os.PathLike[str]) -> Fi
             {name: record.get(name) or {} for name in ("compose", "write")}
         )
         crs = parse_crs(record.get("crs"))
+        update = None if record.get("update") is None else read_update(record["update"])
     except (InputError, SettingsError) as error:
         raise InputError(f"{where}, in its head: {error!s:.400}") from error
     return FileHead(
@@ -142,6 +144,7 @@ def read_head(first: tuple[int, Any] | None, path: str | os.PathLike[str]) -> Fi
         None if offset is None else np.array(offset, float),
         settings.compose,
         settings.write,
+        update=update,
     )
 
 

@@ -30,7 +30,16 @@ from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
 from ..read.damage import excerpt
 from ..status import Change, Grade, Status
-from ..write.attribute_list import CHANGE, CHANGE_PLACE, ENDED_MODEL, PARAMETERS, PART
+from ..write.attribute_list import (
+    CHANGE,
+    CHANGE_PLACE,
+    ENDED_MODEL,
+    PARAMETERS,
+    PART,
+    ROOF_OUTSIDE,
+    UPDATE_HEAD,
+)
+from ..write.head import UpdateHead
 
 WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
@@ -38,6 +47,7 @@ FARTHEST_WORLD_M = 1e8
 LARGEST_NUMBER = 1e15  # at which float64 still holds eighths; larger is no number of a building
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 CHANGE_KEYS = tuple(attribute.name for attribute in CHANGE)
+ROOF_KEYS = tuple(attribute.name for attribute in ROOF_OUTSIDE)
 PART_KEYS = tuple(attribute.name for attribute in PART)
 FIGURES = ("density", "nodata_share", "unexplained_area_m2")
 RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
@@ -328,7 +338,35 @@ def read_change_place(record: Any, where: str) -> dict[str, Any]:
         figure(place, name)
     for rings in list_at(place, "outlines"):
         polygon(rings, f"an outline of {where}")
+    if len(list_at(place, "parts")) not in (0, 2):
+        raise InputError(
+            f"expected the earlier and the new part of {where}, got {excerpt(place['parts'])}; "
+            "write null for none"
+        )
     return place
+
+
+def read_update(record: Any) -> UpdateHead:
+    """Read what an update found beside its buildings."""
+    update = dict(require_mapping(record, "update"))
+    refuse_other_keys(update, [attribute.name for attribute in UPDATE_HEAD], "update")
+    roofs = [
+        read_roof_outside(roof, f"roof {k} of roofs_outside")
+        for k, roof in enumerate(list_at(update, "roofs_outside"))
+    ]
+    return UpdateHead(text_at(update, "survey"), tuple(roofs))
+
+
+def read_roof_outside(record: Any, where: str) -> dict[str, Any]:
+    """Read a roof outside all outlines."""
+    roof = dict(require_mapping(record, where))
+    refuse_other_keys(roof, [attribute.name for attribute in ROOF_OUTSIDE], where)
+    for name in ("id", "kind"):
+        text_at(roof, name)
+    number(roof.get("area"), f"area of {where}")
+    for rings in list_at(roof, "outlines"):
+        polygon(rings, f"an outline of {where}")
+    return {name: roof.get(name) for name in ROOF_KEYS}
 
 
 def read_quality(record: Mapping[str, Any]) -> Quality:

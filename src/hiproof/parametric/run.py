@@ -37,6 +37,7 @@ from ..write.naming import FileUnits, UniqueNames, gml_name
 from ..write.run_files import fragments, join_fragments
 from ..write.values import plain_text
 from .building import build
+from .change_tables import write_changes
 from .file import opened_parameters
 
 # sentences kept of buildings that could not be built; a wrong file may have millions
@@ -89,7 +90,7 @@ def build_file(
 ) -> Built:
     """Write a run's files into the folder `out` from a parameters.jsonl.
 
-    That file is `path`.
+    That file is `path`; that of an update gives changes.csv and changes.gpkg, too.
 
     What is written is as the file's head says, but for `changes` of the settings [write]. A
     building that cannot be built is written without a model, with a sentence, and keeps its
@@ -111,6 +112,7 @@ def build_file(
             make_fragments(maker, records, built, progress),
             maker.head,
         )
+    write_changes(out)
     write_record(path, out, maker.head, built)
     return built
 

@@ -24,6 +24,8 @@ from ..write.attribute_list import (
     PARAMETERS,
     PART,
     PASSAGE,
+    ROOF_OUTSIDE,
+    UPDATE_HEAD,
     Attribute,
 )
 from ..write.parameters import VERSION
@@ -49,6 +51,16 @@ HEAD_KINDS = {
     "cityjson_offset": {"anyOf": [PLACE, {"type": "null"}]},
     "compose": NUMBERS,
     "write": {"type": "object"},
+    "update": {"$ref": "#/$defs/update"},
+}
+UPDATE_KINDS = {
+    "survey": TEXT_SCHEMA,
+    "roofs_outside": {"type": "array", "items": {"$ref": "#/$defs/roof_outside"}},
+}
+ROOF_KINDS = {
+    "id": TEXT_OR_NULL,
+    "kind": {"enum": [kind.code for kind in ChangeKind]},
+    "outlines": {"type": "array", "items": POLYGON_SCHEMA},
 }
 BUILDING_KINDS = {
     "id": TEXT_SCHEMA,
@@ -142,6 +154,10 @@ def schema() -> dict[str, Any]:
     """
     defs = {
         "head": describe_attributes(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
+        "update": describe_attributes(UPDATE_HEAD, UPDATE_KINDS, required=("survey",)),
+        "roof_outside": describe_attributes(
+            ROOF_OUTSIDE, ROOF_KINDS, required=("kind", "area", "outlines")
+        ),
         "building": describe_attributes(PARAMETERS, BUILDING_KINDS, required=("id",)),
         "part": describe_attributes(
             PART,

@@ -27,7 +27,6 @@ rates      false alarms controlled over all buildings, before tiles are brought 
 named      surveys as the user names them for a run of several
 several    such a run: its surveys registered, and its tiles solved
 best       the best survey of each building, and the model made of it
-tables     changes.csv and changes.gpkg
 run        the steps above, one after the other
 
 Earlier and new points are compared with each other wherever the earlier clouds still exist: what

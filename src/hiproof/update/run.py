@@ -17,7 +17,9 @@ from ..city.resume import open_state
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..errors import InputError, OutputError, SettingsError
 from ..garbage import collect_rarely
+from ..parametric.change_tables import write_changes
 from ..status import Change
+from ..write.head import FileHead, UpdateHead
 from .before import prepare_surveys, remove_earlier_points
 from .dates import find_survey_date
 from .earlier import EarlierRun, choose_read_settings, read_earlier
@@ -25,7 +27,6 @@ from .epochs import SURVEYS_FILE, Surveys
 from .outside import CELLS_FOLDER, load_roofs_outside
 from .plan import make_update_plan
 from .request import EACH_BUILDING, WHOLE_CITY, UpdateRequest
-from .tables import collect_changes, write_changes
 from .tile import sort_survey, update_tile
 
 
@@ -87,10 +88,13 @@ def update_area(
     def prepare(plan: WorkPlan, executor: Any, _: Progress) -> None:
         prepare_surveys(request, earlier, date, state, plan, executor)
 
+    def make_head(plan: WorkPlan) -> FileHead:
+        update = UpdateHead(date, tuple(load_roofs_outside(state)))
+        return dataclasses.replace(plan.head, update=update)
+
+    steps = Steps(make_plan, update_tile, sort_survey, prepare, make_head)
     with hold_folder(state), collect_rarely():
-        summary = reconstruct_in_folder(
-            request, state, progress, Steps(make_plan, update_tile, sort_survey, prepare)
-        )
+        summary = reconstruct_in_folder(request, state, progress, steps)
         remove_earlier_points(state)
         return report_changes(request, earlier, state, summary)
 
@@ -109,9 +113,8 @@ def report_changes(
 ) -> UpdateSummary:
     """Write the tables of changes and complete run.json."""
     surveys, out = Surveys.load(state / SURVEYS_FILE), Path(request.out)
-    found = collect_changes(out, surveys.date)
+    found, files = write_changes(out)
     outside = load_roofs_outside(state)
-    files = write_changes(out, found, outside, surveys.date)
     by_change = Counter(change.record["change"]["class"] for change in found)
     by_change[Change.UNCHANGED.code] = summary.buildings - len(found)
     by_kind = Counter(

@@ -55,10 +55,11 @@ def find_texts(run: Path, plan: WorkPlan) -> str:
     state = Path(run) / STATE_FOLDER
     try:
         with (state / PLAN_FILE).open("rb") as plans, (run / RUN_PARAMETERS).open("rb") as lines:
-            names, head = json.loads(plans.readline())["names"], lines.readline()
+            names, head = json.loads(plans.readline())["names"], json.loads(lines.readline())
     except (OSError, ValueError, KeyError):
         return ""
-    is_same = head == dump(head_record(plan.head)) + b"\n" and not names and not plan.names
+    head.pop("update", None)  # every update has its own
+    is_same = dump(head) == dump(head_record(plan.head)) and not names and not plan.names
     return str(state.absolute()) if is_same and run_record(run)["hiproof"] == __version__ else ""
 
 

@@ -686,6 +686,19 @@ HEAD = (
     Attribute("cityjson_offset", "list", "of the CRS", "offset of the CityJSON file"),
     Attribute("compose", "object", "", "the settings [compose]"),
     Attribute("write", "object", "", "the settings [write]"),
+    Attribute("update", "object", "", "only in an update: its survey and roofs, as below"),
+)
+
+UPDATE_HEAD = (
+    Attribute("survey", "text", "", "date of the new survey, as 2014-02-09"),
+    Attribute("roofs_outside", "list", "", "roofs outside all outlines, as below"),
+)
+
+ROOF_OUTSIDE = (
+    Attribute("id", "text", "", "id of the building that the roof extends, null for none"),
+    Attribute("kind", "text", "", "built, extended, demolished or unmapped"),
+    Attribute("area", "number", "m2", "area in plan"),
+    Attribute("outlines", "list", "m", "polygons in the world"),
 )
 
 EVALUATION = (
@@ -775,6 +788,14 @@ TABLES = (
         "Parameters: the first line",
         "`parameters.jsonl`; its schema: `hiproof build --schema`",
         HEAD,
+    ),
+    AttributeTable(
+        "Parameters: an update", "`update` of the first line of `parameters.jsonl`", UPDATE_HEAD
+    ),
+    AttributeTable(
+        "Parameters: a roof outside all outlines",
+        "`roofs_outside` of an update in `parameters.jsonl`",
+        ROOF_OUTSIDE,
     ),
     AttributeTable("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
     AttributeTable("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),

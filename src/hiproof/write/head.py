@@ -15,13 +15,26 @@ from .naming import FileUnits
 
 
 @dataclass(frozen=True)
+class UpdateHead:
+    """What an update found beside its buildings.
+
+    `survey` is the date of the new survey, `roofs_outside` are roofs outside all outlines as
+    parameters.jsonl holds them.
+    """
+
+    survey: str
+    roofs_outside: tuple[dict[str, Any], ...] = ()
+
+
+@dataclass(frozen=True)
 class FileHead:
     """What the files of a run have in common.
 
     It is the CRS (anything pyproj understands, or None), the unit of coordinates without one (a key
     of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
     sets it, how solids are composed, what is written of buildings, what goes before roofer's
-    attribute names, and the date that CityGML gives its buildings, if any.
+    attribute names, the date that CityGML gives its buildings, if any, and what an update found
+    beside its buildings, None for a run that is no update.
     """
 
     crs: Any = None
@@ -31,6 +44,7 @@ class FileHead:
     write: WriteSettings = field(default_factory=WriteSettings)
     prefix: str = PREFIX
     creation_date: datetime.date | None = None
+    update: UpdateHead | None = None
 
     @functools.cached_property
     def units(self) -> FileUnits:

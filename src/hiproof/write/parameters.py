@@ -87,6 +87,7 @@ def head_record(head: FileHead) -> dict[str, Any]:
         "cityjson_offset": None if head.offset is None else [float(value) for value in head.offset],
         "compose": dataclasses.asdict(head.compose),
         "write": dataclasses.asdict(head.write),
+        **({} if head.update is None else {"update": dataclasses.asdict(head.update)}),
     }
 
 

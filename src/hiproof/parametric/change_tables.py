@@ -1,11 +1,12 @@
-"""changes.csv and changes.gpkg: every building that is not unchanged.
+"""changes.csv and changes.gpkg: what an update found not to be unchanged.
 
-Both follow from parameters.jsonl.
+Both follow from the parameters.jsonl beside them.
 """
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,16 +15,17 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..parametric.file import opened_parameters
-from ..parametric.record import polygon, read_outline
+from ..errors import InputError
+from ..formats import FORMATS
 from ..write.colours import CHANGE_COLOURS
 from ..write.files import atomic
-from ..write.head import FileHead
+from ..write.head import FileHead, UpdateHead
 from ..write.naming import plan_wkt
 from ..write.tables.geopackage import OUTLINE_GEOMETRY, write_styles
 from ..write.tables.geopackage_file import GeoPackage
 from ..write.tables.styles import Style
-from .earlier import RUN_PARAMETERS
+from .file import opened_parameters
+from .record import polygon, read_change, read_outline
 
 CSV_FILE, GPKG_FILE = "changes.csv", "changes.gpkg"
 CHANGE_COLUMNS: dict[str, type] = {
@@ -62,14 +64,40 @@ class FoundChange:
     outline: shapely.Geometry | None
 
 
-def collect_changes(folder: Path, survey: str) -> list[FoundChange]:
-    """Return the changes that the survey of that date shows in the run in `folder`."""
-    with opened_parameters(folder / RUN_PARAMETERS) as (_, records):
-        return [
-            FoundChange({key: record[key] for key in ("id", "change")}, find_outline(record))
-            for record in records
-            if record.get("change") and record["change"]["survey"] == survey
-        ]
+def write_changes(folder: Path) -> tuple[list[FoundChange], tuple[Path, ...]]:
+    """Write changes.csv and changes.gpkg into the folder of an update.
+
+    Returns the buildings that are not unchanged, and both paths. There are none in the folder of
+    another run.
+    """
+    with opened_parameters(folder / FORMATS["parameters"].file) as (head, records):
+        if head.update is None:
+            return [], ()
+        found = collect_changes(records, head.update)
+    outside = [report_outside(roof, head.update.survey) for roof in head.update.roofs_outside]
+    files = folder / CSV_FILE, folder / GPKG_FILE
+    with atomic(files[0]) as temporary:
+        write_csv(Path(temporary), [*found, *outside])
+    with atomic(files[1]) as temporary:
+        write_geopackage(Path(temporary), [*found, *outside], head)
+    return found, files
+
+
+def collect_changes(records: Iterable[dict[str, Any]], update: UpdateHead) -> list[FoundChange]:
+    """Return the changes of buildings that the survey of an update shows.
+
+    One that cannot be read is left out: it is not built, either.
+    """
+    result = []
+    for record in records:
+        try:
+            change = read_change(record)
+            if change is not None and change["survey"] == update.survey:
+                values = {"id": record["id"], "change": change}
+                result.append(FoundChange(values, find_outline(record)))
+        except InputError:
+            continue
+    return result
 
 
 def report_outside(roof: dict[str, Any], survey: str) -> FoundChange:
@@ -93,23 +121,6 @@ def find_outline(record: dict[str, Any]) -> shapely.Geometry | None:
     return outline
 
 
-def write_changes(
-    folder: Path, found: list[FoundChange], outside: list[dict[str, Any]], survey: str
-) -> tuple[Path, ...]:
-    """Write changes.csv and changes.gpkg into `folder`.
-
-    `outside` are roofs outside all outlines, which the survey of that date shows.
-    """
-    changes = [*found, *(report_outside(roof, survey) for roof in outside)]
-    with opened_parameters(folder / RUN_PARAMETERS) as (head, _):
-        files = folder / CSV_FILE, folder / GPKG_FILE
-        with atomic(files[0]) as temporary:
-            write_csv(Path(temporary), changes)
-        with atomic(files[1]) as temporary:
-            write_geopackage(Path(temporary), changes, head)
-    return files
-
-
 def write_csv(path: Path, changes: list[FoundChange]) -> None:
     """Write a row a building."""
     with path.open("w", encoding="utf-8", newline="") as file:
@@ -130,7 +141,7 @@ def make_row(change: FoundChange) -> tuple[Any, ...]:
         found["chance"],
         found["survey"],
         len(found["places"]),
-        " ".join(found["predecessors"]) or None,
+        " ".join(map(str, found["predecessors"])) or None,
     )
 
 
@@ -141,9 +152,9 @@ def make_place_rows(change: FoundChange) -> list[tuple[Any, ...]]:
         (
             change.record["id"],
             found["class"],
-            place["kind"],
+            place.get("kind"),
             *(place.get(name) for name in ("difference", "sigma", "area")),
-            *place["parts"],
+            *(place.get("parts") or (None, None)),
         )
         for place in found["places"]
     ]
@@ -156,7 +167,9 @@ def write_geopackage(path: Path, changes: list[FoundChange], head: FileHead) -> 
         outlines, rows = [c.outline for c in buildings], [make_row(c) for c in buildings]
         add_layer(file, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, rows, head)
         places = [
-            shapely.union_all([polygon(rings, "an outline") for rings in place["outlines"]])
+            shapely.union_all(
+                [polygon(rings, "an outline") for rings in place.get("outlines") or []]
+            )
             for change in changes
             for place in change.record["change"]["places"]
         ]
