@@ -196,5 +196,9 @@ RECORDS = {
     "a path with a zero": b'{"inputs": {"clouds": ["a\\u0000b"], "footprints": "a\\u0000b"}}',
     "crs is a number": b'{"crs": -5}',
     "crs is a list": b'{"crs": [1, 2]}',
+    "epochs are numbers": b'{"epochs": {"2014": 1}}',
+    "an epoch counts no clouds": b'{"epochs": {"2014": {"clouds": "1"}}}',
+    "a shift is a number": b'{"update": {"shift": 0.1}}',
+    "a shift has two numbers": b'{"update": {"shift": {"applied": [0, 1]}}}',
 }
 """Contents of `run.json`."""

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pyogrio
 import pytest
 import shapely
@@ -9,8 +10,12 @@ from typer.testing import CliRunner
 
 from hiproof import InputError
 from hiproof.cli.app import app
+from hiproof.edit.points import RunPoints
+from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.run import build_file
 from hiproof.update.named import choose_clouds
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
 from run_records import by_id, records
 from tiny_town import make_town, write_cloud, write_footprints
 
@@ -70,6 +75,46 @@ def test_points_of_both_surveys_count_and_lie_in_the_frame_of_the_newest(houses,
     record = json.loads((out / "run.json").read_text())["epochs"]
     assert record["2014"]["shift"]["xyz"][2] == pytest.approx(-0.3, abs=0.03)
     assert record["2020-05-01"]["shift"] is None
+
+
+@pytest.mark.parametrize(
+    ("raised_m", "expected"),
+    [(RAISED_M, {"unchanged": 4}), (0.0, {"unchanged": 3, "changed": 1})],
+)
+def test_an_update_compares_each_house_with_the_surveys_of_its_model(
+    raised_m, expected, houses, tmp_path
+):
+    """The first survey shows house-1 as it was before its model, and lies 0.3 m lower."""
+    town = make_town(seed=9)
+    raised = shapely.intersects_xy(town.footprints["house-1"], *town.xyz[:, :2].T)
+    town.xyz[raised & (town.classification == 6), 2] += raised_m
+    town.xyz[:, 2] += 0.5
+    cloud = str(write_cloud(tmp_path / "third.laz", town.xyz, town.classification))
+    parameters = str(houses[1] / "parameters.jsonl")
+    request = UpdateRequest(
+        (cloud,), tmp_path / "out", run=houses[1], run_parameters=parameters, date="2024-05-01"
+    )
+    summary = update_area(request)
+    assert summary.by_change == expected
+    assert summary.surveys.shift.clear_xyz[2] == pytest.approx(0.2, abs=0.03)
+    if raised_m == 0.0:
+        place = by_id(tmp_path / "out")["house-1"]["change"]["places"][0]
+        assert place["kind"] == "roof_lowered"
+        assert place["difference"] == pytest.approx(-RAISED_M, abs=0.05)
+
+
+def test_evaluation_and_editor_take_the_surveys_of_a_model(houses):
+    found, out = houses
+    run, editor = evaluate_run(out), RunPoints(out)
+    for model, points, figures in zip(run.models, run.points, run.figures, strict=True):
+        assert len(points) == found[model.id]["points"], model.id
+        assert figures.quality.share_within_20cm == pytest.approx(1.0, abs=0.02), model.id
+        drawn = editor.of(found[model.id])
+        np.testing.assert_allclose(sort_rows(drawn), sort_rows(points), atol=1e-6)
+
+
+def sort_rows(points):
+    return points[np.lexsort(points.T)]
 
 
 def test_surveys_before_the_year_of_a_house_do_not_count(surveys, tmp_path):

@@ -16,6 +16,8 @@ from hiproof import InputError, OutputError, SettingsError
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
+from hiproof.edit.points import RunPoints
+from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.run import build_file
 from hiproof.update.dates import find_survey_date
 from hiproof.update.request import UpdateRequest
@@ -259,6 +261,31 @@ def test_an_update_of_an_update_starts_from_its_models(update, cloud, tmp_path):
     assert lines[0][1:] == lines[1][1:]
     assert json.loads(lines[0][0])["update"]["survey"] == "2025-05-01"
     assert (tmp_path / "changes.csv").read_text().count("\n") == 1  # nothing changed since
+
+
+def write_survey(path, step_m, seed, missing=None):
+    """The town surveyed once more, so much higher, without the points of a house."""
+    town = make_town(seed=seed)
+    x, y = town.xyz[:, :2].T
+    keep = ~shapely.intersects_xy(town.footprints[missing], x, y) if missing else slice(None)
+    return str(write_cloud(path, town.xyz[keep] + [0, 0, step_m], town.classification[keep]))
+
+
+def test_the_shift_of_a_survey_is_taken_off_wherever_its_points_are_used(run, tmp_path):
+    """The second survey lies 0.3 m higher than the first, the third 0.2 m lower."""
+    high = write_survey(tmp_path / "high.laz", 0.3, 9, missing="house-3")
+    low = write_survey(tmp_path / "low.laz", -0.2, 11)
+    first = update_area(make_request(run, high, tmp_path / "first"))
+    assert first.by_change == {"unchanged": 3, "not_covered": 1}
+    evaluated = evaluate_run(tmp_path / "first")
+    shares = [figures.quality.share_within_20cm for figures in evaluated.figures[:3]]
+    assert shares == pytest.approx([1.0] * 3, abs=0.02)
+    drawn = RunPoints(tmp_path / "first").of(by_id(tmp_path / "first")["house-0"])
+    assert drawn[:, 2].mean() == pytest.approx(evaluated.points[0][:, 2].mean(), abs=0.001)
+    request = make_request(tmp_path / "first", low, tmp_path / "second", date="2025-05-01")
+    second = update_area(request)
+    assert second.by_change == {"unchanged": 4}
+    assert second.surveys.shift.clear_xyz[2] == pytest.approx(-0.2, abs=0.03)
 
 
 def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path):

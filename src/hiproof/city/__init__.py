@@ -27,6 +27,7 @@ repro         such a building solved again
 solve         each work tile reconstructs its own buildings and writes them as text, ready to join
 solved        buildings counted as they are solved, for the progress of a run
 ground        the ground around a building, from its tile's cells
+surveys       the points of several surveys, and those of which a model is made
 terrain_check a terrain model against the ground points
 found         the roof of one building among points without classes
 other_classes what the points of other classes say of a building

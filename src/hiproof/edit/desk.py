@@ -22,7 +22,7 @@ from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
 from ..log import LOGGER
 from ..parametric.building import build
-from ..parametric.record import list_at, number, read_outline, text_at
+from ..parametric.record import list_at, number, text_at
 from ..primitives.catalogue import CATALOGUE
 from ..read.damage import finite
 from ..status import Attention
@@ -145,7 +145,7 @@ class Desk:
         `missing` says why there are none.
         """
         record = self.record(id)[0]
-        points = self.points.of(id, read_outline(record))
+        points = self.points.of(record)
         missing = self.points.missing or (
             "" if len(points) else "the run has no points of this building"
         )
@@ -174,7 +174,7 @@ class Desk:
         While a hand drags (`dragged`) it is not measured.
         """
         record = self.draft(id, body)
-        points = self.points.of(id, read_outline(record))
+        points = self.points.of(record)
         edit = apply_edit(
             record, body.get("asked"), points, self.run.settings, not body.get("dragged")
         )
@@ -186,7 +186,7 @@ class Desk:
         Each has the share of points that it explains, the best first.
         """
         record = self.draft(id, body)
-        points, candidates = self.points.of(id, read_outline(record)), []
+        points, candidates = self.points.of(record), []
         for kind in CATALOGUE:
             requested = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:

@@ -7,21 +7,24 @@ from __future__ import annotations
 
 import tempfile
 import threading
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import shapely
 
 from .. import stages
 from ..city.noted import noted_file
 from ..city.plan import PLAN_FILE, Job, WorkPlan
 from ..city.resume import STATE_FOLDER
-from ..city.solve import Surroundings, terrain_model
-from ..city.sort import Gatherer, Reaches, load_points, wanted_points
+from ..city.solve import terrain_model
+from ..city.sort import Gatherer, Reaches, wanted_points
+from ..city.surveys import SurveyPoints
 from ..errors import HiproofError, InputError
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
+from ..parametric.record import read_outline
 from ..read.raster import import_rasterio
 from ..read.thin import thin_to_count
 
@@ -39,10 +42,10 @@ class RunPoints:
 
     def __init__(self, folder: Path, moved_to: Path | None = None) -> None:
         self.lock, self.missing = threading.Lock(), ""
-        self.surroundings = lru_cache(maxsize=KEPT_TILES)(self.read_tile)
+        self.tile_points = lru_cache(maxsize=KEPT_TILES)(self.read_tile)
         self.of_job = lru_cache(maxsize=KEPT_BUILDINGS)(self.read_job)
         inputs = found_inputs(run_record(folder), moved_to)
-        self.clouds, self.terrain = inputs.clouds, inputs.terrain
+        self.surveys, self.terrain = inputs.surveys, inputs.terrain
         self.state = folder / STATE_FOLDER
         plan = self.state / PLAN_FILE
         if not plan.is_file() or not (inputs.clouds or inputs.gone):
@@ -70,30 +73,30 @@ class RunPoints:
             raise InputError(self.missing)
         return self.known
 
-    def of(self, id: str, outline: shapely.Polygon | None) -> np.ndarray:
-        """Return world points (n, 3) inside the `outline` of building `id`.
+    def of(self, record: Mapping[str, Any]) -> np.ndarray:
+        """Return world points (n, 3) inside the outline of a building.
 
-        (0, 3) where the run has none, or where its clouds cannot be read, which `missing` then
-        says.
+        `record` is its object of parameters.jsonl. (0, 3) where the run has none, or where its
+        clouds cannot be read, which `missing` then says.
         """
-        job = self.jobs.get(id)
+        job, outline = self.jobs.get(record["id"]), read_outline(record)
         if job is None or outline is None or self.missing:
             return np.zeros((0, 3))
         try:
             with self.lock:  # one file is read once, however many windows ask
-                result = self.of_job(job.index)
+                result = self.of_job(job.index, tuple(record.get("epochs_used") or ()))
         except (HiproofError, OSError) as error:
             self.missing = explain_unreadable(error)
             return np.zeros((0, 3))
         return stages.usable(result, outline)[0]
 
-    def read_job(self, index: int) -> np.ndarray:
+    def read_job(self, index: int, epochs: tuple[str, ...]) -> np.ndarray:
         """Return points (n, 3) in and around the area of a building.
 
-        They are as many as the run would use.
+        They are as many as the run would use, of the surveys in `epochs` where there are several.
         """
         job: Job = self.plan.jobs[index]
-        surroundings = self.surroundings(self.tile_of[index])
+        surroundings = self.tile_points(self.tile_of[index]).choose({"epochs_used": epochs})
         points = surroundings.select_roof_points(surroundings.move(job)[0]).points
         max_points_a_building = self.plan.settings.city.max_points_a_building
         return (
@@ -102,27 +105,28 @@ class RunPoints:
             else thin_to_count(stages.distinct(points), max_points_a_building)
         )
 
-    def read_tile(self, tile: str) -> Surroundings:
-        """Return all points that the buildings of a work tile may need.
+    def read_tile(self, tile: str) -> SurveyPoints:
+        """Return all points that the buildings of a work tile may need, by survey.
 
         Of files whose runs are noted only these are read.
         """
         reaches = Reaches(self.plan, {tile: self.plan.tiles[tile]})
+        shifts = {survey.name: survey.shift for survey in self.surveys}
+        clouds = [(survey.name, cloud) for survey in self.surveys for cloud in survey.clouds]
+        model = terrain_model(
+            self.terrain, self.plan.crs_wkt, self.plan.units, threading.get_ident()
+        )
         with tempfile.TemporaryDirectory(prefix="hiproof-edit-") as folder:
-            for number, cloud in enumerate(self.clouds):
+            for number, (name, cloud) in enumerate(clouds):
                 gatherer = Gatherer(
-                    reaches, self.plan.settings.read, Path(folder) / "points", number
+                    reaches, self.plan.settings.read, Path(folder) / "points" / name, number
                 )
                 for chunk in wanted_points(
                     cloud, reaches, self.plan.units, noted_file(self.state, number)
                 ):
                     gatherer.add(chunk)
                 gatherer.flush()
-            points = load_points(Path(folder), tile)
-        model = terrain_model(
-            self.terrain, self.plan.crs_wkt, self.plan.units, threading.get_ident()
-        )
-        return Surroundings(points, model, self.plan)
+            return SurveyPoints.load(Path(folder), tile, model, shifts, self.plan)
 
 
 def missing_reader() -> str:

@@ -5,11 +5,29 @@ run.json keeps names as they were typed, and the folder in which they were.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ..errors import InputError
+from ..read.damage import excerpt
+from ..read.plausible import is_place
 from ..read.remote import is_url
+
+
+@dataclass(frozen=True)
+class RunSurvey:
+    """A survey of a run, with its clouds at their present places.
+
+    `name` is empty where the run has but one. `shift` (3,) in metres is what the run takes off its
+    points.
+    """
+
+    name: str
+    clouds: tuple[str, ...]
+    shift: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -18,12 +36,12 @@ class RunInputs:
 
     An input is None where it was not given or does not exist.
 
-    `gone` are those of the clouds that are not there, as the run named them. `id_attribute`,
-    `where` and `bbox` say how the run read its footprints: read otherwise, ids may be those of
-    other buildings.
+    `surveys` hold the clouds, the newest survey first. `gone` are those of the clouds that are not
+    there, as the run named them. `id_attribute`, `where` and `bbox` say how the run read its
+    footprints: read otherwise, ids may be those of other buildings.
     """
 
-    clouds: tuple[str, ...] = ()
+    surveys: tuple[RunSurvey, ...] = ()
     gone: tuple[str, ...] = ()
     footprints: str | None = None
     layer: str | int | None = None
@@ -34,9 +52,18 @@ class RunInputs:
     overrides: str | None = None
 
     @property
-    def files(self) -> list[str]:
-        """The clouds that are files of this machine."""
-        return [cloud for cloud in self.clouds if not is_url(cloud)]
+    def clouds(self) -> tuple[str, ...]:
+        """The clouds of all surveys."""
+        return tuple(cloud for survey in self.surveys for cloud in survey.clouds)
+
+    @property
+    def local_surveys(self) -> list[RunSurvey]:
+        """The surveys with those of their clouds that are files of this machine."""
+        local = (
+            replace(survey, clouds=tuple(c for c in survey.clouds if not is_url(c)))
+            for survey in self.surveys
+        )
+        return [survey for survey in local if survey.clouds]
 
     @property
     def footprint_file(self) -> str | None:
@@ -73,10 +100,9 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
         return locate_input(path, started_in, moved_to) if path and isinstance(path, str) else None
 
     names = [cloud for cloud in inputs.get("clouds") or [] if isinstance(cloud, str)]
-    clouds = [(cloud, place(cloud)) for cloud in names]
     return RunInputs(
-        tuple(result for _, result in clouds if result),
-        tuple(cloud for cloud, result in clouds if not result),
+        list_surveys(record, [place(cloud) for cloud in names]),
+        tuple(cloud for cloud in names if not place(cloud)),
         place(inputs.get("footprints")),
         inputs.get("layer"),
         inputs.get("id_attribute"),
@@ -85,6 +111,37 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
         place(inputs.get("terrain")),
         place(inputs.get("overrides")),
     )
+
+
+def list_surveys(record: dict[str, Any], places: list[str | None]) -> tuple[RunSurvey, ...]:
+    """Return the surveys of a run.
+
+    Its clouds now lie at `places`, None for those that are gone.
+
+    A run of several surveys names its clouds survey by survey.
+    """
+    epochs = record.get("epochs") or {"": {"clouds": len(places), **(record.get("update") or {})}}
+    result, start = [], 0
+    for name, epoch in epochs.items():
+        clouds = places[start : start + epoch["clouds"]]
+        shift = (epoch.get("shift") or {}).get("applied", (0.0, 0.0, 0.0))
+        result.append(RunSurvey(name, tuple(filter(None, clouds)), np.array(shift, float)))
+        start += epoch["clouds"]
+    return tuple(survey for survey in result if survey.clouds)
+
+
+def refuse_other_surveys(record: dict[str, Any]) -> None:
+    """Raise InputError where the surveys of the record are not as a run writes them."""
+    epochs = record.get("epochs") or {}
+    for epoch in (*epochs.values(), record.get("update") or {}):
+        if not isinstance(epoch, dict) or not isinstance(epoch.get("shift") or {}, dict):
+            raise InputError(f"expected objects with a shift as epochs, got {excerpt(epoch)}")
+        shift = (epoch.get("shift") or {}).get("applied", [0.0, 0.0, 0.0])
+        if not is_place(shift):
+            raise InputError(f"expected three numbers as the applied shift, got {excerpt(shift)}")
+    counts = [epoch.get("clouds") for epoch in epochs.values()]
+    if not all(type(count) is int for count in counts):
+        raise InputError(f"expected numbers of clouds in epochs, got {excerpt(counts)}")
 
 
 def locate_input(path: str, started_in: str | None, moved_to: Path | None) -> str | None:

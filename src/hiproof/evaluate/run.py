@@ -19,6 +19,7 @@ from ..read.crs import find_units, parse_crs
 from ..read.damage import Damaged, excerpt, refuse
 from ..settings import Settings
 from ..status import Attention
+from ..write.attribute_list import OWN
 from ..write.naming import FileUnits
 from .evaluation import (
     BuildingFigures,
@@ -26,7 +27,7 @@ from .evaluation import (
     match_by_id_or_overlap,
     points_by_outline,
 )
-from .inputs import found_inputs
+from .inputs import RunSurvey, found_inputs, refuse_other_surveys
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
 
@@ -51,6 +52,9 @@ RECORD: dict[tuple[str, ...], Any] = {
     ("inputs", "overrides"): str,
     ("inputs", "started_in"): str,
     ("crs",): str,
+    ("epochs",): dict,
+    ("update",): dict,
+    ("update", "shift"): dict,
     ("summary",): dict,
     ("summary", "buildings"): NUMBER,
     ("summary", "modelled"): NUMBER,
@@ -112,11 +116,17 @@ def evaluate_run(
     record = run_record(folder)
     inputs = found_inputs(record)
     if not clouds and inputs.gone:
-        text = "measured against the others alone" if inputs.files else "nothing to measure against"
+        text = (
+            "measured against the others alone"
+            if inputs.local_surveys
+            else "nothing to measure against"
+        )
         warnings.warn(
             f"{folder}: {inputs.told_gone}, {text}; name them after the folder", InputWarning
         )
-    clouds = clouds or inputs.files
+    surveys = inputs.local_surveys
+    if clouds:
+        surveys = [RunSurvey("", tuple(clouds), np.zeros(3))]
     options: dict[str, Any] = {}
     if footprints is None:
         footprints, layer = inputs.footprint_file, layer or inputs.layer
@@ -135,17 +145,16 @@ def evaluate_run(
         outline if outline is not None else outline_of_solid(m)
         for m, outline in zip(models, outlines, strict=True)
     ]
-    if clouds and any(area is not None for area in areas):
-        points = points_by_outline(building_points(clouds, record, areas), areas)
+    if surveys and any(area is not None for area in areas):
+        points = collect_points(surveys, record, models, areas)
     else:
         points = [np.empty((0, 3))] * len(models)
     references = match_references(models, reference)
     figures = [
         evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)
     ]
-    return EvaluatedRun(
-        models, tuple(points), tuple(figures), record, tuple(outlines), tuple(clouds)
-    )
+    clouds = tuple(cloud for survey in surveys for cloud in survey.clouds)
+    return EvaluatedRun(models, tuple(points), tuple(figures), record, tuple(outlines), clouds)
 
 
 def run_record(folder: Path) -> dict[str, Any]:
@@ -178,6 +187,7 @@ def refuse_other_kinds(record: dict[str, Any]) -> None:
             raise InputError(
                 f"expected {name_kind(kind)} as {'.'.join(names)}, got {excerpt(value)}"
             )
+    refuse_other_surveys(record)
     bbox = (record.get("inputs") or {}).get("bbox")
     if bbox and (len(bbox) != 4 or not all(type(side) in NUMBER for side in bbox)):
         raise InputError(f"expected four numbers as inputs.bbox, got {excerpt(bbox)}")
@@ -198,6 +208,28 @@ def run_settings(record: dict[str, Any]) -> Settings:
 def run_crs(record: dict[str, Any]) -> Any:
     """Return the pyproj CRS of a run, None where it has none."""
     return parse_crs(record.get("crs"))
+
+
+def collect_points(
+    surveys: Sequence[RunSurvey],
+    record: dict[str, Any],
+    models: Sequence[BuildingModel],
+    areas: Sequence[Any],
+) -> list[np.ndarray]:
+    """Return the points (n, 3) of each model, as its run saw them.
+
+    The shifts of surveys are taken off, and a model that names its surveys gets the points of
+    these alone.
+    """
+    result = [[np.empty((0, 3))] for _ in models]
+    for survey in surveys:
+        xyz = building_points(survey.clouds, record, areas) - survey.shift
+        found = points_by_outline(xyz, areas)
+        for model, points, chosen in zip(models, found, result, strict=True):
+            used = model.text(f"{OWN}epochs_used").split()
+            if not (used and survey.name) or survey.name in used:
+                chosen.append(points)
+    return [np.concatenate(chosen) for chosen in result]
 
 
 def building_points(

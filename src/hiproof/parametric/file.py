@@ -18,7 +18,7 @@ from ..errors import InputError, SettingsError
 from ..read.cityjson import ESCAPED
 from ..read.crs import NAMED_UNITS, parse_crs
 from ..read.damage import Damaged, excerpt, readable, refuse
-from ..read.plausible import MOST_PLAN
+from ..read.plausible import is_place
 from ..settings import Settings
 from ..write.head import FileHead
 from ..write.parameters import VERSION
@@ -146,14 +146,6 @@ def read_head(first: tuple[int, Any] | None, path: str | os.PathLike[str]) -> Fi
         settings.write,
         update=update,
     )
-
-
-def is_place(value: Any) -> bool:
-    """Return whether a value is three numbers that can be coordinates."""
-    is_three = (
-        isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
-    )
-    return is_three and all(abs(v) <= MOST_PLAN for v in value)
 
 
 def records(

@@ -228,7 +228,7 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
 
 
 def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
-    """Return settings and inputs of the run in `folder`, if there is one.
+    """Return settings, inputs and surveys of the run in `folder`, if there is one.
 
     The way in which coordinates are written, and their units, are those of `head`, so that whoever
     reads the models finds their place.
@@ -238,7 +238,8 @@ def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
     except InputError as error:
         LOGGER.warning("built without the settings and inputs of the run: %s", error)
         record = {}
-    kept_values = {name: record[name] for name in ("settings", "inputs") if record.get(name)}
+    names = ("settings", "inputs", "epochs", "update")
+    kept_values = {name: record[name] for name in names if record.get(name)}
     settings = {
         "read": {"unit": head.unit},
         **kept_values.get("settings", {}),

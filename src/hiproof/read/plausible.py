@@ -6,6 +6,8 @@ counts.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 MOST_PLAN = 1e9
@@ -53,3 +55,11 @@ def compute_bounds(xyz: np.ndarray) -> np.ndarray:
     [[1.0, 4.0, 0.0], [3.0, 9.0, 0.0]]
     """
     return np.array([[column.min() for column in xyz.T], [column.max() for column in xyz.T]])
+
+
+def is_place(value: Any) -> bool:
+    """Return whether a value is three numbers that can be coordinates."""
+    is_three = (
+        isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
+    )
+    return is_three and all(abs(v) <= MOST_PLAN for v in value)

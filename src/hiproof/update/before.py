@@ -6,6 +6,7 @@ Earlier points are sorted, and the surveys registered.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,10 +18,11 @@ from ..city.plan import WorkPlan
 from ..city.run import absolute
 from ..city.solve import pass_over_failure
 from ..errors import InputError
+from ..evaluate.inputs import RunSurvey
 from ..log import LOGGER
 from ..parametric.record import read_building
 from .earlier import EarlierRun
-from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys
+from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, save_shifts
 from .members import load_members
 from .outside import save_roofs_outside
 from .plan import EARLIER_FOLDER, save_earlier_plan
@@ -28,7 +30,7 @@ from .rates import find_largest_chance, judge_city
 from .register import SampledRoof, draw_buildings, register_surveys
 from .request import WHOLE_CITY, UpdateRequest
 from .texts import find_texts
-from .tile import sort_survey
+from .tile import sort_earlier_cloud
 
 SORTED_MARK = "sorted"  # file in the earlier folder: its points are complete
 
@@ -48,7 +50,7 @@ def prepare_surveys(
     if not (state / EARLIER_FOLDER / SORTED_MARK).exists():
         remove_earlier_points(state)
         save_earlier_plan(state, plan, earlier)
-        sort_earlier(earlier.clouds, state / EARLIER_FOLDER, executor)
+        sort_earlier(earlier.surveys, state / EARLIER_FOLDER, executor)
         (state / EARLIER_FOLDER / SORTED_MARK).touch()
     if (state / SURVEYS_FILE).exists():
         return
@@ -80,13 +82,16 @@ def remove_earlier_points(state: Path) -> None:
     shutil.rmtree(state / EARLIER_FOLDER, ignore_errors=True)
 
 
-def sort_earlier(clouds: tuple[str, ...], folder: Path, executor: Any) -> None:
-    """Sort the clouds of the earlier survey.
+def sort_earlier(surveys: tuple[RunSurvey, ...], folder: Path, executor: Any) -> None:
+    """Sort the clouds of the earlier surveys, and keep the shifts of these.
 
-    Raises InputError for one that cannot be read.
+    Raises InputError for a cloud that cannot be read.
     """
+    save_shifts(folder, {survey.name: survey.shift for survey in surveys})
+    names = tuple(survey.name for survey in surveys for _ in survey.clouds)
+    clouds = (cloud for survey in surveys for cloud in survey.clouds)
     tasks = ((str(folder.absolute()), i, absolute(cloud)) for i, cloud in enumerate(clouds))
-    for task, _, error in executor.run(sort_survey, tasks):
+    for task, _, error in executor.run(functools.partial(sort_earlier_cloud, names), tasks):
         if error is not None:
             raise InputError(
                 f"expected to read {task[2]}, of which the earlier run was made, got: {error}; "
@@ -108,9 +113,10 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
         for index in inside:
             job = plan.jobs[index]
             with pass_over_failure(job):
-                roof = read_building(members[index]["record"] | {"terrain_line": []})[1]
+                record = members[index]["record"]
+                roof = read_building(record | {"terrain_line": []})[1]
                 if roof is None:
                     continue
-                old, new = epochs.select_roofs(job)
+                old, new = epochs.select_roofs(job, record)
                 to_local = roof.frame.to_local
                 yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))

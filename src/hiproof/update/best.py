@@ -26,7 +26,7 @@ from ..city.solve import (
     solve_one,
     solve_safely,
 )
-from ..city.sort import POINT_KINDS, load_points
+from ..city.surveys import SurveyPoints
 from ..model import Building
 from ..parametric.override import Override
 from ..stages import add_remark
@@ -80,26 +80,14 @@ class TileSurveys:
     """The points of all surveys in a work tile, where the newest has them."""
 
     def __init__(self, root: Path, tile: str, terrain: str | None, names: tuple[str, ...]):
-        self.names, self.plan = names, load_plan(root)
-        self.shifts, self.model = load_shifts(root), open_terrain(self.plan, terrain)
-        self.points = {
-            name: {
-                kind: xyz - self.shifts[name].clear_xyz if name in self.shifts else xyz
-                for kind, xyz in load_points(root, tile, name).items()
-            }
-            for name in names
-        }
-        self.views: dict[tuple[str, ...], Surroundings] = {}
+        self.names, self.plan, self.shifts = names, load_plan(root), load_shifts(root)
+        steps = {name: self.shifts.get(name, SurveyShift()).clear_xyz for name in names}
+        model = open_terrain(self.plan, terrain)
+        self.points = SurveyPoints.load(root, tile, model, steps, self.plan)
 
     def unite(self, names: tuple[str, ...]) -> Surroundings:
         """Return the points of some surveys together."""
-        if names not in self.views:
-            united = {
-                kind: np.concatenate([self.points[name][kind] for name in names])
-                for kind in POINT_KINDS
-            }
-            self.views[names] = Surroundings(united, self.model, self.plan)
-        return self.views[names]
+        return self.points.unite(names)
 
     def select_roof(self, name: str, job: Job) -> np.ndarray:
         """Return the roof points (n, 3) of a building in a survey."""

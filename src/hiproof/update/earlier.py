@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import HiproofError, InputError, InputWarning
-from ..evaluate.inputs import found_inputs
+from ..evaluate.inputs import RunSurvey, found_inputs
 from ..evaluate.run import run_record
 from ..fit.registration import Registration
 from ..formats import FORMATS
@@ -30,16 +30,22 @@ class EarlierRun:
 
     Its head and settings come with them.
 
-    `footprint_shift` (m) is how far the run moved all footprints. `clouds` are those that the run
-    was made of, empty where not all of them exist, `overrides` the file of its overrides.
+    `footprint_shift` (m) is how far the run moved all footprints. `surveys` are those that the run
+    was made of, the newest first, empty where not all of their clouds exist. `overrides` is the
+    file of its overrides.
     """
 
     head: FileHead
     records: tuple[dict[str, Any], ...]
     settings: Settings
-    clouds: tuple[str, ...]
+    surveys: tuple[RunSurvey, ...]
     footprint_shift: tuple[float, float] = (0.0, 0.0)
     overrides: str | None = None
+
+    @property
+    def clouds(self) -> tuple[str, ...]:
+        """The clouds of all surveys."""
+        return tuple(cloud for survey in self.surveys for cloud in survey.clouds)
 
 
 def find_parameters(folder: Path) -> Path:
@@ -72,15 +78,15 @@ def read_earlier(folder: Path) -> EarlierRun:
         Settings.from_dict(record.get("settings") or {}), compose=head.compose, write=head.write
     )
     inputs = found_inputs(record)
-    clouds = () if inputs.gone else inputs.clouds
-    if not clouds:
+    surveys = () if inputs.gone else inputs.surveys
+    if not surveys:
         warnings.warn(
             f"{folder}: the clouds of this run are not there, so the new points are compared with "
             "its models alone; changes that the models leave out are not told from their errors",
             InputWarning,
         )
     shift = find_footprint_shift(record)
-    return EarlierRun(head, records, settings, clouds, shift, find_overrides(folder, record))
+    return EarlierRun(head, records, settings, surveys, shift, find_overrides(folder, record))
 
 
 def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:

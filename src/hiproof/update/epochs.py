@@ -6,6 +6,7 @@ import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -14,6 +15,7 @@ from ..city.found import FoundRoof
 from ..city.plan import Job, load_plan, neighbourhood
 from ..city.solve import Surroundings, open_terrain
 from ..city.sort import load_points
+from ..city.surveys import SurveyPoints
 from ..read.thin import without_repeats
 from .plan import EARLIER_FOLDER
 from .register import SurveyShift
@@ -21,6 +23,8 @@ from .request import EACH_BUILDING, SIGNIFICANCE
 
 SURVEYS_FILE, JUDGING_FILE = "surveys.json", "surveys.judging.json"
 """The surveys for the workers, and what they are before all buildings were judged together."""
+
+SHIFTS_FILE = "shifts.json"  # of the earlier surveys, in the folder of their points
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,12 @@ class Surveys:
         return Surveys(**record | {"shift": SurveyShift.from_dict(record["shift"])})
 
 
+def save_shifts(folder: Path, shifts: dict[str, np.ndarray]) -> None:
+    """Keep what is taken off the points of each survey, by name, the newest first."""
+    record = {name: shift.tolist() for name, shift in shifts.items()}
+    (folder / SHIFTS_FILE).write_text(json.dumps(record) + "\n", encoding="utf-8")
+
+
 class Epochs:
     """The points of both surveys in a work tile, looked up building by building."""
 
@@ -62,19 +72,32 @@ class Epochs:
         self.root, self.plan = root, load_plan(root)
         points = {kind: xyz - shift for kind, xyz in load_points(root, tile).items()}
         self.new = Surroundings(points, open_terrain(self.plan, terrain), self.plan)
-        folder, self.old = root / EARLIER_FOLDER, None
-        if any((folder / "points").iterdir()):
-            self.old = Surroundings(load_points(folder, tile), None, load_plan(folder))
+        self.old = load_earlier(root / EARLIER_FOLDER, tile)
 
-    def select(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
-        """Return the old and new points (n, 3) of a building, roof and bare ground alike."""
-        old = None if self.old is None else select_points(self.old, job)
-        return old, select_points(self.new, job)
+    def select(self, job: Job, record: dict[str, Any]) -> tuple[np.ndarray | None, np.ndarray]:
+        """Return the old and new points (n, 3) of a building, roof and bare ground alike.
 
-    def select_roofs(self, job: Job) -> tuple[np.ndarray | None, np.ndarray]:
+        `record` is its object of the earlier parameters.jsonl. The old points are None where the
+        earlier survey shows nothing.
+        """
+        old = None if self.old is None else select_points(self.old.choose(record), job)
+        return old if old is not None and len(old) else None, select_points(self.new, job)
+
+    def select_roofs(
+        self, job: Job, record: dict[str, Any]
+    ) -> tuple[np.ndarray | None, np.ndarray]:
         """Return the old and new roof points (n, 3) of a building."""
-        old = None if self.old is None else select_roof(self.old, job).points
+        old = None if self.old is None else select_roof(self.old.choose(record), job).points
         return old, select_roof(self.new, job).points
+
+
+def load_earlier(folder: Path, tile: str) -> SurveyPoints | None:
+    """Return the points of the earlier surveys, None where there are none."""
+    if not any((folder / "points").iterdir()):
+        return None
+    record = json.loads((folder / SHIFTS_FILE).read_text(encoding="utf-8"))
+    shifts = {name: np.array(shift) for name, shift in record.items()}
+    return SurveyPoints.load(folder, tile, None, shifts, load_plan(folder))
 
 
 def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:

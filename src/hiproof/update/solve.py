@@ -36,7 +36,7 @@ from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
 from ..write.run_files import fragments
 from .cells import SAME_SIGMAS
-from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys
+from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, select_roof
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
@@ -103,10 +103,11 @@ def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float
     for index in updater.plan.tiles[tile]:
         job = updater.plan.jobs[index]
         with pass_over_failure(job):
-            earlier, roof = read_building(members[index]["record"] or {"id": ""})
+            record = members[index]["record"] or {"id": ""}
+            earlier, roof = read_building(record)
             if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
                 continue
-            verdict = updater.judge(job, earlier, roof)
+            verdict = updater.judge(job, record, earlier, roof)
             if verdict.change in TESTED:
                 chances.append(1.0 if verdict.change is Change.UNCERTAIN else verdict.chance)
     return chances
@@ -137,7 +138,7 @@ class Updater:
         earlier, roof = read_building(member.record | {"terrain_line": []})
         if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
             return self.revisit_empty(job, member)
-        verdict = self.judge(job, earlier, roof)
+        verdict = self.judge(job, member.record, earlier, roof)
         if verdict.change is Change.UNCHANGED and member.is_same_outline:
             kept = self.refine(job, member.record) if self.surveys.refine else None
             kept = kept or keep_texts(earlier, member.record, self.texts)
@@ -148,9 +149,11 @@ class Updater:
         earlier = with_model(earlier, roof, self.plan.settings.compose)
         return self.follow_verdict(job, member, earlier, verdict)
 
-    def judge(self, job: Job, earlier: Building, roof: Roof) -> ChangeVerdict:
+    def judge(
+        self, job: Job, record: dict[str, Any], earlier: Building, roof: Roof
+    ) -> ChangeVerdict:
         """Return the verdict on an earlier building by the points of both surveys."""
-        old, new = self.epochs.select(job)
+        old, new = self.epochs.select(job, record)
         frame, shift = roof.frame, self.surveys.shift
         unexplained = earlier.quality.unexplained_area_m2
         return judge_building(
@@ -169,7 +172,7 @@ class Updater:
 
         None where it gains nothing.
         """
-        old, new = self.epochs.select_roofs(job)
+        old, new = self.epochs.select_roofs(job, record)
         if old is None:
             return None
         earlier = build(record, self.plan.settings.compose)
@@ -203,7 +206,7 @@ class Updater:
             move_to_frame(new.roof, earlier.roof), earlier.roof, verdict
         ):
             return self.mark(earlier, verdict, self.name_places(earlier, None, verdict), member)
-        points = self.epochs.select_roofs(job)[1]
+        points = select_roof(self.epochs.new, job).points
         result, lineage = continue_parts(earlier, new, self.near_m, points)
         places = self.name_places(earlier, result, verdict)
         return self.mark(result, verdict, places, member, lineage)
@@ -229,7 +232,7 @@ class Updater:
         if new.built is None:
             verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
             return self.mark(earlier, verdict, [], member)
-        points = self.epochs.select_roofs(job)[1]
+        points = select_roof(self.epochs.new, job).points
         result, lineage = continue_parts(earlier, new, self.near_m, points)
         is_changed = verdict.change is Change.CHANGED
         places = self.name_places(earlier, result, verdict) if is_changed else []
@@ -260,7 +263,7 @@ class Updater:
         """Return whether the earlier survey shows bare ground over most of an outline."""
         if self.epochs.old is None:
             return False
-        old = self.epochs.old
+        old = self.epochs.old.choose({})
         bare = old.bare(job, old.select_roof_points(job), old.select_other_points(job))
         bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
         cells = np.unique(np.floor(bare[:, :2]), axis=0)

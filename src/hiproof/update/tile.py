@@ -7,14 +7,17 @@ from pathlib import Path
 from ..city.ledger import Outcome
 
 
-def sort_survey(folder: str, number: int, address: str) -> dict:
-    """Sort a point file of a survey, and keep where its roofs and its ground lie."""
+def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
+    """Sort a point file of a survey, and keep where its roofs and its ground lie.
+
+    `epoch` is the name of the survey where it is one of several.
+    """
     from ..city.plan import load_plan
     from ..city.sort import sort_cloud
     from .outside import CELLS_FOLDER, SurveyCells
 
     cells = SurveyCells(load_plan(Path(folder)).settings.read)
-    result = sort_cloud(folder, number, address, cells.add)
+    result = sort_cloud(folder, number, address, cells.add, epoch)
     cells.save(Path(folder) / CELLS_FOLDER / f"{number}.npz")
     return result
 
@@ -27,6 +30,17 @@ def sort_epoch(epochs: tuple[str, ...], folder: str, number: int, address: str) 
     from ..city.sort import sort_cloud
 
     return sort_cloud(folder, number, address, epoch=epochs[number])
+
+
+def sort_earlier_cloud(epochs: tuple[str, ...], folder: str, number: int, address: str) -> dict:
+    """Sort a point file of the earlier run, file `number` of those in `epochs`.
+
+    The newest survey comes first, and is the one whose roofs and ground the new survey is compared
+    with.
+    """
+    if epochs[number] == epochs[0]:
+        return sort_survey(folder, number, address, epochs[0])
+    return sort_epoch(epochs, folder, number, address)
 
 
 def solve_best_tile(
