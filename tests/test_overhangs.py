@@ -110,6 +110,16 @@ def test_overhangs_do_not_cross_a_party_line():
     assert gables == [0.0, pytest.approx(GABLES_M, abs=0.1)]
 
 
+def test_an_overhang_that_a_neighbour_blocks_is_named():
+    roof = shapely.box(*(CORNER - [GABLES_M, EAVES_M]), *(CORNER + [12 + GABLES_M, 8 + EAVES_M]))
+    neighbour = shapely.box(*(CORNER + [12 + GABLES_M, 0]), *(CORNER + [20, 8]))
+    settings = make_settings(footprint_kind="roof", assumed_overhang_m=0.5)
+    house = reconstruct(footprint=roof, settings=settings, neighbours=[neighbour])
+    assert measure_sides(house) == [[0.5, 0.5], [0.0, 0.5]]
+    remark = "its overhangs were left out along 9.2 m to the east (a neighbour stands there)"
+    assert remark in house.detail
+
+
 def test_walls_stand_within_a_footprint_of_the_roof():
     roof = shapely.box(*(CORNER - [GABLES_M, EAVES_M]), *(CORNER + [12 + GABLES_M, 8 + EAVES_M]))
     for kind in ("roof", "auto"):

@@ -17,6 +17,7 @@ import shapely
 
 from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
+from .geometry.outline_edges import describe_sides, list_outline_edges
 from .geometry.rings import repair_polygons
 from .log import count_things
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid, as_xyz
@@ -781,17 +782,26 @@ def add_overhangs(
     """
     if building.built is None or "2.3" not in settings.write.lods:
         return building
-    from .compose.eaves import add_eaves, remove_eaves
+    from .compose.valid_eaves import add_valid_eaves, measure_left_out
     from .fit.overhang import find_eaves
 
-    frame, model = building.roof.frame, building.model
+    frame = building.roof.frame
     area = shapely.union_all([shapely.transform(n, frame.to_local) for n in neighbours])
-    eaves = find_eaves(building, frame.to_local(finite(points)), area, settings.reconstruct)
-    try:
-        return dataclasses.replace(building, built=add_eaves(model, eaves))
-    except CompositionError as error:
-        bare = dataclasses.replace(building, built=remove_eaves(model, eaves))
-        return add_remark(bare, f"its overhangs were left out ({error})")
+    eaves, behind_neighbours = find_eaves(
+        building, frame.to_local(finite(points)), area, settings.reconstruct
+    )
+    model, reason = add_valid_eaves(building.model, eaves)
+    edges = list_outline_edges(building.roof.outline)
+    sides = [
+        f"along {text} ({why})"
+        for lengths, why in (
+            (behind_neighbours, "a neighbour stands there"),
+            (measure_left_out(model, eaves), reason),
+        )
+        if (text := describe_sides(edges, lengths))
+    ]
+    remark = f"its {Doubt.OVERHANGS_LEFT_OUT.value} {' and '.join(sides)}"
+    return add_remark(dataclasses.replace(building, built=model), remark if sides else "")
 
 
 def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:

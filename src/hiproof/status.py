@@ -68,6 +68,7 @@ class Doubt(Enum):
     BARE_GROUND = "its ground lies bare"
     BARE_GROUND_INSIDE = "of bare ground inside its footprint"
     GROUND_UNDER_ROOF = "ground points lie under the roof"
+    OVERHANGS_LEFT_OUT = "overhangs were left out"
 
     @property
     def told(self) -> str:

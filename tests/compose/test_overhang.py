@@ -8,6 +8,7 @@ import hiproof
 from hiproof.compose import check_solid, compose
 from hiproof.compose.eaves import add_eaves
 from hiproof.compose.settle import settled_roof
+from hiproof.compose.valid_eaves import add_valid_eaves, measure_left_out
 from hiproof.errors import CompositionError
 from hiproof.geometry.outline_edges import list_outline_edges
 from hiproof.model import CEILING, GROUND, Eaves, Model, Overhang
@@ -72,6 +73,55 @@ def test_edges_without_overhang_keep_their_wall():
 def test_roofs_near_the_ground_have_none():
     with pytest.raises(CompositionError, match="leave them out"):
         add_eaves(build_pair(3.0, z=0.3), make_eaves([0.5] * 4))
+
+
+def test_only_the_eaves_that_hang_too_low_lose_their_overhang():
+    model = build_pair(3.0, z=0.5)
+    wanted = make_eaves([0.5] * 4)
+    valid, reason = add_valid_eaves(model, wanted)
+    assert [overhang.edge for overhang in valid.eaves.overhangs] == [1, 3]
+    assert check_solid(valid.eaves.solid) == () and "over the ground" in reason
+    assert measure_left_out(valid, wanted).tolist() == [12.0, 0.0, 12.0, 0.0]
+
+
+def build_blocks(*blocks):
+    """Level roofs over boxes (x0, y0, x1, y1) at heights z, under one outline."""
+    boxes = [shapely.box(*box) for box, _ in blocks]
+    parts = [
+        {
+            "type": "flat",
+            "parameters": {"width": box[3] - box[1], "length": box[2] - box[0]},
+            "position": [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, z],
+            "outlines": [[shapely.get_coordinates(area)[:-1].tolist()]],
+        }
+        for area, (box, z) in zip(boxes, blocks, strict=True)
+    ]
+    outline = shapely.union_all(boxes)
+    ring = shapely.get_coordinates(shapely.orient_polygons(outline).normalize())[:-1]
+    record = {"id": "a", "origin": [0, 0, 0], "outline": [ring.tolist()], "z_ground": 0}
+    return hiproof.build(record | {"parts": parts}).model
+
+
+def test_a_low_roof_too_narrow_for_walls_inside_keeps_its_own():
+    model = build_blocks(((0, 0, 10, 8), 6.0), ((3, 8, 7, 8.4), 3.0))
+    edges = list_outline_edges(model.roof.outline)
+    wanted = make_eaves([0.6] * len(edges.starts), kind="roof")
+    valid, _ = add_valid_eaves(model, wanted)
+    assert check_solid(valid.eaves.solid) == ()
+    assert len(valid.eaves.overhangs) == len(edges.starts)
+    left_out = measure_left_out(valid, wanted)
+    is_outer = (edges.normals[:, 1] > 0.9) & (edges.lengths < 5.0) & (edges.starts[:, 1] > 8.2)
+    assert left_out[is_outer] == pytest.approx([4.0])
+    assert left_out[edges.lengths > 5.0].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_walls_stand_under_each_of_two_blocks_that_meet_in_a_narrow_neck():
+    model = build_blocks(((0, 0, 8, 8), 5.0), ((8, 3, 10, 4), 5.0), ((10, 0, 18, 8), 5.0))
+    count = len(list_outline_edges(model.roof.outline).starts)
+    solid = add_eaves(model, make_eaves([0.6] * count, kind="roof")).eaves.solid
+    assert check_solid(solid) == ()
+    grounds = [solid.project_face(face).area for face in solid.select_faces(GROUND)]
+    assert sorted(grounds) == pytest.approx([6.8**2, 6.8**2], abs=0.01)
 
 
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)

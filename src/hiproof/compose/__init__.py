@@ -21,7 +21,9 @@ blocks            LoD1: prisms over the outline
 profile           heights of the terrain along an outline
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls
+inner_walls       walls inside the outline of a roof that overhangs them
 eaves             a model with overhangs
+valid_eaves       as many overhangs as make a valid solid
 finish            a model with the underside that it is to have
 boxes             installations on roofs
 building_parts    a solid cut where its roofs meet, for formats that know building parts

@@ -16,7 +16,8 @@ from ..model import GROUND, Eaves, Model, Piece, Roof, Solid
 from ..model.overhang import WALLS
 from ..settings import ComposeSettings, Settings
 from .arrangement import GRID_M
-from .check import check_solid
+from .check import Finding, check_solid
+from .inner_walls import find_loose_roofs, join_walls, set_walls_in, tidy_walls
 from .overhang import OverhangingShell, to_grid
 from .settle import PLAN_DIGITS
 from .solid import compose
@@ -53,22 +54,46 @@ def make_solid(model: Model, eaves: Eaves, widths: np.ndarray) -> Solid:
     origin = model.roof.frame.origin
     level = model.on_one_level
     local = Solid(np.round(level.vertices - origin, PLAN_DIGITS), level.faces)
-    options = model.compose or ComposeSettings()
     if eaves.footprint_kind == WALLS:
-        walls = model.roof.outline
+        options = model.compose or ComposeSettings()
         local = compose_over(widen_roof(model.roof, widths), local, options)
+        solid, findings = close_solid(local, model, model.roof.outline, eaves.thickness)
     else:
-        walls = set_walls_in(model.roof.outline, widths)
-    return close_solid(local, model, to_grid(walls), eaves.thickness).move(origin)
+        solid, findings = make_inner_solid(local, model, eaves, widths)
+    if findings:
+        raise CompositionError(
+            f"expected a valid solid with overhangs, got: {findings[0].message}; leave them out"
+        )
+    return solid.move(origin)
 
 
-def remove_eaves(model: Model, eaves: Eaves) -> Model:
-    """Return the model without any overhang, `eaves` saying how they would be made."""
-    return replace(model, eaves=replace(eaves, overhangs=(), solid=None))
+def make_inner_solid(
+    level: Solid, model: Model, eaves: Eaves, widths: np.ndarray
+) -> tuple[Solid, tuple[Finding, ...]]:
+    """Return the solid with walls inside the roof's outline, and its findings.
+
+    Where it falls apart, roofs that hang loose keep their own walls and those that stand apart are
+    joined to the others; if that is not enough, these keep their own walls too.
+    """
+    outline, options = model.roof.outline, model.compose or ComposeSettings()
+    inside = set_walls_in(outline, widths, options.min_face_width_m)
+    solid, findings = close_solid(level, model, inside, eaves.thickness)
+    if findings:
+        hanging, apart = find_loose_roofs(solid)
+        loose = shapely.union(hanging, apart)
+        for kept in (hanging, loose) if not loose.is_empty else ():
+            walls = join_walls(shapely.union(inside, kept), loose, widths.max())
+            walls = tidy_walls(walls, outline, options.min_face_width_m)
+            solid, findings = close_solid(level, model, walls, eaves.thickness)
+            if not findings:
+                break
+    return solid, findings
 
 
-def close_solid(level: Solid, model: Model, walls: shapely.Polygon, thickness_m: float) -> Solid:
-    """Return the solid over one level with walls and slabs.
+def close_solid(
+    level: Solid, model: Model, walls: shapely.Geometry, thickness_m: float
+) -> tuple[Solid, tuple[Finding, ...]]:
+    """Return the solid over one level with walls and slabs, and its findings.
 
     All are in the roof's frame. Slabs get thinner where their undersides would touch a lower roof
     along a line.
@@ -77,16 +102,14 @@ def close_solid(level: Solid, model: Model, walls: shapely.Polygon, thickness_m:
     caps = [cap_by_place(level, options.ground_clearance_m)]
     if model.underside.terrain:
         caps.append(cap_everywhere(level, options.ground_clearance_m))
-    findings: tuple = ()
     for cap, share in itertools.product(caps, THICKNESS_SHARES):
         thickness = round(share * thickness_m / GRID_M)
-        solid = OverhangingShell(level, model.underside, cap, walls, thickness).close()
+        shell = OverhangingShell(level, model.underside, cap, to_grid(walls), thickness)
+        solid = shell.close()
         findings = check_solid(solid, planarity_m=options.planarity_m)
         if not findings:
-            return solid
-    raise CompositionError(
-        f"expected a valid solid with overhangs, got: {findings[0].message}; leave them out"
-    )
+            break
+    return solid, findings
 
 
 def compose_over(roof: Roof, level: Solid, options: ComposeSettings) -> Solid:
@@ -200,18 +223,3 @@ def cut_strip(
     ]
     polygon = repair_polygons(shapely.polygons(corners))  # mitres at a short edge may cross
     return with_area(shapely.difference(polygon, outline, grid_size=OVERLAY_GRID_M))
-
-
-def set_walls_in(outline: shapely.Polygon, widths: np.ndarray) -> shapely.Polygon:
-    """Return the outline of walls that stand `widths` (n,) within an outline."""
-    strips = make_strips(list_outline_edges(outline), widths, side=-1.0)
-    taken = [shapely.make_valid(shapely.polygons(strips[k])) for k in np.flatnonzero(widths)]
-    walls = with_area(
-        shapely.difference(outline, shapely.union_all(taken), grid_size=OVERLAY_GRID_M)
-    )
-    if walls.geom_type != "Polygon" or walls.is_empty:
-        raise CompositionError(
-            "expected walls in one piece within the roof, got none or several; assume a shorter "
-            "overhang"
-        )
-    return walls

@@ -61,7 +61,7 @@ class OverhangingShell(Shell):
         solid: Solid,
         underside: Underside,
         cap: Cap,
-        walls: shapely.Polygon,
+        walls: shapely.Geometry,
         thickness: int,
     ) -> None:
         self.walls, self.thickness = walls, thickness
@@ -90,7 +90,8 @@ class OverhangingShell(Shell):
         numbers = [n for n, face in enumerate(self.solid.faces) if face.kind == ROOF]
         roofs = np.array([to_grid(self.solid.project_face(self.solid.faces[n])) for n in numbers])
         walls = weld_walls(self.walls, [area, *roofs])
-        rings = [ring for polygon in (walls, area, *roofs) for ring in list_rings(polygon)]
+        polygons = [*shapely.get_parts(walls), area, *roofs]
+        rings = [ring for polygon in polygons for ring in list_rings(polygon)]
         self.pool = np.unique(np.concatenate(rings).astype(int), axis=0)
         lines = shapely.union_all(
             [shapely.linearrings(self.node_ring(ring)) for ring in rings], grid_size=1.0
@@ -240,9 +241,9 @@ class OverhangingShell(Shell):
         )
 
 
-def to_grid(polygon: shapely.Polygon) -> shapely.Polygon:
-    """Return a polygon in units of the grid."""
-    return shapely.transform(polygon, lambda xy: np.rint(xy / GRID_M))
+def to_grid(area: shapely.Geometry) -> shapely.Geometry:
+    """Return an area in units of the grid."""
+    return shapely.transform(area, lambda xy: np.rint(xy / GRID_M))
 
 
 def find_slivers(cells: np.ndarray, walls: shapely.Geometry) -> np.ndarray:
@@ -252,17 +253,24 @@ def find_slivers(cells: np.ndarray, walls: shapely.Geometry) -> np.ndarray:
     return is_thin & (shared > 0.0)
 
 
-def weld_walls(walls: shapely.Polygon, roofs: list[shapely.Polygon]) -> shapely.Polygon:
-    """Return the walls' outline through all that is the same place of the roof's plan.
+def weld_walls(walls: shapely.Geometry, roofs: list[shapely.Polygon]) -> shapely.Geometry:
+    """Return the walls' areas through all that is the same place of the roof's plan.
 
-    Its corners move onto corners and edges of `roofs`, and its edges pass through corners.
+    Their corners move onto corners and edges of `roofs`, and their edges pass through corners.
     """
     rings = [np.array(ring, float) for polygon in roofs for ring in list_rings(polygon)]
     corners = np.unique(np.concatenate(rings), axis=0)
     lines = np.concatenate([np.stack([r, np.roll(r, -1, axis=0)], axis=1) for r in rings])
+    return shapely.multipolygons(
+        [weld_wall(part, corners, lines) for part in shapely.get_parts(walls)]
+    )
+
+
+def weld_wall(area: shapely.Polygon, corners: np.ndarray, lines: np.ndarray) -> shapely.Polygon:
+    """Return one area within walls, welded to corners (n, 2) and `lines` (m, 2, 2)."""
     welded = [
         weld_edges(np.array([weld_corner(place, corners, lines) for place in ring]), corners)
-        for ring in list_rings(walls)
+        for ring in list_rings(area)
     ]
     return shapely.Polygon(welded[0], welded[1:])
 

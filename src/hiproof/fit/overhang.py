@@ -109,8 +109,8 @@ def measure_reach(roof: Roof, points: np.ndarray, neighbours: shapely.Geometry) 
         for k in range(len(edges.starts))
     ]
     lengths, sigmas = pool_sides(edges, measured)
+    lengths = np.where(gaps <= PARTY_M, 0.0, lengths)
     is_blocked = (gaps <= PARTY_M) | (gaps < lengths + ACROSS_STEP_M)
-    lengths = np.where(is_blocked, 0.0, lengths)
     return RoofReach(lengths, sigmas, ~is_blocked, ends_at_outline(edges, measured))
 
 
@@ -119,8 +119,10 @@ def find_eaves(
     points: np.ndarray,
     neighbours: shapely.Geometry,
     settings: ReconstructSettings,
-) -> Eaves:
+) -> tuple[Eaves, np.ndarray]:
     """Find the overhangs of a building's roof, which has no solid of LoD2.3 yet.
+
+    The length (n,) of each edge that would have one but for its neighbours comes second.
 
     Without a footprint its outline is that of the roof, and overhangs are assumed, as they are
     where its footprint is one of a roof. Points (n, 3) and neighbours are as in `measure_reach`.
@@ -131,7 +133,7 @@ def find_eaves(
     if building.footprint is None or ends:
         kind = ROOF_EDGE
     if kind == ROOF_EDGE:
-        lengths = np.where(reach.free, assumed_m, 0.0)
+        lengths = np.full(len(reach.lengths), assumed_m)
         sigmas = np.full(len(lengths), math.nan)
     else:
         kind, lengths, sigmas = WALLS, reach.lengths, reach.sigmas
@@ -141,9 +143,11 @@ def find_eaves(
             round(float(lengths[edge]), MILLIMETRE_DIGITS),
             round(float(sigmas[edge]), MILLIMETRE_DIGITS),
         )
-        for edge in np.flatnonzero(lengths).tolist()
+        for edge in np.flatnonzero(lengths * reach.free).tolist()
     )
-    return Eaves(overhangs, settings.roof_thickness_m, kind)
+    along = list_outline_edges(building.roof.outline).lengths
+    behind_neighbours = np.where(reach.free, 0.0, along * (lengths > 0.0))
+    return Eaves(overhangs, settings.roof_thickness_m, kind), behind_neighbours
 
 
 def find_near(

@@ -12,6 +12,18 @@ FARTHEST_MITRE = (
     3.0  # distance of a mitred corner by the wider strip's width; a farther one is a spike
 )
 
+SHORTEST_SIDE_M = 0.05  # of a side that is worth a word
+COMPASS_POINTS = (
+    "east",
+    "north-east",
+    "north",
+    "north-west",
+    "west",
+    "south-west",
+    "south",
+    "south-east",
+)
+
 
 class OutlineEdges(NamedTuple):
     """The edges (n,) of a polygon, the outer ring first, in the order of its rings.
@@ -55,6 +67,26 @@ def list_outline_edges(outline: shapely.Polygon) -> OutlineEdges:
     return OutlineEdges(
         *(np.concatenate(values) for values in (starts, ends, normals, previous, following))
     )
+
+
+def describe_sides(edges: OutlineEdges, lengths: np.ndarray) -> str:
+    """Describe stretches of edges, `lengths` (n,) in metres, by where they face.
+
+    The longest come first, those of a few centimetres are left out.
+
+    >>> edges = list_outline_edges(shapely.Polygon([(0, 0), (4, 0), (4, 3), (0, 3)]))
+    >>> describe_sides(edges, np.array([4.0, 0.0, 0.0, 3.0]))
+    '4.0 m to the south and 3.0 m to the west'
+    """
+    octant = np.rint(np.arctan2(edges.normals[:, 1], edges.normals[:, 0]) / (np.pi / 4))
+    metres = np.bincount(octant.astype(int) % len(COMPASS_POINTS), lengths, len(COMPASS_POINTS))
+    order = np.argsort(-metres, kind="stable")
+    texts = [
+        f"{metres[k]:.1f} m to the {COMPASS_POINTS[k]}"
+        for k in order.tolist()
+        if metres[k] >= SHORTEST_SIDE_M
+    ]
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def make_strips(edges: OutlineEdges, widths: np.ndarray, side: float = 1.0) -> np.ndarray:
