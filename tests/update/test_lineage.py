@@ -1,9 +1,11 @@
 """Parts that did not change keep their parameters, and their place in the list."""
 
 import copy
+import dataclasses
 
 import numpy as np
 import pytest
+import shapely
 
 from hiproof.compose import check_solid
 from hiproof.parametric.building import build
@@ -106,3 +108,15 @@ def test_a_part_that_would_leave_a_gap_is_not_kept():
     result, _ = continue_parts(old, new, NEAR_M, scan(new))
     assert len(result.parts) == 2
     assert result.roof.frame.origin.tolist() == new.roof.frame.origin.tolist()
+
+
+def test_a_part_whose_ring_crosses_itself_is_matched_as_any():
+    old, new = build(HOUSE), build_new()
+    gable, flat = old.model.roof.parts
+    ring = [(0, 0), (12, 0), (12, 8), (6, 8), (5, 8.1), (6, 8.1), (5, 8), (0, 8)]
+    (piece, *others) = gable.pieces
+    crossing = dataclasses.replace(piece, outline=shapely.Polygon(ring))
+    gable = dataclasses.replace(gable, pieces=(crossing, *others))
+    roof = dataclasses.replace(old.model.roof, parts=(gable, flat))
+    old = dataclasses.replace(old, built=dataclasses.replace(old.built, roof=roof))
+    assert continue_parts(old, new, NEAR_M, scan(new))[1] == [0, 1]

@@ -7,6 +7,7 @@ keeps that part's number where it can: parts that continue others come first, in
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ import shapely
 
 from ..compose.settle import PLAN_DIGITS
 from ..errors import HiproofError
-from ..model import Building, Roof
+from ..geometry.rings import repair_polygons
+from ..model import Building, Piece, Roof
 from ..model.heights import find_highest
 from ..parametric.building import build
 from ..parametric.refit import measure_building, select_inside
@@ -92,8 +94,8 @@ def is_same_part(old: Building, j: int, new: Building, k: int, near_m: float) ->
     """Return whether part `k` of the new roof is part `j` of the old one."""
     before, after = old.parts[j], new.parts[k]
     shift = old.roof.frame.origin - new.roof.frame.origin
-    first = shapely.union_all([piece.outline for piece in before.pieces])
-    second = shapely.union_all([piece.move(-shift).outline for piece in after.pieces])
+    first = unite_pieces(before.pieces)
+    second = unite_pieces([piece.move(-shift) for piece in after.pieces])
     common = shapely.intersection(first, second)
     if before.type != after.type or common.area < SAME_OUTLINE_SHARE * first.union(second).area:
         return False
@@ -105,8 +107,13 @@ def is_same_part(old: Building, j: int, new: Building, k: int, near_m: float) ->
 
 def covers_outline(roof: Roof) -> bool:
     """Return whether the parts leave no gap in the outline."""
-    pieces = shapely.union_all([piece.outline for piece in roof.pieces])
-    return bool(shapely.difference(roof.outline, pieces).area < LARGEST_GAP_M2)
+    gaps = shapely.difference(roof.outline, unite_pieces(roof.pieces))
+    return bool(gaps.area < LARGEST_GAP_M2)
+
+
+def unite_pieces(pieces: Sequence[Piece]) -> shapely.Geometry:
+    """Return the place of some pieces; one whose ring touches itself is repaired."""
+    return shapely.union_all(repair_polygons([piece.outline for piece in pieces]))
 
 
 def make_grid(area: shapely.Geometry) -> np.ndarray:
