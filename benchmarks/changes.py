@@ -38,7 +38,7 @@ import shapely
 
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
-from hiproof.model import Building
+from hiproof.model import Building, Roof
 from hiproof.parametric.building import build
 from hiproof.parametric.file import read_parameters
 from hiproof.read.pointcloud import read_points
@@ -54,6 +54,7 @@ from hiproof.update.request import UpdateRequest
 from hiproof.update.run import UpdateSummary, update_area
 
 from .compounds import compare_parts
+from .kept_parts import count_kept, describe_kept
 
 USUAL_SHARE = 0.2  # of the buildings that change; as many others are disturbed
 SHIFT_M = np.array([0.16, -0.12, 0.05])
@@ -211,8 +212,23 @@ def run_city(
     end = time.process_time()
     with (folder / "updated" / "changes.csv").open() as table:
         rows = {row["id"]: row for row in csv.DictReader(table)}
-    shift = summary.surveys.shift
-    return {"truth": truth, "rows": rows, "seconds": (middle - start, end - middle), "shift": shift}
+    return {
+        "truth": truth,
+        "rows": rows,
+        "seconds": (middle - start, end - middle),
+        "shift": summary.surveys.shift,
+        "kept": count_kept(folder, find_changed_roofs(seed, count, densities[0], share)),
+    }
+
+
+def find_changed_roofs(
+    seed: int, count: int, density: float, share: float
+) -> dict[str, tuple[Roof, Roof]]:
+    """Return the true roofs of changed buildings before and after, by id."""
+    stock = Stock(City(count, seed, density))
+    lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
+    after, by_id = draw_truth(seed, lots, share)[1], {lot.id: lot for lot in lots}
+    return {id: (by_id[id].building.roof, lot.building.roof) for id, lot in after.items()}
 
 
 def reconstruct_city(folder: Path) -> None:
@@ -385,6 +401,7 @@ def main() -> None:
             print(f"CPU: run {result['seconds'][0]:.1f} s, update {result['seconds'][1]:.1f} s")
         for name, value in score(results, given.verbose).items():
             print(f"{name:24s} {value:.4g}")
+        print(describe_kept(sum((result["kept"] for result in results), Counter())))
 
 
 if __name__ == "__main__":

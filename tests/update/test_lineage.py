@@ -92,22 +92,45 @@ def test_figures_of_a_building_with_kept_parts_are_those_of_its_own_roof():
     assert 0.6 * distance < result.quality.rmse < 0.9 * distance
 
 
-def test_a_part_that_moved_by_more_than_the_surveys_differ_is_new():
-    old, new = build(HOUSE), build_new(rise_west=0.3, rise_east=2.0)
+@pytest.mark.parametrize("rise_east", [2.0, -0.4])
+def test_a_part_that_only_moved_keeps_all_but_its_height(rise_east):
+    old, new = build(HOUSE), build_new(rise_west=0.3, rise_east=rise_east)
     result, lineage = continue_parts(old, new, NEAR_M, scan(new))
     assert lineage == [0, 1]
-    local = result.roof.frame.origin[:2] - [1000.0, 2000.0]
-    tops = result.roof.height_at([[6.0, 4.0], [16.0, 4.0]] - local) + result.roof.frame.origin[2]
-    assert tops == pytest.approx([11.3, 8.0], abs=1e-6)
+    assert find_tops(result) == pytest.approx([11.3, 6.0 + rise_east], abs=1e-6)
+    before, after = building_record(old)["parts"], building_record(result)["parts"]
+    for was, part, rise in zip(before, after, (0.3, rise_east), strict=True):
+        x, y, z = was["position"]
+        assert part == was | {"position": [x, y, pytest.approx(z + rise, abs=1e-6)]}
 
 
-def test_a_part_that_would_leave_a_gap_is_not_kept():
+def test_a_part_of_another_shape_is_new():
+    old = build(HOUSE)
+    record = building_record(build_new())
+    record["parts"][1]["parameters"]["height"] += 0.5
+    new = build(record)
+    result, lineage = continue_parts(old, new, NEAR_M, scan(new))
+    assert lineage == [0, 1]
+    gable, flat = building_record(result)["parts"]
+    assert gable["parameters"]["height"] == pytest.approx(3.5)
+    assert flat == building_record(old)["parts"][1]
+
+
+def test_a_part_keeps_its_parameters_over_another_outline():
     """The flat part now begins half a metre away from the earlier gable."""
     narrow = [[12.5, 0], [20, 0], [20, 8], [12.5, 8]]
     old, new = build(HOUSE), build_new(rise_east=2.0, east=narrow)
     result, _ = continue_parts(old, new, NEAR_M, scan(new))
-    assert len(result.parts) == 2
-    assert result.roof.frame.origin.tolist() == new.roof.frame.origin.tolist()
+    before, after = (building_record(building)["parts"][0] for building in (old, result))
+    assert [after[name] for name in ("type", "parameters", "position")] == [
+        before[name] for name in ("type", "parameters", "position")
+    ]
+    gaps = shapely.difference(result.roof.outline, shapely.union_all(find_outlines(result)))
+    assert gaps.area < 0.05
+
+
+def find_outlines(building):
+    return [piece.outline for piece in building.roof.pieces]
 
 
 def test_a_part_whose_ring_crosses_itself_is_matched_as_any():

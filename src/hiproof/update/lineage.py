@@ -28,10 +28,14 @@ SAME_PLACE = 0.5
 """Intersection over union of the places of two parts from which on one continues the other."""
 
 SAME_OUTLINE_SHARE = 0.9
-"""The same of their outlines, from which on both may be one part that did not change."""
+"""The same of their outlines, from which on the earlier outline stands, too."""
 
 LARGEST_GAP_M2 = 0.05
 """Area (m2) between parts, beyond which parts of two epochs do not fit each other."""
+
+OTHER_SHARE = 0.02
+"""Share of a roof that may lie elsewhere with earlier parts than without: strips along their edges,
+which lie within some decimetres."""
 
 
 def continue_parts(
@@ -40,29 +44,118 @@ def continue_parts(
     """Return the new building with its parts in the earlier order.
 
     A part that the test does not tell from the part it continues keeps that part's parameters:
-    their heights differ by no more than `near_m`. The numbers of the parts that they continue come
-    with the building, None for new parts. With kept parts, the building is measured again on the
-    new `points` (n, 3), in world metres.
+    their heights differ by no more than `near_m`. One that only moved up or down keeps all but its
+    height. The numbers of the parts that they continue come with the building, None for new parts.
+    With kept parts, the building is measured again on the new `points` (n, 3), in world metres.
     """
     pairs = match_parts(old, new)
     order = sorted(range(len(new.parts)), key=lambda k: (k not in pairs, pairs.get(k, k), k))
     lineage = [pairs.get(k) for k in order]
-    before, record = building_record(old), building_record(new)
-    move_record(record, np.array(before["origin"]))
-    same = {k: before["parts"][j] for k, j in pairs.items() if is_same_part(old, j, new, k, near_m)}
-    if same:
-        parts = [same.get(k, record["parts"][k]) for k in order]
-        try:
-            result = build(record | {"parts": parts}, new.model.compose)
-        except HiproofError:
-            result = new
-        if result is not new and covers_outline(result.roof):
-            return measure_again(result, new, points), lineage
+    result = keep_parts(old, new, pairs, order, near_m)
+    if result is not None:
+        return measure_again(result, new, points), lineage
     if order == list(range(len(order))):
         return new, lineage
     record = building_record(new)
     record["parts"] = [record["parts"][k] for k in order]
     return build(record, new.model.compose), lineage
+
+
+def keep_parts(
+    old: Building, new: Building, pairs: dict[int, int], order: list[int], near_m: float
+) -> Building | None:
+    """Return the new building with as many earlier parts as fit it, None where none does.
+
+    `pairs` has the earlier part that each new part continues. The parts come in the `order`.
+    """
+    before, record = building_record(old), building_record(new)
+    move_record(record, np.array(before["origin"]))
+    lifts = find_lifts(old, new, pairs, near_m)
+    kept = {
+        k: lift_part(before["parts"][pairs[k]], record["parts"][k], lift)
+        for k, lift in lifts.items()
+    }
+    redrawn = {k: part | {"outlines": record["parts"][k]["outlines"]} for k, part in kept.items()}
+    first = {k: kept[k] if has_same_outline(old, pairs[k], new, k) else redrawn[k] for k in kept}
+
+    def try_parts(parts: dict[int, dict[str, Any]]) -> Building | None:
+        if not parts:
+            return None
+        requested = record | {"parts": [parts.get(k, record["parts"][k]) for k in order]}
+        try:
+            result = build(requested, new.model.compose)
+        except HiproofError:
+            return None
+        return result if is_same_roof(result.roof, new.roof, near_m) else None
+
+    result = try_parts(first) or try_parts(redrawn)
+    if result is not None or len(kept) < 2:
+        return result
+    chosen: dict[int, dict[str, Any]] = {}
+    for k in kept:
+        for parts in (chosen | {k: first[k]}, chosen | {k: redrawn[k]}):
+            if (found := try_parts(parts)) is not None:
+                result, chosen = found, parts
+                break
+    return result
+
+
+def find_lifts(
+    old: Building, new: Building, pairs: dict[int, int], near_m: float
+) -> dict[int, float]:
+    """Return how much higher (m) each new part is that has the shape of the part it continues.
+
+    Parts that did not move have 0, and parts that moved together the same height.
+    """
+    result = {}
+    for k, j in pairs.items():
+        d = compare_heights(old, j, new, k)
+        if d.size and np.abs(d - np.median(d)).max() <= near_m:
+            lift = float(np.median(d))
+            result[k] = lift if abs(lift) > near_m else 0.0
+    moved = [lift for lift in result.values() if lift]
+    if moved and np.ptp(moved) <= near_m:
+        result = {k: float(np.mean(moved)) if lift else 0.0 for k, lift in result.items()}
+    return result
+
+
+def compare_heights(old: Building, j: int, new: Building, k: int) -> np.ndarray:
+    """Return how much higher (n,) part `k` of the new roof is where both have a part."""
+    before, after = old.parts[j], new.parts[k]
+    shift = old.roof.frame.origin - new.roof.frame.origin
+    xy = make_grid(unite_pieces(before.pieces))
+    heights = np.stack([before.height_at(xy) + shift[2], after.height_at(xy + shift[:2])])
+    return np.diff(heights[:, np.isfinite(heights).all(axis=0)], axis=0)[0]
+
+
+def lift_part(before: dict[str, Any], after: dict[str, Any], height: float) -> dict[str, Any]:
+    """Return an earlier part so much higher (m), as sure of that as the part `after` it."""
+    if not height:
+        return before
+    x, y, z = before["position"]
+    sigma = {name: value for name, value in before["sigma"].items() if name != "t_z"}
+    if "t_z" in after["sigma"]:
+        sigma["t_z"] = after["sigma"]["t_z"]
+    return before | {"position": [x, y, round(z + height, LENGTH_DIGITS)], "sigma": sigma}
+
+
+def has_same_outline(old: Building, j: int, new: Building, k: int) -> bool:
+    """Return whether part `k` of the new roof takes the place of part `j` of the old one."""
+    shift = old.roof.frame.origin - new.roof.frame.origin
+    first = unite_pieces(old.parts[j].pieces)
+    second = unite_pieces([piece.move(-shift) for piece in new.parts[k].pieces])
+    common = shapely.intersection(first, second).area
+    return bool(common >= SAME_OUTLINE_SHARE * first.union(second).area)
+
+
+def is_same_roof(roof: Roof, new: Roof, near_m: float) -> bool:
+    """Return whether a roof lies where the `new` one does, but for what chance explains."""
+    if not covers_outline(roof):
+        return False
+    xy, shift = make_grid(roof.outline), roof.frame.origin - new.frame.origin
+    heights = np.stack([roof.height_at(xy) + shift[2], new.height_at(xy + shift[:2])])
+    heights = heights[:, np.isfinite(heights).all(axis=0)]
+    return bool(np.mean(np.abs(heights[1] - heights[0]) > near_m) <= OTHER_SHARE)
 
 
 def measure_again(result: Building, new: Building, points: np.ndarray) -> Building:
@@ -88,21 +181,6 @@ def move_record(record: dict[str, Any], origin: np.ndarray) -> None:
     for part in record["parts"]:
         part["position"] = np.round(np.array(part["position"]) + shift, LENGTH_DIGITS).tolist()
         part["outlines"] = [move_rings(rings) for rings in part["outlines"]]
-
-
-def is_same_part(old: Building, j: int, new: Building, k: int, near_m: float) -> bool:
-    """Return whether part `k` of the new roof is part `j` of the old one."""
-    before, after = old.parts[j], new.parts[k]
-    shift = old.roof.frame.origin - new.roof.frame.origin
-    first = unite_pieces(before.pieces)
-    second = unite_pieces([piece.move(-shift) for piece in after.pieces])
-    common = shapely.intersection(first, second)
-    if before.type != after.type or common.area < SAME_OUTLINE_SHARE * first.union(second).area:
-        return False
-    xy = make_grid(common)
-    heights = np.stack([before.height_at(xy) + shift[2], after.height_at(xy + shift[:2])])
-    heights = heights[:, np.isfinite(heights).all(axis=0)]
-    return heights.size > 0 and bool(np.abs(heights[1] - heights[0]).max() <= near_m)
 
 
 def covers_outline(roof: Roof) -> bool:
