@@ -80,7 +80,7 @@ def count_parts(old: dict[str, Any], new: dict[str, Any], truth: tuple[Roof, Roo
 
 
 def is_equal(part: dict[str, Any], other: dict[str, Any], names: tuple[str, ...]) -> bool:
-    """Return whether two parts have the same values of some names, and the same place in plan."""
+    """Return whether two parts have the same place in plan and the same values."""
     same = part["position"][:2] == other["position"][:2]
     return same and all(part[name] == other[name] for name in names)
 

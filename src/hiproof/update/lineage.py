@@ -64,9 +64,10 @@ def continue_parts(
 def keep_parts(
     old: Building, new: Building, pairs: dict[int, int], order: list[int], near_m: float
 ) -> Building | None:
-    """Return the new building with as many earlier parts as fit it, None where none does.
+    """Return the new building with as many earlier parts as fit it.
 
-    `pairs` has the earlier part that each new part continues. The parts come in the `order`.
+    None where none does. `pairs` has the earlier part that each new part continues. The parts come
+    in the `order`.
     """
     before, record = building_record(old), building_record(new)
     move_record(record, np.array(before["origin"]))
@@ -103,7 +104,7 @@ def keep_parts(
 def find_lifts(
     old: Building, new: Building, pairs: dict[int, int], near_m: float
 ) -> dict[int, float]:
-    """Return how much higher (m) each new part is that has the shape of the part it continues.
+    """Return how much higher (m) each new part of an earlier shape lies.
 
     Parts that did not move have 0, and parts that moved together the same height.
     """
@@ -120,7 +121,7 @@ def find_lifts(
 
 
 def compare_heights(old: Building, j: int, new: Building, k: int) -> np.ndarray:
-    """Return how much higher (n,) part `k` of the new roof is where both have a part."""
+    """Return how much higher (n,) part `k` is than `j`, place by place."""
     before, after = old.parts[j], new.parts[k]
     shift = old.roof.frame.origin - new.roof.frame.origin
     xy = make_grid(unite_pieces(before.pieces))
@@ -129,7 +130,7 @@ def compare_heights(old: Building, j: int, new: Building, k: int) -> np.ndarray:
 
 
 def lift_part(before: dict[str, Any], after: dict[str, Any], height: float) -> dict[str, Any]:
-    """Return an earlier part so much higher (m), as sure of that as the part `after` it."""
+    """Return an earlier part so much higher (m), as sure as part `after`."""
     if not height:
         return before
     x, y, z = before["position"]
@@ -140,7 +141,7 @@ def lift_part(before: dict[str, Any], after: dict[str, Any], height: float) -> d
 
 
 def has_same_outline(old: Building, j: int, new: Building, k: int) -> bool:
-    """Return whether part `k` of the new roof takes the place of part `j` of the old one."""
+    """Return whether part `k` of the new roof has the outline of `j`."""
     shift = old.roof.frame.origin - new.roof.frame.origin
     first = unite_pieces(old.parts[j].pieces)
     second = unite_pieces([piece.move(-shift) for piece in new.parts[k].pieces])
@@ -149,7 +150,7 @@ def has_same_outline(old: Building, j: int, new: Building, k: int) -> bool:
 
 
 def is_same_roof(roof: Roof, new: Roof, near_m: float) -> bool:
-    """Return whether a roof lies where the `new` one does, but for what chance explains."""
+    """Return whether chance explains the differences of two roofs."""
     if not covers_outline(roof):
         return False
     xy, shift = make_grid(roof.outline), roof.frame.origin - new.frame.origin
