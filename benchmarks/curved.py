@@ -30,7 +30,7 @@ from hiproof.primitives.catalogue import ROUND
 
 KINDS = {
     "alone": (*ROUND, "hexagonal_spire", "barrel"),
-    "tower": (*ROUND, "barrel"),
+    "tower": (*ROUND, "hexagonal_spire", "barrel"),
     "turret": (*ROUND, "hexagonal_spire"),
     "apse": ("half_cone",),
 }
@@ -151,6 +151,7 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=int, default=16)
     parser.add_argument("--first-seed", type=int, default=100)
+    parser.add_argument("--kinds", nargs="*", help="only these")
     parser.add_argument("--densities", type=float, nargs="*", default=[8.0, 2.0])
     request = parser.parse_args()
     seeds = range(request.first_seed, request.first_seed + request.seeds)
@@ -158,7 +159,7 @@ def main() -> None:
     print("| --- | --- | --- | --- | --- | --- |")
     for density in request.densities:
         for setting, kinds in KINDS.items():
-            for kind in kinds:
+            for kind in kinds if not request.kinds else set(kinds) & set(request.kinds):
                 outcomes = [judge_scene(draw_scene(kind, setting, s, density)) for s in seeds]
                 shares = [
                     np.mean([one.is_right for one in outcomes]),

@@ -20,14 +20,17 @@ HEAD = """# Roof types and their parameters
   ends, seen from the front.
 - If only one end slopes, it is the right one. A single slope rises from the front.
 - `end_height` is the height that a corner's end would reach at the left.
-- A cone, a broach (a spire of eight sides) and a dome are measured by the `width` and the `length`
-  of a circle or an ellipse. The `length` of a hexagonal spire is that across flats, and its `width`
-  is as large where its sides are equal.
+- A cone, a broach (a spire of eight sides), a dome and an onion are measured by the `width` and the
+  `length` of a circle or an ellipse. The `length` of a hexagonal spire is that across flats, and
+  its `width` is as large where its sides are equal.
 - Circles are written with as many facets as keep them within 0.1 m, and with the circle's area. A
   dome and a barrel follow a circular arc in four chords or more on each side. Set
   `chord_tolerance_m` in `[compose]` for finer or coarser facets; roofs are fitted with those of
   0.1 m. No shape has more than 256 facets, and faces below `min_face_width_m` still join a
   neighbour.
+- An onion is a bulge with a pointed top. Its eave lies at its widest circle. Walls are vertical, so
+  the model leaves out how the bulge draws in below that. The `neck_height` is the height at which
+  the top begins, at two fifths of the radius; it is at most three fifths of the `height`.
 - A half cone roofs an apse. Its `width` runs along the wall, and its `length` away from it.
 - A gable with its ridge off the middle also has a `ridge_offset` (m, towards the back).
 - A roof that is less regular than its type gives each side's own values, such as `pitch_front` and

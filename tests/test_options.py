@@ -79,7 +79,7 @@ CONFIGURATIONS = {
     "types": ("", ["--types", "gable, hip"], RUNS),
     "types misspelt": ("", ["--types", "Gable,hipp"], "'Gable' (did you mean gable?), 'hipp' (did "
                                                       "you mean hip?)"),
-    "types of another kind": ("", ["--types", "onion"], "got 'onion'"),
+    "types of another kind": ("", ["--types", "igloo"], "got 'igloo'"),
     "types with a comma too many": ("", ["--types", "gable,"], "got ''"),
     "types of numbers": ("[fit]\ntypes = [1]", [], "to be text, got 1"),
     "types misspelt in the file": ('[fit]\ntypes = ["half-hip"]', [], "did you mean half_hip?"),

@@ -161,8 +161,8 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(gable_scan):
     [
         ({}, "expected the id"),
         ({"id": "a", "colour": "red"}, "got also colour"),
-        ({"id": "a", "type": "onion"}, "got 'onion'"),
-        ({"id": "a", "types": "gable,onion"}, "got 'onion'"),
+        ({"id": "a", "type": "igloo"}, "got 'igloo'"),
+        ({"id": "a", "types": "gable,igloo"}, "got 'igloo'"),
         ({"id": "a", "type": "hip", "types": ["gable"]}, "the type among the types"),
         ({"id": "a", "types": []}, "name one at least"),
         ({"id": "a", "types": 5}, "expected a list of roof types"),
@@ -505,7 +505,7 @@ def test_tables_override_too(town_files, tmp_path):
     [
         ('{"id": "a", "type": "hip"}\n{"id": "a", "type": "gable"}\n', "two that differ of 'a'"),
         ('{"id": "a", "type": "hip"\n', "line 1 of .* column"),
-        ('\n{"id": "a", "type": "onion"}\n', "line 2 of .*: expected roof types"),
+        ('\n{"id": "a", "type": "igloo"}\n', "line 2 of .*: expected roof types"),
     ],
 )
 def test_overrides_that_cannot_be_read_are_refused_before_anything_is_redone(

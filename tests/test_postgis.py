@@ -379,10 +379,10 @@ def test_other_prefixes_are_refused(database, tmp_path, prefix):
 def test_a_damaged_building_is_left_out_of_the_tables(database, run_of_two):
     folder, _ = run_of_two
     path = folder / "parameters.jsonl"
-    path.write_text(path.read_text().replace('"type":"flat"', '"type":"onion"'))
+    path.write_text(path.read_text().replace('"type":"flat"', '"type":"igloo"'))
     remarks = []
     assert load_postgis(folder, database, "damaged", remarks.append) == 2
-    assert len(remarks) == 1 and "building yard" in str(remarks[0]) and "onion" in str(remarks[0])
+    assert len(remarks) == 1 and "building yard" in str(remarks[0]) and "igloo" in str(remarks[0])
     with psycopg.connect(database) as connection:
         ids = connection.execute("select id from damaged_buildings order by id").fetchall()
         assert ids == [("house",), ("lost",)]

@@ -228,7 +228,11 @@ class ComposeSettings:
         0.1, "the ground lies at least this far below the lowest eave", "m", 0.01, 10.0
     )
     chord_tolerance_m: float = setting(
-        0.1, "facets of cones, domes and vaults lie within this of the curve", "m", 0.02, 1.0
+        0.1,
+        "facets of cones, domes, onions and vaults lie within this of the curve",
+        "m",
+        0.02,
+        1.0,
     )
     planarity_m: float = setting(
         0.001, "vertices of a face lie within this of its plane", "m", 0.0005, 0.05

@@ -20,7 +20,7 @@ from hiproof.write.parameters import write_parameters
 def make_roof(kind, width=8.0):
     shape = CATALOGUE[kind]
     length = width / 2 if kind == "half_cone" else width
-    parameters = {"width": width, "length": length, "height": 0.4 * width}
+    parameters = shape.typical(width, length, 0.4 * width)
     part = shape.variant(parameters).part(shape.to_theta(parameters, 0.3, (1.0, 2.0, 6.0)))
     return Roof((part,), part.pieces[0].outline, LocalFrame(np.zeros(3)))
 
@@ -37,7 +37,8 @@ def test_the_default_draws_what_is_fitted(kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "fewest"), [("cone", 32), ("half_cone", 16), ("dome", 100), ("barrel", 12)]
+    ("kind", "fewest"),
+    [("cone", 32), ("half_cone", 16), ("dome", 100), ("barrel", 12), ("onion", 70)],
 )
 def test_a_finer_tolerance_has_more_facets_and_the_same_volume(kind, fewest):
     roof = make_roof(kind)

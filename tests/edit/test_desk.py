@@ -206,7 +206,7 @@ def test_types_are_tried_and_the_right_one_wins(desk):
         ({"action": "explode"}, "got 'explode'"),
         ({"action": "change", "part": 7, "change": {}}, "part from 0 to 0, got 7"),
         ({"action": "change", "part": "0", "change": {}}, "got '0'"),
-        ({"action": "change", "part": 0, "change": {"type": "onion"}}, "got 'onion'"),
+        ({"action": "change", "part": 0, "change": {"type": "igloo"}}, "got 'igloo'"),
         ({"action": "change", "part": 0, "change": {"width": -3.0}}, "positive width"),
         ({"action": "change", "part": 0, "change": {"width": float("nan")}}, "got nan"),
         ({"action": "remove", "part": 0}, "two or more parts"),

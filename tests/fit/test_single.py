@@ -199,7 +199,7 @@ def test_wrong_shapes_names_and_weights_are_refused(gable_points):
     with pytest.raises(FitError, match="weights between 0 and 1"):
         fit_roof(gable_points, weights=np.full(len(gable_points), 2.0))
     with pytest.raises(SettingsError, match="expected a roof type"):
-        fit_roof(gable_points, settings=only("onion"))
+        fit_roof(gable_points, settings=only("igloo"))
     with pytest.raises(SettingsError, match="one of likelihood, paper"):
         fit_roof(gable_points, settings=Settings.from_dict({"fit": {"objective": "magic"}}))
 

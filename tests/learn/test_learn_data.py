@@ -154,8 +154,8 @@ def test_unknown_data_is_refused(data):
 
 
 def test_unknown_types_and_unusable_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match="onion"):
-        open_source("simulated", ("gable", "onion"))
+    with pytest.raises(InputError, match="igloo"):
+        open_source("simulated", ("gable", "igloo"))
     (tmp_path / "text.json").write_text("{}")
     with pytest.raises(InputError, match="CityJSON"):
         open_source(f"denhaag:{tmp_path / 'text.json'}")

@@ -161,7 +161,7 @@ BAD = {
     "infinite": (lambda r: r.update(z_ground=float("inf")), "number as z_ground, got inf"),
     "text": (lambda r: r["parts"][0].update(position=["a", 0, 0]), "position of part 0, got 'a'"),
     "huge": (lambda r: r["parts"][0]["parameters"].update(height=10**400), "number as height"),
-    "no such type": (lambda r: r["parts"][0].update(type="onion"), "roof type .* got 'onion'"),
+    "no such type": (lambda r: r["parts"][0].update(type="igloo"), "roof type .* got 'igloo'"),
     "missing": (lambda r: r["parts"][0]["parameters"].pop("height"), "got none for height"),
     "misspelt": (lambda r: r["parts"][0]["parameters"].update(ridge=3.0), "got also ridge"),
     "misspelt key": (lambda r: r["parts"][0].update(rotatoin=3.0), "got also rotatoin"),

@@ -156,7 +156,7 @@ def test_arrays_tuples_and_numbers_of_numpy_are_what_lists_and_numbers_are(gable
 def test_what_cannot_be_is_one_sentence(gable):
     for change, message in [
         ({"width": -1.0}, "positive width"),
-        ({"type": "onion"}, "roof type"),
+        ({"type": "igloo"}, "roof type"),
         ({"ridge_height": 3.0}, "ridge above the eave"),
         ({"ridge_height": "12"}, "number as ridge_height, got '12'"),
         ({"eave_height": np.nan}, "number as eave_height, got nan"),

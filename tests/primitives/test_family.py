@@ -381,8 +381,8 @@ def test_a_name_stands_for_itself_its_kin_or_nothing(name):
 
 
 def test_what_is_no_type_or_lacks_a_parameter_is_told_in_a_sentence():
-    with pytest.raises(FitError, match=r"expected a roof type .* got 'onion'"):
-        compute_planes("onion", {"pitch_front": 30.0}, 0.0, np.zeros(3))
+    with pytest.raises(FitError, match=r"expected a roof type .* got 'igloo'"):
+        compute_planes("igloo", {"pitch_front": 30.0}, 0.0, np.zeros(3))
     parameters, kappa, translation = draw_member(np.random.default_rng(0), "corner").side_by_side()
     del parameters["eave_front"]
     with pytest.raises(FitError, match="expected the parameter eave_front of a corner roof"):

@@ -103,12 +103,8 @@ def test_vertices_lie_on_the_surface_and_on_the_part(primitive):
         assert part.type == shape.name
         assert part.area == pytest.approx(compute_plan_area(shape, theta_p))
         for xy, z in zip(centroids[:, :2], centroids[:, 2], strict=True):
-            (piece,) = [
-                piece
-                for piece in part.pieces
-                if piece.outline.buffer(1e-9).contains(shapely.Point(xy))
-            ]
-            assert piece.height_at(xy[None])[0] == pytest.approx(z)
+            (_,) = [o for o in part.outlines if o.buffer(1e-9).contains(shapely.Point(xy))]
+            assert part.height_at(xy[None])[0] == pytest.approx(z)
 
 
 @each_variant
@@ -138,9 +134,9 @@ def test_codes_bounds_and_signs_are_complete(primitive):
 
 
 def test_round_plans_have_the_area_of_their_ellipse():
-    for kind in ("cone", "dome"):
+    for kind in ("cone", "dome", "onion"):
         for width, length in ((1.5, 1.5), (7.0, 9.0), (40.0, 40.0)):
-            theta_p = {"width": width, "length": length, "height": width / 3}
+            theta_p = CATALOGUE[kind].typical(width, length, width / 3)
             shape = CATALOGUE[kind].variant(theta_p)
             assert compute_plan_area(shape, theta_p) == pytest.approx(np.pi / 4 * width * length)
             farthest = np.linalg.norm(np.array(shape.rim), axis=1).max() * length / 2
@@ -168,6 +164,27 @@ def test_vaults_hold_what_circular_arcs_do(kind, share):
     segment = sphere**2 * (half_angle - np.sin(half_angle) * np.cos(half_angle))
     true = np.pi * height * (3 * radius**2 + height**2) / 6 if kind == "dome" else segment * length
     assert volume == pytest.approx(true, rel=0.01)
+
+
+@pytest.mark.parametrize(("height", "neck_height"), [(5.0, 3.0), (8.0, 3.0), (12.0, 4.5)])
+@pytest.mark.parametrize("chord_m", [0.1, 0.03])
+def test_an_onion_follows_its_two_curves(height, neck_height, chord_m):
+    """A quarter ellipse from the eave to the neck, and a parabola from there to the apex."""
+    radius, neck = 4.0, 0.4
+    theta_p = {"width": 8.0, "length": 8.0, "height": height, "neck_height": neck_height}
+    shape = CATALOGUE["onion"].refine(theta_p, chord_m)
+    theta = shape.to_theta(theta_p)
+    ((x0, y0), (x1, y1)) = np.min(shape.rim, axis=0) * radius, np.max(shape.rim, axis=0) * radius
+    step = 0.02
+    xy = np.stack(np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step)), -1).reshape(-1, 2)
+    xy = xy[shapely.contains_xy(shapely.Polygon(shape.plan_rings(theta)[0]), *xy.T)]
+    r = np.minimum(np.hypot(*xy.T) / radius, 1.0)
+    line = neck_height / (1 - neck)
+    top = line * (1 - r) + (height - line) * (1 - r / neck) ** 2
+    bulge = neck_height * np.sqrt((1 - r**2) / (1 - neck**2))
+    true, drawn = np.where(r < neck, top, bulge), shape.height_at(theta, xy)
+    assert drawn.sum() == pytest.approx(true.sum(), rel=0.01)
+    assert np.abs(drawn - true)[r < 0.8].mean() <= 0.03 * neck_height
 
 
 def test_gable_is_the_papers_figure_3():
@@ -204,9 +221,7 @@ def test_formula_cancels_and_divides_by_monomials_only():
 
 
 def test_unknown_type_is_named_with_the_known_ones():
-    with pytest.raises(
-        SettingsError, match=r"expected a roof type \(flat, .*hexagonal_spire\), got 'zome'"
-    ):
+    with pytest.raises(SettingsError, match=r"expected a roof type \(flat, .*onion\), got 'zome'"):
         get("zome")
 
 

@@ -209,8 +209,8 @@ def test_a_gpu_that_is_absent_is_refused():
 
 
 def test_types_the_network_does_not_know_are_refused():
-    with pytest.raises(SettingsError, match="onion"):
+    with pytest.raises(SettingsError, match="igloo"):
         segment(
             np.random.default_rng(0).random((20, 3)),
-            Settings().replace({"fit": {"types": ("onion",)}}),
+            Settings().replace({"fit": {"types": ("igloo",)}}),
         )

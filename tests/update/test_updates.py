@@ -365,7 +365,7 @@ def test_bad_input_is_refused_in_a_sentence(run, cloud, tmp_path):
         with pytest.raises(error, match=text):
             update_area(make_request(run, cloud, tmp_path / "out", **change))
     lines = (run / "parameters.jsonl").read_text().splitlines()
-    lines[2] = lines[2].replace('"type":"gable"', '"type":"onion"')
+    lines[2] = lines[2].replace('"type":"gable"', '"type":"igloo"')
     (run / "parameters.jsonl").write_text("\n".join(lines) + "\n")
     with pytest.raises(InputError, match=r"building house-1 in .*parameters\.jsonl"):
         update_area(make_request(run, cloud, tmp_path / "out"))

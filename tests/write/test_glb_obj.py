@@ -92,7 +92,7 @@ def test_obj_holds_every_building_closed(tmp_path):
 
 
 def test_an_unheard_of_roof_type_gets_a_material_that_exists(tmp_path):
-    write_obj(tmp_path / "a.obj", [ViewedModel("x", "onion", gable_solid(), {}, {0: "onion"})])
+    write_obj(tmp_path / "a.obj", [ViewedModel("x", "igloo", gable_solid(), {}, {0: "igloo"})])
     assert "usemtl roof_unknown" in (tmp_path / "a.obj").read_text()
 
 

@@ -35,6 +35,7 @@ DOCUMENTED = {
         "sawtooth",
         "cone",
         "dome",
+        "onion",
         "round",
         "saltbox",
         "double_saltbox",

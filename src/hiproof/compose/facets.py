@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..model import Part, Piece, Roof
+from ..model import Part, Roof
 from ..primitives.catalogue import CATALOGUE
 
 
@@ -24,4 +24,4 @@ def draw_part_facets(part: Part, chord_m: float) -> Part:
         return part
     shape = refine(part.parameters, chord_m)
     planes = shape.planes_at(shape.to_theta(part.parameters, part.kappa, part.translation))
-    return replace(part, pieces=tuple(Piece(piece.outline, planes) for piece in part.pieces))
+    return replace(part, pieces=shape.make_pieces(part.outlines, planes))

@@ -19,6 +19,7 @@ import shapely
 
 from ..errors import FitError
 from ..model import Building, Part, Piece, Quality, Roof
+from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import compute_planes
 
 DIGITS = 6  # of parameters: micrometres and millionths of a degree
@@ -43,13 +44,11 @@ def settled_part(part: Part) -> Part:
     parameters = {name: round_number(value) for name, value in part.parameters.items()}
     kappa = math.radians(round_number(math.degrees(part.kappa)))
     translation = np.array([round_number(value) for value in part.translation])
-    outlines = [rounded_outline(piece.outline) for piece in part.pieces]
+    outlines = [rounded_outline(outline) for outline in part.outlines]
     try:
         pieces = make_pieces(part.type, parameters, kappa, translation, outlines)
     except (FitError, KeyError):  # a shape of somebody's own, which parameters do not make
-        pieces = tuple(
-            Piece(o, piece.planes) for o, piece in zip(outlines, part.pieces, strict=True)
-        )
+        pieces = tuple(Piece(rounded_outline(p.outline), p.planes) for p in part.pieces)
     return Part(part.type, pieces, parameters, kappa, translation, settled_sigma(part.sigma))
 
 
@@ -62,7 +61,8 @@ def make_pieces(
 ) -> tuple[Piece, ...]:
     """Return the pieces of a part over `outlines`.
 
-    They have every plane of its shape, of a saw-tooth the one of the tooth in which they lie.
+    They have every plane of its shape, of a saw-tooth the one of the tooth in which they lie. An
+    onion has several over each outline.
 
     Raises FitError for a type or parameters that make no shape.
     """
@@ -71,7 +71,7 @@ def make_pieces(
     else:
         planes = compute_planes(kind, parameters, kappa, translation)
     if kind != "shed":
-        return tuple(Piece(outline, planes) for outline in outlines)
+        return CATALOGUE[kind].variant(parameters).make_pieces(outlines, planes)
     across = np.array([-math.sin(kappa), math.cos(kappa)])
     places = np.array(
         [shapely.point_on_surface(outline).coords[0] for outline in outlines]

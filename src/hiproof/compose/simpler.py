@@ -72,7 +72,8 @@ def level_part(part: Part, points: np.ndarray) -> Part:
     z = part.height_at(points[:, :2])
     z = points[np.isfinite(z) & (np.abs(z - points[:, 2]) < NEAR_M), 2]
     height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)
-    pieces = tuple(Piece(piece.outline, np.array([[0.0, 0.0, height]])) for piece in part.pieces)
+    level = np.array([[0.0, 0.0, height]])
+    pieces = tuple(Piece(outline, level) for outline in part.outlines)
     size: dict[str, float] = {
         name: part.parameters[name]
         for name in ("width", "length")

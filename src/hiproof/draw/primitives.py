@@ -16,6 +16,7 @@ import numpy as np
 from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
+from ..primitives.onion import NECK
 from .view import (
     SeenFace,
     bound_sphere,
@@ -111,6 +112,7 @@ def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measur
         "eave_step": ((u + 0.3, v, 0), (u + 0.3, v, p.get("eave_step", 0))),
         "break_width": ((u, -half_break, z_break), (u, half_break, z_break)),
         "break_height": ((u, half_break, 0), (u, half_break, z_break)),
+        "neck_height": ((NECK * u, 0, 0), (NECK * u, 0, p.get("neck_height", 0))),
     }
     if name not in ends:
         return Measure(name, np.array([0.0, v + 0.5, h]))

@@ -10,9 +10,10 @@ roof's height, or an outlier anywhere in the cloud's volume,
 
 with mu_u = U - |u|, mu_v = V - |v| the margins to the sides, S the logistic function, w_i the given
 probability that the point is roof. The roof at (u, v) is the lowest plane (or the plane of the
-strip, for a saw-tooth). A point enters the gradient and the Gauss-Newton Hessian through its active
-plane only, so sums of moments of (u, v, 1) by plane, and five by side, suffice; a small Jacobian of
-planes by parameters (from the term table) takes them to theta.
+strip, for a saw-tooth, and the highest of several minima, for an onion). A point enters the
+gradient and the Gauss-Newton Hessian through its active plane only, so sums of moments of (u, v, 1)
+by plane, and five by side, suffice; a small Jacobian of planes by parameters (from the term table)
+takes them to theta.
 
 Units are metres and radians, points are (n, 4): x, y, z, w.
 """
@@ -45,6 +46,7 @@ class Tables(NamedTuple):
 
     size: np.ndarray  # (T,) used entries of theta
     planes: np.ndarray  # (T,) number of planes
+    ends: np.ndarray  # (T, k) where the planes of each minimum end, the last repeated
     strips: np.ndarray  # (T,) 1, or the number of teeth
     first_term: np.ndarray  # (T + 1,)
     factor: np.ndarray  # (m,)
@@ -107,10 +109,7 @@ def integer_power(base, exponent):
 
 @compiled
 def planes_from_terms(tables, kind, theta, planes):
-    """Fill `planes` (k, 3) at `theta`, and return their number.
-
-    A plane is z = a u + b v + c.
-    """
+    """Fill `planes` (k, 3) at `theta`: z = a u + b v + c."""
     count = tables.planes[kind]
     planes[:count] = 0.0
     for m in range(tables.first_term[kind], tables.first_term[kind + 1]):
@@ -119,7 +118,6 @@ def planes_from_terms(tables, kind, theta, planes):
             if tables.power[m, k] != 0:
                 value *= integer_power(theta[HALF_WIDTH + k], tables.power[m, k])
         planes[tables.target[m] // 3, tables.target[m] % 3] += value
-    return count
 
 
 @compiled
@@ -151,18 +149,28 @@ def jacobian_from_terms(tables, kind, theta, planes, jacobian):
 
 
 @compiled
-def active_plane(planes, count, strips, half_width, u, v):
-    """Index of the plane that is the roof at (u, v) and the height there."""
+def active_plane(planes, ends, strips, half_width, u, v):
+    """Index of the plane that is the roof at (u, v) and the height there.
+
+    It is the highest of the minima whose planes end at `ends`.
+    """
     if strips > 1:
         j = int((v + half_width) * strips / (2.0 * half_width))
         j = min(max(j, 0), strips - 1)
         return j, planes[j, 0] * u + planes[j, 1] * v + planes[j, 2]
-    lowest, j = planes[0, 0] * u + planes[0, 1] * v + planes[0, 2], 0
-    for k in range(1, count):
-        z = planes[k, 0] * u + planes[k, 1] * v + planes[k, 2]
-        if z < lowest:
-            lowest, j = z, k
-    return j, lowest
+    highest, active, first = -np.inf, 0, 0
+    for end in ends:
+        if end == first:
+            break
+        lowest, j = planes[first, 0] * u + planes[first, 1] * v + planes[first, 2], first
+        for k in range(first + 1, end):
+            z = planes[k, 0] * u + planes[k, 1] * v + planes[k, 2]
+            if z < lowest:
+                lowest, j = z, k
+        if lowest > highest:
+            highest, active = lowest, j
+        first = end
+    return active, highest
 
 
 @compiled(fastmath=True)
@@ -174,8 +182,8 @@ def sum_moments(problem, tables, kind, theta, noise, space):
     Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
     """
     points, planes, moments, sides = problem.points, space.planes, space.moments, space.sides
-    count = planes_from_terms(tables, kind, theta, planes)
-    strips = tables.strips[kind]
+    planes_from_terms(tables, kind, theta, planes)
+    ends, strips = tables.ends[kind], tables.strips[kind]
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
     per_sigma, per_tau = 1.0 / noise.sigma, 1.0 / noise.tau
@@ -190,7 +198,7 @@ def sum_moments(problem, tables, kind, theta, noise, space):
     for i in range(points.shape[0]):
         dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
         u, v = c * dx + s * dy, c * dy - s * dx
-        j, roof = active_plane(planes, count, strips, half_width, u, v)
+        j, roof = active_plane(planes, ends, strips, half_width, u, v)
         residual = (points[i, 2] - roof) * per_sigma
         prior = points[i, 3]
         outlier = (1.0 - prior * (1.0 - noise.eps)) * background
@@ -537,7 +545,8 @@ def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
     Sides are +u, -u, +v and -v; `shifts` (2, k) are along u and along v.
     """
     points, planes = problem.points, space.planes
-    count = planes_from_terms(tables, kind, theta, planes)
+    planes_from_terms(tables, kind, theta, planes)
+    ends, strips = tables.ends[kind], tables.strips[kind]
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     background = math.exp(problem.log_background)
     scale = (1.0 - noise.eps) / (
@@ -547,7 +556,7 @@ def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
     for i in range(len(points)):
         dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
         u, v = c * dx + s * dy, c * dy - s * dx
-        _, roof = active_plane(planes, count, tables.strips[kind], theta[HALF_WIDTH], u, v)
+        _, roof = active_plane(planes, ends, strips, theta[HALF_WIDTH], u, v)
         residual = (points[i, 2] - roof) / noise.sigma
         if residual * residual > FAR_SQUARED:
             continue
@@ -674,6 +683,7 @@ def vote(problem, tables, kind, theta, space, heights, counts):
     points = problem.points
     best, best_slope, best_shift, best_z = -1, 0.0, 0.0, 0.0
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    ends, strips = tables.ends[kind], tables.strips[kind]
     theta[Q0:] = 0.0
     for shift in tables.shifts[kind]:
         for slope in tables.slopes[kind]:
@@ -685,13 +695,11 @@ def vote(problem, tables, kind, theta, space, heights, counts):
                 continue
             for k in range(Q0 + 1, tables.size[kind]):
                 theta[k] = slope
-            count = planes_from_terms(tables, kind, theta, space.planes)
+            planes_from_terms(tables, kind, theta, space.planes)
             for i in range(len(points)):
                 dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
                 u, v = c * dx + s * dy, c * dy - s * dx - shift * theta[HALF_WIDTH]
-                _, roof = active_plane(
-                    space.planes, count, tables.strips[kind], theta[HALF_WIDTH], u, v
-                )
+                _, roof = active_plane(space.planes, ends, strips, theta[HALF_WIDTH], u, v)
                 heights[i] = points[i, 2] - roof
             votes, z = mode(heights, 0.2, counts)
             if votes > best:

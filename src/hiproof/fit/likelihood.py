@@ -49,6 +49,7 @@ SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04
 ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15
 # of the fine fit, that a type must have over the one it derives from to be considered
 LEAST_GAIN_NATS = 0.2
+POINTED_STARTS = 5  # Starts of a shape of several minima, by how far its top bends up.
 SIDE_GRID = 28  # cells a side over which its posterior mean is summed
 PLAN_INDICES = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
 
@@ -238,8 +239,19 @@ def fit_heights(
     """
     search = new_search(points, (primitive.name,), False, COARSE_POINTS)
     kind = search.shapes.index(primitive)
-    candidates, noises = learn(search, Candidates(np.array([kind]), theta[None], np.zeros(1)))
-    return candidates.thetas[0], Noise(*noises[0])
+    thetas = theta[None]
+    if primitive.minima:
+        # The pointed top has few points, which are outliers for a start that is not near.
+        thetas = np.repeat(thetas, POINTED_STARTS, axis=0)
+        thetas[1:, primitive.theta_size - 1] = np.linspace(*primitive.bounds[-1], POINTED_STARTS)[
+            :-1
+        ]
+    starts = Candidates(np.full(len(thetas), kind), thetas, np.zeros(len(thetas)))
+    for noise in (COARSE, MIDDLE, FINE) if primitive.minima else ():
+        starts = search.minimise(search.whole, starts, noise, 6, 0.3)
+    candidates, noises = learn(search, starts)
+    best = int(np.argmin(candidates.values))
+    return candidates.thetas[best], Noise(*noises[best])
 
 
 def search_types(

@@ -59,6 +59,7 @@ def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
     return Tables(
         size=np.array([shape.theta_size for shape in shapes]),
         planes=np.array([len(shape.planes) for shape in shapes]),
+        ends=list_ends(shapes),
         strips=np.array([shape.strips for shape in shapes]),
         first_term=np.array(first_term),
         factor=np.array(factors, float),
@@ -68,6 +69,16 @@ def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
         slopes=pad_rows([vote.slopes for vote in votes]),
         shifts=pad_rows([vote.shifts for vote in votes]),
     )
+
+
+def list_ends(shapes: tuple[Primitive, ...]) -> np.ndarray:
+    """Return where the planes of each minimum end (T, k).
+
+    The last is repeated where there are fewer.
+    """
+    rows = [np.cumsum(shape.minima or (len(shape.planes),)) for shape in shapes]
+    longest = max(len(row) for row in rows)
+    return np.array([np.pad(row, (0, longest - len(row)), "edge") for row in rows])
 
 
 def pad_rows(rows: list[tuple[float, ...]]) -> np.ndarray:

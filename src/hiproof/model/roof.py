@@ -48,7 +48,7 @@ class Part:
 
     `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L
     (3,) in the roof's local frame, `sigma` the standard deviation by parameter name. A saw-tooth
-    has a piece a tooth; all others have one.
+    has a piece a tooth, and an onion several over one outline; all others have one.
     """
 
     type: str
@@ -60,7 +60,12 @@ class Part:
 
     @property
     def area(self) -> float:
-        return float(sum(piece.outline.area for piece in self.pieces))
+        return float(sum(outline.area for outline in self.outlines))
+
+    @property
+    def outlines(self) -> list[shapely.Polygon]:
+        """The outlines of the pieces, each once."""
+        return list(dict.fromkeys(piece.outline for piece in self.pieces))
 
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
         """Return the height (n,) at `xy_local` (n, 2) in the roof's frame.

@@ -20,7 +20,7 @@ import shapely
 from ..compose.settle import make_pieces
 from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
-from ..primitives.parameters import SIDED
+from ..primitives.parameters import SIDED, refuse_no_shape
 from ..write.parameters import building_record
 from .edit import rebuild
 
@@ -192,7 +192,7 @@ class Heights:
             [k for k, (i, _) in enumerate(unknowns.names) if i == index]
             for index in range(len(parts))
         ]
-        self.outlines = [[piece.outline for piece in part.pieces] for part in parts]
+        self.outlines = [part.outlines for part in parts]
         self.inside = [
             [
                 np.flatnonzero(shapely.intersects_xy(outline, points[:, 0], points[:, 1]))
@@ -213,10 +213,11 @@ class Heights:
         parameters = {name: values.get(name, value) for name, value in part.parameters.items()}
         translation = np.array([*part.translation[:2], values.get(Z, part.translation[2])])
         try:
+            refuse_no_shape(part.type, parameters, f"part {index}")
             pieces = make_pieces(
                 part.type, parameters, part.kappa, translation, self.outlines[index]
             )
-        except (FitError, ZeroDivisionError):
+        except (FitError, InputError, ZeroDivisionError):
             return None
         return [piece.planes for piece in pieces]
 
@@ -229,7 +230,8 @@ class Heights:
             planes, first = self.planes(index, x), 0
             if planes is None:
                 return RefitSurface(np.full(count, UNBOUNDED_M), part, row, [])
-            for point_mask, own_planes in zip(inside, planes, strict=True):
+            masks = (mask for mask in inside for _ in range(len(planes) // len(inside)))
+            for point_mask, own_planes in zip(masks, planes, strict=True):
                 heights = self.terms[point_mask] @ own_planes.T
                 lowest = heights.argmin(axis=1)
                 height = heights[np.arange(len(point_mask)), lowest]

@@ -17,6 +17,7 @@ from . import (
     hip,
     mansard,
     monopitch,
+    onion,
     pyramid,
     shed,
     truncated_gable,
@@ -50,9 +51,10 @@ SHAPES = (
     vault.BARREL,
     half_cone.HALF_CONE,
     cone.HEXAGONAL_SPIRE,
+    onion.ONION,
 )
 CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
-ROUND = ("cone", "broach", "dome")  # over a round or many-sided plan
+ROUND = ("cone", "broach", "dome", "onion")  # over a round or many-sided plan
 # whose facets stand for a curved surface, or are more than a volume's
 CURVED = (*ROUND, "barrel", "half_cone", "hexagonal_spire")
 # whose facets all stand for one curved surface

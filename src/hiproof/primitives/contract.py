@@ -45,6 +45,7 @@ Shape = tuple[float, ...]  # V, U, q0..q3
 # The corners of a plan as shares of its half extents.
 RECTANGLE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 Corners = Sequence[tuple[float, float, float]] | np.ndarray  # (n, 3)
+Pieces = tuple[Piece, ...]
 
 
 class Sides(Protocol):
@@ -133,6 +134,8 @@ class Primitive:
     canonical    theta -> the one theta chosen among those of the same surface
     strips       number of teeth: planes are then chosen by equal strips across instead of by the
                  minimum
+    minima       numbers of planes of each of several minima, of which the roof is the highest;
+                 without it, all planes make one
     more         the same roof type with other strips, other parameters or more facets
     choose       theta_p -> the place in `variants` of that with as many facets as its size asks
                  for
@@ -161,6 +164,7 @@ class Primitive:
     signed: tuple[str, ...] = ()
     half_turn_symmetric: bool = True
     strips: int = 1
+    minima: tuple[int, ...] = ()
     more: tuple[Primitive, ...] = ()
     choose: Callable[[Mapping[str, float]], int] | None = None
     refine: Callable[[Mapping[str, float], float], Primitive] | None = None
@@ -348,7 +352,7 @@ class Primitive:
         u, v = xy_centred @ (c, s), xy_centred @ (-s, c)
         heights = np.stack([u, v, np.ones_like(u)], axis=1) @ self.plane_values(theta).T
         if self.strips == 1:
-            return heights.min(axis=1)
+            return np.max([z.min(axis=0) for z in self.split_planes(heights.T)], axis=0)
         half_width = theta[HALF_WIDTH]
         strip = np.clip(
             np.floor((v + half_width) * self.strips / (2 * half_width)), 0, self.strips - 1
@@ -372,12 +376,24 @@ class Primitive:
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
         planes = self.planes_at(theta)
-        groups = [planes] if self.strips == 1 else [plane[None] for plane in planes]
-        pieces = []
-        for ring, group in zip(self.plan_rings(theta), groups, strict=True):
-            xy = translation[:2] + ring @ np.array([[c, s], [-s, c]])
-            pieces.append(Piece(shapely.polygons(xy), group))
-        return Part(self.name, tuple(pieces), theta_p, kappa, translation, dict(sigma or {}))
+        outlines = [
+            shapely.polygons(translation[:2] + ring @ np.array([[c, s], [-s, c]]))
+            for ring in self.plan_rings(theta)
+        ]
+        if self.strips == 1:
+            pieces = self.make_pieces(outlines, planes)
+        else:
+            pieces = tuple(Piece(o, plane[None]) for o, plane in zip(outlines, planes, strict=True))
+        return Part(self.name, pieces, theta_p, kappa, translation, dict(sigma or {}))
+
+    def split_planes(self, planes: np.ndarray) -> list[np.ndarray]:
+        """Return the planes (k, ...) of each minimum."""
+        return np.split(planes, np.cumsum(self.minima)[:-1]) if self.minima else [planes]
+
+    def make_pieces(self, outlines: Sequence[shapely.Polygon], planes: np.ndarray) -> Pieces:
+        """Return a piece for each minimum of `planes` (k, 3) over each of the outlines."""
+        groups = self.split_planes(planes)
+        return tuple(Piece(outline, group) for outline in outlines for group in groups)
 
     def plan_rings(self, theta: np.ndarray) -> list[np.ndarray]:
         """Return the corners (n, 2) over u, v of the plan, one rectangle a tooth."""

@@ -86,8 +86,8 @@ def make_facet_planes(sides: int, apothem: float, fall: Formula, top: Formula) -
     return tuple((-(steep / U) * x, -(steep / V) * y, top) for x, y in list_directions(sides))
 
 
-class ArcProfile(NamedTuple):
-    """A vault's profile in chords, as formulas of half the width V and the rise q1 V.
+class ChordProfile(NamedTuple):
+    """A profile in chords, as formulas of half the width V and of q.
 
     `knots` (k,) are shares of the radius, and `heights` (k,) those above the eave there. Of every
     chord between two of them, `chords` have the height at the axis and the fall from there to the
@@ -99,7 +99,16 @@ class ArcProfile(NamedTuple):
     chords: list[tuple[Formula, Formula]]
 
 
-def draw_profile(around_axis: bool, splits: int = 1) -> ArcProfile:
+def join_knots(knots: list[float], heights: list[Formula]) -> ChordProfile:
+    """Return the profile of the chords between knots."""
+    chords = []
+    for (a, b), (z, z_next) in zip(pairwise(knots), pairwise(heights), strict=True):
+        fall = (z - z_next) * (1.0 / (b - a))
+        chords.append((z + fall * a, fall))
+    return ChordProfile(knots, heights, chords)
+
+
+def draw_profile(around_axis: bool, splits: int = 1) -> ChordProfile:
     """Draw a vault's profile in chords, `around_axis` or along a ridge.
 
     Each of four chords is split into so many.
@@ -119,11 +128,7 @@ def draw_profile(around_axis: bool, splits: int = 1) -> ArcProfile:
     circle = raise_knots(knots, lambda r: math.sqrt(1.0 - r * r), volumes[1], around_axis)
     cube = q1 * q1 * q1 * V
     heights = [(q1 * V - cube) * x + cube * y for x, y in zip(parabola, circle, strict=True)]
-    chords = []
-    for (a, b), (z, z_next) in zip(pairwise(knots), pairwise(heights), strict=True):
-        fall = (z - z_next) * (1.0 / (b - a))
-        chords.append((z + fall * a, fall))
-    return ArcProfile(knots, heights, chords)
+    return join_knots(knots, heights)
 
 
 def raise_knots(

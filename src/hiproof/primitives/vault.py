@@ -5,13 +5,13 @@ facets.py says how an arc is written.
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
 from .algebra import U, V, q0, q1
-from .contract import Corners, DerivedStart, Plane, Primitive, at_quarters
+from .contract import Corners, DerivedStart, Primitive, at_quarters
 from .drawing import drawn_plan
 from .facets import (
     MOST_FACETS,
@@ -22,10 +22,10 @@ from .facets import (
     find_apothem,
     find_sides,
     find_splits,
-    make_facet_planes,
     make_rim,
 )
 from .gable import shape, typical
+from .revolved import list_ring_corners, list_ring_faces, make_ring_planes
 
 LOWEST, HIGHEST = 0.1, 1.0  # Height over half the width: flatter is level, and higher no arc.
 CHORDS = len(PROFILE_DEG) - 1  # of half a profile
@@ -68,37 +68,15 @@ def make_starts(source: str) -> tuple[DerivedStart, ...]:
 @cache
 def make_dome(sides: int, splits: int = 1) -> Primitive:
     """Return the dome of so many facets around, each chord of its profile split."""
-    apothem, profile = find_apothem(sides), draw_profile(True, splits)
-    rim = make_rim(sides, apothem)
-    planes: tuple[Plane, ...] = ()
-    for height, fall in profile.chords:
-        planes += make_facet_planes(sides, apothem, fall, q0 - CROWN + height)
-
-    def corners(p: Mapping[str, float]) -> Corners:
-        """Return the apex, then ring by ring the corners of the facets, last the eave's."""
-        values, ring = shape(p), np.array(rim) * (p["length"] / 2, p["width"] / 2)
-        rings = [
-            np.column_stack([share * ring, np.full(sides, height.at(values))])
-            for share, height in zip(profile.knots[1:], profile.heights[1:], strict=True)
-        ]
-        return np.vstack([[[0.0, 0.0, p["height"]]], *rings])
-
-    def list_faces() -> list[tuple[int, ...]]:
-        places = [(k, (k + 1) % sides) for k in range(sides)]
-        faces: list[tuple[int, ...]] = [(1 + k, 1 + after, 0) for k, after in places]
-        for ring in range(1, len(profile.chords)):
-            lower, upper = 1 + ring * sides, 1 + (ring - 1) * sides
-            faces += [(lower + k, lower + after, upper + after, upper + k) for k, after in places]
-        return faces
-
+    profile = draw_profile(True, splits)
     return make_vault(
         "dome",
         ("1090", "3700", "dome"),
         make_starts("pyramid"),
-        planes=planes,
-        corners=corners,
-        faces=tuple(list_faces()),
-        rim=rim,
+        planes=make_ring_planes(sides, profile, q0 - CROWN),
+        corners=partial(list_ring_corners, sides, profile, shape),
+        faces=list_ring_faces(sides, len(profile.chords)),
+        rim=make_rim(sides, find_apothem(sides)),
         draw=lambda rng, width: typical(width, width, width / 2 * float(rng.uniform(0.3, 1.0))),
     )
 

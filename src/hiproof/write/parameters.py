@@ -211,7 +211,7 @@ def part_record(part: Part) -> dict[str, Any]:
         "position": numbers(part.translation),
         "rotation": number(math.degrees(part.kappa)),
         "sigma": by_name(sigma),
-        "outlines": [outline_record(piece.outline) for piece in part.pieces],
+        "outlines": [outline_record(outline) for outline in part.outlines],
     }
 
 

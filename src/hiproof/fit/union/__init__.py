@@ -55,8 +55,9 @@ teeth       rows of equal monopitches as saw-teeth
 larger      gambrels combined from their parts
 own         custom shapes instead of neighbouring parts
 judged      roofs judged by points, with one shape in place of several parts
-round_ends  cones, spires, domes and half cones over round stretches of the outline
-round_tops  cones, spires and domes around the tops of parts
+round_ends  cones, spires, domes, onions and half cones over round stretches of the outline
+round_tops  cones, spires, domes and onions around the tops of parts
+onions      onions around round parts, which may be their tops
 barrels     barrel vaults over parts with slopes to two sides
 curved      these shapes where points follow them better
 shown       hidden parts removed
@@ -216,7 +217,7 @@ def restrict_type(part: Part, types: tuple[str, ...], points: np.ndarray) -> Par
     )
     z = points[inside, 2] if inside.any() else np.array([part.translation[2]])
     level = np.array([[0.0, 0.0, float(np.sort(z)[len(z) // 2])]])
-    pieces = tuple(Piece(piece.outline, level) for piece in part.pieces)
+    pieces = tuple(Piece(outline, level) for outline in part.outlines)
     size: dict[str, float] = {
         name: part.parameters[name] for name in ("width", "length") if name in part.parameters
     }

@@ -43,18 +43,21 @@ def clamp_part(part: Part, z_low: float, z_high: float, missed: float = 0.0) -> 
     may have `missed` (m) of an eave.
     """
     kept_pieces, beneath, overhead = [], [], []
-    for piece in part.pieces:
-        sunken, risen = find_excess(piece, z_low - missed, z_high)
+    for outline in part.outlines:
+        pieces = [piece for piece in part.pieces if piece.outline == outline]
+        sunken, risen = find_excess(pieces, z_low - missed, z_high)
         if sunken.area + risen.area < LEAST_EXCESS_M2:
-            kept_pieces.append(piece)
+            kept_pieces += pieces
             continue
-        sunken = find_excess(piece, z_low, z_high)[0] if sunken.area > 0.0 else sunken
+        sunken = find_excess(pieces, z_low, z_high)[0] if sunken.area > 0.0 else sunken
         beneath += list_polygons(sunken)
         overhead += list_polygons(risen)
         remainder = shapely.difference(
-            piece.outline, with_area(shapely.union(sunken, risen)), grid_size=OVERLAY_GRID_M
+            outline, with_area(shapely.union(sunken, risen)), grid_size=OVERLAY_GRID_M
         )
-        kept_pieces += [Piece(polygon, piece.planes) for polygon in list_polygons(remainder)]
+        kept_pieces += [
+            Piece(polygon, piece.planes) for polygon in list_polygons(remainder) for piece in pieces
+        ]
     if not beneath and not overhead:
         return [part]
     new_parts = [dataclasses.replace(part, pieces=tuple(kept_pieces))] if kept_pieces else []
@@ -66,6 +69,20 @@ def clamp_part(part: Part, z_low: float, z_high: float, missed: float = 0.0) -> 
 
 
 def find_excess(
+    pieces: list[Piece], z_low: float, z_high: float
+) -> tuple[shapely.Geometry, shapely.Geometry]:
+    """Return where the highest of pieces is below `z_low`, and where above `z_high`.
+
+    They have one outline.
+    """
+    (sunken, risen), *others = (find_piece_excess(piece, z_low, z_high) for piece in pieces)
+    for its_sunken, its_risen in others:
+        sunken = with_area(shapely.intersection(sunken, its_sunken, grid_size=OVERLAY_GRID_M))
+        risen = with_area(shapely.union(risen, its_risen, grid_size=OVERLAY_GRID_M))
+    return sunken, risen
+
+
+def find_piece_excess(
     piece: Piece, z_low: float, z_high: float
 ) -> tuple[shapely.Geometry, shapely.Geometry]:
     """Return where a piece is below `z_low`, and where above `z_high`.

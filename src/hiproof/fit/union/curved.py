@@ -7,6 +7,7 @@ across it, one curved shape is fitted to them and compared with the parts that i
 
 from __future__ import annotations
 
+import math
 from itertools import chain
 
 import numpy as np
@@ -15,10 +16,11 @@ import shapely
 from ...model import Part
 from ...model.heights import find_highest
 from ...primitives.cants import list_cants
-from ...primitives.catalogue import CURVED, ROUND
+from ...primitives.catalogue import CATALOGUE, CURVED, ROUND
 from ...settings import Settings
 from .barrels import list_barrels
 from .judged import JudgedRoof, measure_gain, measure_slope, replace_parts, scale_cap, trim_parts
+from .onions import list_onions
 from .own import MOST_DISTANCE_M
 from .round_ends import RoundEnd, find_round_ends, list_end_shapes
 from .round_tops import LEAST_FALL_M, list_round_shapes
@@ -69,6 +71,7 @@ def roof_round_end(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> JudgedR
         if new is roof or measure_visible_share(new) < LEAST_VISIBLE:
             continue
         price = WHOLE_NATS if end.is_half_disc and shape.type != "half_cone" else 0.0
+        price += (len(CATALOGUE[shape.type].bounds) - 1) * math.log(np.count_nonzero(judged))
         gain = measure_gain(roof, new, judged, scale_cap(measure_slope(shape))) - price
         if gain > least:
             best, least = new, gain
@@ -85,18 +88,19 @@ def measure_visible_share(roof: JudgedRoof) -> float:
 def find_better_roof(roof: JudgedRoof, names: list[str], settings: Settings) -> JudgedRoof | None:
     """Find the first part where a curved shape is better, with the best one."""
     distances, top = roof.measure_distances(MOST_DISTANCE_M), roof.highest[1]
-    for k, part in enumerate(roof.parts):
-        own = top == k
-        if (
-            part.type in CURVED
-            or np.count_nonzero(own) < FEWEST_CURVE_POINTS
-            or (distances[own].mean() < LEAST_MISFIT_M and not list_cants(part.parameters))
-        ):
+    for k in sorted(range(len(roof.parts)), key=lambda k: roof.parts[k].type not in CURVED):
+        part, own = roof.parts[k], top == k
+        if np.count_nonzero(own) < FEWEST_CURVE_POINTS:
             continue
-        shapes = chain(
-            list_round_shapes(roof, part, own, tuple(n for n in names if n in ROUND), settings),
-            list_barrels(roof, part, own, settings) if "barrel" in names else (),
-        )
+        if part.type in CURVED:
+            shapes = list_onions(roof, part, settings) if "onion" in names else iter(())
+        elif distances[own].mean() >= LEAST_MISFIT_M or list_cants(part.parameters):
+            shapes = chain(
+                list_round_shapes(roof, part, own, tuple(n for n in names if n in ROUND), settings),
+                list_barrels(roof, part, own, settings) if "barrel" in names else (),
+            )
+        else:
+            continue
         gains = [replace_parts(roof, shape) for shape in shapes]
         gain, better = max(gains, key=lambda one: one[0], default=(0.0, roof))
         if gain > LEAST_NATS:

@@ -107,8 +107,8 @@ def fit_types(
 
 def cut_part(part: Part, outline: shapely.Polygon) -> Part:
     """Return the part over `outline`, or the share of each piece of several."""
-    if len(part.pieces) == 1:
-        return replace(part, pieces=(Piece(outline, part.pieces[0].planes),))
+    if len(part.outlines) == 1:
+        return replace(part, pieces=tuple(Piece(outline, p.planes) for p in part.pieces))
     cut = [
         (
             list_polygons(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)),

@@ -1,4 +1,4 @@
-"""Find cones, spires, domes and half cones over round stretches of an outline.
+"""Find round roofs and half cones over round stretches of an outline.
 
 Such a stretch is a run of short sides that turn alike. It gives the middle and the radius of the
 shape: of an apse from half a circle, and of a turret from more. Points give the heights.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import shapely
@@ -22,7 +23,7 @@ from ...primitives.facets import find_apothem
 from .judged import JudgedRoof
 from .own import cut_part
 from .regions import list_polygons
-from .round_tops import FOLLOW_M
+from .round_tops import FOLLOW_M, is_top_seen
 
 # Turns (degrees) between sides that follow a circle, or a polygon of six sides or more.
 LEAST_TURN_DEG, MOST_TURN_DEG = 3.0, 65.0
@@ -31,10 +32,13 @@ SIDES_OF_SPIRES = {"broach": BROACH_SIDES, "hexagonal_spire": HEXAGON_SIDES}
 FEWEST_CORNERS = 4  # Fewer lie on some circle by chance.
 SHORTEST_ARC_DEG = 120.0  # Shorter arcs are round corners of a roof, not shapes of their own.
 APSE_DEG = (140.0, 220.0)  # Arcs of half discs.
+WHOLE_DISCS = ("cone", "dome", "onion")  # Types over a whole disc.
 TURRET_DEG = 150.0  # Shortest arc of a whole disc.
 ON_CIRCLE = 0.03  # Farthest that a corner lies off its circle, in shares of the radius.
 LARGEST_RADIUS_M = 30.0  # Larger circles are bent facades.
 SLOPES_TRIED = 24  # Slopes, in equal ratios, from which the likeliest start is taken.
+BULGES_TRIED, BENDS_TRIED = 10, 7  # The same of the two slopes of an onion.
+LOOSE_REACH = 3.0  # So much further from a start of two slopes may points lie that follow it.
 FEWEST_HEIGHTS = 6  # A slope and a height, and as many points again to check them.
 
 
@@ -133,7 +137,7 @@ def list_end_shapes(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> Iterat
     A half cone has its apex at the middle of the circle.
     """
     for name in names:
-        if name in ("cone", "dome") and end.is_round and end.span_deg >= TURRET_DEG:
+        if name in WHOLE_DISCS and end.is_round and end.span_deg >= TURRET_DEG:
             yield from fit_over_circle(roof, end, name, end.radius)
         elif end.sides == SIDES_OF_SPIRES.get(name) and end.span_deg >= TURRET_DEG:
             yield from fit_over_circle(roof, end, name, end.radius * find_apothem(end.sides))
@@ -157,34 +161,54 @@ def fit_over_circle(roof: JudgedRoof, end: RoundEnd, name: str, radius: float) -
     points = roof.points[shapely.contains_xy(plan, *roof.points[:, :2].T)]
     if len(points) < FEWEST_HEIGHTS:
         return
-    theta[[Q0, Q1]], follows = find_start(points, shape, theta)
+    theta, follows = find_start(points, shape, theta)
     if np.count_nonzero(follows) < FEWEST_HEIGHTS:
         return
-    points = points[follows]
-    theta, _ = fit_heights(np.column_stack([points, np.ones(len(points))]), shape, theta)
+    cloud = np.column_stack([points, np.ones(len(points))])[follows]
+    theta, _ = fit_heights(cloud, shape, theta)
     parameters, _, _ = shape.from_theta(theta)
-    yield from cut_to_outline(shape.variant(parameters).part(theta), end, roof.outline)
+    part = shape.variant(parameters).part(theta)
+    if is_top_seen(part, points):
+        yield from cut_to_outline(part, end, roof.outline)
 
 
 def find_start(
     points: np.ndarray, shape: Primitive, theta: np.ndarray
-) -> tuple[tuple[float, float], np.ndarray]:
-    """Return the height and the slope at which most points (n, 3) follow a shape.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return theta (9,) with the height and slopes that most points follow.
 
-    `theta` has its plan. With them comes which points these are (n,).
+    They are those of a shape with the plan of `theta`. With it comes which of the points (n, 3)
+    these are (n,).
     """
-    best: tuple[int, tuple[float, float], np.ndarray] = (0, (0.0, 0.0), np.zeros(len(points), bool))
-    for slope in np.geomspace(*shape.bounds[0], SLOPES_TRIED).tolist():
-        theta[[Q0, Q1]] = 0.0, slope
-        above = points[:, 2] - shape.height_at(theta, points[:, :2])
+    best, most, followers = theta, 0, np.zeros(len(points), bool)
+    for slopes in list_slopes(shape):
+        trial = theta.copy()
+        trial[Q1 : Q1 + len(slopes)] = slopes
+        above = points[:, 2] - shape.height_at(trial, points[:, :2])
         lowest = np.sort(above)
-        reach = FOLLOW_M * math.hypot(1.0, slope)
+        reach = FOLLOW_M * math.hypot(1.0, sum(slopes))
         counts = np.searchsorted(lowest, lowest + 2.0 * reach, side="right") - np.arange(len(above))
         first = int(np.argmax(counts))
-        if counts[first] > best[0]:
-            follows = (above >= lowest[first]) & (above <= lowest[first] + 2.0 * reach)
-            best = int(counts[first]), (float(above[follows].mean()), slope), follows
-    return best[1:]
+        if counts[first] > most:
+            most, best = int(counts[first]), trial
+            followers = (above >= lowest[first]) & (above <= lowest[first] + 2.0 * reach)
+            best[Q0] = float(above[followers].mean())
+            if len(slopes) > 1:  # They are tried too far apart.
+                followers = np.abs(above - best[Q0]) <= LOOSE_REACH * reach
+    return best, followers
+
+
+def list_slopes(shape: Primitive) -> list[tuple[float, ...]]:
+    """Return slopes between the bounds of a shape.
+
+    A shape with two has fewer values of each.
+    """
+    (lowest, highest), *others = shape.bounds
+    if not others:
+        return [(slope,) for slope in np.geomspace(lowest, highest, SLOPES_TRIED).tolist()]
+    first = np.geomspace(lowest, highest, BULGES_TRIED).tolist()
+    second = np.linspace(*others[0], BENDS_TRIED).tolist()
+    return list(product(first, second))
 
 
 def cut_to_outline(shape: Part, end: RoundEnd, outline: shapely.Polygon) -> Iterator[Part]:

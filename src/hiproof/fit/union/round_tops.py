@@ -1,4 +1,4 @@
-"""Find cones, spires and domes around the tops of parts.
+"""Find cones, spires, domes and onions around the tops of parts.
 
 A top is round where heights fall alike in all directions, and points lie nearer to a curve of the
 distance from it, or to eight facets, than to the roof.
@@ -38,6 +38,8 @@ ROTATIONS = 6  # Rotations of a spire that are tried within one of its facets.
 BENT = 0.85  # Share of the misfit that a curve leaves of the roof's, at most.
 GROWTH_ROUNDS = 2  # Rounds in which a spire is fitted to all points that follow it.
 FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
+BENT_TYPES = ("dome", "onion")  # Their slope changes with the distance from the top.
+TOP_SEEN = 0.25  # Share of the height of an onion's top that points must reach.
 LIKE_OUTLINE = 0.85  # Share of an outline and of a disc in common from which they are the same.
 
 
@@ -150,9 +152,9 @@ def measure_broaches(points: np.ndarray, centre: np.ndarray, cap_m: float) -> li
 def select_followers(roof: JudgedRoof, part: Part) -> np.ndarray | None:
     """Select the points (k, 3) out to where they leave the slopes of a spire.
 
-    A dome is not continued: it returns None.
+    What is round in height, too, is not continued: it returns None.
     """
-    if part.type == "dome":
+    if part.type in BENT_TYPES:
         return None
     shape = CATALOGUE[part.type]
     theta = shape.to_theta(part.parameters, part.kappa, part.translation)
@@ -172,6 +174,9 @@ def fit_round(
     Where it covers the outline, and hardly more, the outline is its plan.
     """
     part = fit_types(near, None, names, settings)
+    if part is not None and not is_top_seen(part, near):
+        others = tuple(name for name in names if name != "onion")
+        part = fit_types(near, None, others, settings) if others else None
     for _ in range(GROWTH_ROUNDS):
         wider = None if part is None else select_followers(roof, part)
         if part is None or wider is None or len(wider) <= len(near):
@@ -185,6 +190,18 @@ def fit_round(
         return fit_over(outline, part, roof.points)
     polygons = list_polygons(common)
     return cut_part(part, max(polygons, key=lambda p: p.area)) if polygons else None
+
+
+def is_top_seen(part: Part, points: np.ndarray) -> bool:
+    """Return whether points (n, 3) reach far enough up the top of an onion.
+
+    It may be as high as anything above them. Other shapes have no top of their own.
+    """
+    if part.type != "onion":
+        return True
+    height, neck = part.parameters["height"], part.parameters["neck_height"]
+    reached = points[:, 2].max() - part.translation[2]
+    return bool(reached >= neck + TOP_SEEN * (height - neck))
 
 
 def fit_over(outline: shapely.Polygon, part: Part, points: np.ndarray) -> Part:

@@ -71,7 +71,10 @@ def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Pa
         )
         if len(merged) != 1:
             return None
-        pieces[k][q] = Piece(merged[0], pieces[k][q].planes)
+        pieces[k] = [
+            Piece(merged[0], piece.planes) if piece.outline == outline else piece
+            for piece in pieces[k]
+        ]
     return [
         replace(part, pieces=tuple(part_pieces))
         for part, part_pieces in zip(parts, pieces, strict=True)
