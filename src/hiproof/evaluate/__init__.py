@@ -15,4 +15,5 @@ report             the page about a run: map, distributions, the worst twenty, 3
 report_data        what that page draws, packed
 report_pictures    its small pictures
 before_after       buildings that an update changed, before and after
+change_scenes      these in 3D, packed
 """

@@ -33,13 +33,13 @@ def evaluate_earlier(record: dict[str, Any], damaged: Damaged = refuse) -> Evalu
     return None if found is None else evaluate_run(Path(found), damaged=damaged)
 
 
-def draw_changes(run: EvaluatedRun, earlier: EvaluatedRun | None) -> str:
-    """Return a section with the buildings that changed most.
+def find_changes(run: EvaluatedRun, earlier: EvaluatedRun | None) -> list[tuple[int, int]]:
+    """Return the buildings that changed most.
 
-    It is empty where none is known.
+    They are numbers in the update and in the earlier run. There are none where that is unknown.
     """
     if earlier is None:
-        return ""
+        return []
     before = {model.id: number for number, model in enumerate(earlier.models)}
     changed = [
         number
@@ -47,14 +47,26 @@ def draw_changes(run: EvaluatedRun, earlier: EvaluatedRun | None) -> str:
         if model.attributes.get(f"{OWN}change") in SHOWN and model.id in before
     ]
     changed.sort(key=lambda number: (-measure_change(run.models[number]), number))
-    cards = "".join(
-        draw_card(run, number, earlier, before[run.models[number].id])
-        for number in changed[:MOST_DRAWN_CHANGES]
-    )
-    if not cards:
+    return [(number, before[run.models[number].id]) for number in changed[:MOST_DRAWN_CHANGES]]
+
+
+def draw_changes(
+    run: EvaluatedRun, earlier: EvaluatedRun | None, pairs: list[tuple[int, int]], section: str
+) -> str:
+    """Return the `section` of the buildings that changed most.
+
+    It is empty where there are none. `pairs` are those of `find_changes`.
+    """
+    if earlier is None or not pairs:
         return ""
-    heading = "What changed: before, over the earlier points, and after, over the new ones"
-    return f'<section><h2>{heading}</h2><div class="grid cards">{cards}</div></section>'
+    ids = [run.models[after].id for after, _ in pairs]
+    options = [f'<option value="{number}">{escape(id)}</option>' for number, id in enumerate(ids)]
+    cards = [
+        draw_card(run, after, earlier, before, number)
+        for number, (after, before) in enumerate(pairs)
+    ]
+    section = section.replace("<!--options-->", "".join(options))
+    return section.replace("<!--cards-->", "".join(cards))
 
 
 def measure_change(model: BuildingModel) -> float:
@@ -63,8 +75,13 @@ def measure_change(model: BuildingModel) -> float:
     return abs(value) if isinstance(value, (int, float)) else 0.0
 
 
-def draw_card(run: EvaluatedRun, after: int, earlier: EvaluatedRun, before: int) -> str:
-    """Return the card of a building with its pictures before and after."""
+def draw_card(
+    run: EvaluatedRun, after: int, earlier: EvaluatedRun, before: int, number: int
+) -> str:
+    """Return the card of a building with its pictures before and after.
+
+    Its button shows the building of that number in 3D.
+    """
     model = run.models[after]
     words = [model.attributes.get(f"{OWN}{name}") for name in ("change", "change_kind")]
     text = ", ".join(str(word).replace("_", " ") for word in words if word)
@@ -77,7 +94,8 @@ def draw_card(run: EvaluatedRun, after: int, earlier: EvaluatedRun, before: int)
             ("after", (model, run.points[after])),
         )
     )
-    caption = f"<figcaption>{escape(model.id)}: {escape(text)}</figcaption>"
+    button = f'<button type="button" data-change="{number}">{escape(model.id)}</button>'
+    caption = f"<figcaption>{button} {escape(text)}</figcaption>"
     return f'<figure class="change">{rows}{caption}</figure>'
 
 

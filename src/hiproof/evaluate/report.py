@@ -21,7 +21,8 @@ from .. import __version__
 from ..log import count_things
 from ..masking import masked_values
 from ..status import Grade, Status
-from .before_after import draw_changes
+from .before_after import draw_changes, find_changes
+from .change_scenes import make_scenes
 from .evaluation import summarise
 from .metrics import psd
 from .overview import BuildingOutcome, Overview, show_command
@@ -76,7 +77,10 @@ def report_html(
     worst = worst_indices(run)
     buildings = choose_buildings(run, worst, most_shown)
     places = run.only(buildings)
+    changes = find_changes(run, earlier)
+    scenes = [] if earlier is None else make_scenes(run, earlier, changes)
     record = json.dumps(masked_values(run.record), indent=1, ensure_ascii=False)
+    scripts = ["viewer.js", "report.js", *(["changes.js"] if scenes else [])]
     sections = {
         "title": escape(title),
         "style": read_asset("page.css") + read_asset("report.css"),
@@ -86,11 +90,11 @@ def report_html(
         "qualities": grade_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
-        "changes": draw_changes(run, earlier),
+        "changes": draw_changes(run, earlier, changes, read_asset("changes.html")),
         "worst": worst_buildings(run, worst, buildings),
         "record": f'<pre tabindex="0" role="region" aria-label="run.json">{escape(record)}</pre>',
-        "data": embed_json(report_data(places, places_on_map(places))),
-        "script": read_asset("viewer.js") + read_asset("report.js"),
+        "data": embed_json(report_data(places, places_on_map(places)) | {"changes": scenes}),
+        "script": "".join(map(read_asset, scripts)),
     }
     page = read_asset("report.html")
     for name, content in sections.items():

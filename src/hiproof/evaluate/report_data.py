@@ -13,7 +13,14 @@ import shapely
 
 from ..status import Status
 from ..write.attribute_list import OWN
-from ..write.colours import CHANGE_COLOURS, GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, page_colours
+from ..write.colours import (
+    CHANGE_COLOURS,
+    GRADE_COLOURS,
+    NO_MODEL,
+    STATUS_COLOURS,
+    SURVEY_COLOURS,
+    page_colours,
+)
 from ..write.meshes.page_mesh import pack_values, solid_mesh
 from .evaluation import TEXT_COLUMNS
 from .metrics import plan_outline, psd
@@ -37,7 +44,8 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     return {
         "buildings": buildings,
         "colours": page_colours()
-        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "change": CHANGE_COLOURS},
+        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "change": CHANGE_COLOURS}
+        | {"surveys": SURVEY_COLOURS},
         "types": types,
         "mesh": mesh_data(run, types, origin),
         "points": point_data(run, origin),
