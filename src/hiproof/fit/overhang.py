@@ -20,54 +20,32 @@ from ..model import Building, Eaves, Overhang, Roof
 from ..model.overhang import ROOF_EDGE, WALLS
 from ..settings import ReconstructSettings
 
-OVERHANG_REACH_M = 1.5  # beyond an edge, within which points are looked at
-BEHIND_EDGE_M = 1.0  # behind an edge, where the roof shows how dense points are
-LONGEST_OVERHANG_M = 1.2  # an overhang; a roof that goes on farther is another one
+OVERHANG_REACH_M = 1.5  # behind and beyond an edge, within which points are looked at
+LONGEST_OVERHANG_M = 1.2  # beyond, a roof is another one; shorter edges are not measured
 SHORTEST_OVERHANG_M = 0.1  # an overhang; less is within the accuracy of footprints
-ON_PLANE_M = 0.15  # from the roof's plane, within which a point continues it
-PLAN_ERROR_M = 0.1  # of points; on a steep roof it moves them off the plane
-EAVE_BLUR_M = (
-    0.07  # standard deviation of the roof's end in the points: their own and the beam's width
-)
+ON_PLANE_M = 0.15  # from the roof's plane at right angles, within which a point continues it
+EAVE_BLUR_M = 0.08  # standard deviation of the roof's end in the points: theirs, the beam's width
 STRAY_DENSITY = 0.02  # density of other points near the plane, by that of the roof's
-ACROSS_STEP_M = 0.05  # between the places at which the free length of a strip is measured
-ALONG_STEP_M = 0.25  # the same along an edge
-TRIED_M = np.arange(-0.4, 1.4001, 0.02)  # m; those whose likelihood is compared
-EDGE_ERROR_M = 0.025  # standard deviation of a straight edge of the footprint or the points
-LEAST_EDGE_M = 1.0  # of an edge that is measured; shorter ones follow their side
+EAVE_STEP_M = 0.05  # between the places that are compared across an edge
+LEAST_SIGMA_M = EAVE_STEP_M / math.sqrt(12.0)  # of a place known to one step
 FEWEST_POINTS = 4  # behind an edge, or on the ground before it
-LOW_SHARE = 0.1  # of the points below the roof's plane; lower ones are ground, or noise
-CLEAR_ROOM_M = 0.3  # between the roof's plane and the ground, below which either may be meant
-OVERHANG_SIGMAS = 2.0  # that an overhang is long at least
-LEAST_FILL = 0.6  # of a strip along the edge, and of its density by that behind the edge
-POINTS_A_STRETCH = 3.0  # expected on each stretch of an edge that is to be filled
+LEAST_FILL = 0.5  # of the points that an overhang should hold by the density behind the edge
+OVERHANG_SIGMAS = 3.0  # that an overhang is long at least, and pooled lengths differ at most
 SAME_AXIS = math.sin(math.radians(5.0))  # sine of the angle up to which edges are parallel
-AGREEING_SIGMAS = 2.5  # by which lengths that are taken together may differ from their mean
 JUST_INSIDE_M = 0.02  # from an edge, where the plane is taken that goes on beyond
 PARTY_M = 0.3  # between an edge and a neighbour's outline, below which they share a wall
 MILLIMETRE_DIGITS = 3  # of lengths (m) as they are written
-ROOF_ENDS_M, ROOF_ENDS_SHARE = (
-    0.2,
-    0.75,
-)  # how near to how much of a roof's own outline its points end
+ROOF_ENDS_M = 0.2  # how near to a roof's own outline its points end
+ROOF_ENDS_SHARE = 0.75  # of the outline at which they do
 
-
-class Strip(NamedTuple):
-    """The points at one edge: positions along it and across it (n,), outwards.
-
-    `free` (k,) is the length of the strip that lies clear at each of the places `across`.
-    """
-
-    along: np.ndarray
-    across: np.ndarray
-    free: np.ndarray
+ACROSS_M = np.arange(-OVERHANG_REACH_M + EAVE_STEP_M / 2, OVERHANG_REACH_M, EAVE_STEP_M)
 
 
 class RoofReach(NamedTuple):
     """How far a roof reaches beyond the edges (n,) of its outline.
 
-    Each edge has its length (m), 0 where the points show none, with its standard deviation. Before
-    some edges stand neighbours: they are not `free`. `is_roof_edge` says whether the points end at
+    Each edge has its length (m), 0 where the points show none, with its standard deviation. Edges
+    before which a neighbour stands, so near that none has room, are not `free`. `is_roof_edge` says whether the points end at
     most of the outline.
     """
 
@@ -78,18 +56,30 @@ class RoofReach(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """The end of a roof before an edge (m), its standard deviation, and its `fill`.
+    """The end of a roof before an edge (m), and its standard deviation.
 
-    That is how full of points the strip up to the end is.
+    `found` points lie between the edge and the end, of those `expected` by the density behind it.
     """
 
     length: float
     sigma: float
-    fill: float
+    found: int
+    expected: float
 
 
-ACROSS_M = np.arange(-BEHIND_EDGE_M + ACROSS_STEP_M / 2, OVERHANG_REACH_M, ACROSS_STEP_M)
-UNMEASURED = Measurement(math.nan, math.inf, 0.0)
+class EdgeFrame(NamedTuple):
+    """The frame of an edge of the outline.
+
+    It has its `start`, unit vectors along the edge and outwards, and the edge's `length`.
+    """
+
+    start: np.ndarray
+    along: np.ndarray
+    outwards: np.ndarray
+    length: float
+
+
+UNMEASURED = Measurement(math.nan, math.inf, 0, 0.0)
 
 
 def measure_reach(roof: Roof, points: np.ndarray, neighbours: shapely.Geometry) -> RoofReach:
@@ -102,15 +92,14 @@ def measure_reach(roof: Roof, points: np.ndarray, neighbours: shapely.Geometry) 
     shapely.prepare(outline)
     near = find_near(points, outline, neighbours)
     gaps = np.array([measure_gap(edges, k, neighbours) for k in range(len(edges.starts))])
+    is_measured = (gaps > PARTY_M) & (edges.lengths >= LONGEST_OVERHANG_M)
     measured = [
-        measure_edge(roof, edges, k, near, neighbours)
-        if gaps[k] > PARTY_M and edges.lengths[k] >= LEAST_EDGE_M
-        else UNMEASURED
+        measure_edge(roof, edges, k, near, neighbours) if is_measured[k] else UNMEASURED
         for k in range(len(edges.starts))
     ]
     lengths, sigmas = pool_sides(edges, measured)
     lengths = np.where(gaps <= PARTY_M, 0.0, lengths)
-    is_blocked = (gaps <= PARTY_M) | (gaps < lengths + ACROSS_STEP_M)
+    is_blocked = (gaps <= PARTY_M) | (gaps < lengths + EAVE_STEP_M)
     return RoofReach(lengths, sigmas, ~is_blocked, ends_at_outline(edges, measured))
 
 
@@ -184,85 +173,90 @@ def measure_gap(edges: OutlineEdges, number: int, neighbours: shapely.Geometry) 
 def measure_edge(
     roof: Roof, edges: OutlineEdges, number: int, points: np.ndarray, neighbours: shapely.Geometry
 ) -> Measurement:
-    """Measure where the roof ends before an edge."""
-    strip = cut_strip(roof, edges, number, points, neighbours)
-    behind = strip.across < 0.0
-    if behind.sum() < FEWEST_POINTS or not (strip.free[ACROSS_M < 0] > 0).any():
+    """Measure where the roof ends before an edge.
+
+    The likelihood of an end is that of points which lie evenly over the clear area up to it.
+    """
+    start, end, outwards = (values[number] for values in edges[:3])
+    length = float(edges.lengths[number])
+    frame = EdgeFrame(start, (end - start) / length, outwards, length)
+    across, clear = cut_strip(roof, frame, points, neighbours)
+    behind = int((across < 0.0).sum())
+    if behind < FEWEST_POINTS or not clear[ACROSS_M < 0.0].any():
         return UNMEASURED
-    density = behind.sum() / max(float(strip.free[ACROSS_M < 0].sum()) * ACROSS_STEP_M, 1e-6)
-    shape = STRAY_DENSITY + (1.0 - STRAY_DENSITY) * ndtr(
-        (TRIED_M[:, None] - strip.across) / EAVE_BLUR_M
+    at_points, at_places = (
+        STRAY_DENSITY + (1.0 - STRAY_DENSITY) * ndtr((ACROSS_M[:, None] - x) / EAVE_BLUR_M)
+        for x in (across, ACROSS_M)
     )
-    whole = STRAY_DENSITY + (1.0 - STRAY_DENSITY) * ndtr(
-        (TRIED_M[:, None] - ACROSS_M) / EAVE_BLUR_M
-    )
-    log_likelihood = np.log(shape).sum(axis=1) - len(strip.across) * np.log(whole @ strip.free)
+    log_likelihood = np.log(at_points).sum(axis=1) - len(across) * np.log(at_places @ clear)
     chance = np.exp(log_likelihood - log_likelihood.max())
     chance /= chance.sum()
-    length = float(chance @ TRIED_M)
-    spread = float(chance @ (TRIED_M - length) ** 2)
-    further, variance = measure_gaps(strip.across[strip.across < length])
-    length += further
-    sigma = math.sqrt(spread + variance + EDGE_ERROR_M**2)
-    return Measurement(length, sigma, measure_fill(strip, length, density, edges.lengths[number]))
-
-
-def measure_gaps(across: np.ndarray) -> tuple[float, float]:
-    """Return how much farther a roof ends than evenly spread points show.
-
-    The variance of that comes second. Points at places `across` (n,) lie on scan lines, which may
-    run along the edge. From the last of them, the roof goes on by a part of the gap to the next: of
-    gaps g, E(g^2) / 2 E(g) on average, and E(g^3) / 3 E(g) in the square (renewal theory). What
-    evenly spread points have is part of their likelihood.
-    """
-    gaps = np.diff(np.sort(across))
-    if len(gaps) < FEWEST_POINTS:
-        return 0.0, 0.0
-    mean = float(gaps.mean())
-    rest = float((gaps**2).mean()) / (2.0 * mean)
-    variance = float((gaps**3).mean()) / (3.0 * mean) - rest**2
-    return max(rest - mean, 0.0), max(variance - mean**2, 0.0)
+    reach = float(chance @ ACROSS_M)
+    sigma = max(math.sqrt(float(chance @ (ACROSS_M - reach) ** 2)), LEAST_SIGMA_M)
+    before = (ACROSS_M > 0.0) & (reach > ACROSS_M)
+    expected = behind * float(clear[before].sum() / clear[ACROSS_M < 0.0].sum())
+    return Measurement(reach, sigma, int(((across > 0.0) & (across < reach)).sum()), expected)
 
 
 def cut_strip(
-    roof: Roof, edges: OutlineEdges, number: int, points: np.ndarray, neighbours: shapely.Geometry
-) -> Strip:
-    """Return the points that lie on the roof behind an edge, or continue it beyond."""
-    start, end, normal = (values[number] for values in edges[:3])
-    length = float(edges.lengths[number])
-    direction = (end - start) / length
-    offset = points[:, :2] - start
-    along, across = offset @ direction, offset @ normal
-    within = (
-        (along >= 0) & (along <= length) & (across >= -BEHIND_EDGE_M) & (across <= OVERHANG_REACH_M)
-    )
-    points, along, across = points[within], along[within], across[within]
-    is_inside = shapely.contains_xy(roof.outline, points[:, 0], points[:, 1])
-    foot = start + along[:, None] * direction - JUST_INSIDE_M * normal
-    planes = find_planes(roof, foot)
-    z = np.where(
-        is_inside,
-        roof.height_at(points[:, :2]),
-        (points[:, :2] * planes[:, :2]).sum(axis=1) + planes[:, 2],
-    )
-    slack = ON_PLANE_M + PLAN_ERROR_M * np.hypot(planes[:, 0], planes[:, 1])
-    room_m = measure_room(points[:, 2], z - slack, np.where(is_inside, -np.inf, across))
-    keep = (np.abs(points[:, 2] - z) <= slack) & (is_inside == (across < 0.0)) & (across < room_m)
-    free = measure_free(roof.outline, start, end, normal, neighbours)
-    return Strip(along[keep], across[keep], np.where(room_m > ACROSS_M, free, 0.0))
+    roof: Roof, frame: EdgeFrame, points: np.ndarray, neighbours: shapely.Geometry
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where points of a roof lie across an edge (n,), and the clear share (k,).
 
-
-def measure_room(z: np.ndarray, lowest: np.ndarray, across: np.ndarray) -> float:
-    """Return the distance from an edge at which the plane reaches the ground.
-
-    Points before the edge have heights `z` (n,), continue the plane if not below `lowest` (n,),
-    and lie so far `across`, those behind it nowhere.
+    Beyond the edge these are points that continue its plane. The share is that of the edge before
+    which each of the places ACROSS_M is clear.
     """
-    below = np.isfinite(across) & (z < lowest)
-    if below.sum() < FEWEST_POINTS:
-        return math.inf
-    ground = float(np.quantile(z[below], LOW_SHARE))
-    return float(across[np.isfinite(across) & (lowest < ground + CLEAR_ROOM_M)].min(initial=np.inf))
+    offset = points[:, :2] - frame.start
+    along, across = offset @ frame.along, offset @ frame.outwards
+    within = (along >= 0.0) & (along <= frame.length) & (np.abs(across) <= OVERHANG_REACH_M)
+    points, along, across = points[within], along[within], across[within]
+    z, slack = continue_planes(roof, frame, along, across)
+    is_low = (across > 0.0) & (points[:, 2] < z - slack)
+    z_ground = np.median(points[is_low, 2]) if is_low.sum() >= FEWEST_POINTS else -np.inf
+    is_clear = find_clear(roof, frame, along, across, neighbours, z_ground)
+    z = np.where(across < 0.0, roof.height_at(points[:, :2]), z)
+    shares = (np.arange(len(ACROSS_M)) + 0.5) / len(ACROSS_M)
+    places = np.meshgrid(shares * frame.length, ACROSS_M)
+    clear = find_clear(roof, frame, places[0].ravel(), places[1].ravel(), neighbours, z_ground)
+    return (
+        across[is_clear & (np.abs(points[:, 2] - z) <= slack)],
+        clear.reshape(places[0].shape).mean(axis=1),
+    )
+
+
+def find_clear(
+    roof: Roof,
+    frame: EdgeFrame,
+    along: np.ndarray,
+    across: np.ndarray,
+    neighbours: shapely.Geometry,
+    z_ground: float,
+) -> np.ndarray:
+    """Return which places (n,) show the roof, or whether it goes on before an edge.
+
+    There, neither the outline nor a neighbour lies, and the plane is clear of the ground.
+    """
+    x, y = (frame.start + along[:, None] * frame.along + across[:, None] * frame.outwards).T
+    result = shapely.contains_xy(roof.outline, x, y) == (across < 0.0)
+    if not neighbours.is_empty:
+        result &= ~shapely.contains_xy(neighbours, x, y)
+    z, slack = continue_planes(roof, frame, along, across)
+    return result & ((across < 0.0) | (z - slack > z_ground + ON_PLANE_M))
+
+
+def continue_planes(
+    roof: Roof, frame: EdgeFrame, along: np.ndarray, across: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Continue the planes just inside an edge to places (n,) in its frame.
+
+    Returns heights, and how far off upright points may lie.
+    """
+    feet, number = np.unique(along, return_inverse=True)
+    foot = frame.start + feet[:, None] * frame.along - JUST_INSIDE_M * frame.outwards
+    planes = find_planes(roof, foot)[number]
+    xy = foot[number] + (across + JUST_INSIDE_M)[:, None] * frame.outwards
+    z = (xy * planes[:, :2]).sum(axis=1) + planes[:, 2]
+    return z, ON_PLANE_M * np.sqrt(1.0 + (planes[:, :2] ** 2).sum(axis=1))
 
 
 def find_planes(roof: Roof, xy: np.ndarray) -> np.ndarray:
@@ -275,40 +269,6 @@ def find_planes(roof: Roof, xy: np.ndarray) -> np.ndarray:
         highest[is_seen] = lowest[is_seen]
         result[is_seen] = piece.planes[z.argmin(axis=1)[is_seen]]
     return result
-
-
-def measure_free(
-    outline: shapely.Polygon,
-    start: np.ndarray,
-    end: np.ndarray,
-    normal: np.ndarray,
-    neighbours: shapely.Geometry,
-) -> np.ndarray:
-    """Return the length (k,) of an edge that lies clear at each place across."""
-    length = float(np.hypot(*(end - start)))
-    count = max(math.ceil(length / ALONG_STEP_M), 1)
-    share = (np.arange(count) + 0.5) / count
-    xy = (start + share[:, None] * (end - start))[:, None] + ACROSS_M[:, None] * normal
-    x, y = xy[..., 0], xy[..., 1]
-    is_free = shapely.contains_xy(outline, x, y) == (ACROSS_M < 0.0)
-    if not neighbours.is_empty:
-        is_free &= ~shapely.contains_xy(neighbours, x, y)
-    return is_free.sum(axis=0) * length / count
-
-
-def measure_fill(strip: Strip, length: float, density: float, along_m: float) -> float:
-    """Return how full of points a strip is up to its `length`.
-
-    The share is the less of that along it and that by their density.
-    """
-    area = float(strip.free[(ACROSS_M > 0.0) & (length > ACROSS_M)].sum()) * ACROSS_STEP_M
-    expected = density * area
-    before = strip.along[(strip.across > 0.0) & (strip.across < length)]
-    if expected <= 0.0:
-        return 0.0
-    stretches = max(int(expected / POINTS_A_STRETCH), 1)
-    filled = np.unique(np.floor(before / along_m * stretches).clip(0, stretches - 1))
-    return min(len(filled) / stretches, len(before) / expected)
 
 
 def pool_sides(edges: OutlineEdges, measured: list[Measurement]) -> tuple[np.ndarray, np.ndarray]:
@@ -328,7 +288,8 @@ def pool_sides(edges: OutlineEdges, measured: list[Measurement]) -> tuple[np.nda
             mean, sigma = average(known)
             sigmas[group] = sigma
             is_long = max(OVERHANG_SIGMAS * sigma, SHORTEST_OVERHANG_M) < mean <= LONGEST_OVERHANG_M
-            if is_long and np.median([item.fill for item in known]) >= LEAST_FILL:
+            found, expected = (sum(values) for values in list(zip(*known, strict=True))[2:])
+            if is_long and found >= LEAST_FILL * expected:
                 lengths[group] = mean
     return lengths, sigmas
 
@@ -366,7 +327,7 @@ def agree(measured: list[Measurement]) -> bool:
     if len(known) < 2:
         return True
     mean, _ = average(known)
-    return all(abs(item.length - mean) <= AGREEING_SIGMAS * item.sigma for item in known)
+    return all(abs(item.length - mean) <= OVERHANG_SIGMAS * item.sigma for item in known)
 
 
 def average(known: list[Measurement]) -> tuple[float, float]:
