@@ -45,8 +45,8 @@ class RoofReach(NamedTuple):
     """How far a roof reaches beyond the edges (n,) of its outline.
 
     Each edge has its length (m), 0 where the points show none, with its standard deviation. Edges
-    before which a neighbour stands, so near that none has room, are not `free`. `is_roof_edge` says whether the points end at
-    most of the outline.
+    before which a neighbour stands, so near that none has room, are not `free`. `is_roof_edge` says
+    whether the points end at most of the outline.
     """
 
     lengths: np.ndarray
