@@ -71,7 +71,11 @@ def test_facing_walls_never_costs(seed):
     value = compute_objective(volumes, scene, np.inf)
     for k in range(1, len(volumes)):
         result, lower = face_walls(
-            volumes.copy(), scene, value, k, measure_context(volumes, scene.U, scene.V, k)
+            volumes.copy(),
+            scene,
+            value,
+            k,
+            measure_context(volumes, scene.U, scene.V, scene.order, k),
         )
         assert lower <= value
         assert compute_objective(result, scene, np.inf) == pytest.approx(lower, rel=1e-9)
@@ -92,7 +96,7 @@ def test_facing_walls_takes_no_plane_away(seed):
             scene,
             compute_objective(volumes, scene, np.inf),
             k,
-            measure_context(volumes, scene.U, scene.V, k),
+            measure_context(volumes, scene.U, scene.V, scene.order, k),
         )
         n_kept, is_given = (
             np.isfinite(rows[k, OFFSET0 : OFFSET0 + N_SIDES]) for rows in (result, volumes)

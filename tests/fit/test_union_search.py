@@ -97,7 +97,7 @@ def draw_case(seed, **options):
 
 def compute_both_roofs(volumes, scene, k):
     """Return the heights of the roof with volume k everywhere, and without it."""
-    context = measure_context(volumes, scene.U, scene.V, k)
+    context = measure_context(volumes, scene.U, scene.V, scene.order, k)
     return compute_roof_everywhere(volumes, scene.U, scene.V, k, context), context.roof_without
 
 
@@ -111,7 +111,7 @@ def is_true(volumes, scene, value):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_height_of_a_roof_is_a_few_lines_of_numpy(seed):
     _, volumes, scene = draw_case(seed)
-    z, top = compute_roof_heights(volumes, scene.U, scene.V)
+    z, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     expected, expected_top = compute_heights(volumes, scene.U, scene.V)
     np.testing.assert_allclose(z, expected, atol=1e-12)
     assert (top == expected_top).all()
@@ -138,11 +138,11 @@ def test_a_roof_with_and_without_a_volume_is_a_few_lines_of_numpy(seed):
 def test_what_is_around_a_volume_tells_the_roof_with_any_other_in_its_place(seed):
     rng, volumes, scene = draw_case(seed)
     for k in range(len(volumes)):
-        context = measure_context(volumes, scene.U, scene.V, k)
+        context = measure_context(volumes, scene.U, scene.V, scene.order, k)
         for replacing in (0.0, 1.0):
             trial = volumes.copy()
             trial[k] = draw_volume(rng, replacing) if k > 0 else make_base(rng.uniform(0, 9))
-            z, top = compute_roof_heights(trial, scene.U, scene.V)
+            z, top = compute_roof_heights(trial, scene.U, scene.V, scene.order)
             assert (compute_roof_with(trial, scene.U, scene.V, k, context) == z).all()
             places = zip(z, scene.U[int(trial[k, 0])], scene.V[int(trial[k, 0])], strict=True)
             item = [
@@ -155,8 +155,8 @@ def test_what_is_around_a_volume_tells_the_roof_with_any_other_in_its_place(seed
             value = compute_objective(trial, scene, np.inf)
             assert compute_objective_with(trial, scene, k, context, np.inf) == value
     new = np.vstack([volumes, draw_volume(rng, 0.0)])
-    context = measure_context(volumes, scene.U, scene.V, len(volumes))
-    z, _ = compute_roof_heights(new, scene.U, scene.V)
+    context = measure_context(volumes, scene.U, scene.V, scene.order, len(volumes))
+    z, _ = compute_roof_heights(new, scene.U, scene.V, scene.order)
     assert (compute_roof_with(new, scene.U, scene.V, len(volumes), context) == z).all()
 
 
@@ -169,8 +169,8 @@ def test_a_hidden_volume_changes_no_height_and_no_misfit(seed):
     place = rng.integers(1, len(volumes) + 1)
     extended = np.insert(volumes, place, hidden, axis=0)
     assert (
-        compute_roof_heights(extended, scene.U, scene.V)[0]
-        == compute_roof_heights(volumes, scene.U, scene.V)[0]
+        compute_roof_heights(extended, scene.U, scene.V, scene.order)[0]
+        == compute_roof_heights(volumes, scene.U, scene.V, scene.order)[0]
     ).all()
     assert sum(price_edge(extended, gather_walls(scene), place, edge) for edge in range(4)) == 0.0
     paid = compute_objective(extended, scene, np.inf) - compute_objective(volumes, scene, np.inf)
@@ -184,8 +184,8 @@ def test_the_order_of_volumes_that_join_does_not_matter(seed):
     scene = draw_scene(rng, volumes)
     other = np.vstack([volumes[:1], rng.permutation(volumes[1:])])
     assert (
-        compute_roof_heights(other, scene.U, scene.V)[0]
-        == compute_roof_heights(volumes, scene.U, scene.V)[0]
+        compute_roof_heights(other, scene.U, scene.V, scene.order)[0]
+        == compute_roof_heights(volumes, scene.U, scene.V, scene.order)[0]
     ).all()
     assert compute_objective(other, scene, np.inf) == pytest.approx(
         compute_objective(volumes, scene, np.inf)
@@ -200,8 +200,8 @@ def test_a_roof_united_with_itself_moved_under_it_is_itself(seed):
     lowered = volumes.copy()
     lowered[:, OFFSET0 : OFFSET0 + N_PLANES] -= rng.uniform(0.01, 2.0)
     united = np.vstack([volumes, lowered])
-    z, top = compute_roof_heights(united, scene.U, scene.V)
-    assert (z == compute_roof_heights(volumes, scene.U, scene.V)[0]).all()
+    z, top = compute_roof_heights(united, scene.U, scene.V, scene.order)
+    assert (z == compute_roof_heights(volumes, scene.U, scene.V, scene.order)[0]).all()
     assert top.max() < len(volumes)
 
 
@@ -372,7 +372,10 @@ def test_moving_edges_keeps_the_books_and_never_costs(seed):
     value = compute_objective(volumes, scene, np.inf)
     for k in range(1, len(volumes)):
         original, remainder = value, np.delete(volumes, k, axis=0)
-        reach, context = rng.choice([0.5, 2.0, 60.0]), measure_context(volumes, scene.U, scene.V, k)
+        reach, context = (
+            rng.choice([0.5, 2.0, 60.0]),
+            measure_context(volumes, scene.U, scene.V, scene.order, k),
+        )
         value = move_edges(volumes, scene, k, value, reach, context)
         assert value <= original + 1e-9
         assert is_true(volumes, scene, value)
@@ -385,7 +388,7 @@ def test_moved_edges_leave_a_rectangle(seed):
     value = compute_objective(volumes, scene, np.inf)
     for k in range(1, len(volumes)):
         original = volumes[k].copy()
-        context = measure_context(volumes, scene.U, scene.V, k)
+        context = measure_context(volumes, scene.U, scene.V, scene.order, k)
         move_edges(volumes, scene, k, value, 60.0, context)
         for lower in (U0, U0 + 2):
             moved = (volumes[k, lower : lower + 2] != original[lower : lower + 2]).any()
@@ -607,10 +610,10 @@ def test_refitting_finds_the_planes_of_points_without_noise(seed):
     nearby[1, OFFSET0 : OFFSET0 + N_PLANES][is_present] += rng.uniform(
         -0.05, 0.05, is_present.sum()
     )
-    context = measure_context(nearby, scene.U, scene.V, 1)
+    context = measure_context(nearby, scene.U, scene.V, scene.order, 1)
     for _ in range(25):
         refit(nearby, scene, 1, context)
-    z, _ = compute_roof_heights(nearby, scene.U, scene.V)
+    z, _ = compute_roof_heights(nearby, scene.U, scene.V, scene.order)
     np.testing.assert_allclose(z[: scene.n], scene.z[: scene.n], atol=1e-3)
 
 
@@ -623,7 +626,7 @@ def test_a_plane_without_points_stays_where_it_is():
         np.isfinite(volumes[1, OFFSET0 : OFFSET0 + N_SIDES])
     ] = 60.0
     original = volumes.copy()
-    context = measure_context(volumes, scene.U, scene.V, 1)
+    context = measure_context(volumes, scene.U, scene.V, scene.order, 1)
     refit(volumes, scene._replace(z=np.full(len(scene.z), 1.1)), 1, context)
     assert volumes[1, OFFSET0 + LEVEL] == pytest.approx(1.1)
     assert (
@@ -642,7 +645,7 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
     candidates = np.array([draw_volume(rng, 0.0) for _ in range(6)])
     cell_u, cell_v = rng.integers(0, 6, (2, *scene.U.shape))
     scene = scene._replace(lines=np.tile(np.arange(7.0), (2, 2, 1)))
-    z_now, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    z_now, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     cost_now = compute_costs(z_now, scene)
     gains, cells = find_best_rectangles(
         scene, candidates, cell_u, cell_v, cost_now, z_now, replacing
@@ -678,7 +681,7 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
     rng, volumes, scene = draw_case(seed)
     candidate = draw_volume(rng, 0.0)[None]
     cell = np.zeros(scene.U.shape, int)
-    z_now, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    z_now, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     cost_now, gain = compute_costs(z_now, scene), np.zeros((1, 1))
     fill_cell_gains(scene, candidate, 0, (cell, cell), cost_now, z_now, False, gain)
     wide = candidate.copy()
@@ -731,7 +734,7 @@ def test_a_further_plane_gains_what_the_points_then_cost_less(seed):
     rng, _, scene = draw_case(seed)
     volumes = draw_volumes(rng)
     volumes[1:, REPLACES] = 0.0
-    z_now, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    z_now, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     for k in range(1, len(volumes)):
         everywhere, beneath = compute_both_roofs(volumes, scene, k)
         for plane in np.nonzero(volumes[k, OFFSET0 : OFFSET0 + N_PLANES] == np.inf)[0]:
@@ -745,7 +748,7 @@ def test_a_further_plane_gains_what_the_points_then_cost_less(seed):
                 trial[k, OFFSET0 + plane] = offset
             if plane < LEVEL:
                 trial[k, SLOPE0 + plane] = slope
-            z_then, _ = compute_roof_heights(trial, scene.U, scene.V)
+            z_then, _ = compute_roof_heights(trial, scene.U, scene.V, scene.order)
             saving = (
                 compute_costs(z_now, scene)[: scene.n].sum()
                 - compute_costs(z_then, scene)[: scene.n].sum()

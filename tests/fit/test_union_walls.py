@@ -87,7 +87,8 @@ def test_no_volume_of_several_is_a_speck(seed):
     remainder = drop_specks(volumes.copy(), scene)
     visible, original = (
         np.bincount(
-            compute_roof_heights(rows, scene.U, scene.V)[1][: scene.n], minlength=len(rows)
+            compute_roof_heights(rows, scene.U, scene.V, scene.order)[1][: scene.n],
+            minlength=len(rows),
         )[1:]
         for rows in (remainder, volumes)
     )

@@ -13,7 +13,7 @@ from .moves import remove_volume
 from .objective import compute_objective
 from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
 from .trim import COVER_M, find_runs
-from .volumes import DIRECTION, LEVEL, OFFSET0, U0, U1, V0, V1, compute_roof_heights
+from .volumes import DIRECTION, LEVEL, OFFSET0, U0, U1, UNSORTED, V0, V1, compute_roof_heights
 
 LEAST_SHOWN_M2 = 1.0  # Least area (m2) of each of the places in which a volume is visible.
 ROW_DEPTH_M = 0.5  # Difference in depth (m) within which volumes of a row are equally deep.
@@ -25,15 +25,15 @@ END_DEPTH_M = 0.4  # Depth (m) inside the outline at which a volume's end must b
 def split_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """Split each volume that is visible in several places of a row or under a roof."""
     U, V = list_nodes(scene, VISIBLE_DEPTH_M)
-    heights, top = compute_roof_heights(volumes, U, V)
+    heights, top = compute_roof_heights(volumes, U, V, UNSORTED)
     for k in range(len(volumes) - 1, 0, -1):
         for axis in (0, 1):
             pieces = find_pieces(volumes, k, axis, U, V, top, scene)
             if len(pieces) > 1:
                 trial = insert_pieces(volumes, k, pieces)
-                if np.array_equal(compute_roof_heights(trial, U, V)[0], heights):
+                if np.array_equal(compute_roof_heights(trial, U, V, UNSORTED)[0], heights):
                     volumes = drop_strips(trial, k, len(pieces), scene)
-                    heights, top = compute_roof_heights(volumes, U, V)
+                    heights, top = compute_roof_heights(volumes, U, V, UNSORTED)
                     break
     return volumes
 

@@ -12,7 +12,15 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from .volumes import DIRECTION, REPLACES, find_lowest, is_within, read_coefficients, read_rectangle
+from .volumes import (
+    DIRECTION,
+    REPLACES,
+    find_lowest,
+    find_strip,
+    is_within,
+    read_coefficients,
+    read_rectangle,
+)
 
 Context = namedtuple("Context", "earlier later roof_without")
 """The heights (n,) that the other volumes leave for volume k at n places.
@@ -23,8 +31,8 @@ where one of them replaces it. `roof_without` is the height of the roof without 
 
 
 @compiled
-def measure_context(volumes, U, V, k):
-    """Return what the others leave for volume k at U, V (directions, n).
+def measure_context(volumes, U, V, order, k):
+    """Return what the others leave for volume k at U, V (directions, n), sorted by `order`.
 
     A new volume comes after all.
     """
@@ -34,9 +42,20 @@ def measure_context(volumes, U, V, k):
         if j == k:
             earlier[:] = roof_without
             continue
-        u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
-        ends = read_rectangle(volumes, j)
+        direction = int(volumes[j, DIRECTION])
+        u, v, ends = U[direction], V[direction], read_rectangle(volumes, j)
         c, replaces = read_coefficients(volumes, j), volumes[j, REPLACES] > 0.0
+        axis, first, last = find_strip(volumes, j, U, V, order)
+        if last - first < n:
+            for q in range(first, last):
+                i = order[direction, axis, q]
+                if is_within(ends, u[i], v[i]):
+                    h = find_lowest(c, u[i], v[i])
+                    if replaces or h > roof_without[i]:
+                        roof_without[i] = h
+                    if j > k:
+                        later[i] = max(later[i], np.inf if replaces else h)
+            continue
         if j < k:
             for i in range(n):  # no branches: a processor does several places at once
                 h = find_lowest(c, u[i], v[i])

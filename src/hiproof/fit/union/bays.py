@@ -30,6 +30,7 @@ from .volumes import (
     REPLACES,
     U0,
     U1,
+    UNSORTED,
     V0,
     V1,
     compute_roof_heights,
@@ -110,12 +111,13 @@ def fit_level_volume(
     if len(z) < FEWEST_BAY_POINTS:
         return -np.inf, row
     coordinates = [np.ascontiguousarray(axis[:, is_inside]) for axis in (points.U, points.V)]
-    roof, top = compute_roof_heights(volumes, *coordinates)
+    roof, top = compute_roof_heights(volumes, *coordinates, UNSORTED)
     current = compute_misfits(z, roof, scene)
     narrow = min(bay[2] - bay[1], bay[4] - bay[3])
     if narrow < 2.0 * THICK_M or not is_base_visible(volumes, scene):
         # The little that is visible of the base is drawn as the roof beside it.
-        neighbour_z, _ = compute_roof_heights(widen_volumes(volumes, narrow), *coordinates)
+        widened = widen_volumes(volumes, narrow)
+        neighbour_z, _ = compute_roof_heights(widened, *coordinates, UNSORTED)
         current = np.where(top > 0, current, compute_misfits(z, neighbour_z, scene))
     reach = scene.dead + scene.width
     first, last = np.searchsorted(z, z - reach, "right"), np.searchsorted(z, z + reach, "left")

@@ -62,6 +62,6 @@ def settle_volumes(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float
 
 def is_base_bare(volumes: np.ndarray, scene: Scene) -> bool:
     """Return whether more than a sliver of the base is visible."""
-    _, top = compute_roof_heights(volumes, scene.U, scene.V)
+    _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     cells = scene.weight[scene.n :][top[scene.n :] == 0].sum()
     return bool(max(cells, 0.5 * (top[: scene.n] == 0).sum()) > BARE_BLOCK_SHARE * scene.n)

@@ -12,7 +12,7 @@ from ...compiled import compiled
 from .around import compute_roof_everywhere
 from .objective import BASE_SHARE, compute_costs
 from .prices import BASE_COST
-from .steps import gather_walls, locate_line, price_edge
+from .steps import gather_walls, list_near, locate_line, price_edge
 from .volumes import (
     DIRECTION,
     LEVEL,
@@ -69,6 +69,7 @@ def move_edges(volumes, scene, k, value, reach, context):
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
     touched = np.zeros((len(volumes), 4), np.bool_)
     walls, is_charged, direction = gather_walls(scene), False, int(volumes[k, DIRECTION])
+    near = np.zeros((0, 0), np.int64)
     for edge in range(4):
         places, m = list_edge_places(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
@@ -98,8 +99,12 @@ def move_edges(volumes, scene, k, value, reach, context):
                 continue
             if not is_charged:
                 is_charged = True
-                charge_edges(volumes, walls, direction, charge, boxes)
-            trial = charge_move(volumes, walls, k, edge, t, trial, best, charge, boxes, touched)
+                if len(near) == 0:
+                    near = list_near(volumes, walls.turn, k)
+                charge_edges(volumes, walls, near, direction, charge, boxes)
+            trial = charge_move(
+                volumes, walls, near, k, edge, t, trial, best, charge, boxes, touched
+            )
             if trial < best:
                 best, best_place = trial, t
         if best_place != start:
@@ -210,7 +215,7 @@ def is_repeated(places, q):
 
 
 @compiled(allocates=False)
-def charge_edges(volumes, walls, direction, charge, boxes):
+def charge_edges(volumes, walls, near, direction, charge, boxes):
     """Fill `charge` (k, 4) with the price of every edge, and `boxes` (k, 4, 4).
 
     Boxes are the edges' bounds in the axes of `direction`, empty where an edge lies outside the
@@ -227,7 +232,7 @@ def charge_edges(volumes, walls, direction, charge, boxes):
             boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
             if not locate_line(walls, other, e // 2, volumes[j, U0 + e])[0]:
                 continue  # it is never visible, whatever moves beside it
-            charge[j, e] = price_edge(volumes, walls, j, e)
+            charge[j, e] = price_edge(volumes, walls, j, e, near)
             for end in range(2):
                 a = volumes[j, U0 + e] if e < 2 else volumes[j, U0 + end]
                 b = volumes[j, V0 + end] if e < 2 else volumes[j, U0 + e]
@@ -237,7 +242,7 @@ def charge_edges(volumes, walls, direction, charge, boxes):
 
 
 @compiled(allocates=False)
-def charge_move(volumes, walls, k, edge, t, trial, best, charge, boxes, touched):
+def charge_move(volumes, walls, near, k, edge, t, trial, best, charge, boxes, touched):
     """Add the price of all edges to `trial`, with edge `edge` of volume k at `t`.
 
     It stops as soon as the sum is not below `best`. `touched` is room for which edges (k, 4) the
@@ -266,6 +271,6 @@ def charge_move(volumes, walls, k, edge, t, trial, best, charge, boxes, touched)
     for j in range(1, len(volumes)):
         for e in range(4):
             if trial < best and touched[j, e]:
-                trial += walls.evidence * price_edge(volumes, walls, j, e)
+                trial += walls.evidence * price_edge(volumes, walls, j, e, near)
     volumes[k, U0 + edge] = start
     return trial

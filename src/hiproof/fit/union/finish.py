@@ -92,11 +92,8 @@ class Planes:
 
 def find_visible_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
     """Return the numbers of the points (m,) over which each volume is visible."""
-    n = scene.n
-    _, top = compute_roof_heights(
-        volumes, np.ascontiguousarray(scene.U[:, :n]), np.ascontiguousarray(scene.V[:, :n])
-    )
-    return [np.nonzero(top == k)[0] for k in range(len(volumes))]
+    _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    return [np.nonzero(top[: scene.n] == k)[0] for k in range(len(volumes))]
 
 
 def take_points(volume: np.ndarray, members: np.ndarray, scene: Scene) -> np.ndarray:

@@ -47,7 +47,7 @@ def improve(volumes, scene, value, slopes, rounds):
                 volumes, value = refit_volume(volumes, scene, value, k)
         for k in range(1, len(volumes)):
             if is_unsettled(volumes, k):
-                context = measure_context(volumes, scene.U, scene.V, k)
+                context = measure_context(volumes, scene.U, scene.V, scene.order, k)
                 value = move_edges(volumes, scene, k, value, EVERYWHERE, context)
         volumes, value = drop_volumes(volumes, scene, value)
         k = 1
@@ -74,7 +74,7 @@ def change_structure(volumes, scene, value, k, slopes):
 @compiled
 def change_planes(volumes, scene, value, k, slopes):
     """Make all moves that change which planes volume k has, their ties and facings."""
-    context = measure_context(volumes, scene.U, scene.V, k)
+    context = measure_context(volumes, scene.U, scene.V, scene.order, k)
     volumes, value = drop_planes(volumes, scene, value, k, np.inf, context)
     volumes, value = flatten(volumes, scene, value, k, context)
     volumes, value = change_ties(volumes, scene, value, k, context)
@@ -148,7 +148,7 @@ def simplify(volumes, scene, value, steepest):
                     if trial_value < value - NO_GAIN:
                         volumes, value = trial, trial_value
                         continue
-            context = measure_context(volumes, scene.U, scene.V, k)
+            context = measure_context(volumes, scene.U, scene.V, scene.order, k)
             volumes, value = drop_planes(volumes, scene, value, k, steepest, context)
             k += 1
         volumes, value = merge_volumes(volumes, scene, value, steepest)

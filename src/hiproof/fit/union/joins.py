@@ -93,7 +93,7 @@ def settle_merger(trial, scene, k, value, j):
 @compiled
 def settle_trial(trial, scene, k, value):
     """Settle volume k of a `trial` of which others changed, too."""
-    context = measure_context(trial, scene.U, scene.V, k)
+    context = measure_context(trial, scene.U, scene.V, scene.order, k)
     return settle_move(trial, scene, k, value, MERGE_REACH_M, context)
 
 

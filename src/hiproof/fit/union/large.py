@@ -73,7 +73,7 @@ def settle_volume(whole: Whole, k: int) -> None:
     def settle_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
         row = find_row(rows, k)
         rows, value = refit_volume(rows, scene, value, row)
-        context = measure_context(rows, scene.U, scene.V, row)
+        context = measure_context(rows, scene.U, scene.V, scene.order, row)
         value = move_edges(rows, scene, row, value, SETTLE_REACH_M, context)
         return refit_volume(rows, scene, value, row)
 

@@ -94,7 +94,7 @@ def refit_volumes(volumes, scene, value):
 @compiled
 def refit_volume(volumes, scene, value, k):
     """Refit volume k, if that helps."""
-    trial, context = volumes.copy(), measure_context(volumes, scene.U, scene.V, k)
+    trial, context = volumes.copy(), measure_context(volumes, scene.U, scene.V, scene.order, k)
     refit(trial, scene, k, context)
     trial_value = compute_objective_with(trial, scene, k, context, value)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (volumes, value)
@@ -104,7 +104,7 @@ def refit_volume(volumes, scene, value, k):
 def move_all_edges(volumes, scene, value, reach):
     """Move the edges of every volume, in place."""
     for k in range(1, len(volumes)):
-        context = measure_context(volumes, scene.U, scene.V, k)
+        context = measure_context(volumes, scene.U, scene.V, scene.order, k)
         value = move_edges(volumes, scene, k, value, reach, context)
     return value
 

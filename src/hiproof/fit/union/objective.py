@@ -15,7 +15,7 @@ import numpy as np
 from ...compiled import compiled
 from .around import compute_roof_with
 from .prices import BASE_COST
-from .steps import gather_walls, price_edge
+from .steps import gather_walls, list_near, price_edge
 from .volumes import LEVEL, OFFSET0, compute_roof_heights, is_allowed, price_volume
 
 BASE_SHARE = 0.01  # The base costs nothing if it is visible on less of the outline's area.
@@ -68,7 +68,7 @@ def compute_objective(volumes, scene, limit):
     for k in range(1, len(volumes)):
         if not is_allowed(volumes[k], scene.allowed):
             return np.inf
-    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     return compute_roof_cost(volumes, scene, z, limit)
 
 
@@ -102,17 +102,19 @@ def compute_roof_cost(volumes, scene, z, limit):
 @compiled
 def price_edges(volumes, scene, limit):
     """Sum up the price of all edges; infinite once it is known to exceed `limit`."""
-    walls, total = gather_walls(scene), 0.0
+    if limit < 0.0:
+        return np.inf
+    walls, near, total = gather_walls(scene), list_near(volumes, scene.turn, -1), 0.0
     for k in range(1, len(volumes)):
         for edge in range(4):
             if total > limit:
                 return np.inf
-            total += scene.evidence * price_edge(volumes, walls, k, edge)
+            total += scene.evidence * price_edge(volumes, walls, k, edge, near)
     return total
 
 
 @compiled
 def is_base_visible(volumes, scene):
     """Return whether the base roofs a noticeable share of the outline."""
-    _, top = compute_roof_heights(volumes, scene.U, scene.V)
+    _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     return scene.weight[scene.n :][top[scene.n :] == 0].sum() > BASE_SHARE * scene.n

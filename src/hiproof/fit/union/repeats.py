@@ -74,7 +74,7 @@ def add_copy(volumes: np.ndarray, copy: np.ndarray, strip: Scene, scene: Scene) 
     value = compute_objective(with_copy, scene, np.inf)
     settled, value = refit_volume(with_copy, scene, value, last)
     settled = settled.copy()
-    context = measure_context(settled, scene.U, scene.V, last)
+    context = measure_context(settled, scene.U, scene.V, scene.order, last)
     move_edges(settled, scene, last, value, COPY_REACH_M, context)
     saved = compute_strip_costs(volumes, strip).sum() - compute_strip_costs(settled, strip).sum()
     return settled if saved > COPY_UNITS * scene.evidence else with_copy
@@ -82,7 +82,7 @@ def add_copy(volumes: np.ndarray, copy: np.ndarray, strip: Scene, scene: Scene) 
 
 def compute_strip_costs(volumes: np.ndarray, strip: Scene) -> np.ndarray:
     """Return what each point and unobserved cell (n,) of a strip costs."""
-    return compute_costs(compute_roof_heights(volumes, strip.U, strip.V)[0], strip)
+    return compute_costs(compute_roof_heights(volumes, strip.U, strip.V, strip.order)[0], strip)
 
 
 def find_copy(

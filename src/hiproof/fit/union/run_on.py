@@ -141,7 +141,7 @@ def measure_protrusion(volumes, k, edge, scene):
             y = start + length * (q % count) / (count - 1)
             u, v = (x, y) if axis == 0 else (y, x)
             U[d, q], V[d, q] = c * u + s * v, c * v - s * u
-    z, top = compute_roof_heights(volumes, U, V)
+    z, top = compute_roof_heights(volumes, U, V, np.zeros((1, 2, 0), np.int64))
     places, highest = 0, 0.0
     for q in range(count):
         gap = abs(z[q] - z[count + q])

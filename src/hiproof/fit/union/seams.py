@@ -18,7 +18,18 @@ from .moves import refit_volume, remove_volume
 from .objective import compute_objective
 from .prices import LEFT_OUT_SHARE, LEFT_OUT_UNITS
 from .scene import Scene
-from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0, U1, V0, V1, compute_roof_heights, is_fixed
+from .volumes import (
+    DIRECTION,
+    ROW_NUMBER,
+    SETTLED,
+    U0,
+    U1,
+    UNSORTED,
+    V0,
+    V1,
+    compute_roof_heights,
+    is_fixed,
+)
 from .whole import POSITION, Whole
 from .window import change_in_window
 
@@ -100,7 +111,7 @@ def is_same_roof(whole: Whole, j: int, k: int) -> bool:
     U, V = c * u.ravel() + s * v.ravel(), c * v.ravel() - s * u.ravel()
     wide = whole.volumes[[j, k]].copy()
     wide[:, U0 : V1 + 1] = whole.volumes[0, U0 : V1 + 1]
-    heights, other_heights = (compute_roof_heights(row[None], U, V)[0] for row in wide)
+    heights, other_heights = (compute_roof_heights(row[None], U, V, UNSORTED)[0] for row in wide)
     return bool(np.mean(np.abs(heights - other_heights) < SAME_ROOF_M) >= SAME_ROOF_SHARE)
 
 
@@ -146,7 +157,7 @@ def improve_volume(whole: Whole, place: bytes) -> None:
     def improve_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
         row = find_row(rows, k)
         rows, value = refit_volume(rows, scene, value, row)
-        context = measure_context(rows, scene.U, scene.V, row)
+        context = measure_context(rows, scene.U, scene.V, scene.order, row)
         value = move_edges(rows, scene, row, value, EVERYWHERE, context)
         rows, value = leave_out(whole, rows, scene, value, row)
         row = find_row(rows, k)
@@ -171,7 +182,7 @@ def leave_out(
     trial_value = compute_objective(trial, scene, limit)
     if trial_value == np.inf or trial_value < value - NO_GAIN:
         return (trial, trial_value) if trial_value < value - NO_GAIN else (rows, value)
-    shows = compute_roof_heights(rows, scene.U, scene.V)[1] == k
+    shows = compute_roof_heights(rows, scene.U, scene.V, scene.order)[1] == k
     u, v = scene.U[0][shows], scene.V[0][shows]
     neighbours = [q for q in range(1, len(trial)) if not is_fixed(trial, q)]
     neighbours = [
@@ -181,7 +192,7 @@ def leave_out(
     ]
     for _ in range(LEFT_OUT_ROUNDS):
         for q in neighbours:
-            context = measure_context(trial, scene.U, scene.V, q)
+            context = measure_context(trial, scene.U, scene.V, scene.order, q)
             trial_value = move_edges(trial, scene, q, trial_value, EVERYWHERE, context)
         for q in neighbours:
             trial, trial_value = refit_volume(trial, scene, trial_value, q)

@@ -237,7 +237,7 @@ def measure_gain(volumes, k, numbers, scene):
     It is compared with the roof without it.
     """
     U, V = scene.U[:, numbers], scene.V[:, numbers]
-    context = measure_context(volumes, U, V, k)
+    context = measure_context(volumes, U, V, scene.order, k)
     everywhere, roof_without = (
         compute_roof_everywhere(volumes, U, V, k, context),
         context.roof_without,

@@ -22,6 +22,7 @@ from .volumes import (
     N_SIDES,
     OFFSET0,
     SLOPE0,
+    UNSORTED,
     compute_roof_heights,
     find_lowest_plane,
     measure_run,
@@ -40,7 +41,7 @@ def drop_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     A single volume stays: it is all there is of its roof.
     """
     while len(volumes) > 2:
-        _, top = compute_roof_heights(volumes, scene.U, scene.V)
+        _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
         n_seen = np.bincount(top[: scene.n], minlength=len(volumes))[1:]
         if n_seen.min() >= FEWEST_SEEN:
             break
@@ -56,7 +57,7 @@ def drop_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """
     value = compute_objective(volumes, scene, np.inf)
     U, V = list_nodes(scene)
-    _, top = compute_roof_heights(volumes, U, V)
+    _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     for k in range(1, len(volumes)):
         for plane in list_narrow_planes(volumes, k, U, V, top):
             if np.isfinite(volumes[k, OFFSET0 : OFFSET0 + N_PLANES]).sum() < 2:
@@ -71,7 +72,7 @@ def drop_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
                 volumes, trial, k, plane, scene
             ):
                 volumes, value = trial, min(value, trial_value)
-                _, top = compute_roof_heights(volumes, U, V)
+                _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     return volumes
 
 

@@ -47,11 +47,53 @@ def gather_walls(scene):
     return Walls(scene.turn, scene.depth, *raster, *corners, *room, prices, scene.evidence)
 
 
+@compiled
+def list_near(volumes, turn, moving):
+    """List the volumes that may cover an edge of each volume: (k, k + 1), first their number.
+
+    They are in the roof's order. Volume `moving` (-1: none) is near all others.
+    """
+    near = np.empty((len(volumes), len(volumes) + 1), np.int64)
+    for k in range(len(volumes)):
+        direction, count = int(volumes[k, DIRECTION]), 0
+        for j in range(len(volumes)):
+            if j != moving and k != moving and j != k:
+                other = int(volumes[j, DIRECTION])
+                low_u, high_u, low_v, high_v = enclose_volume(
+                    volumes,
+                    j,
+                    turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1],
+                    turn[other, 1] * turn[direction, 0] - turn[other, 0] * turn[direction, 1],
+                )
+                if low_u > volumes[k, U1] or high_u < volumes[k, U0]:
+                    continue
+                if low_v > volumes[k, V1] or high_v < volumes[k, V0]:
+                    continue
+            count += 1
+            near[k, count] = j
+        near[k, 0] = count
+    return near
+
+
+@compiled(inline="always")
+def enclose_volume(volumes, j, cosine, sine):
+    """Return the bounds of volume j, a little widened, in axes turned from its own."""
+    half_u, half_v = (
+        0.5 * (volumes[j, U1] - volumes[j, U0]),
+        0.5 * (volumes[j, V1] - volumes[j, V0]),
+    )
+    u, v = volumes[j, U0] + half_u, volumes[j, V0] + half_v
+    reach_u = abs(cosine) * half_u + abs(sine) * half_v + 2.0 * COVER_TOUCH_M
+    reach_v = abs(sine) * half_u + abs(cosine) * half_v + 2.0 * COVER_TOUCH_M
+    u, v = cosine * u - sine * v, sine * u + cosine * v
+    return u - reach_u, u + reach_u, v - reach_v, v + reach_v
+
+
 @compiled(allocates=False)
-def price_edge(volumes, walls, k, edge):
+def price_edge(volumes, walls, k, edge, near):
     """Compute the units of one visible edge of volume k.
 
-    Edges are 0 u low, 1 u high, 2 v low, 3 v high.
+    Edges are 0 u low, 1 u high, 2 v low, 3 v high. `near` is that of `list_near`.
     """
     direction, axis, place = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     inside, in_line = locate_line(walls, direction, axis, place)
@@ -60,7 +102,7 @@ def price_edge(volumes, walls, k, edge):
     m, step = place_samples(volumes, walls, k, edge)
     if m == 0:
         return 0.0
-    fill_heights(volumes, walls, k, edge, m)
+    fill_heights(volumes, walls, k, edge, near, m)
     any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
     shown_length = low_length = 0.0
     for q in range(m):
@@ -142,7 +184,7 @@ def pad_count(count):
 
 
 @compiled(inline="always")
-def fill_heights(volumes, walls, k, edge, m):
+def fill_heights(volumes, walls, k, edge, near, m):
     """Fill walls.inside and walls.outside with the heights on either side of an edge.
 
     They are those at the first `m` of walls.places, just inside and just outside of volume k. All
@@ -154,7 +196,8 @@ def fill_heights(volumes, walls, k, edge, m):
     n_padded = pad_count(m)
     for q in range(n_padded):
         inside[q] = outside[q] = -np.inf
-    for j in range(len(volumes)):
+    for p in range(1, near[k, 0] + 1):
+        j = near[k, p]
         other, cosine, sine = int(volumes[j, DIRECTION]), 1.0, 0.0
         if other != direction:
             cosine = turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1]

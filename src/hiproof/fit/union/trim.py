@@ -12,7 +12,7 @@ from .moves import remove_volume
 from .objective import compute_objective
 from .prices import CUT_UNITS, SLACK_UNITS
 from .scene import Scene, list_nodes
-from .volumes import DIRECTION, U0, U1, V0, V1, compute_roof_heights
+from .volumes import DIRECTION, U0, U1, UNSORTED, V0, V1, compute_roof_heights
 
 HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
 COVER_M = 0.25  # They are drawn in to this distance (m) beyond what is visible.
@@ -31,7 +31,7 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
     """
     volumes, value = draw_out(volumes, scene, value)
     U, V = list_nodes(scene)
-    _, top = compute_roof_heights(volumes, U, V)
+    _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     visible_by_volume = [top == k for k in range(len(volumes))]
     k = 1
     for visible in visible_by_volume[1:]:
@@ -119,11 +119,24 @@ def draw_in(
         trial_value = compute_objective(trial, scene, value + SLACK_UNITS * scene.evidence)
         if np.isfinite(trial_value):
             return trial, trial_value
-        if np.array_equal(
-            compute_roof_heights(trial, U, V)[0], compute_roof_heights(volumes, U, V)[0]
-        ):
+        if not changes_heights(volumes, trial, k, edge, U, V):
             return trial, compute_objective(trial, scene, np.inf)
     return volumes, value
+
+
+def changes_heights(
+    volumes: np.ndarray, trial: np.ndarray, k: int, edge: int, U: np.ndarray, V: np.ndarray
+) -> bool:
+    """Return whether the roof's height at any of U, V changes with an edge of volume k.
+
+    The edge is a column, and `trial` are the volumes with it elsewhere.
+    """
+    x = (U if edge in (U0, U1) else V)[int(volumes[k, DIRECTION])]
+    first, last = sorted((volumes[k, edge], trial[k, edge]))
+    is_between = (first <= x) & (x <= last)
+    U, V = (np.ascontiguousarray(axis[:, is_between]) for axis in (U, V))
+    before, after = (compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (volumes, trial))
+    return not np.array_equal(before, after)
 
 
 def cut_short(

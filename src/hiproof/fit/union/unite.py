@@ -179,7 +179,7 @@ def bound_cost(volumes: np.ndarray, scene: Scene) -> float:
 
     It costs its volumes, its edges, and the points above it.
     """
-    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     is_above = scene.z[: scene.n] > z[: scene.n]
     return float(compute_costs(z, scene)[: scene.n][is_above].sum()) + price_structure(
         volumes, scene

@@ -45,6 +45,10 @@ FREE = 0.0  # The tie under which no slopes are equal.
 OPPOSITE = 1.0  # The tie under which slopes that face each other are equal.
 ALL_EQUAL = 2.0  # The tie under which all slopes are equal.
 SLOPE_LOW = 0.04  # A flatter slope (rise over run), 2 degrees, is level.
+# Share of all places below which those of a strip are looked at one after another. Of more, all are
+# looked at, several at once.
+STRIP_SHARE = 0.5
+UNSORTED = np.zeros((1, 2, 0), np.int64)  # The order of places that are not sorted.
 SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
 
 
@@ -143,22 +147,65 @@ def measure_runs(row: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def compute_roof_heights(volumes, U, V):
+def compute_roof_heights(volumes, U, V, order):
     """Return the height (n,) of the roof and the visible volume (n,) at U, V.
 
-    These are (directions, n).
+    These are (directions, n), and `order` is that of `scene.sort_along`, or UNSORTED.
     """
     n = U.shape[1]
     z, top = np.full(n, -np.inf), np.zeros(n, np.int64)
     for k in range(len(volumes)):
-        u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
-        ends = read_rectangle(volumes, k)
+        direction = int(volumes[k, DIRECTION])
+        u, v, ends = U[direction], V[direction], read_rectangle(volumes, k)
         c, replaces = read_coefficients(volumes, k), volumes[k, REPLACES] > 0.0
+        axis, first, last = find_strip(volumes, k, U, V, order)
+        if last - first < n:
+            for q in range(first, last):
+                i = order[direction, axis, q]
+                if is_within(ends, u[i], v[i]):
+                    h = find_lowest(c, u[i], v[i])
+                    if replaces or h > z[i]:
+                        z[i], top[i] = h, k
+            continue
         for i in range(n):  # no branches: a processor does several points at once
             h = find_lowest(c, u[i], v[i])
             shows = is_within(ends, u[i], v[i]) & (replaces | (h > z[i]))
             z[i], top[i] = h if shows else z[i], k if shows else top[i]
     return z, top
+
+
+@compiled
+def find_strip(volumes, k, U, V, order):
+    """Find the strip across U, V (directions, n) that ends where volume k does along one axis.
+
+    Returns the axis, and the first and last number of its places in `order`. They are 0 and n if
+    the places are not sorted, or if the strip would hold too many of them.
+    """
+    n, direction = U.shape[1], int(volumes[k, DIRECTION])
+    if n == 0 or order.shape[2] != n:
+        return 0, 0, n
+    for axis in range(2):
+        X, low, high = U if axis == 0 else V, volumes[k, U0 + 2 * axis], volumes[k, U1 + 2 * axis]
+        if low <= X[direction, order[direction, axis, 0]]:
+            if high >= X[direction, order[direction, axis, n - 1]]:
+                continue
+        first, last = 0, n
+        while first < last:
+            q = (first + last) // 2
+            if X[direction, order[direction, axis, q]] < low:
+                first = q + 1
+            else:
+                last = q
+        end, last = first, n
+        while end < last:
+            q = (end + last) // 2
+            if X[direction, order[direction, axis, q]] <= high:
+                end = q + 1
+            else:
+                last = q
+        if end - first < STRIP_SHARE * n:
+            return axis, first, end
+    return 0, 0, n
 
 
 @compiled

@@ -481,7 +481,7 @@ def measure_extra_cost(
     is_before, is_after = (
         is_within & (sign * (x - line.offset - line.lean * y) <= 0.0) for line in (old_side, side)
     )
-    context = measure_context(volumes, scene.U, scene.V, k)
+    context = measure_context(volumes, scene.U, scene.V, scene.order, k)
     everywhere, roof_without = (
         compute_roof_everywhere(volumes, scene.U, scene.V, k, context),
         context.roof_without,

@@ -20,6 +20,7 @@ from .volumes import (
     ROW_NUMBER,
     U0,
     U1,
+    UNSORTED,
     V0,
     V1,
     compute_roof_heights,
@@ -142,7 +143,8 @@ class Whole:
         for k in range(1, len(self.volumes)):
             i = self.find_points(Box(*self.boxes[k]))
             u, v = self.u[i], self.v[i]
-            h, _ = compute_roof_heights(self.volumes[k : k + 1], c * u + s * v, c * v - s * u)
+            U, V = c * u + s * v, c * v - s * u
+            h, _ = compute_roof_heights(self.volumes[k : k + 1], U, V, UNSORTED)
             is_higher = (h > z[i]) | ((self.volumes[k, REPLACES] > 0) & np.isfinite(h))
             z[i[is_higher]] = h[is_higher]
         return z
