@@ -16,6 +16,7 @@ from hiproof.fit.union.volumes import (
     OFFSET0,
     SLOPE0,
     U0,
+    UNSORTED,
     V1,
     compute_roof_heights,
     make_base,
@@ -102,7 +103,7 @@ def test_a_moved_volume_is_as_high_at_moved_places(seed, axis, step_m):
     moved = move_volume(volume, axis, step_m)[None]
     shifted = (u + step_m, v) if axis == 0 else (u, v + step_m)
     original, changed_state = (
-        compute_roof_heights(volume[None], u, v)[0],
-        compute_roof_heights(moved, *shifted)[0],
+        compute_roof_heights(volume[None], u, v, UNSORTED)[0],
+        compute_roof_heights(moved, *shifted, UNSORTED)[0],
     )
     assert changed_state == pytest.approx(original, abs=1e-6)

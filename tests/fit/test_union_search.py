@@ -41,6 +41,7 @@ from hiproof.fit.union.steps import (
     STEP_DEPTH_M,
     VISIBLE_STEP_M,
     gather_walls,
+    list_near,
     price_edge,
 )
 from hiproof.fit.union.trim import (
@@ -65,6 +66,7 @@ from hiproof.fit.union.volumes import (
     TIE,
     U0,
     U1,
+    UNSORTED,
     V0,
     V1,
     compute_roof_heights,
@@ -172,7 +174,7 @@ def test_a_hidden_volume_changes_no_height_and_no_misfit(seed):
         compute_roof_heights(extended, scene.U, scene.V, scene.order)[0]
         == compute_roof_heights(volumes, scene.U, scene.V, scene.order)[0]
     ).all()
-    assert sum(price_edge(extended, gather_walls(scene), place, edge) for edge in range(4)) == 0.0
+    assert sum(price_one_edge(extended, scene, place, edge) for edge in range(4)) == 0.0
     paid = compute_objective(extended, scene, np.inf) - compute_objective(volumes, scene, np.inf)
     assert paid == pytest.approx(scene.evidence * price_volume(hidden), rel=1e-9)
 
@@ -284,12 +286,43 @@ def price_edge_slowly(volumes, scene, k, edge, spacing):
     return (prices.any_step - prices.at_corner * ends) * whole + by_length
 
 
+def price_one_edge(volumes, scene, k, edge):
+    """Return the units of one edge, with every volume that may cover it looked at."""
+    near = list_near(volumes, scene.turn, -1)
+    cost = price_edge(volumes, gather_walls(scene), k, edge, near)
+    all_near = np.tile(np.array([len(volumes), *range(len(volumes))]), (len(volumes), 1))
+    assert price_edge(volumes, gather_walls(scene), k, edge, all_near) == cost
+    return cost
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_heights_are_the_same_in_any_order_of_places(seed):
+    rng, volumes, scene = draw_case(seed)
+    for _ in range(4):
+        narrow = volumes.copy()
+        for low in (U0, V0):  # so that strips hold few places
+            ends = np.sort(rng.uniform(narrow[1:, low], narrow[1:, low + 1], (2, len(narrow) - 1)))
+            narrow[1:, [low, low + 1]] = np.sort(ends, axis=0).T
+        for order in (scene.order, UNSORTED):
+            z, top = compute_roof_heights(narrow, scene.U, scene.V, order)
+            slow_z, slow_top = compute_heights(narrow, scene.U, scene.V)
+            np.testing.assert_allclose(z, slow_z, atol=1e-12)
+            assert np.array_equal(top, slow_top)
+            for k in range(1, len(narrow) + 1):
+                contexts = [
+                    measure_context(narrow, scene.U, scene.V, one, k)
+                    for one in (scene.order, UNSORTED)
+                ]
+                for sorted_places, unsorted_places in zip(*contexts, strict=True):
+                    assert np.array_equal(sorted_places, unsorted_places)
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_edge_costs_what_shows_of_it(seed):
     _, volumes, scene = draw_case(seed)
     for k in range(1, len(volumes)):
         for edge in range(4):
-            cost = price_edge(volumes, gather_walls(scene), k, edge)
+            cost = price_one_edge(volumes, scene, k, edge)
             assert cost == pytest.approx(price_edge_slowly(volumes, scene, k, edge, 0.5), abs=1e-9)
 
 
@@ -319,7 +352,7 @@ def test_an_edge_costs_nearly_what_dense_samples_of_it_say():
         for k in range(1, len(volumes)):
             for edge in range(4):
                 dense = price_edge_slowly(volumes, scene, k, edge, 0.01)
-                differences.append(abs(price_edge(volumes, gather_walls(scene), k, edge) - dense))
+                differences.append(abs(price_one_edge(volumes, scene, k, edge) - dense))
     a_sample = 0.5 * (scene.edge_prices.a_metre + scene.edge_prices.low_a_metre)
     assert np.median(differences) < a_sample
     assert np.mean(np.array(differences) < 3 * a_sample) > 0.95
@@ -465,7 +498,8 @@ def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_change
             trial, result = draw_in(volumes, scene, value, k, edge, seen_to, U, V)
             assert is_true(trial, scene, result)
             twin = (
-                compute_roof_heights(trial, U, V)[0] == compute_roof_heights(volumes, U, V)[0]
+                compute_roof_heights(trial, U, V, UNSORTED)[0]
+                == compute_roof_heights(volumes, U, V, UNSORTED)[0]
             ).all()
             assert twin or result <= value + SLACK_UNITS * scene.evidence + 1e-6
 
@@ -474,7 +508,7 @@ def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_change
 def test_an_edge_is_drawn_out_to_a_corners_line_for_next_to_nothing_or_stays(seed):
     _, volumes, scene = draw_case(seed)
     value = compute_objective(volumes, scene, np.inf)
-    outwards, result = draw_out(volumes, scene, value)
+    outwards, result = draw_out(volumes, scene, value, np.arange(len(volumes)))
     assert (
         is_true(outwards, scene, result)
         and result <= value + 4 * len(volumes) * SLACK_UNITS * scene.evidence
@@ -494,7 +528,9 @@ def test_a_rectangle_just_short_of_the_outline_is_drawn_out_to_it():
     scene = scene._replace(z=compute_heights(true, scene.U, scene.V)[0])
     short = true.copy()
     short[1, U0 : U0 + 2] += 0.2, -0.1
-    result, _ = draw_out(short, scene, compute_objective(short, scene, np.inf))
+    result, _ = draw_out(
+        short, scene, compute_objective(short, scene, np.inf), np.arange(len(short))
+    )
     assert result[1, U0 : U0 + 2].tolist() == pytest.approx([lower, upper])
 
 

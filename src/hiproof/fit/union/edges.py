@@ -257,18 +257,22 @@ def charge_move(volumes, walls, near, k, edge, t, trial, best, charge, boxes, to
     for j in range(1, len(volumes)):
         for e in range(4):
             if j == k:
-                touched[j, e] = e == edge or (e != edge ^ 1 and boxes[j, e, 0] < np.inf)
+                is_touched = e == edge or (e != edge ^ 1 and boxes[j, e, 0] < np.inf)
             else:
                 meets = boxes[j, e, along] <= move_high and boxes[j, e, along + 1] >= move_low
                 is_beside = (
                     boxes[j, e, cross] <= cross_high + MOVE_TOUCH_M
                     and boxes[j, e, cross + 1] >= cross_low - MOVE_TOUCH_M
                 )
-                touched[j, e] = meets and is_beside
-            if not touched[j, e]:
+                is_touched = meets and is_beside
+            touched[j, e] = is_touched
+            if not is_touched:
                 trial += walls.evidence * charge[j, e]
     volumes[k, U0 + edge] = t
-    for j in range(1, len(volumes)):
+    for q in range(len(volumes)):  # volume k first: its own edges cost the most
+        j = k if q == 0 else q
+        if q == k:
+            continue
         for e in range(4):
             if trial < best and touched[j, e]:
                 trial += walls.evidence * price_edge(volumes, walls, j, e, near)

@@ -12,6 +12,7 @@ from .moves import remove_volume
 from .objective import compute_objective
 from .prices import CUT_UNITS, SLACK_UNITS
 from .scene import Scene, list_nodes
+from .steps import list_near
 from .volumes import DIRECTION, U0, U1, UNSORTED, V0, V1, compute_roof_heights
 
 HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
@@ -29,7 +30,7 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
 
     Edges are drawn in to what is visible of each volume. Also returns the objective.
     """
-    volumes, value = draw_out(volumes, scene, value)
+    volumes, value = draw_out(volumes, scene, value, np.arange(len(volumes)))
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     visible_by_volume = [top == k for k in range(len(volumes))]
@@ -70,8 +71,10 @@ def find_runs(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.n
     return x[first], x[last], last - first + 1
 
 
-def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-    """Draw every edge out to the line of corners next to it.
+def draw_out(
+    volumes: np.ndarray, scene: Scene, value: float, numbers: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Draw every edge of the volumes `numbers` out to the line of corners next to it.
 
     An edge is drawn out if that costs nearly nothing.
     """
@@ -81,7 +84,8 @@ def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarra
     )
     distances = OUTWARDS[:, None] * (lines[:, :, None] - edges)
     nearest = np.where(distances > 0.0, distances, np.inf).min(axis=3).reshape(-1, 4)
-    for k, edge in np.argwhere(nearest < NEAR_VERTEX_M):
+    for q, edge in np.argwhere(nearest[numbers] < NEAR_VERTEX_M):
+        k = numbers[q]
         if k > 0:
             trial = volumes.copy()
             trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
@@ -89,6 +93,15 @@ def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarra
             if np.isfinite(trial_value):
                 volumes, value = trial, trial_value
     return volumes, value
+
+
+def list_around(volumes: np.ndarray, k: int, scene: Scene) -> np.ndarray:
+    """Return the numbers of the volumes whose edges could be drawn out over volume k."""
+    wide = volumes.copy()
+    wide[k, [U0, V0]] -= NEAR_VERTEX_M
+    wide[k, [U1, V1]] += NEAR_VERTEX_M
+    near = list_near(wide, scene.turn, -1)[k]
+    return near[1 : 1 + near[0]]
 
 
 def draw_in(
@@ -155,7 +168,7 @@ def cut_short(
         return volumes, value
     trial_value = compute_objective(trial, scene, value + CUT_UNITS * scene.evidence)
     if np.isfinite(trial_value):
-        trial, trial_value = draw_out(trial, scene, trial_value)
+        trial, trial_value = draw_out(trial, scene, trial_value, list_around(volumes, k, scene))
     return (
         (trial, trial_value)
         if trial_value < value + SLACK_UNITS * scene.evidence
