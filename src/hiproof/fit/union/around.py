@@ -32,9 +32,9 @@ where one of them replaces it. `roof_without` is the height of the roof without 
 
 @compiled
 def measure_context(volumes, U, V, order, k):
-    """Return what the others leave for volume k at U, V (directions, n), sorted by `order`.
+    """Return what the others leave for volume k at U, V (directions, n).
 
-    A new volume comes after all.
+    `order` is that of `compute_roof_heights`. A new volume comes after all.
     """
     n = U.shape[1]
     earlier, later, roof_without = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, -np.inf)

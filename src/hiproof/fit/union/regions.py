@@ -114,6 +114,23 @@ def cut_regions(
     )
 
 
+def sketch_regions(
+    volumes: np.ndarray, sides: list[list[Side]], site: PlanSite
+) -> list[list[shapely.Polygon]]:
+    """Return, for each volume, the polygons that it may roof, as if no base showed.
+
+    They reach beyond the outline and leave gaps along it, both of which `compose.cells.arrange`
+    takes care of. So hardly an overlay is necessary.
+    """
+    regions: list[list[shapely.Polygon]] = [[]]
+    for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True):
+        quad, _ = site.cut_quad(volume, volume_sides)
+        if volume[REPLACES]:
+            regions = [site.cut_out(earlier, quad) for earlier in regions]
+        regions.append([quad])
+    return regions
+
+
 def list_part_polygons(
     regions: list[list[shapely.Polygon]], outline: shapely.Polygon, plan: Plan
 ) -> Iterator[tuple[int, list[shapely.Polygon]]]:

@@ -49,9 +49,10 @@ def gather_walls(scene):
 
 @compiled
 def list_near(volumes, turn, moving):
-    """List the volumes that may cover an edge of each volume: (k, k + 1), first their number.
+    """List which volumes may cover an edge of each volume.
 
-    They are in the roof's order. Volume `moving` (-1: none) is near all others.
+    Each row of (k, k + 1) begins with their number, and they are in the roof's order. Volume
+    `moving` (-1: none) is near all others.
     """
     near = np.empty((len(volumes), len(volumes) + 1), np.int64)
     for k in range(len(volumes)):

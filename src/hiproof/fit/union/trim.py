@@ -74,7 +74,7 @@ def find_runs(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.n
 def draw_out(
     volumes: np.ndarray, scene: Scene, value: float, numbers: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Draw every edge of the volumes `numbers` out to the line of corners next to it.
+    """Draw edges of the volumes `numbers` out to the line of corners next to each.
 
     An edge is drawn out if that costs nearly nothing.
     """
@@ -140,9 +140,9 @@ def draw_in(
 def changes_heights(
     volumes: np.ndarray, trial: np.ndarray, k: int, edge: int, U: np.ndarray, V: np.ndarray
 ) -> bool:
-    """Return whether the roof's height at any of U, V changes with an edge of volume k.
+    """Return whether the roof's height changes at any of U, V with a moved edge.
 
-    The edge is a column, and `trial` are the volumes with it elsewhere.
+    The edge is a column of volume k, and `trial` are the volumes with it elsewhere.
     """
     x = (U if edge in (U0, U1) else V)[int(volumes[k, DIRECTION])]
     first, last = sorted((volumes[k, edge], trial[k, edge]))

@@ -45,11 +45,11 @@ FREE = 0.0  # The tie under which no slopes are equal.
 OPPOSITE = 1.0  # The tie under which slopes that face each other are equal.
 ALL_EQUAL = 2.0  # The tie under which all slopes are equal.
 SLOPE_LOW = 0.04  # A flatter slope (rise over run), 2 degrees, is level.
+SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
 # Share of all places below which those of a strip are looked at one after another. Of more, all are
 # looked at, several at once.
-STRIP_SHARE = 0.5
+SPARSE_SHARE = 0.5
 UNSORTED = np.zeros((1, 2, 0), np.int64)  # The order of places that are not sorted.
-SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
 
 
 def make_base(height: float) -> np.ndarray:
@@ -176,10 +176,10 @@ def compute_roof_heights(volumes, U, V, order):
 
 @compiled
 def find_strip(volumes, k, U, V, order):
-    """Find the strip across U, V (directions, n) that ends where volume k does along one axis.
+    """Find the strip of places that ends where volume k does along one axis.
 
-    Returns the axis, and the first and last number of its places in `order`. They are 0 and n if
-    the places are not sorted, or if the strip would hold too many of them.
+    Returns the axis, and the first and last number in `order` of the places U, V (directions, n).
+    They are 0 and n if the places are not sorted, or if the strip would hold too many of them.
     """
     n, direction = U.shape[1], int(volumes[k, DIRECTION])
     if n == 0 or order.shape[2] != n:
@@ -203,7 +203,7 @@ def find_strip(volumes, k, U, V, order):
                 end = q + 1
             else:
                 last = q
-        if end - first < STRIP_SHARE * n:
+        if end - first < SPARSE_SHARE * n:
             return axis, first, end
     return 0, 0, n
 

@@ -27,7 +27,7 @@ from .finish import Planes
 from .objective import compute_costs, compute_misfits
 from .plan import Plan
 from .prices import CORNER_COST, PARAMETER_COST, REPAIR_UNITS
-from .regions import PlanSite, cut_regions, list_polygons
+from .regions import PlanSite, cut_regions, list_polygons, sketch_regions
 from .repairs import Repair, find_repairs
 from .scene import Scene, select_points
 from .sides import Side, cross_lines
@@ -101,12 +101,11 @@ class Window(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a window shows of a roof: regions, one part of these, and plan by site.
+    """What a window shows of a roof: one part and its plan by site.
 
-    A plan is None where its regions make none.
+    A plan is None where its part makes none.
     """
 
-    regions: list[list[list[shapely.Polygon]]]
     parts: list[Part]
     plans: list[DrawnPlan | None]
 
@@ -134,7 +133,8 @@ def weld(
         if next_state is state:
             break
         state, drawing = next_state, better_drawing or draw_window(next_state, whole, problem)
-    return state.sides, state.planes, drawing.regions[0]
+    regions = cut_regions(volumes, state.planes, state.sides, site, base)
+    return state.sides, state.planes, regions
 
 
 def make_problem(
@@ -163,14 +163,16 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     """Draw what a window shows of a roof."""
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
-    regions = [cut_regions(volumes, planes, sides, site, problem.base) for site in window.sites]
-    parts_and_owners = [
-        make_part(site_regions, volumes, planes, problem.plan, problem.scene)
-        for site_regions in regions
-    ]
-    pairs = zip(parts_and_owners, window.sites, strict=True)
-    plans = [draw_plan(part, owner, site.outline) for (part, owner), site in pairs]
-    return Drawing(regions, [part for part, _ in parts_and_owners], plans)
+    parts, plans = [], []
+    for site in window.sites:
+        if problem.base or len(volumes) == 1:
+            regions = cut_regions(volumes, planes, sides, site, problem.base)
+        else:
+            regions = sketch_regions(volumes, sides, problem.site)
+        part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
+        parts.append(part)
+        plans.append(draw_plan(part, owner, site.outline))
+    return Drawing(parts, plans)
 
 
 @dataclass
