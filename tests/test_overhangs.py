@@ -7,12 +7,14 @@ import pytest
 import shapely
 
 import hiproof
+from hiproof.cli.convert import convert_models
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
 from hiproof.geometry.outline_edges import list_outline_edges
 from hiproof.model import CEILING, GROUND
 from hiproof.settings import Settings
 from hiproof.write.building_attributes import building_attributes, measure_figures
+from hiproof.write.meshes.stl import STL_TRIANGLE
 from hiproof.write.parameters import building_record
 from tiny_town import gable
 from written_run import require_valid_files, write_run
@@ -157,6 +159,22 @@ def test_citygml_has_the_finest_solid(tmp_path):
     for house in houses:
         volume = models[house.id].volume
         assert volume == pytest.approx(house.model.finest_solid.volume, rel=1e-4)
+
+
+def measure_stl(path):
+    """Volume (m3) that the triangles of an STL file enclose."""
+    rows = np.frombuffer(path.read_bytes()[84:], STL_TRIANGLE)
+    a, b, c = (rows["corners"][:, k].astype(float) for k in range(3))
+    return (np.cross(a, b) * c).sum() / 6.0
+
+
+@pytest.mark.parametrize("lods", [["2.2"], ["2.2", "2.3"]])
+def test_meshes_have_overhangs_where_the_run_asked_for_them(tmp_path, lods):
+    house = reconstruct("a")
+    write_run(tmp_path, [house], {"lods": lods})
+    convert_models(tmp_path, tmp_path / "town.stl", "stl", None, lambda *_: None)
+    solid = house.model.finest_solid if "2.3" in lods else house.solid
+    assert measure_stl(tmp_path / "town.stl") == pytest.approx(solid.volume, rel=1e-4)
 
 
 @pytest.mark.parametrize("lods", [["2.3"], ["2.2", "2.3"]])

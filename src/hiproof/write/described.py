@@ -36,7 +36,7 @@ def write_format(
     module, given = import_format(FORMATS[name].module), {**FORMATS[name].given, **given}
     if hasattr(module, "write_models"):
         models = (
-            view_building(building, attributes, head.units.gml)
+            view_building(building, attributes, head.units.gml, head.write.lods)
             for building, _, attributes in buildings
             if building.built is not None
         )

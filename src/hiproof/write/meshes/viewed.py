@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ...frames import Units
@@ -43,13 +43,16 @@ class ViewedModel(NamedTuple):
         return result
 
 
-def view_building(building: Building, attributes: dict[str, Any], units: Units) -> ViewedModel:
+def view_building(
+    building: Building, attributes: dict[str, Any], units: Units, lods: Sequence[str] = ()
+) -> ViewedModel:
     """Return the model of a building with its `attributes`.
 
     Its parameters are among them as JSON where its parts have any. The solid is in metres of the
-    CRS of files, which are in `units`.
+    CRS of files, which are in `units`. It has overhangs where `lods` name LoD2.3.
     """
-    solid, text = building.solid, parameters_text(building)
+    solid = building.model.finest_solid if "2.3" in lods else building.solid
+    text = parameters_text(building)
     there = Units(units.plan, units.height).to_metres(units.from_metres(solid.vertices))
     return ViewedModel(
         building.id,
