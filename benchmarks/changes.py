@@ -299,20 +299,23 @@ def read_models(folder: Path) -> dict[str, Building]:
 
 
 def report_refined(results: list[dict[str, list[dict[str, float]]]]) -> None:
-    """Print the RMS of errors over sigma, of estimated parameters and of each."""
+    """Print the RMS of errors over sigma, of all parameters and of each."""
     for name in ("models", "refined"):
         found = [errors for result in results for errors in result[name]]
         by_name: dict[str, list[float]] = {}
         for errors in found:
             for parameter, value in errors.items():
                 by_name.setdefault(parameter, []).append(value)
-        every = [value for n, values in by_name.items() if n not in HELD for value in values]
+        every = [value for values in by_name.values() for value in values]
+        estimated = [value for n, values in by_name.items() if n not in HELD for value in values]
+        rms, rms_all = (np.sqrt(np.mean(np.square(values))) for values in (estimated, every))
         each = ", ".join(
             f"{parameter} {np.sqrt(np.mean(np.square(values))):.2f} ({len(values)})"
             for parameter, values in sorted(by_name.items())
         )
         print(
-            f"{name}: {len(found)} buildings, RMS {np.sqrt(np.mean(np.square(every))):.2f}: {each}"
+            f"{name}: {len(found)} buildings, RMS {rms:.2f} of estimated parameters, "
+            f"{rms_all:.2f} with held ones: {each}"
         )
 
 

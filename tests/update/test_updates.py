@@ -19,6 +19,7 @@ from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
 from hiproof.edit.points import RunPoints
 from hiproof.evaluate.run import evaluate_run
+from hiproof.parametric.building import build
 from hiproof.parametric.run import build_file
 from hiproof.update.dates import find_survey_date
 from hiproof.update.request import UpdateRequest
@@ -103,6 +104,34 @@ def test_the_raised_house_keeps_its_parts_and_is_as_high_as_its_points(update, r
     tops = [r["parts"][0]["position"][2] + r["origin"][2] for r in (old, new)]
     assert tops[1] - tops[0] == pytest.approx(RAISED_M, abs=0.05)
     assert by_id(out)["house-2"]["status"] == "no_building"
+
+
+def test_the_raised_house_differs_in_its_height_alone(update, run):
+    _, out, _ = update
+    old, new = by_id(run)["house-1"], by_id(out)["house-1"]
+    measured = ("change", "detail", "points", "density", "residuals", "parts", "quality")
+    assert {k: v for k, v in new.items() if k not in measured} == {
+        k: v for k, v in old.items() if k not in measured
+    }
+    for before, after in zip(old["parts"], new["parts"], strict=True):
+        x, y, z = before["position"]
+        assert after["position"] == [x, y, pytest.approx(z + RAISED_M, abs=0.05)]
+        assert {**after, "position": 0, "sigma": 0} == {**before, "position": 0, "sigma": 0}
+    assert new["residuals"]["rmse"] == pytest.approx(old["residuals"]["rmse"], rel=0.3)
+
+
+def test_a_raised_house_with_a_block_on_it_is_no_longer_of_the_earlier_shape(run, tmp_path):
+    xyz, classes = make_later_survey()
+    x0, y0, x1, y1 = make_town(seed=7).footprints["house-1"].bounds
+    corner = np.array([x0 + 0.3 * (x1 - x0), y0 + 0.3 * (y1 - y0)])
+    block = shapely.box(*corner, *(corner + 4.0))
+    inside = shapely.intersects_xy(block, *xyz[:, :2].T) & (classes == 6)
+    xyz[inside, 2] = xyz[inside, 2].max() + 2.0
+    cloud = str(write_cloud(tmp_path / "block.laz", xyz, classes))
+    update_area(make_request(run, cloud, tmp_path / "out"))
+    model = build(by_id(tmp_path / "out")["house-1"])
+    top = model.roof.height_at([corner + 2.0 - model.roof.frame.origin[:2]])[0]
+    assert top + model.roof.frame.origin[2] == pytest.approx(xyz[inside, 2].max(), abs=0.2)
 
 
 def test_a_changed_house_keeps_its_passage(run, cloud, tmp_path):

@@ -73,7 +73,7 @@ def keep_parts(
     move_record(record, np.array(before["origin"]))
     lifts = find_lifts(old, new, pairs, near_m)
     kept = {
-        k: lift_part(before["parts"][pairs[k]], record["parts"][k], lift)
+        k: lift_part(before["parts"][pairs[k]], lift, record["parts"][k]["sigma"].get("t_z"))
         for k, lift in lifts.items()
     }
     redrawn = {k: part | {"outlines": record["parts"][k]["outlines"]} for k, part in kept.items()}
@@ -114,10 +114,15 @@ def find_lifts(
         if d.size and np.abs(d - np.median(d)).max() <= near_m:
             lift = float(np.median(d))
             result[k] = lift if abs(lift) > near_m else 0.0
-    moved = [lift for lift in result.values() if lift]
-    if moved and np.ptp(moved) <= near_m:
-        result = {k: float(np.mean(moved)) if lift else 0.0 for k, lift in result.items()}
-    return result
+    return unite_lifts(result, near_m)
+
+
+def unite_lifts(lifts: dict[int, float], near_m: float) -> dict[int, float]:
+    """Return how much higher (m) parts lie, the same for all that moved together."""
+    moved = [lift for lift in lifts.values() if lift]
+    if not moved or np.ptp(moved) > near_m:
+        return lifts
+    return {k: float(np.mean(moved)) if lift else 0.0 for k, lift in lifts.items()}
 
 
 def compare_heights(old: Building, j: int, new: Building, k: int) -> np.ndarray:
@@ -129,14 +134,17 @@ def compare_heights(old: Building, j: int, new: Building, k: int) -> np.ndarray:
     return np.diff(heights[:, np.isfinite(heights).all(axis=0)], axis=0)[0]
 
 
-def lift_part(before: dict[str, Any], after: dict[str, Any], height: float) -> dict[str, Any]:
-    """Return an earlier part so much higher (m), as sure as part `after`."""
+def lift_part(before: dict[str, Any], height: float, sigma_m: float | None) -> dict[str, Any]:
+    """Return an earlier part so much higher (m).
+
+    `sigma_m` is the standard deviation of its new height, None where it is unknown.
+    """
     if not height:
         return before
     x, y, z = before["position"]
-    sigma = {name: value for name, value in before["sigma"].items() if name != "t_z"}
-    if "t_z" in after["sigma"]:
-        sigma["t_z"] = after["sigma"]["t_z"]
+    sigma = {name: v for name, v in (before.get("sigma") or {}).items() if name != "t_z"}
+    if sigma_m is not None:
+        sigma["t_z"] = round(sigma_m, LENGTH_DIGITS)
     return before | {"position": [x, y, round(z + height, LENGTH_DIGITS)], "sigma": sigma}
 
 

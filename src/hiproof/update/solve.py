@@ -41,6 +41,7 @@ from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
 from .members import UpdateMember, load_members
+from .moved import measure_moved, move_building
 from .places import (
     demolish,
     end_building,
@@ -201,6 +202,10 @@ class Updater:
         if verdict.change is Change.UNCERTAIN:
             places = record_places(name_doubts(verdict), frame)
             return self.mark(earlier, verdict, places, member)
+        moved = self.move(job, member, earlier, verdict)
+        if moved is not None:
+            places = self.name_places(earlier, moved, verdict)
+            return self.mark(moved, verdict, places, member, list(range(len(moved.parts))))
         new = self.reconstruct(job, member)
         if new.built is None or not explains(
             move_to_frame(new.roof, earlier.roof), earlier.roof, verdict
@@ -210,6 +215,24 @@ class Updater:
         result, lineage = continue_parts(earlier, new, self.near_m, points)
         places = self.name_places(earlier, result, verdict)
         return self.mark(result, verdict, places, member, lineage)
+
+    def move(
+        self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
+    ) -> Building | None:
+        """Return the earlier building with moved parts.
+
+        None where that does not explain the new points, or where an override holds.
+        """
+        if job.index in self.overrides or member.record is None:
+            return None
+        old, new = self.epochs.select(job, member.record)
+        to_local = earlier.roof.frame.to_local
+        points = None if old is None else to_local(old), to_local(new)
+        moved = move_building(earlier, member.record, verdict, points, self.surveys, self.near_m)
+        if moved is None:
+            return None
+        moved = dataclasses.replace(moved, attributes=member.attributes)
+        return measure_moved(moved, select_roof(self.epochs.new, job).points)
 
     def name_places(
         self, earlier: Building, result: Building | None, verdict: ChangeVerdict
