@@ -88,7 +88,7 @@ class Window(NamedTuple):
 
     It has the numbers of the volumes that reach into the box, what they are cut to (one site for
     every part of the outline), and the points that judge: local `xy` (n, 2) and `z` (n,), each for
-    `weight` points.
+    `weight` points. `base` says whether the base may show in it.
     """
 
     box: shapely.Polygon
@@ -98,6 +98,7 @@ class Window(NamedTuple):
     xy: np.ndarray
     z: np.ndarray
     weight: float
+    base: bool
 
 
 class Drawing(NamedTuple):
@@ -125,7 +126,7 @@ def weld(
     """Return the sides, planes and regions of all volumes with every repair that pays."""
     problem = make_problem(volumes, agreement, site, base)
     state = begin_state(sides, problem)
-    whole = make_window(make_whole_box(problem), list_quads(state, problem), problem)
+    whole = make_window(make_whole_box(problem), list_quads(state, problem), base, problem)
     drawing = draw_window(state, whole, problem)
     trials: Counter[tuple] = Counter()
     for _ in range(MOST_ROUNDS):
@@ -165,8 +166,8 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     sides = [state.sides[k] for k in window.numbers]
     parts, plans = [], []
     for site in window.sites:
-        if problem.base or len(volumes) == 1:
-            regions = cut_regions(volumes, planes, sides, site, problem.base)
+        if window.base or len(volumes) == 1:
+            regions = cut_regions(volumes, planes, sides, site, window.base)
         else:
             regions = sketch_regions(volumes, sides, problem.site)
         part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
@@ -239,7 +240,8 @@ def run_round(
         if any(shapely.intersects(box, other) for other in changed):
             continue
         if present.window.box is not box and not present.window.box.equals(box):
-            present = RepairTrial(state, make_window(box, quads, problem), plan, problem)
+            window = make_window(box, quads, problem.base and shows_base(plan, box), problem)
+            present = RepairTrial(state, window, plan, problem)
         repaired_state = apply_repair(state, repair, present.window, problem)
         if repaired_state is None:
             continue
@@ -258,6 +260,15 @@ def list_owners_beyond(plan_drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple
     out = (x < x0) | (x > x1) | (y < y0) | (y > y1)
     planes = plan_drawn.beside[out[plan_drawn.edges].any(axis=1)]
     return {(k, p) for k, p in plan_drawn.owner[np.unique(planes[planes >= 0])].tolist()}
+
+
+def shows_base(plan_drawn: DrawnPlan, box: shapely.Polygon) -> bool:
+    """Return whether the base lies beside an edge in a box."""
+    is_base = np.append(plan_drawn.owner[:, 0] == 0, False)  # False is that of -1, outside
+    ends = plan_drawn.places[plan_drawn.edges[is_base[plan_drawn.beside].any(axis=1)]]
+    x0, y0, x1, y1 = box.bounds
+    is_low, is_high = ends.max(axis=1) < (x0, y0), ends.min(axis=1) > (x1, y1)
+    return not (is_low | is_high).any(axis=1).all()
 
 
 def make_whole_box(problem: WeldProblem) -> shapely.Polygon:
@@ -311,10 +322,12 @@ def list_quads(state: RoofState, problem: WeldProblem) -> list[shapely.Polygon]:
     return [problem.site.cut_quad(volume, volume_sides)[0] for volume, volume_sides in pairs]
 
 
-def make_window(box: shapely.Polygon, quads: list[shapely.Polygon], problem: WeldProblem) -> Window:
+def make_window(
+    box: shapely.Polygon, quads: list[shapely.Polygon], base: bool, problem: WeldProblem
+) -> Window:
     """Return what of the roof lies in a box of local coordinates.
 
-    Its volumes have these `quads`.
+    Its volumes have these `quads`, and `base` says whether the base may show.
     """
     scene, xy, order = problem.scene, problem.xy, problem.order
     numbers = np.array([0, *(1 + np.flatnonzero(shapely.intersects(quads, box)))], int)
@@ -332,7 +345,7 @@ def make_window(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Wel
         polygons = list_polygons(shapely.intersection(outline, box))
         sites = [PlanSite(part, problem.plan, window_scene, {}) for part in polygons]
     weight = len(inside) / max(count, 1)
-    return Window(box, numbers, sites, window_scene, xy[judges], scene.z[judges], weight)
+    return Window(box, numbers, sites, window_scene, xy[judges], scene.z[judges], weight, base)
 
 
 def price_window(
