@@ -172,14 +172,13 @@ def tidy_volumes(
     """
     is_house = site.outline.area <= LARGE_ROOF_M2
 
-    def tidy(rows: np.ndarray, scene: Scene, _: list[int] | None) -> np.ndarray:
+    def tidy(rows: np.ndarray, scene: Scene) -> np.ndarray:
         return split_volumes(drop_slivers(drop_specks(rows, scene), scene), scene)
 
-    def unite(rows: np.ndarray, scene: Scene, movable: list[int] | None) -> np.ndarray:
-        if movable is None:
-            return unite_volumes(rows, ends, scene, cache, None, is_house).volumes
-        own_ends = select_ends(ends, scene)
-        return unite_volumes(rows, own_ends, scene, {}, movable, is_house).volumes
+    def unite(rows: np.ndarray, scene: Scene) -> np.ndarray:
+        if scene is site.scene:
+            return unite_volumes(rows, ends, scene, cache, is_house).volumes
+        return unite_volumes(rows, select_ends(ends, scene), scene, {}, is_house).volumes
 
     return run_in_groups(unite, run_in_groups(tidy, volumes, site), site)
 

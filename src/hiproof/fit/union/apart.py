@@ -13,7 +13,18 @@ from .moves import remove_volume
 from .objective import compute_objective
 from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
 from .trim import COVER_M, find_runs
-from .volumes import DIRECTION, LEVEL, OFFSET0, U0, U1, UNSORTED, V0, V1, compute_roof_heights
+from .volumes import (
+    DIRECTION,
+    LEVEL,
+    OFFSET0,
+    U0,
+    U1,
+    UNSORTED,
+    V0,
+    V1,
+    compute_roof_heights,
+    list_movable,
+)
 
 LEAST_SHOWN_M2 = 1.0  # Least area (m2) of each of the places in which a volume is visible.
 ROW_DEPTH_M = 0.5  # Difference in depth (m) within which volumes of a row are equally deep.
@@ -26,7 +37,7 @@ def split_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """Split each volume that is visible in several places of a row or under a roof."""
     U, V = list_nodes(scene, VISIBLE_DEPTH_M)
     heights, top = compute_roof_heights(volumes, U, V, UNSORTED)
-    for k in range(len(volumes) - 1, 0, -1):
+    for k in reversed(list_movable(volumes)):
         for axis in (0, 1):
             pieces = find_pieces(volumes, k, axis, U, V, top, scene)
             if len(pieces) > 1:

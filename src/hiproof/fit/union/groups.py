@@ -19,7 +19,7 @@ from .regions import PlanSite
 from .scene import Scene
 from .sides import Side
 from .unite import DrawnRoof, OutlineEnds, draw_roof, select_ends
-from .volumes import U0, V1
+from .volumes import SETTLED, U0, V1
 from .whole import POSITION, Whole
 from .window import forget_digests, open_window, restore_volumes
 
@@ -28,14 +28,14 @@ GROUP = 8  # Most volumes of a group.
 GROUP_MARGIN_M = 2.0  # Distance (m) around a group that its window shows.
 GROUP_POINTS = 6000  # Most points of a group's window.
 
-# A change of volumes in a scene. It takes the numbers of those that may change (None: all).
-Pass = Callable[[np.ndarray, Scene, list[int] | None], np.ndarray]
+# A change of volumes in a scene. It leaves fixed ones as they are.
+Pass = Callable[[np.ndarray, Scene], np.ndarray]
 
 
 def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarray:
     """Let a pass change the volumes: all at once if they are few, else group by group."""
     if len(volumes) <= MOST_AT_ONCE:
-        return change(volumes, site.scene, None)
+        return change(volumes, site.scene)
     whole = Whole(site.scene, site.plan, site.outline, volumes)
     for places in [
         [whole.volumes[k, POSITION].tobytes() for k in group] for group in group_volumes(whole)
@@ -45,9 +45,9 @@ def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarr
         if view is None:
             continue
         scene, numbers = view
-        new_rows = change(whole.volumes[numbers].copy(), scene, group)
-        unmoved = [k for k in numbers[1:] if k not in group]
-        new_rows = restore_volumes(new_rows.copy(), whole.volumes, unmoved)
+        rows, unmoved = whole.volumes[numbers], [k for k in numbers[1:] if k not in group]
+        rows[np.isin(numbers, [0, *unmoved]), SETTLED] = np.inf
+        new_rows = restore_volumes(change(rows, scene).copy(), whole.volumes, unmoved)
         whole.replace(numbers[1:], new_rows[1:])
     return forget_digests(whole.volumes)
 

@@ -27,6 +27,7 @@ from .volumes import (
     U0,
     V0,
     compute_roof_heights,
+    list_movable,
 )
 
 END_SAMPLE_M = 0.1  # Distance (m) between the places at which an end is sampled.
@@ -46,7 +47,7 @@ def extend_ends(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.nda
 
     They move if that costs less than a step. Also returns the objective.
     """
-    for k in range(1, len(volumes)):
+    for k in list_movable(volumes):
         for edge in range(N_SIDES):
             places, highest = measure_protrusion(volumes, k, edge, scene)
             if places == 0 or places * END_SAMPLE_M > WIDEST_END_M or highest > HIGHEST_END_M:

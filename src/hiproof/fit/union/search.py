@@ -66,7 +66,7 @@ def find_volumes(
     return volumes, value, full_scene
 
 
-def trim_and_extend(volumes: np.ndarray, scene: Scene, _: object = None) -> np.ndarray:
+def trim_and_extend(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """Draw hidden edges in, and extend ends that stand out of a neighbour into it."""
     volumes, value = trim(volumes, scene, compute_objective(volumes, scene, np.inf))
     return extend_ends(volumes, scene, value)[0]

@@ -25,6 +25,7 @@ from .volumes import (
     UNSORTED,
     compute_roof_heights,
     find_lowest_plane,
+    list_movable,
     measure_run,
     read_coefficients,
 )
@@ -42,10 +43,11 @@ def drop_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """
     while len(volumes) > 2:
         _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
-        n_seen = np.bincount(top[: scene.n], minlength=len(volumes))[1:]
-        if n_seen.min() >= FEWEST_SEEN:
+        movable = list_movable(volumes)
+        n_seen = np.bincount(top[: scene.n], minlength=len(volumes))[movable]
+        if n_seen.min(initial=FEWEST_SEEN) >= FEWEST_SEEN:
             break
-        trial = remove_volume(volumes, 1 + int(np.argmin(n_seen)))
+        trial = remove_volume(volumes, int(movable[np.argmin(n_seen)]))
         volumes, _ = refit_volumes(trial, scene, compute_objective(trial, scene, np.inf))
     return volumes
 
@@ -58,7 +60,7 @@ def drop_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     value = compute_objective(volumes, scene, np.inf)
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V, UNSORTED)
-    for k in range(1, len(volumes)):
+    for k in list_movable(volumes):
         for plane in list_narrow_planes(volumes, k, U, V, top):
             if np.isfinite(volumes[k, OFFSET0 : OFFSET0 + N_PLANES]).sum() < 2:
                 break

@@ -13,7 +13,17 @@ from .objective import compute_objective
 from .prices import CUT_UNITS, SLACK_UNITS
 from .scene import Scene, list_nodes
 from .steps import list_near
-from .volumes import DIRECTION, U0, U1, UNSORTED, V0, V1, compute_roof_heights
+from .volumes import (
+    DIRECTION,
+    U0,
+    U1,
+    UNSORTED,
+    V0,
+    V1,
+    compute_roof_heights,
+    is_fixed,
+    list_movable,
+)
 
 HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
 COVER_M = 0.25  # They are drawn in to this distance (m) beyond what is visible.
@@ -30,12 +40,15 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
 
     Edges are drawn in to what is visible of each volume. Also returns the objective.
     """
-    volumes, value = draw_out(volumes, scene, value, np.arange(len(volumes)))
+    volumes, value = draw_out(volumes, scene, value, list_movable(volumes))
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     visible_by_volume = [top == k for k in range(len(volumes))]
     k = 1
     for visible in visible_by_volume[1:]:
+        if is_fixed(volumes, k):
+            k += 1
+            continue
         if not visible.any():
             trial = remove_volume(volumes, k)
             trial_value = compute_objective(trial, scene, value + 1e-9)
@@ -85,13 +98,11 @@ def draw_out(
     distances = OUTWARDS[:, None] * (lines[:, :, None] - edges)
     nearest = np.where(distances > 0.0, distances, np.inf).min(axis=3).reshape(-1, 4)
     for q, edge in np.argwhere(nearest[numbers] < NEAR_VERTEX_M):
-        k = numbers[q]
-        if k > 0:
-            trial = volumes.copy()
-            trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
-            trial_value = compute_objective(trial, scene, value + SLACK_UNITS * scene.evidence)
-            if np.isfinite(trial_value):
-                volumes, value = trial, trial_value
+        k, trial = numbers[q], volumes.copy()
+        trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
+        trial_value = compute_objective(trial, scene, value + SLACK_UNITS * scene.evidence)
+        if np.isfinite(trial_value):
+            volumes, value = trial, trial_value
     return volumes, value
 
 
@@ -101,7 +112,7 @@ def list_around(volumes: np.ndarray, k: int, scene: Scene) -> np.ndarray:
     wide[k, [U0, V0]] -= NEAR_VERTEX_M
     wide[k, [U1, V1]] += NEAR_VERTEX_M
     near = list_near(wide, scene.turn, -1)[k]
-    return near[1 : 1 + near[0]]
+    return np.intersect1d(near[1 : 1 + near[0]], list_movable(volumes))
 
 
 def draw_in(

@@ -7,7 +7,7 @@ volumes beside each other then stand for one.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -39,12 +39,12 @@ from .volumes import (
     N_PLANES,
     OFFSET0,
     REPLACES,
-    ROW_NUMBER,
     SLOPE0,
     U0,
     V0,
     V1,
     compute_roof_heights,
+    list_movable,
     measure_runs,
     price_volume,
 )
@@ -87,12 +87,10 @@ def unite_volumes(
     ends: OutlineEnds,
     scene: Scene,
     cache: Cache,
-    movable: Collection[int] | None = None,
     covers_corners: bool = True,
 ) -> DrawnRoof:
     """Draw the volumes along their sides, and drop or merge those that do not pay.
 
-    Only volumes of the numbers `movable` are merged with others or dropped, all if it is None.
     Planes in the `cache` of this scene are not fitted again. `covers_corners` says whether one
     volume may replace several over walls that cut its corners off.
     """
@@ -103,7 +101,7 @@ def unite_volumes(
     has_improved = True
     while has_improved:
         has_improved = False
-        for trial in list_reductions(best, movable):
+        for trial in list_reductions(best):
             if is_base_bared(trial, best.volumes, scene):
                 continue
             trial, trial_value = refit_volumes(
@@ -192,23 +190,20 @@ def price_structure(volumes: np.ndarray, scene: Scene) -> float:
     )
 
 
-def list_reductions(roof: DrawnRoof, movable: Collection[int] | None) -> Iterator[np.ndarray]:
+def list_reductions(roof: DrawnRoof) -> Iterator[np.ndarray]:
     """Yield volumes with two alike merged, and without one.
 
     The latter are tried if sides are not square to each other.
     """
-    is_movable = [
-        movable is None or number in movable for number in roof.volumes[:, ROW_NUMBER].tolist()
-    ]
-    for j, k in combinations(range(1, len(roof.volumes)), 2):
-        if (is_movable[j] or is_movable[k]) and is_alike(roof.volumes[j], roof.volumes[k]):
+    movable = list_movable(roof.volumes).tolist()
+    for j, k in combinations(movable, 2):
+        if is_alike(roof.volumes[j], roof.volumes[k]):
             trial = roof.volumes.copy()
             trial[j] = merge_rectangles(trial[j], trial[k])
             yield remove_volume(trial, k)
     if any(abs(side.lean) > SQUARE_LEAN for volume_sides in roof.sides for side in volume_sides):
-        for k in range(len(roof.volumes) - 1, 0, -1):
-            if is_movable[k]:
-                yield remove_volume(roof.volumes, k)
+        for k in reversed(movable):
+            yield remove_volume(roof.volumes, k)
 
 
 def draw_roof(volumes: np.ndarray, ends: OutlineEnds, scene: Scene, cache: Cache) -> DrawnRoof:

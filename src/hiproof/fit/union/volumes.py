@@ -94,6 +94,11 @@ def is_fixed(volumes, k):
     return volumes[k, SETTLED] == np.inf
 
 
+def list_movable(volumes: np.ndarray) -> np.ndarray:
+    """Return the numbers of the volumes but the base that moves may change."""
+    return 1 + np.flatnonzero(volumes[1:, SETTLED] < np.inf)
+
+
 @compiled(inline="always")
 def is_within(ends, u, v):
     """Return whether u, v lies in a rectangle with these `ends`.
