@@ -31,6 +31,8 @@ HEAD = """# Roof types and their parameters
 - An onion is a bulge with a pointed top. Its eave lies at its widest circle. Walls are vertical, so
   the model leaves out how the bulge draws in below that. The `neck_height` is the height at which
   the top begins, at two fifths of the radius; it is at most three fifths of the `height`.
+- A drum is a flat part over a circle, and a ring one around a court or another drum. Their
+  outlines have as many sides as a cone of their size has facets.
 - A half cone roofs an apse. Its `width` runs along the wall, and its `length` away from it.
 - A gable with its ridge off the middle also has a `ridge_offset` (m, towards the back).
 - A roof that is less regular than its type gives each side's own values, such as `pitch_front` and

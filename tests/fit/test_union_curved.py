@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from benchmarks.curved import draw_scene, judge_scene
+from benchmarks.curved import DRUM_SETTINGS, draw_scene, is_drum_found, judge_scene, make_disc
 
 import hiproof
 from hiproof.compose import check_solid, compose
@@ -76,6 +76,37 @@ def test_a_turret_is_found_from_two_points_a_square_metre():
         judge_scene(draw_scene("cone", "turret", seed, 2.0)).is_right for seed in range(20, 26)
     ]
     assert all(found)
+
+
+@pytest.mark.parametrize("setting", DRUM_SETTINGS)
+def test_a_drum_is_found(setting):
+    assert is_drum_found(setting, 20, 8.0)
+
+
+@pytest.mark.parametrize("step", [-3.0, 1.5])
+def test_a_drum_in_a_drum_leaves_a_ring(step):
+    disc, middle = make_disc(0.0, 0.0, 5.0), make_disc(0.0, 0.0, 2.5)
+
+    def height_at(x, y):
+        return 10.0 + np.where(np.hypot(x, y) < 2.49, step, 0.0)
+
+    building = hiproof.reconstruct(sample_heights(height_at, disc), disc)
+    assert [part.type for part in building.parts] == ["flat", "flat"]
+    roof = building.solid.select_faces("RoofSurface")
+    areas = sorted(building.solid.project_face(face).area for face in roof)
+    assert areas == pytest.approx([middle.area, disc.area - middle.area], rel=0.03)
+    assert not check_solid(building.solid)
+
+
+def test_a_square_shaft_is_no_drum():
+    house, shaft = shapely.box(0.0, 0.0, 14.0, 10.0), shapely.box(5.0, 3.0, 8.5, 6.5)
+
+    def height_at(x, y):
+        return 9.0 + 3.0 * shapely.contains_xy(shaft, x, y)
+
+    parts = fit_building(sample_heights(height_at, house), house).roof_parts
+    assert min(part.area for part in parts) == pytest.approx(shaft.area, rel=0.05)
+    assert min(len(part.outlines[0].exterior.coords) for part in parts) == 5
 
 
 def test_a_level_or_a_hipped_end_stays_so():

@@ -58,6 +58,7 @@ judged      roofs judged by points, with one shape in place of several parts
 round_ends  cones, spires, domes, onions and half cones over round stretches of the outline
 round_tops  cones, spires, domes and onions around the tops of parts
 onions      onions around round parts, which may be their tops
+drums       level discs over arcs of the outline and around level parts
 barrels     barrel vaults over parts with slopes to two sides
 curved      these shapes where points follow them better
 shown       hidden parts removed

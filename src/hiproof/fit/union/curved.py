@@ -19,6 +19,7 @@ from ...primitives.cants import list_cants
 from ...primitives.catalogue import CATALOGUE, CURVED, ROUND
 from ...settings import Settings
 from .barrels import list_barrels
+from .drums import place_drums
 from .judged import JudgedRoof, measure_gain, measure_slope, replace_parts, scale_cap, trim_parts
 from .onions import list_onions
 from .own import MOST_DISTANCE_M
@@ -42,11 +43,14 @@ def fit_curved_shapes(
     """Replace parts by curved shapes that follow the points (n, 3) better."""
     allowed = settings.fit.types or CURVED
     names = [name for name in CURVED if name in allowed]
-    if not names:
-        return parts
     inside = points[shapely.contains_xy(outline, points[:, 0], points[:, 1])]
     roof = JudgedRoof(parts, inside, outline)
-    for end in find_round_ends(outline):
+    ends = find_round_ends(outline)
+    if not settings.fit.types or "flat" in settings.fit.types:
+        roof = place_drums(roof, ends)
+    if not names:
+        return roof.parts
+    for end in ends:
         roof = roof_round_end(roof, end, names)
     for _ in range(len(parts)):
         better = find_better_roof(roof, names, settings)

@@ -53,7 +53,7 @@ def scale_cap(slope: float) -> float:
 
 def measure_slope(shape: Part) -> float:
     """Return the rise of a curved shape over half of its width."""
-    return 2.0 * shape.parameters["height"] / shape.parameters["width"]
+    return 2.0 * shape.parameters.get("height", 0.0) / shape.parameters["width"]
 
 
 def replace_parts(

@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 import shapely
+from shapely import affinity
 
 from ...geometry.rings import OVERLAY_GRID_M, counterclockwise
 from ...model import Part
@@ -35,6 +36,8 @@ APSE_DEG = (140.0, 220.0)  # Arcs of half discs.
 WHOLE_DISCS = ("cone", "dome", "onion")  # Types over a whole disc.
 TURRET_DEG = 150.0  # Shortest arc of a whole disc.
 ON_CIRCLE = 0.03  # Farthest that a corner lies off its circle, in shares of the radius.
+WHOLE_CIRCLE_DEG = 359.0  # Longer arcs are whole circles.
+SECTOR_REACH = 2.0  # A sector of so many radii holds all of a shape beyond its arc.
 LARGEST_RADIUS_M = 30.0  # Larger circles are bent facades.
 SLOPES_TRIED = 24  # Slopes, in equal ratios, from which the likeliest start is taken.
 BULGES_TRIED, BENDS_TRIED = 10, 7  # The same of the two slopes of an onion.
@@ -213,7 +216,18 @@ def list_slopes(shape: Primitive) -> list[tuple[float, ...]]:
 
 def cut_to_outline(shape: Part, end: RoundEnd, outline: shapely.Polygon) -> Iterator[Part]:
     """Yield the shape over its plan and up to the arc, as far as the outline reaches."""
-    plan = shapely.union(shape.pieces[0].outline, end.area, grid_size=OVERLAY_GRID_M)
+    plan = follow_arc(shape.pieces[0].outline, end)
     polygons = list_polygons(shapely.intersection(plan, outline, grid_size=OVERLAY_GRID_M))
     if polygons:
         yield cut_part(shape, max(polygons, key=lambda polygon: polygon.area))
+
+
+def follow_arc(plan: shapely.Polygon, end: RoundEnd) -> shapely.Geometry:
+    """Return a plan over the circle of a round end with the corners of its arc."""
+    if end.span_deg >= WHOLE_CIRCLE_DEG or not isinstance(end.area, shapely.Polygon):
+        return shapely.union(plan, end.area, grid_size=OVERLAY_GRID_M)
+    arc = shapely.get_coordinates(end.area.exterior)[:-1]
+    sector = shapely.make_valid(shapely.Polygon([end.centre, *arc]))
+    beyond = affinity.scale(sector, SECTOR_REACH, SECTOR_REACH, origin=tuple(end.centre))
+    rest = shapely.difference(plan, beyond, grid_size=OVERLAY_GRID_M)
+    return shapely.union(rest, sector, grid_size=OVERLAY_GRID_M)
