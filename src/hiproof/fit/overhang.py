@@ -24,7 +24,7 @@ OVERHANG_REACH_M = 1.5  # behind and beyond an edge, within which points are loo
 LONGEST_OVERHANG_M = 1.2  # beyond, a roof is another one; shorter edges are not measured
 SHORTEST_OVERHANG_M = 0.1  # an overhang; less is within the accuracy of footprints
 ON_PLANE_M = 0.15  # from the roof's plane at right angles, within which a point continues it
-EAVE_BLUR_M = 0.08  # standard deviation of the roof's end in the points: theirs, the beam's width
+EAVE_BLUR_M = 0.07  # standard deviation of the roof's end in the points: theirs, the beam's width
 STRAY_DENSITY = 0.02  # density of other points near the plane, by that of the roof's
 EAVE_STEP_M = 0.05  # between the places that are compared across an edge
 LEAST_SIGMA_M = EAVE_STEP_M / math.sqrt(12.0)  # of a place known to one step
@@ -189,13 +189,32 @@ def measure_edge(
         for x in (across, ACROSS_M)
     )
     log_likelihood = np.log(at_points).sum(axis=1) - len(across) * np.log(at_places @ clear)
-    chance = np.exp(log_likelihood - log_likelihood.max())
-    chance /= chance.sum()
+    first = float(find_chances(log_likelihood) @ ACROSS_M)
+    chance = find_chances(log_likelihood / measure_clumping(across[across < first]))
     reach = float(chance @ ACROSS_M)
     sigma = max(math.sqrt(float(chance @ (ACROSS_M - reach) ** 2)), LEAST_SIGMA_M)
     before = (ACROSS_M > 0.0) & (reach > ACROSS_M)
     expected = behind * float(clear[before].sum() / clear[ACROSS_M < 0.0].sum())
     return Measurement(reach, sigma, int(((across > 0.0) & (across < reach)).sum()), expected)
+
+
+def find_chances(log_likelihood: np.ndarray) -> np.ndarray:
+    """Return the chances (k,) of places by their likelihood."""
+    chance = np.exp(log_likelihood - log_likelihood.max())
+    return chance / chance.sum()
+
+
+def measure_clumping(across: np.ndarray) -> float:
+    """Return how many of the points (n,) across an edge count as one.
+
+    It is 1 where they lie evenly. Scan lines that run along an edge leave gaps g. From the last of
+    them, the roof goes on by E(g^2) / 2 E(g) on average (renewal theory), by E(g) where points lie
+    evenly.
+    """
+    gaps = np.diff(np.sort(across))
+    if not gaps.any():
+        return 1.0
+    return max(float((gaps**2).mean() / (2.0 * gaps.mean() ** 2)), 1.0)
 
 
 def cut_strip(
