@@ -42,7 +42,7 @@ from ..read.las import translate_errors
 from ..settings import Settings
 from .overrides import OVERRIDES_FILE
 from .plan import Job, WorkPlan, neighbourhood
-from .sort import POINT_KINDS, load_points
+from .sort import POINT_KINDS
 from .terrain_check import TerrainModel
 
 FAILURES_FOLDER, FACTS = "failures", "failure.json"
@@ -104,7 +104,7 @@ class TerrainRecorder:
 
 def keep_failure(
     root: Path,
-    tile: str,
+    load: Callable[[], dict[str, np.ndarray]],
     plan: WorkPlan,
     job: Job,
     trace: str,
@@ -112,7 +112,8 @@ def keep_failure(
 ) -> None:
     """Log the traceback of a failed building and keep its bundle; failing that, warn.
 
-    `root` is the run's own folder. `terrain` solves the building again over a recorded terrain
+    `root` is the run's own folder, and `load` returns the points of the building's work tile, by
+    kind. `terrain` solves the building again over a recorded terrain
     model, and returns None without one.
     """
     LOGGER.info("building %s failed:\n%s", job.id, trace)
@@ -121,7 +122,7 @@ def keep_failure(
     try:
         folder = root.parent / FAILURES_FOLDER / folder_name(job.id)
         if folder.exists() or len(bundles_in(root.parent)) < MOST_BUNDLES:
-            save_bundle(folder, root, tile, plan, job, trace, terrain())
+            save_bundle(folder, root, load(), plan, job, trace, terrain())
             if len(bundles_in(root.parent)) > MOST_BUNDLES:  # another process was faster
                 shutil.rmtree(folder)
     except Exception as error:
@@ -174,15 +175,18 @@ def remove_bundles(out: Path, failed_ids: Collection[str] = ()) -> None:
 def save_bundle(
     folder: Path,
     root: Path,
-    tile: str,
+    points: dict[str, np.ndarray],
     plan: WorkPlan,
     job: Job,
     trace: str,
     terrain: TerrainRecorder | None,
 ) -> None:
-    """Write the bundle `folder`, whole or not at all."""
+    """Write the bundle `folder`, whole or not at all.
+
+    `points` (n, 3) by kind are those of the building's work tile.
+    """
     with whole_folder(folder) as temporary:
-        write_points(temporary / "points.laz", crop_points(load_points(root, tile), plan, job))
+        write_points(temporary / "points.laz", crop_points(points, plan, job))
         write_outline(temporary / "footprint.geojson", job)
         (temporary / "settings.toml").write_text(plan.settings.to_toml(), encoding="utf-8")
         (temporary / "traceback.txt").write_text(mask(trace), encoding="utf-8", errors="replace")

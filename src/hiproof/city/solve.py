@@ -322,12 +322,13 @@ def solve_tile(
     root = Path(folder)
     plan = load_plan(root)
     surroundings = Surroundings(load_points(root, tile), open_terrain(plan, terrain), plan)
-    overrides, keep = load_overrides(root), functools.partial(keep_failure, root, tile, plan)
+    overrides = load_overrides(root)
+    keep = functools.partial(keep_failure, root, lambda: surroundings.points, plan)
 
     def solve(job: Job) -> tuple[Building, Fragments]:
         return solve_one(plan, job, surroundings, overrides.get(job.index), keep)
 
-    return solve_buildings(root, plan, tile, solve, avoid)
+    return solve_buildings(root, plan, tile, solve, keep, avoid)
 
 
 def solve_buildings(
@@ -335,9 +336,13 @@ def solve_buildings(
     plan: WorkPlan,
     tile: str,
     solve: Callable[[Job], tuple[Building, Fragments]],
+    keep: KeepFailure,
     avoid: tuple[int, ...],
 ) -> list[Outcome]:
-    """Solve the buildings of `tile` one by one, and write its part file."""
+    """Solve the buildings of `tile` one by one, and write its part file.
+
+    `keep` is called with those to `avoid`.
+    """
     selection = kept_parts(root, tile, plan)
     parts, rows = [], []
     for index in plan.tiles[tile]:
@@ -347,7 +352,7 @@ def solve_buildings(
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
             building, part = record_failure(plan, job, DIED)
-            keep_failure(root, tile, plan, job, DIED, no_terrain)
+            keep(job, DIED, no_terrain)
         else:
             building, part = solve(job)
         parts.append(part)

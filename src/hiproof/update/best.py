@@ -61,13 +61,13 @@ def solve_best_tile(
     """
     root = Path(folder)
     plan, overrides = load_plan(root), load_overrides(root)
-    keep = functools.partial(keep_failure, root, tile, plan)
     surveys = TileSurveys(root, tile, terrain, names)
+    keep = functools.partial(keep_failure, root, lambda: surveys.unite(names).points, plan)
 
     def solve(job: Job) -> tuple[Building, Fragments]:
         return solve_best(plan, job, surveys, overrides.get(job.index), keep)
 
-    return solve_buildings(root, plan, tile, solve, avoid)
+    return solve_buildings(root, plan, tile, solve, keep, avoid)
 
 
 def load_shifts(state: Path) -> dict[str, SurveyShift]:

@@ -82,14 +82,14 @@ def update_tile(
     def solve(job: Job) -> tuple[Building, Fragments]:
         return solve_safely(plan, job, functools.partial(update, job), updater.keep)
 
-    return solve_buildings(root, plan, tile, solve, avoid)
+    return solve_buildings(root, plan, tile, solve, updater.keep, avoid)
 
 
 def make_updater(root: Path, tile: str, terrain: str | None, file: str) -> Updater:
     """Make the updater of a work tile by the surveys in `file`."""
     plan, surveys = load_plan(root), Surveys.load(root / file)
     epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
-    keep = functools.partial(keep_failure, root, tile, plan)
+    keep = functools.partial(keep_failure, root, lambda: epochs.new.points, plan)
     texts = load_texts(surveys.texts, tile, plan.head)
     return Updater(plan, epochs, surveys, keep, texts, load_overrides(root))
 
