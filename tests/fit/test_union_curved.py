@@ -11,6 +11,7 @@ from hiproof.fit.union import fit_building
 from hiproof.fit.union.round_ends import find_round_ends
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
+from hiproof.model.heights import find_highest
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import CURVED
 from hiproof.settings import Settings
@@ -43,6 +44,15 @@ def test_a_curved_roof_is_found(kind, setting):
     tolerance_m = 0.5 if kind == "onion" else 0.2
     assert outcome.height_error_m == pytest.approx(0.0, abs=tolerance_m)
     assert outcome.volume_error == pytest.approx(0.0, abs=0.03)
+
+
+@pytest.mark.parametrize("kind", ["cone", "dome", "onion"])
+def test_facets_over_an_arc_stand_on_its_sides(kind):
+    """So the eave is level."""
+    scene = draw_scene(kind, "alone", 22, 8.0)
+    parts = fit_building(scene.points, scene.outline).roof_parts
+    corners = 0.999 * shapely.get_coordinates(scene.outline)
+    assert np.ptp(find_highest(parts, corners)[0]) <= 0.05
 
 
 def test_an_onion_is_found_around_what_looks_like_a_spire():

@@ -49,14 +49,16 @@ FEWEST_HEIGHTS = 6  # A slope and a height, and as many points again to check th
 class RoundEnd:
     """An arc of an outline: the `centre` (2,) and `radius` (m) of its circle.
 
-    `kappa` (rad) leads from the centre to the middle of the arc, `span_deg` is its length, and the
-    polygon `area` lies between it and its chord. `sides` are those of a whole circle of its kind.
+    `kappa` (rad) leads from the centre to the middle of the arc, and `facing` to that of a side.
+    `span_deg` is the arc's length, and the polygon `area` lies between it and its chord. `sides`
+    are those of a whole circle of its kind.
     """
 
     area: shapely.Polygon
     centre: np.ndarray
     radius: float
     kappa: float
+    facing: float
     span_deg: float
     sides: int
 
@@ -128,10 +130,8 @@ def fit_round_end(corners: np.ndarray) -> RoundEnd | None:
     radius *= math.sqrt(math.sin(step) / step)  # of the circle with the same area
     area = shapely.make_valid(shapely.Polygon(arc))
     sides = round(2.0 * math.pi / step)
-    middle = float(0.5 * (way[0] + way[-1]))
-    if sides < FEWEST_ROUND_SIDES:
-        middle = float(0.5 * (way[0] + way[1]))  # in which a side faces
-    return RoundEnd(area, centre, radius, middle, span, sides)
+    middle, facing = (float(0.5 * (way[0] + way[k])) for k in (-1, 1))
+    return RoundEnd(area, centre, radius, middle, facing, span, sides)
 
 
 def list_end_shapes(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> Iterator[Part]:
@@ -156,8 +156,9 @@ def fit_over_circle(roof: JudgedRoof, end: RoundEnd, name: str, radius: float) -
     from ..likelihood import fit_heights  # compiled code that most roofs never need
 
     shape = CATALOGUE[name]
-    theta = np.array([*end.centre, end.kappa, radius, radius, 0.0, 0.0, 0.0, 0.0])
+    theta = np.array([*end.centre, end.facing, radius, radius, 0.0, 0.0, 0.0, 0.0])
     if name == "half_cone":
+        theta[KAPPA] = end.kappa
         theta[HALF_LENGTH] *= 0.5
         theta[:KAPPA] += 0.5 * radius * end.way
     plan = shape.part(theta).pieces[0].outline
