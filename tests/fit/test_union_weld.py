@@ -41,8 +41,10 @@ def capture_problem(monkeypatch, kind, seed):
 def price_box(state, problem, box=None):
     """Return price and corners of a roof, in a window or as a whole."""
     box = problem.outline.envelope if box is None else box
-    window = weld.make_window(box, weld.list_quads(state, problem), problem)
-    whole = weld.make_window(weld.make_whole_box(problem), weld.list_quads(state, problem), problem)
+    window = weld.make_window(box, weld.list_quads(state, problem), problem.base, problem)
+    whole = weld.make_window(
+        weld.make_whole_box(problem), weld.list_quads(state, problem), problem.base, problem
+    )
     extra = weld.list_owners_beyond(weld.draw_window(state, whole, problem).plans[0], box)
     drawing = weld.draw_window(state, window, problem)
     return weld.price_window(state, drawing, extra, window, problem), drawing.corners

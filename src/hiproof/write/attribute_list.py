@@ -595,6 +595,7 @@ SIZES = {
     "eave_step": ("m", "of an asymmetric gable: the back eave over the front eave"),
     "break_width": ("m", "of a gambrel, between the lines where its slopes break"),
     "break_height": ("m", "of these lines over the eave"),
+    "neck_height": ("m", "of an onion: the end of its bulge over the eave"),
 }
 OF_SIDES = {
     "pitch": ("deg", "slope of the plane from this side"),
