@@ -39,7 +39,10 @@ BULGE_CHORDS = 2  # of equal angles, between the neck and the eave
 ALL_CHORDS = len(TOP_KNOTS) - 1 + BULGE_CHORDS
 # Height of the bulge over half the width: flatter and higher ones are not built.
 LOWEST_BULGE, HIGHEST_BULGE = 0.2, 1.6
-FLATTEST, STEEPEST = 0.25, 1.8  # Heights over the width between which a typical onion is one.
+FLATTEST_TYPICAL, STEEPEST_TYPICAL = (
+    0.25,
+    1.8,
+)  # Heights over the width between which a typical onion is one.
 MOST_BEND = 4.0  # Largest height over half the width by which the top bends up: a needle.
 MOST_SIDES = 32  # They keep the tolerance of chords up to a diameter of 40 m.
 NECK_HEIGHT = math.sqrt(1.0 - NECK * NECK)  # of a bulge of the height 1
@@ -68,7 +71,7 @@ def shape(p: Mapping[str, float]) -> Shape:
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Return an onion of these sizes, higher or lower if no onion is so flat or steep."""
-    height = min(max(height, FLATTEST * width), STEEPEST * width)
+    height = min(max(height, FLATTEST_TYPICAL * width), STEEPEST_TYPICAL * width)
     return {"width": width, "length": length, "height": height, "neck_height": 0.4 * height}
 
 
