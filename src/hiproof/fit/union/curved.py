@@ -7,7 +7,6 @@ across it, one curved shape is fitted to them and compared with the parts that i
 
 from __future__ import annotations
 
-import math
 from itertools import chain
 
 import numpy as np
@@ -16,7 +15,7 @@ import shapely
 from ...model import Part
 from ...model.heights import find_highest
 from ...primitives.cants import list_cants
-from ...primitives.catalogue import CATALOGUE, CURVED, ROUND
+from ...primitives.catalogue import CURVED, ROUND
 from ...settings import Settings
 from .barrels import list_barrels
 from .drums import place_drums
@@ -75,7 +74,7 @@ def roof_round_end(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> JudgedR
         if new is roof or measure_visible_share(new) < LEAST_VISIBLE:
             continue
         price = WHOLE_NATS if end.is_half_disc and shape.type != "half_cone" else 0.0
-        price += (len(CATALOGUE[shape.type].bounds) - 1) * math.log(np.count_nonzero(judged))
+        price += LEAST_NATS if shape.type == "onion" else 0.0  # It is a cone or a dome and more.
         gain = measure_gain(roof, new, judged, scale_cap(measure_slope(shape))) - price
         if gain > least:
             best, least = new, gain
@@ -92,6 +91,7 @@ def measure_visible_share(roof: JudgedRoof) -> float:
 def find_better_roof(roof: JudgedRoof, names: list[str], settings: Settings) -> JudgedRoof | None:
     """Find the first part where a curved shape is better, with the best one."""
     distances, top = roof.measure_distances(MOST_DISTANCE_M), roof.highest[1]
+    tops = tuple(name for name in names if name in ROUND and name != "onion")
     for k in sorted(range(len(roof.parts)), key=lambda k: roof.parts[k].type not in CURVED):
         part, own = roof.parts[k], top == k
         if np.count_nonzero(own) < FEWEST_CURVE_POINTS:
@@ -100,7 +100,7 @@ def find_better_roof(roof: JudgedRoof, names: list[str], settings: Settings) -> 
             shapes = list_onions(roof, part, settings) if "onion" in names else iter(())
         elif distances[own].mean() >= LEAST_MISFIT_M or list_cants(part.parameters):
             shapes = chain(
-                list_round_shapes(roof, part, own, tuple(n for n in names if n in ROUND), settings),
+                list_round_shapes(roof, part, own, tops, settings),
                 list_barrels(roof, part, own, settings) if "barrel" in names else (),
             )
         else:

@@ -39,7 +39,8 @@ BENT = 0.85  # Share of the misfit that a curve leaves of the roof's, at most.
 GROWTH_ROUNDS = 2  # Rounds in which a spire is fitted to all points that follow it.
 FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
 BENT_TYPES = ("dome", "onion")  # Their slope changes with the distance from the top.
-TOP_SEEN = 0.25  # Share of the height of an onion's top that points must reach.
+TOP_FOLLOW_M = 0.5  # Points so near (m in height) to a steep top lie on it.
+TOP_SEEN = 0.5  # Share of the height of an onion's top that points must reach.
 LIKE_OUTLINE = 0.85  # Share of an outline and of a disc in common from which they are the same.
 
 
@@ -200,7 +201,8 @@ def is_top_seen(part: Part, points: np.ndarray) -> bool:
     if part.type != "onion":
         return True
     height, neck = part.parameters["height"], part.parameters["neck_height"]
-    reached = points[:, 2].max() - part.translation[2]
+    follows = np.abs(points[:, 2] - part.height_at(points[:, :2])) <= TOP_FOLLOW_M
+    reached = points[follows, 2].max(initial=-np.inf) - part.translation[2]
     return bool(reached >= neck + TOP_SEEN * (height - neck))
 
 
