@@ -25,8 +25,8 @@ AFTER_USER = re.compile(r"(://[^\s:@/?#\[]*):(?:[^\s?#]*@|(?!\d*(?:[/?#\s]|$))\S
 TOKEN_AS_USER = re.compile(r"(https?://)[^\s:@/?#]+@", re.IGNORECASE)
 ENCODED = re.compile(r"(%3A%2F%2F)[^\s&/]*%40", re.IGNORECASE)
 SECRET_NAME = (
-    r"(?<![a-z])(?:[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)"
-    r"|pass|sig|key|accesskeyid)\s*=\s*"
+    r"(?:(?<![\w-])[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)"
+    r"|(?<![a-z])(?:pass|sig|key|accesskeyid))\s*=\s*"
 )
 NAMED = re.compile(
     rf"({SECRET_NAME})" r"""(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^&\s]*[^&\s,;:.)'"])""",
