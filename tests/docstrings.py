@@ -10,7 +10,15 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from naming import ROOT, is_property, list_files, list_files_around, name_file
+from naming import (
+    ROOT,
+    is_property,
+    iterate_statements,
+    list_files,
+    list_files_around,
+    name_file,
+    parse,
+)
 
 LONGEST_LINE = 80  # characters of a first line, so that lists of functions show it whole
 NOUNS = ("The", "A", "An", "What", "Whether", "How", "Where", "Which", "Those", "All", "One", "Of")
@@ -28,7 +36,7 @@ def iterate_docstrings() -> Iterator[tuple[str, Documented, str]]:
 
 def iterate_file(file: Path) -> Iterator[tuple[str, Documented, str]]:
     """Yield the place, the node and the docstring of all that has one in a file."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in iterate_statements(parse(file)):
         if isinstance(node, Documented) and (text := ast.get_docstring(node)):
             yield f"{name_file(file)}: {getattr(node, 'name', 'module')}", node, text
 

@@ -12,6 +12,8 @@ import ast
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -89,12 +91,35 @@ def parse(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"))
 
 
-def iterate_functions(files: list[Path]) -> Iterator[tuple[Path, ast.FunctionDef]]:
-    """Yield all functions and methods, without properties, which are nouns."""
-    for file in files:
-        for node in ast.walk(parse(file)):
-            if isinstance(node, ast.FunctionDef) and not is_property(node):
-                yield file, node
+def iterate_statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield a node and all statements below it, however deep.
+
+    Expressions, most of a tree, hold no statements and are passed over.
+    """
+    yield node
+    for field in ("body", "handlers", "cases", "orelse", "finalbody"):
+        inner = getattr(node, field, ())
+        for statement in inner if isinstance(inner, list) else ():
+            yield from iterate_statements(statement)
+
+
+@dataclass(frozen=True)
+class FileNames:
+    """The names of a file: of functions with their locals, and of classes."""
+
+    functions: tuple[tuple[str, frozenset[str]], ...]
+    classes: tuple[str, ...]
+
+
+@cache
+def read_names(file: Path) -> FileNames:
+    """Return the names of a file, without those of properties, which are nouns."""
+    statements = list(iterate_statements(parse(file)))
+    functions = (node for node in statements if isinstance(node, ast.FunctionDef))
+    return FileNames(
+        tuple((node.name, list_locals(node)) for node in functions if not is_property(node)),
+        tuple(node.name for node in statements if isinstance(node, ast.ClassDef)),
+    )
 
 
 def is_property(function: ast.FunctionDef) -> bool:
@@ -116,28 +141,30 @@ def find_misnamed_functions(files: list[Path]) -> list[str]:
     Tests are named by the law that they check, which is a sentence.
     """
     misnamed = []
-    for file, function in iterate_functions(files):
-        words = function.name.strip("_").split("_")
+    functions = ((file, name) for file in files for name, _ in read_names(file).functions)
+    for file, name in functions:
+        words = name.strip("_").split("_")
         first, last = words[0], words[-1]
-        if function.name in ALLOWED_FUNCTIONS or first in VERBS | {"test"}:
+        if name in ALLOWED_FUNCTIONS or first in VERBS | {"test"}:
             continue
         if is_participle(last) or last in FUNCTION_WORDS - {"at"}:  # `height_at` is a height
-            misnamed.append(f"{name_file(file)}: {function.name}")
+            misnamed.append(f"{name_file(file)}: {name}")
     return sorted(set(misnamed))
 
 
-def list_locals(function: ast.FunctionDef) -> set[str]:
+def list_locals(function: ast.FunctionDef) -> frozenset[str]:
     """Return the names of a function's parameters and variables."""
     arguments = function.args
     names = {item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
     stores = (node for node in ast.walk(function) if isinstance(node, ast.Name))
     names |= {node.id for node in stores if isinstance(node.ctx, ast.Store)}
-    return names - ({"left"} if "right" in names else set())
+    return frozenset(names - ({"left"} if "right" in names else set()))
 
 
 def count_locals(files: list[Path]) -> tuple[int, Counter[str]]:
     """Return the number of local names, and how often each function word is one of them."""
-    names = [name for _, function in iterate_functions(files) for name in list_locals(function)]
+    functions = (function for file in files for function in read_names(file).functions)
+    names = [name for _, local_names in functions for name in local_names]
     return len(names), Counter(name for name in names if name in FUNCTION_WORDS)
 
 
@@ -145,9 +172,8 @@ def find_duplicate_classes(files: list[Path]) -> dict[str, list[str]]:
     """Return the names that several classes have, with their files."""
     places = defaultdict(list)
     for file in files:
-        for node in ast.walk(parse(file)):
-            if isinstance(node, ast.ClassDef):
-                places[node.name].append(name_file(file))
+        for name in read_names(file).classes:
+            places[name].append(name_file(file))
     return {name: files for name, files in places.items() if len(files) > 1}
 
 

@@ -22,6 +22,7 @@ from hiproof.write.parameters import building_record, parameters_line
 
 PLAIN = Settings.from_dict({"segment": {"network": "never"}})
 BUILDING_CLASS, SOME = 6, 12
+SIMULATED = 12  # buildings of each kind of scene
 DELFT = Path(__file__).parents[3] / "shared" / "data" / "delft"
 GROUND, TREE = SOURCES.index("ground"), SOURCES.index("tree")
 
@@ -60,9 +61,9 @@ def test_real_buildings_follow_from_what_is_written():
 @pytest.mark.parametrize("with_footprint", [True, False])
 @pytest.mark.parametrize("density", [0.5, 1.0, 2.0, 5.0])
 def test_simulated_buildings_of_all_kinds_follow_from_what_is_written(density, with_footprint):
-    """A run reads its own file: of 200 buildings, damaged and sparse ones among them."""
+    """A run reads its own file: of 96 buildings, damaged and sparse ones among them."""
     scene, modelled = SceneSettings(density, True, with_footprint, damage=0.3), 0
-    for number in range(1, 26):
+    for number in range(1, SIMULATED + 1):
         placed = place_building(int(10 * density), number, scene)
         points = placed.points[(placed.source != GROUND) & (placed.source != TREE)]
         footprint = placed.footprint if with_footprint else None
@@ -73,7 +74,7 @@ def test_simulated_buildings_of_all_kinds_follow_from_what_is_written(density, w
         else:
             assert_follows(building)
             modelled += 1
-    assert modelled >= 20
+    assert modelled >= 0.8 * SIMULATED
 
 
 @pytest.mark.parametrize("wrong", [{"width": -131.0}, {"pitch_front": -12.0}, {"length": 0.0}])
