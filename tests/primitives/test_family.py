@@ -385,5 +385,5 @@ def test_what_is_no_type_or_lacks_a_parameter_is_told_in_a_sentence():
         compute_planes("igloo", {"pitch_front": 30.0}, 0.0, np.zeros(3))
     parameters, kappa, translation = draw_member(np.random.default_rng(0), "corner").side_by_side()
     del parameters["eave_front"]
-    with pytest.raises(FitError, match="expected the parameter eave_front of a corner roof"):
+    with pytest.raises(FitError, match="expected the parameter eave_front of the roof type corner"):
         compute_planes("corner", parameters, kappa, translation)

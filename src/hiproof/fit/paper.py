@@ -159,8 +159,8 @@ class PaperFit:
         """Return the fit with canonical parameters, in the frame of the points."""
         if not self.is_roof(self.theta):
             raise FitError(
-                f"expected points of a {self.shape.name} roof, got no such roof from them; try "
-                "other types"
+                f"expected points of the roof type {self.shape.name}, got no such roof from them; "
+                "try other types"
             )
         theta = self.shape.canonical_theta(
             self.shape.to_theta(self.theta_p(self.theta), self.theta[-4], self.theta[-3:])

@@ -141,8 +141,8 @@ def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
         return part
     if not CATALOGUE[part["type"]].is_of_family or part["type"] == "flat":
         raise InputError(
-            f"expected a roof with pitches of its own sides, got a {part['type']} roof; change its "
-            "type first"
+            "expected a roof with pitches of its own sides, got the roof type "
+            f"{part['type']}; change its type first"
         )
     return {
         **part,

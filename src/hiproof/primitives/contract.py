@@ -226,8 +226,8 @@ class Primitive:
             if variant.strips == theta_p.get("teeth", self.strips):
                 return variant
         raise FitError(
-            f"expected 2 to 6 teeth for a {self.name} roof, got {theta_p['teeth']}; choose one of "
-            "these"
+            f"expected 2 to 6 teeth for the roof type {self.name}, got {theta_p['teeth']}; choose "
+            "one of these"
         )
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
@@ -239,8 +239,8 @@ class Primitive:
         missing = [name for name in shape.parameters if name not in theta_p]
         if missing:
             raise FitError(
-                f"expected the parameters {', '.join(shape.parameters)} of a {self.name} roof, got "
-                "none for "
+                f"expected the parameters {', '.join(shape.parameters)} of the roof type "
+                f"{self.name}, got none for "
                 f"{', '.join(missing)}; give every parameter in metres"
             )
         return np.asarray(shape.corners(theta_p), float)

@@ -499,7 +499,7 @@ def read_member(
         half = 0.5 * np.array([parameters["length"], parameters["width"]])
     except KeyError as missing:
         raise FitError(
-            f"expected the parameter {missing.args[0]} of a {name} roof, got "
+            f"expected the parameter {missing.args[0]} of the roof type {name}, got "
             f"{', '.join(parameters)}; give every one"
         ) from missing
     return Member(

@@ -93,7 +93,7 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
         text = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
         raise InputError(
             f"expected planes that rise from the eaves by less than {STEEPEST_DEG:g} degrees, got "
-            f"a {kind} roof of {text} "
+            f"the roof type {kind} with {text} "
             f"in {where}; is one of its sizes negative, or too long?"
         )
 
