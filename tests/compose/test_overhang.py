@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 import hiproof
-from hiproof.compose import check_solid, compose
+from hiproof.compose import check_solid, compose, valid_eaves
 from hiproof.compose.eaves import add_eaves
 from hiproof.compose.settle import settled_roof
 from hiproof.compose.valid_eaves import add_valid_eaves, measure_left_out
@@ -100,6 +100,25 @@ def build_blocks(*blocks):
     ring = shapely.get_coordinates(shapely.orient_polygons(outline).normalize())[:-1]
     record = {"id": "a", "origin": [0, 0, 0], "outline": [ring.tolist()], "z_ground": 0}
     return hiproof.build(record | {"parts": parts}).model
+
+
+@pytest.mark.parametrize("bad", [{0}, {3, 17}, {0, 1, 2, 39}, set(range(40))])
+def test_overhangs_are_kept_but_for_those_that_fail(bad, monkeypatch):
+    tried = []
+
+    def is_valid(_, overhangs):
+        tried.append(overhangs)
+        return not bad & set(overhangs)
+
+    monkeypatch.setattr(valid_eaves, "is_valid", is_valid)
+    monkeypatch.setattr(valid_eaves, "select_overhangs", lambda _, overhangs: overhangs)
+    kept = valid_eaves.keep_valid(None, None, list(range(40)))
+    assert kept == [k for k in range(40) if k not in bad]
+    # a building of many overhangs that all fail ends soon, and keeps none
+    tried.clear()
+    bad = set(range(1000))
+    assert valid_eaves.keep_valid(None, None, list(range(1000))) == []
+    assert len(tried) == valid_eaves.MOST_TRIALS
 
 
 def test_a_low_roof_too_narrow_for_walls_inside_keeps_its_own():
