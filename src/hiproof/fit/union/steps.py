@@ -27,6 +27,7 @@ MOST_EDGE_SAMPLES = 40  # Most samples of an edge.
 # Samples that a processor computes together. MOST_EDGE_SAMPLES is a multiple of it: samples are
 # added so that none is left over.
 SAMPLES_AT_ONCE = 8
+FEW_VOLUMES = 8  # Of no more volumes, all count as near: looking is as dear as pricing.
 COVER_TOUCH_M = 0.03  # A volume that reaches so near (m) covers the place.
 
 
@@ -52,13 +53,13 @@ def list_near(volumes, turn, moving):
     """List which volumes may cover an edge of each volume.
 
     Each row of (k, k + 1) begins with their number, and they are in the roof's order. Volume
-    `moving` (-1: none) is near all others.
+    `moving` (-1: none) is near all others, and of few volumes all are near each other.
     """
     near = np.empty((len(volumes), len(volumes) + 1), np.int64)
     for k in range(len(volumes)):
         direction, count = int(volumes[k, DIRECTION]), 0
         for j in range(len(volumes)):
-            if j != moving and k != moving and j != k:
+            if len(volumes) > FEW_VOLUMES and j != moving and k != moving and j != k:
                 other = int(volumes[j, DIRECTION])
                 low_u, high_u, low_v, high_v = enclose_volume(
                     volumes,

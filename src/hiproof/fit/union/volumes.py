@@ -46,8 +46,8 @@ OPPOSITE = 1.0  # The tie under which slopes that face each other are equal.
 ALL_EQUAL = 2.0  # The tie under which all slopes are equal.
 SLOPE_LOW = 0.04  # A flatter slope (rise over run), 2 degrees, is level.
 SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
-# Share of all places below which those of a strip are looked at one after another. Of more, all are
-# looked at, several at once.
+# Share of the extent of all places up to which those of a strip are looked at one after another. Of
+# wider ones, all are looked at, several at once.
 SPARSE_SHARE = 0.5
 UNSORTED = np.zeros((1, 2, 0), np.int64)  # The order of places that are not sorted.
 
@@ -184,16 +184,17 @@ def find_strip(volumes, k, U, V, order):
     """Find the strip of places that ends where volume k does along one axis.
 
     Returns the axis, and the first and last number in `order` of the places U, V (directions, n).
-    They are 0 and n if the places are not sorted, or if the strip would hold too many of them.
+    They are 0 and n if the places are not sorted, or if the strip would be a wide one.
     """
     n, direction = U.shape[1], int(volumes[k, DIRECTION])
     if n == 0 or order.shape[2] != n:
         return 0, 0, n
     for axis in range(2):
         X, low, high = U if axis == 0 else V, volumes[k, U0 + 2 * axis], volumes[k, U1 + 2 * axis]
-        if low <= X[direction, order[direction, axis, 0]]:
-            if high >= X[direction, order[direction, axis, n - 1]]:
-                continue
+        least = X[direction, order[direction, axis, 0]]
+        most = X[direction, order[direction, axis, n - 1]]
+        if min(high, most) - max(low, least) > SPARSE_SHARE * (most - least):
+            continue
         first, last = 0, n
         while first < last:
             q = (first + last) // 2
@@ -208,8 +209,7 @@ def find_strip(volumes, k, U, V, order):
                 end = q + 1
             else:
                 last = q
-        if end - first < SPARSE_SHARE * n:
-            return axis, first, end
+        return axis, first, end
     return 0, 0, n
 
 
