@@ -112,9 +112,14 @@ def find_lifts(
     for k, j in pairs.items():
         d = compare_heights(old, j, new, k)
         if d.size and np.abs(d - np.median(d)).max() <= near_m:
-            lift = float(np.median(d))
-            result[k] = lift if abs(lift) > near_m else 0.0
+            result[k] = measure_lift(d, near_m)
     return unite_lifts(result, near_m)
+
+
+def measure_lift(differences: np.ndarray, near_m: float) -> float:
+    """Return the median difference (m) of heights (n,), 0 where chance explains it."""
+    lift = float(np.median(differences))
+    return lift if abs(lift) > near_m else 0.0
 
 
 def unite_lifts(lifts: dict[int, float], near_m: float) -> dict[int, float]:

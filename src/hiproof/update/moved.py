@@ -19,7 +19,7 @@ from ..status import Change, Status
 from .cells import MEDIAN_VARIANCE, CellComparison
 from .epochs import Surveys
 from .judge import FEWEST_COMPARED, ChangeVerdict, judge_building
-from .lineage import lift_part, show_parts, unite_lifts
+from .lineage import lift_part, measure_lift, show_parts, unite_lifts
 
 OF_SURVEYS = ("survey_date", "epochs_used", "change")  # keys that say which points made a model
 
@@ -73,11 +73,10 @@ def measure_lifts(roof: Roof, comparison: CellComparison, near_m: float) -> list
     None where a part has too few cells. Parts that moved together move by the same height.
     """
     result = {}
-    for number, d in enumerate(collect_differences(roof, comparison)):
+    for number, d in enumerate(split_by_part(roof, comparison, comparison.difference)):
         if len(d) < FEWEST_COMPARED:
             return None
-        lift = float(np.median(d))
-        result[number] = lift if abs(lift) > near_m else 0.0
+        result[number] = measure_lift(d, near_m)
     return list(unite_lifts(result, near_m).values())
 
 
@@ -86,20 +85,16 @@ def measure_sigmas(roof: Roof, comparison: CellComparison, sigma_m: float) -> li
 
     `sigma_m` is that of the common vertical shift.
     """
-    shown = show_parts(roof, comparison.centres)[comparison.is_compared]
-    variances = comparison.sigma[comparison.is_compared] ** 2
-    means = [
-        MEDIAN_VARIANCE * float(variances[shown == k].mean()) / int((shown == k).sum())
-        for k in range(len(roof.parts))
-    ]
+    variances = split_by_part(roof, comparison, comparison.sigma**2)
+    means = [MEDIAN_VARIANCE * float(own.mean()) / len(own) for own in variances]
     return [float(np.hypot(np.sqrt(mean), sigma_m)) for mean in means]
 
 
-def collect_differences(roof: Roof, comparison: CellComparison) -> list[np.ndarray]:
-    """Return the differences (k,) of heights between the surveys, part by part."""
+def split_by_part(roof: Roof, comparison: CellComparison, values: np.ndarray) -> list[np.ndarray]:
+    """Return the `values` (n,) of the compared cells, part by part."""
     shown = show_parts(roof, comparison.centres)[comparison.is_compared]
-    d = comparison.difference[comparison.is_compared]
-    return [d[shown == number] for number in range(len(roof.parts))]
+    compared = values[comparison.is_compared]
+    return [compared[shown == number] for number in range(len(roof.parts))]
 
 
 def lift_points(roof: Roof, points: np.ndarray, lifts: np.ndarray) -> np.ndarray:

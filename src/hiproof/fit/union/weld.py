@@ -164,12 +164,11 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     """Draw what a window shows of a roof."""
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
+    is_cut = window.base or len(volumes) == 1
+    sketch = None if is_cut else sketch_regions(volumes, sides, problem.site)
     parts, plans = [], []
     for site in window.sites:
-        if window.base or len(volumes) == 1:
-            regions = cut_regions(volumes, planes, sides, site, window.base)
-        else:
-            regions = sketch_regions(volumes, sides, problem.site)
+        regions = sketch or cut_regions(volumes, planes, sides, site, window.base)
         part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
         parts.append(part)
         plans.append(draw_plan(part, owner, site.outline))
