@@ -11,6 +11,7 @@ import os
 import pickle
 import platform
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -256,6 +257,22 @@ NEHALEM = {"sse4.2": True}
 OTHER_VERSIONS = "import numba; numba.__version__ = '0'"
 
 
+@pytest.fixture(scope="module")
+def installed_wheel(tmp_path_factory):
+    """A folder with the package installed from a wheel that holds its compiled code."""
+    pytest.importorskip("wheel", reason="needs wheel, to pack wheels")
+    from release.compiled_wheel import compiled_wheel
+
+    folder = tmp_path_factory.mktemp("wheel")
+    packages = folder / "installed"
+    wheel = compiled_wheel(
+        write_wheel(folder, 3), folder, ["-c", "from town.outer import answer; answer(10)"]
+    )
+    options = ["--no-index", "--no-deps", "--disable-pip-version-check"]
+    run(packages, "-m", "pip", "install", *options, "--target", str(packages), str(wheel))
+    return packages
+
+
 @pytest.mark.skipif(not kinds.runs_kind(), reason=f"makes code for {kinds.KIND}")
 @pytest.mark.parametrize(
     "name, features, extra, is_loaded",
@@ -266,26 +283,9 @@ OTHER_VERSIONS = "import numba; numba.__version__ = '0'"
     ],
 )
 def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_passed_over(
-    tmp_path, name, features, extra, is_loaded
+    installed_wheel, tmp_path, name, features, extra, is_loaded
 ):
-    pytest.importorskip("wheel", reason="needs wheel, to pack wheels")
-    from release.compiled_wheel import compiled_wheel
-
-    wheel = compiled_wheel(
-        write_wheel(tmp_path, 3), tmp_path, ["-c", "from town.outer import answer; answer(10)"]
-    )
-    packages = tmp_path / "installed"
-    run(
-        packages,
-        "-m",
-        "pip",
-        "install",
-        "--no-index",
-        "--no-deps",
-        "--target",
-        str(packages),
-        str(wheel),
-    )
+    packages = shutil.copytree(installed_wheel, tmp_path / "installed")
     assert "numba==" in (packages / "town-3.dist-info" / "METADATA").read_text()
     script = f"""
 import llvmlite.binding as binding
