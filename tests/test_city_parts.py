@@ -2,6 +2,7 @@
 dead workers end nothing.
 """
 
+import os
 from types import SimpleNamespace
 
 import numpy as np
@@ -186,6 +187,19 @@ def test_workers_import_what_tasks_need_before_there_are_tasks():
     ((_, result, error),) = executor.run(has_imported, [("hiproof.city.solve",)])
     executor.close()
     assert result and error is None
+
+
+def test_workers_have_the_environment_and_the_folder_of_the_moment(tmp_path, monkeypatch):
+    for name in ("first", "second"):
+        folder = tmp_path / name
+        folder.mkdir()
+        monkeypatch.setenv("HIPROOF_TOWN", name)
+        monkeypatch.chdir(folder)
+        executor = Processes(1)
+        ((_, town, _),) = executor.run(os.getenv, [("HIPROOF_TOWN",)])
+        ((_, current, _),) = executor.run(os.getcwd, [()])
+        executor.close()
+        assert (town, current) == (name, str(folder))
 
 
 def test_a_killed_worker_loses_its_tasks_but_not_the_others():

@@ -14,17 +14,12 @@ taken from their iterable only when a worker is near.
 
 from __future__ import annotations
 
-import gc
-import os
-import signal
 import sys
 import threading
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import RawValue
 from queue import Empty, SimpleQueue
@@ -34,12 +29,12 @@ from urllib.parse import urlsplit
 from .. import log
 from ..compiled import news
 from ..compiled.stamp import count_compiled
-from ..errors import InputError, NotKeptWarning, OutputError, is_interrupt
+from ..errors import InputError, OutputError, is_interrupt
 from ..extras import import_extra
-from ..garbage import RARELY
 from . import solved
 from .cores import limit_threads
 from .tasks import import_work, make_ready
+from .workers import begin_worker, choose_context, describe_start
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
@@ -88,7 +83,7 @@ class InProcess:
 class Processes:
     """`count` worker processes.
 
-    They are spawned, not forked: a fork would copy locks of compiled code mid-flight.
+    See workers.py for how they begin.
     """
 
     def __init__(self, count: int):
@@ -147,9 +142,10 @@ class Processes:
 
     def submit(self, function: Callable, task: tuple) -> Future:
         if self.pool is None:
-            context = get_context("spawn")
+            context = choose_context()
             heard, self.word = context.Pipe(duplex=False)
-            arguments = (os.getpid(), heard, log.worker_arguments(), self.count_solved)
+            state = describe_start(context)
+            arguments: Any = (heard, state, log.worker_arguments(), self.count_solved)
             self.pool = ProcessPoolExecutor(
                 self.count, mp_context=context, initializer=begin_worker, initargs=arguments
             )
@@ -185,37 +181,6 @@ class Processes:
         if self.pool is not None:
             self.pool.shutdown(wait=True, cancel_futures=True)
             self.pool = None
-
-
-def begin_worker(parent: int, heard: Connection, logging: tuple, count: Any) -> None:
-    """Set up a worker process.
-
-    It logs as the main process does, counts buildings in memory that both share, and ends with it.
-
-    That compiled code cannot be kept, the main process has said.
-    """
-    log.start(*logging)
-    solved.begin_worker(count)
-    gc.set_threshold(RARELY)
-    warnings.simplefilter("ignore", NotKeptWarning)
-    leave_with_parent(parent, heard)
-
-
-def leave_with_parent(parent: int, heard: Connection) -> None:
-    """Make a worker end when its parent closes the pipe, or is gone.
-
-    A kill -9 of the main process leaves nothing running.
-
-    Ctrl-C, which a terminal sends to all, is the parent's to answer.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent and not heard.poll(0.5):
-            pass
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 class Dask:

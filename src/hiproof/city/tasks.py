@@ -7,6 +7,7 @@ compiled code, the network and the readers of points.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 
 from .ledger import Outcome
 
@@ -23,6 +24,10 @@ RECOGNISING = ("warm_recognition",)
 """What runs that ask the network need besides."""
 
 ALL = (*WITHOUT_FOOTPRINTS, *RECOGNISING)
+
+
+WORK = ("hiproof.city.sort", "hiproof.city.solve", "hiproof.fit.union")
+"""Modules that a worker needs."""
 
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:
@@ -43,8 +48,8 @@ def solve_tile(
 
 def import_work() -> None:
     """Import what tasks need, in a worker that waits for its first one."""
-    from ..fit import union  # noqa: F401
-    from . import solve, sort  # noqa: F401
+    for name in WORK:
+        import_module(name)
 
 
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:

@@ -7,7 +7,8 @@ the planes of every primitive, and their exact derivatives, without knowing any 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import operator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -80,18 +81,17 @@ class Formula:
         return Formula(tuple((f * factor ** powers[k], powers) for f, powers in self.terms))
 
     def __add__(self, other: Formula | float) -> Formula:
-        total: dict[tuple[int, ...], float] = {}
-        for factor, powers in self.terms + formula(other).terms:
-            total[powers] = total.get(powers, 0.0) + factor
-        return Formula(tuple((factor, powers) for powers, factor in total.items() if factor))
+        return add_terms(self.terms + formula(other).terms)
 
     def __mul__(self, other: Formula | float) -> Formula:
-        product = Formula(())
-        for factor, powers in self.terms:
-            for other_factor, other_powers in formula(other).terms:
-                summed = tuple(a + b for a, b in zip(powers, other_powers, strict=True))
-                product = product + Formula(((factor * other_factor, summed),))
-        return product
+        if not isinstance(other, Formula):
+            number = float(other)
+            return Formula(tuple((f * number, powers) for f, powers in self.terms if number))
+        return add_terms(
+            (factor * other_factor, tuple(map(operator.add, powers, other_powers)))
+            for factor, powers in self.terms
+            for other_factor, other_powers in other.terms
+        )
 
     def __truediv__(self, other: Formula | float) -> Formula:
         """Divide by one monomial.
@@ -112,6 +112,14 @@ class Formula:
 
     __radd__ = __add__
     __rmul__ = __mul__
+
+
+def add_terms(terms: Iterable[tuple[float, tuple[int, ...]]]) -> Formula:
+    """Add terms: those of the same exponents become one, or none where it is 0."""
+    total: dict[tuple[int, ...], float] = {}
+    for factor, powers in terms:
+        total[powers] = total.get(powers, 0.0) + factor
+    return Formula(tuple((factor, powers) for powers, factor in total.items() if factor))
 
 
 def formula(value: Formula | float) -> Formula:

@@ -83,7 +83,8 @@ def make_rim(sides: int, apothem: float) -> tuple[tuple[float, float], ...]:
 def make_facet_planes(sides: int, apothem: float, fall: Formula, top: Formula) -> tuple[Plane, ...]:
     """Return one plane a side, each from `top` at the axis down by `fall` at the rim."""
     steep = fall * (1.0 / apothem)
-    return tuple((-(steep / U) * x, -(steep / V) * y, top) for x, y in list_directions(sides))
+    along, across = -(steep / U), -(steep / V)
+    return tuple((along * x, across * y, top) for x, y in list_directions(sides))
 
 
 class ChordProfile(NamedTuple):
