@@ -12,6 +12,7 @@ planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes made of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, and the heights of a roof
 around      compiled: the heights that the other volumes leave for one
+beside      compiled: the price of the edges beside a moving volume
 steps       compiled: the price of an edge of a volume that is visible
 prices      the table of prices: what a unit is, what structure costs, what a change must gain
 objective   compiled: the cost of a roof: misfit, volumes and visible edges

@@ -10,9 +10,10 @@ import numpy as np
 
 from ...compiled import compiled
 from .around import compute_roof_everywhere
+from .beside import BOX0, gather_neighbour_edges, make_room, price_neighbour_edge
 from .objective import BASE_SHARE, compute_costs
 from .prices import BASE_COST
-from .steps import gather_walls, list_near, locate_line, price_edge
+from .steps import gather_walls, list_near, price_edge, widen_rectangle
 from .volumes import (
     DIRECTION,
     LEVEL,
@@ -66,10 +67,10 @@ def move_edges(volumes, scene, k, value, reach, context):
     fixed = cost_without.sum()
     for j in range(1, len(volumes)):
         fixed += scene.evidence * price_volume(volumes[j])
-    charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
-    touched = np.zeros((len(volumes), 4), np.bool_)
-    walls, is_charged, direction = gather_walls(scene), False, int(volumes[k, DIRECTION])
-    near = np.zeros((0, 0), np.int64)
+    charge, touched = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4), np.bool_)
+    walls, is_charged = gather_walls(scene), False
+    neighbours = np.zeros((0, 0), np.int64)
+    beside = make_room(0)
     for edge in range(4):
         places, m = list_edge_places(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
@@ -99,11 +100,12 @@ def move_edges(volumes, scene, k, value, reach, context):
                 continue
             if not is_charged:
                 is_charged = True
-                if len(near) == 0:
-                    near = list_near(volumes, walls.turn, k)
-                charge_edges(volumes, walls, near, direction, charge, boxes)
+                if len(neighbours) == 0:
+                    neighbours = list_near(volumes, walls.turn, k)
+                    beside = gather_neighbour_edges(volumes, walls, neighbours, k)
+                charge_edges(volumes, walls, neighbours, k, beside, charge)
             trial = charge_move(
-                volumes, walls, near, k, edge, t, trial, best, charge, boxes, touched
+                volumes, walls, neighbours, k, edge, t, trial, best, charge, beside, touched
             )
             if trial < best:
                 best, best_place = trial, t
@@ -215,34 +217,19 @@ def is_repeated(places, q):
 
 
 @compiled(allocates=False)
-def charge_edges(volumes, walls, near, direction, charge, boxes):
-    """Fill `charge` (k, 4) with the price of every edge, and `boxes` (k, 4, 4).
-
-    Boxes are the edges' bounds in the axes of `direction`, empty where an edge lies outside the
-    outline.
-    """
-    c, s = walls.turn[direction, 0], walls.turn[direction, 1]
-    charge[:] = 0.0
+def charge_edges(volumes, walls, neighbours, k, beside, charge):
+    """Fill `charge` (k, 4) with the price of every edge."""
+    ends = widen_rectangle(volumes, k)
     for j in range(1, len(volumes)):
-        other = int(volumes[j, DIRECTION])
-        cosine = walls.turn[other, 0] * c + walls.turn[other, 1] * s
-        sine = walls.turn[other, 1] * c - walls.turn[other, 0] * s
         for e in range(4):
-            boxes[j, e, 0] = boxes[j, e, 2] = np.inf
-            boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
-            if not locate_line(walls, other, e // 2, volumes[j, U0 + e])[0]:
-                continue  # it is never visible, whatever moves beside it
-            charge[j, e] = price_edge(volumes, walls, j, e, near)
-            for end in range(2):
-                a = volumes[j, U0 + e] if e < 2 else volumes[j, U0 + end]
-                b = volumes[j, V0 + end] if e < 2 else volumes[j, U0 + e]
-                x, y = cosine * a - sine * b, sine * a + cosine * b
-                boxes[j, e, 0], boxes[j, e, 1] = min(boxes[j, e, 0], x), max(boxes[j, e, 1], x)
-                boxes[j, e, 2], boxes[j, e, 3] = min(boxes[j, e, 2], y), max(boxes[j, e, 3], y)
+            if j == k:
+                charge[j, e] = price_edge(volumes, walls, j, e, neighbours)
+            else:
+                charge[j, e] = price_neighbour_edge(beside, walls.prices, j, e, ends)
 
 
 @compiled(allocates=False)
-def charge_move(volumes, walls, near, k, edge, t, trial, best, charge, boxes, touched):
+def charge_move(volumes, walls, neighbours, k, edge, t, trial, best, charge, beside, touched):
     """Add the price of all edges to `trial`, with edge `edge` of volume k at `t`.
 
     It stops as soon as the sum is not below `best`. `touched` is room for which edges (k, 4) the
@@ -253,28 +240,30 @@ def charge_move(volumes, walls, near, k, edge, t, trial, best, charge, boxes, to
     cross_low, cross_high = (
         (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     )
-    along, cross = (0, 2) if edge < 2 else (2, 0)
+    along, cross = (BOX0, BOX0 + 2) if edge < 2 else (BOX0 + 2, BOX0)
+    edges = beside.edges
     for j in range(1, len(volumes)):
         for e in range(4):
             if j == k:
-                is_touched = e == edge or (e != edge ^ 1 and boxes[j, e, 0] < np.inf)
+                is_touched = e != edge ^ 1
             else:
-                meets = boxes[j, e, along] <= move_high and boxes[j, e, along + 1] >= move_low
+                meets = edges[j, e, along] <= move_high and edges[j, e, along + 1] >= move_low
                 is_beside = (
-                    boxes[j, e, cross] <= cross_high + MOVE_TOUCH_M
-                    and boxes[j, e, cross + 1] >= cross_low - MOVE_TOUCH_M
+                    edges[j, e, cross] <= cross_high + MOVE_TOUCH_M
+                    and edges[j, e, cross + 1] >= cross_low - MOVE_TOUCH_M
                 )
                 is_touched = meets and is_beside
             touched[j, e] = is_touched
             if not is_touched:
                 trial += walls.evidence * charge[j, e]
     volumes[k, U0 + edge] = t
-    for q in range(len(volumes)):  # volume k first: its own edges cost the most
-        j = k if q == 0 else q
-        if q == k:
-            continue
+    for e in range(4):  # its own edges cost the most
+        if trial < best and touched[k, e]:
+            trial += walls.evidence * price_edge(volumes, walls, k, e, neighbours)
+    ends = widen_rectangle(volumes, k)
+    for j in range(1, len(volumes)):
         for e in range(4):
-            if trial < best and touched[j, e]:
-                trial += walls.evidence * price_edge(volumes, walls, j, e, near)
+            if trial < best and j != k and touched[j, e]:
+                trial += walls.evidence * price_neighbour_edge(beside, walls.prices, j, e, ends)
     volumes[k, U0 + edge] = start
     return trial

@@ -104,12 +104,12 @@ def price_edges(volumes, scene, limit):
     """Sum up the price of all edges; infinite once it is known to exceed `limit`."""
     if limit < 0.0:
         return np.inf
-    walls, near, total = gather_walls(scene), list_near(volumes, scene.turn, -1), 0.0
+    walls, neighbours, total = gather_walls(scene), list_near(volumes, scene.turn, -1), 0.0
     for k in range(1, len(volumes)):
         for edge in range(4):
             if total > limit:
                 return np.inf
-            total += scene.evidence * price_edge(volumes, walls, k, edge, near)
+            total += scene.evidence * price_edge(volumes, walls, k, edge, neighbours)
     return total
 
 

@@ -29,6 +29,7 @@ MOST_EDGE_SAMPLES = 40  # Most samples of an edge.
 SAMPLES_AT_ONCE = 8
 FEW_VOLUMES = 8  # Of no more volumes, all count as near: looking is as dear as pricing.
 COVER_TOUCH_M = 0.03  # A volume that reaches so near (m) covers the place.
+NO_STEP, SHOWN_STEP, LOW_STEP = 0, 1, 2  # What the heights beside a sample of an edge make.
 
 
 # What the price of edges depends on, of a scene, and room (MOST_EDGE_SAMPLES,) to work in: the
@@ -55,7 +56,7 @@ def list_near(volumes, turn, moving):
     Each row of (k, k + 1) begins with their number, and they are in the roof's order. Volume
     `moving` (-1: none) is near all others, and of few volumes all are near each other.
     """
-    near = np.empty((len(volumes), len(volumes) + 1), np.int64)
+    neighbours = np.empty((len(volumes), len(volumes) + 1), np.int64)
     for k in range(len(volumes)):
         direction, count = int(volumes[k, DIRECTION]), 0
         for j in range(len(volumes)):
@@ -72,9 +73,9 @@ def list_near(volumes, turn, moving):
                 if low_v > volumes[k, V1] or high_v < volumes[k, V0]:
                     continue
             count += 1
-            near[k, count] = j
-        near[k, 0] = count
-    return near
+            neighbours[k, count] = j
+        neighbours[k, 0] = count
+    return neighbours
 
 
 @compiled(inline="always")
@@ -92,10 +93,10 @@ def enclose_volume(volumes, j, cosine, sine):
 
 
 @compiled(allocates=False)
-def price_edge(volumes, walls, k, edge, near):
+def price_edge(volumes, walls, k, edge, neighbours):
     """Compute the units of one visible edge of volume k.
 
-    Edges are 0 u low, 1 u high, 2 v low, 3 v high. `near` is that of `list_near`.
+    Edges are 0 u low, 1 u high, 2 v low, 3 v high. `neighbours` is that of `list_near`.
     """
     direction, axis, place = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     inside, in_line = locate_line(walls, direction, axis, place)
@@ -104,27 +105,42 @@ def price_edge(volumes, walls, k, edge, near):
     m, step = place_samples(volumes, walls, k, edge)
     if m == 0:
         return 0.0
-    fill_heights(volumes, walls, k, edge, near, m)
-    any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
-    shown_length = low_length = 0.0
+    fill_heights(volumes, walls, k, edge, neighbours, m)
+    shown_count = low_count = 0
     for q in range(m):
-        gap = abs(walls.inside[q] - walls.outside[q])
-        if gap > VISIBLE_STEP_M:
-            shown_length += step
-            if gap < low_step:
-                low_length += step
-    if shown_length == 0.0:
+        kind = classify_step(walls.inside[q] - walls.outside[q], walls.prices)
+        shown_count += kind != NO_STEP
+        low_count += kind == LOW_STEP
+    if shown_count == 0:
         return 0.0
+    whole_price = price_whole_edge(walls, direction, axis, place, in_line, m)
+    return price_length(walls.prices, whole_price, step * shown_count, step * low_count)
+
+
+@compiled(inline="always")
+def classify_step(gap, prices):
+    """Return which kind of step a gap (m) between the heights beside an edge is."""
+    gap = abs(gap)
+    return NO_STEP if gap <= VISIBLE_STEP_M else LOW_STEP if gap < prices[3] else SHOWN_STEP
+
+
+@compiled(inline="always")
+def price_whole_edge(walls, direction, axis, place, in_line, m):
+    """Compute the fixed sum of an edge with `m` samples. Short ones cost less."""
+    any_step, _, _, _, loose, at_corner = walls.prices
+    if not in_line:
+        return any_step + loose
     first, last = walls.places[0], walls.places[m - 1]
-    fixed_price = any_step + (
-        -at_corner * count_corner_ends(walls, direction, axis, place, first, last)
-        if in_line
-        else loose
-    )
+    return any_step - at_corner * count_corner_ends(walls, direction, axis, place, first, last)
+
+
+@compiled(inline="always")
+def price_length(prices, whole_price, shown_length, low_length):
+    """Compute the units of an edge that is a step, or a low one, on these lengths (m)."""
     return (
-        fixed_price * min(shown_length / FULL_PRICE_M, 1.0)
-        + a_metre * shown_length
-        + low_a_metre * low_length
+        whole_price * min(shown_length / FULL_PRICE_M, 1.0)
+        + prices[1] * shown_length
+        + prices[2] * low_length
     )
 
 
@@ -186,49 +202,88 @@ def pad_count(count):
 
 
 @compiled(inline="always")
-def fill_heights(volumes, walls, k, edge, near, m):
+def fill_heights(volumes, walls, k, edge, neighbours, m):
     """Fill walls.inside and walls.outside with the heights on either side of an edge.
 
     They are those at the first `m` of walls.places, just inside and just outside of volume k. All
     places in one volume follow each other, so that a processor computes several at once.
     """
-    direction, place = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
-    places, inside, outside, turn = walls.places, walls.inside, walls.outside, walls.turn
-    first, last = places[0], places[m - 1]
     n_padded = pad_count(m)
     for q in range(n_padded):
-        inside[q] = outside[q] = -np.inf
-    for p in range(1, near[k, 0] + 1):
-        j = near[k, p]
-        other, cosine, sine = int(volumes[j, DIRECTION]), 1.0, 0.0
-        if other != direction:
-            cosine = turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1]
-            sine = turn[other, 1] * turn[direction, 0] - turn[other, 0] * turn[direction, 1]
-        # along the edge the place in the axes of volume j is (a0 + a t, b0 + b t)
-        a0, a, b0, b = (
-            (cosine * place, sine, -sine * place, cosine)
-            if edge < 2
-            else (sine * place, cosine, cosine * place, -sine)
-        )
-        u0, u1 = volumes[j, U0] - COVER_TOUCH_M, volumes[j, U1] + COVER_TOUCH_M
-        v0, v1 = volumes[j, V0] - COVER_TOUCH_M, volumes[j, V1] + COVER_TOUCH_M
-        ends_u, ends_v = (a0 + a * first, a0 + a * last), (b0 + b * first, b0 + b * last)
-        if j != k and (
-            max(ends_u) < u0 or min(ends_u) > u1 or max(ends_v) < v0 or min(ends_v) > v1
-        ):
-            continue
-        c, replaces = read_coefficients(volumes, j), volumes[j, REPLACES] > 0.0
-        if j == k:
-            for q in range(n_padded):
-                h = find_lowest(c, a0 + a * places[q], b0 + b * places[q])
-                inside[q] = h if replaces | (h > inside[q]) else inside[q]
-            continue
-        for q in range(n_padded):
-            u, v = a0 + a * places[q], b0 + b * places[q]
-            h = find_lowest(c, u, v)
-            is_inside = is_within((u0, u1, v0, v1), u, v)
-            inside[q] = h if is_inside & (replaces | (h > inside[q])) else inside[q]
-            outside[q] = h if is_inside & (replaces | (h > outside[q])) else outside[q]
+        walls.inside[q] = walls.outside[q] = -np.inf
+    for p in range(1, neighbours[k, 0] + 1):
+        j = neighbours[k, p]
+        line = turn_line(volumes, walls.turn, k, edge, j)
+        ends = widen_rectangle(volumes, j)
+        if j == k or meets_line(line, ends, walls.places[0], walls.places[m - 1]):
+            raise_heights(
+                volumes, j, line, ends, j == k, walls, walls.inside, walls.outside, n_padded
+            )
+
+
+@compiled(inline="always")
+def turn_line(volumes, turn, k, edge, j):
+    """Return the line of an edge of volume k in the axes of volume j.
+
+    It is a0, a, b0, b: the place t along the edge lies at (a0 + a t, b0 + b t).
+    """
+    direction, other, place = (
+        int(volumes[k, DIRECTION]),
+        int(volumes[j, DIRECTION]),
+        volumes[k, U0 + edge],
+    )
+    cosine, sine = 1.0, 0.0
+    if other != direction:
+        cosine = turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1]
+        sine = turn[other, 1] * turn[direction, 0] - turn[other, 0] * turn[direction, 1]
+    if edge < 2:
+        return cosine * place, sine, -sine * place, cosine
+    return sine * place, cosine, cosine * place, -sine
+
+
+@compiled(inline="always")
+def widen_rectangle(volumes, j):
+    """Return where volume j covers places: its rectangle and a little more."""
+    return (
+        volumes[j, U0] - COVER_TOUCH_M,
+        volumes[j, U1] + COVER_TOUCH_M,
+        volumes[j, V0] - COVER_TOUCH_M,
+        volumes[j, V1] + COVER_TOUCH_M,
+    )
+
+
+@compiled(inline="always")
+def meets_line(line, ends, first, last):
+    """Return whether the bounds of a line from `first` to `last` meet a rectangle."""
+    a0, a, b0, b = line
+    start_u, end_u, start_v, end_v = a0 + a * first, a0 + a * last, b0 + b * first, b0 + b * last
+    return not (
+        max(start_u, end_u) < ends[0]
+        or min(start_u, end_u) > ends[1]
+        or max(start_v, end_v) < ends[2]
+        or min(start_v, end_v) > ends[3]
+    )
+
+
+@compiled(inline="always")
+def raise_heights(volumes, j, line, ends, is_own, walls, inside, outside, n):
+    """Raise the heights beside an edge at the first `n` samples to those of volume j.
+
+    Of its own edge (`is_own`), a volume lies inside, all along.
+    """
+    a0, a, b0, b = line
+    places, c, replaces = walls.places, read_coefficients(volumes, j), volumes[j, REPLACES] > 0.0
+    if is_own:
+        for q in range(n):
+            h = find_lowest(c, a0 + a * places[q], b0 + b * places[q])
+            inside[q] = h if replaces | (h > inside[q]) else inside[q]
+        return
+    for q in range(n):
+        u, v = a0 + a * places[q], b0 + b * places[q]
+        h = find_lowest(c, u, v)
+        is_inside = is_within(ends, u, v)
+        inside[q] = h if is_inside & (replaces | (h > inside[q])) else inside[q]
+        outside[q] = h if is_inside & (replaces | (h > outside[q])) else outside[q]
 
 
 @compiled(allocates=False)
