@@ -31,9 +31,9 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import ROUND
 
 KINDS = {
-    "alone": (*ROUND, "hexagonal_spire", "barrel"),
-    "tower": (*ROUND, "hexagonal_spire", "barrel"),
-    "turret": (*ROUND, "hexagonal_spire"),
+    "alone": (*ROUND, "barrel"),
+    "tower": (*ROUND, "barrel"),
+    "turret": ROUND,
     "apse": ("half_cone",),
 }
 HOUSE_LENGTH_M, HOUSE_WIDTH_M = 14.0, 9.0  # Of the house with a turret.

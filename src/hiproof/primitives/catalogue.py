@@ -54,9 +54,9 @@ SHAPES = (
     onion.ONION,
 )
 CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
-ROUND = ("cone", "broach", "dome", "onion")  # over a round or many-sided plan
+ROUND = ("cone", "broach", "hexagonal_spire", "dome", "onion")  # over a round or many-sided plan
 # whose facets stand for a curved surface, or are more than a volume's
-CURVED = (*ROUND, "barrel", "half_cone", "hexagonal_spire")
+CURVED = (*ROUND, "barrel", "half_cone")
 # whose facets all stand for one curved surface
 SMOOTH = tuple(name for name, shape in CATALOGUE.items() if shape.refine is not None)
 

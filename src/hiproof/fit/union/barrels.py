@@ -13,10 +13,9 @@ from ...settings import Settings
 from .judged import COMPARED_M, JudgedRoof
 from .own import MOST_DISTANCE_M, cut_part, fit_types
 from .regions import list_polygons, unite_outlines
-from .round_tops import BENT
+from .round_tops import AS_NEAR, BENT
 
 BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel")  # What is made of one.
-AS_NEAR = 1.05  # Share of the misfit that an arc may leave if it replaces several parts.
 CURVE_ROUNDS = 2  # The second leaves out points beside the vault, such as those of a wall's top.
 ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
 

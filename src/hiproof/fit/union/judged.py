@@ -81,9 +81,9 @@ def replace_parts(
             numbers.append(k)
     replaced = [kept_roof.parts[k] for k in numbers]
     kept = [part for k, part in enumerate(kept_roof.parts) if k not in numbers]
-    judged, options = within | np.isin(top, numbers), [(0.0, roof)]
+    judged, options = within | np.isin(top, numbers), []
     if not judged.any():
-        return options[0]
+        return 0.0, roof
     for parts in cover_bare_places(roof, [*kept, shape], replaced):
         new = JudgedRoof(parts, roof.points, roof.outline)
         options.append((measure_gain(roof, new, judged, cap), new))

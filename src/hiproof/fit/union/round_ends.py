@@ -18,18 +18,18 @@ from shapely import affinity
 from ...geometry.rings import OVERLAY_GRID_M, counterclockwise
 from ...model import Part
 from ...primitives.catalogue import CATALOGUE
-from ...primitives.cone import BROACH_SIDES, HEXAGON_SIDES
 from ...primitives.contract import HALF_LENGTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
 from .judged import JudgedRoof
 from .own import cut_part
 from .regions import list_polygons
+from .regular import REGULAR, fit_regular, list_heights
 from .round_tops import FOLLOW_M, is_top_seen
+from .spires import SIDES_OF_SPIRES
 
 # Turns (degrees) between sides that follow a circle, or a polygon of six sides or more.
 LEAST_TURN_DEG, MOST_TURN_DEG = 3.0, 65.0
 FEWEST_ROUND_SIDES = 11  # A circle has as many sides or more.
-SIDES_OF_SPIRES = {"broach": BROACH_SIDES, "hexagonal_spire": HEXAGON_SIDES}
 FEWEST_CORNERS = 4  # Fewer lie on some circle by chance.
 SHORTEST_ARC_DEG = 120.0  # Shorter arcs are round corners of a roof, not shapes of their own.
 APSE_DEG = (140.0, 220.0)  # Arcs of half discs.
@@ -41,7 +41,8 @@ SECTOR_REACH = 2.0  # A sector of so many radii holds all of a shape beyond its 
 LARGEST_RADIUS_M = 30.0  # Larger circles are bent facades.
 SLOPES_TRIED = 24  # Slopes, in equal ratios, from which the likeliest start is taken.
 BULGES_TRIED, BENDS_TRIED = 10, 7  # The same of the two slopes of an onion.
-LOOSE_REACH = 3.0  # So much further from a start of two slopes may points lie that follow it.
+LOOSE_REACH = 3.0  # So much further from a start may points lie that follow it.
+FOLLOW_ROUNDS = 3  # Rounds in which a shape is fitted to the points that follow it.
 FEWEST_HEIGHTS = 6  # A slope and a height, and as many points again to check them.
 
 
@@ -166,10 +167,15 @@ def fit_over_circle(roof: JudgedRoof, end: RoundEnd, name: str, radius: float) -
     if len(points) < FEWEST_HEIGHTS:
         return
     theta, follows = find_start(points, shape, theta)
-    if np.count_nonzero(follows) < FEWEST_HEIGHTS:
-        return
-    cloud = np.column_stack([points, np.ones(len(points))])[follows]
-    theta, _ = fit_heights(cloud, shape, theta)
+    cloud = np.column_stack([points, np.ones(len(points))])
+    for _ in range(FOLLOW_ROUNDS):
+        if np.count_nonzero(follows) < FEWEST_HEIGHTS:
+            return
+        theta, _ = fit_heights(cloud[follows], shape, theta)
+        reach = FOLLOW_M * math.hypot(1.0, theta[Q1 : Q1 + len(shape.bounds)].sum())
+        follows = np.abs(points[:, 2] - shape.height_at(theta, points[:, :2])) <= reach
+    if name in REGULAR:
+        theta = fit_regular(points, shape, theta, list_heights(shape))
     parameters, _, _ = shape.from_theta(theta)
     part = shape.variant(parameters).part(theta)
     if is_top_seen(part, points):
@@ -195,10 +201,8 @@ def find_start(
         first = int(np.argmax(counts))
         if counts[first] > most:
             most, best = int(counts[first]), trial
-            followers = (above >= lowest[first]) & (above <= lowest[first] + 2.0 * reach)
-            best[Q0] = float(above[followers].mean())
-            if len(slopes) > 1:  # They are tried too far apart.
-                followers = np.abs(above - best[Q0]) <= LOOSE_REACH * reach
+            best[Q0] = float(lowest[first : first + most].mean())
+            followers = np.abs(above - best[Q0]) <= LOOSE_REACH * reach
     return best, followers
 
 

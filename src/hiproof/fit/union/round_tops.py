@@ -16,13 +16,14 @@ from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
 from ...primitives.cants import list_cants
 from ...primitives.catalogue import CATALOGUE
-from ...primitives.cone import BROACH_SIDES
 from ...primitives.contract import Q0
 from ...settings import Settings
 from ..direction import outline_rectangle
 from .judged import COMPARED_M, JudgedRoof, scale_cap
 from .own import cut_part, fit_types
 from .regions import list_polygons
+from .regular import REGULAR, fit_regular
+from .spires import measure_spires
 
 RADII = (0.6, 0.85, 1.15, 1.5)  # Of discs around a part's top, in radii of a circle of its area.
 BEYOND = 1.15  # Points so much further off than the disc's radius show where the shape ends.
@@ -34,13 +35,13 @@ FEWEST_SECTORS = 7  # Of these must hold points: a whole turn, but for a gap.
 ALL_ROUND, LOOSELY = 0.25, 0.5
 LEAST_FALL_M = 0.3  # Least fall (m) from the top: less is a level roof.
 CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
-ROTATIONS = 6  # Rotations of a spire that are tried within one of its facets.
+AS_NEAR = 1.05  # Share of the misfit that a curve may leave if it replaces several parts.
 BENT = 0.85  # Share of the misfit that a curve leaves of the roof's, at most.
 GROWTH_ROUNDS = 2  # Rounds in which a spire is fitted to all points that follow it.
 FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
 BENT_TYPES = ("dome", "onion")  # Their slope changes with the distance from the top.
 TOP_FOLLOW_M = 0.5  # Points so near (m in height) to a steep top lie on it.
-TOP_SEEN = 0.5  # Share of the height of an onion's top that points must reach.
+TOP_SEEN = 0.3  # Share of the height of an onion's top that points must reach.
 LIKE_OUTLINE = 0.85  # Share of an outline and of a disc in common from which they are the same.
 
 
@@ -66,7 +67,8 @@ def list_round_shapes(
         cap = scale_cap(fall / radius)
         disc = np.hypot(*(xy - centre).T) <= radius
         centre, left = fit_radially(roof.points[disc], centre, cap)
-        if left > BENT * roof.measure_distances(cap)[disc].mean() and not list_cants(
+        most_left = BENT if len(np.unique(roof.highest[1][disc])) == 1 else AS_NEAR
+        if left > most_left * roof.measure_distances(cap)[disc].mean() and not list_cants(
             part.parameters
         ):
             continue
@@ -129,25 +131,7 @@ def fit_radially(points: np.ndarray, centre: np.ndarray, cap_m: float) -> tuple[
         if columns == 5:
             centre = centre + np.clip(solution[3:], -cap_m, cap_m)
     left = np.minimum(distances, cap_m).mean()
-    return centre, float(min(left, *measure_broaches(points, centre, cap_m)))
-
-
-def measure_broaches(points: np.ndarray, centre: np.ndarray, cap_m: float) -> list[float]:
-    """Measure how far (m, mean) points lie from spires of eight sides.
-
-    There is one value for each rotation.
-    """
-    way = points[:, :2] - centre
-    r, turns = np.hypot(*way.T), np.arctan2(way[:, 1], way[:, 0])
-    facet = 2.0 * math.pi / BROACH_SIDES
-    lefts = []
-    for rotation in np.arange(ROTATIONS) * facet / ROTATIONS:
-        from_middle = (turns - rotation + 0.5 * facet) % facet - 0.5 * facet
-        design = np.column_stack([np.ones_like(r), r * np.cos(from_middle)])
-        solution = np.linalg.lstsq(design, points[:, 2], rcond=None)[0]
-        distances = np.abs(points[:, 2] - design @ solution)
-        lefts.append(float(np.minimum(distances, cap_m).mean()))
-    return lefts
+    return centre, min(float(left), measure_spires(points, centre, cap_m))
 
 
 def select_followers(roof: JudgedRoof, part: Part) -> np.ndarray | None:
@@ -174,15 +158,15 @@ def fit_round(
 
     Where it covers the outline, and hardly more, the outline is its plan.
     """
-    part = fit_types(near, None, names, settings)
+    part = fit_free(near, names, settings)
     if part is not None and not is_top_seen(part, near):
         others = tuple(name for name in names if name != "onion")
-        part = fit_types(near, None, others, settings) if others else None
+        part = fit_free(near, others, settings) if others else None
     for _ in range(GROWTH_ROUNDS):
         wider = None if part is None else select_followers(roof, part)
         if part is None or wider is None or len(wider) <= len(near):
             break
-        near, part = wider, fit_types(wider, None, (part.type,), settings)
+        near, part = wider, fit_free(wider, (part.type,), settings)
     if part is None:
         return None
     ring, outline = part.pieces[0].outline, roof.outline
@@ -206,6 +190,21 @@ def is_top_seen(part: Part, points: np.ndarray) -> bool:
     return bool(reached >= neck + TOP_SEEN * (height - neck))
 
 
+def fit_free(points: np.ndarray, names: tuple[str, ...], settings: Settings) -> Part | None:
+    """Fit a part of one of the types `names` to points (n, 3), None if none fits.
+
+    Spires and onions are as long as wide.
+    """
+    part = fit_types(points, None, names, settings)
+    if part is None or part.type not in REGULAR:
+        return part
+    shape = CATALOGUE[part.type]
+    theta = shape.to_theta(part.parameters, part.kappa, part.translation)
+    theta = fit_regular(points, shape, theta)
+    parameters, _, _ = shape.from_theta(theta)
+    return shape.variant(parameters).part(theta, part.sigma)
+
+
 def fit_over(outline: shapely.Polygon, part: Part, points: np.ndarray) -> Part:
     """Fit the heights of a round part again, over all of an outline."""
     from ..likelihood import fit_heights  # compiled code that most roofs never need
@@ -214,5 +213,7 @@ def fit_over(outline: shapely.Polygon, part: Part, points: np.ndarray) -> Part:
     theta = shape.to_theta(part.parameters, part.kappa, part.translation)
     theta[:Q0] = outline_rectangle(outline, part.kappa)
     theta, _ = fit_heights(np.column_stack([points, np.ones(len(points))]), shape, theta)
+    if part.type in REGULAR:
+        theta = fit_regular(points, shape, theta)
     parameters, _, _ = shape.from_theta(theta)
     return cut_part(shape.variant(parameters).part(theta, part.sigma), outline)

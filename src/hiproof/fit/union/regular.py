@@ -1,0 +1,96 @@
+"""Fit shapes that are as long as they are wide: spires of equal sides and onions.
+
+A free plan has the rectangle of the points for its own, which holds for neither: no point lies
+where a circle touches it, and a hexagon is longer from corner to corner. Here the middle and what
+else the points determine are fitted at once, by distances at right angles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Q2, Primitive
+
+# What points determine of each shape. Of a spire, they show no width.
+REGULAR = {
+    "broach": (CX, CY, KAPPA, Q0, Q1),
+    "hexagonal_spire": (CX, CY, KAPPA, Q0, Q1),
+    "onion": (CX, CY, HALF_WIDTH, Q0, Q1, Q2),
+}
+REGULAR_ROUNDS = 6  # Steps to the optimum. The last ones move it by millimetres.
+LEAST_REACH_M = 0.12  # Points nearer than this, at right angles, always count.
+MEDIANS = 3.0  # Points further off than so many medians of the distances do not count.
+WIDTH_ROUNDS = 2  # Rounds in which points are taken from within the plan.
+BENDS_STARTED = 4  # Starts of a shape with a top of its own, by how far that bends up.
+STEP = 1e-4  # Step (m, rad or slope) of numerical derivatives.
+PLAN_STEP_M = 0.05  # Step (m) over which slopes are measured: as far as points lie off in plan.
+
+
+def fit_regular(
+    points: np.ndarray, shape: Primitive, theta: np.ndarray, free: tuple[int, ...] = ()
+) -> np.ndarray:
+    """Fit theta (9,) of a shape as long as wide to points (n, 3) from a start.
+
+    The start's shorter side gives the width. Only the numbers `free` are fitted, by default all
+    that the points determine.
+    """
+    shape = shape.variant(shape.from_theta(theta)[0])
+    theta = theta.copy()
+    theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_WIDTH, HALF_LENGTH]].min()
+    starts = [theta]
+    if shape.minima:  # Its top has few points, which a start that is not near leaves out.
+        for bend in np.linspace(*shape.bounds[-1], BENDS_STARTED):
+            starts.append(theta.copy())
+            starts[-1][shape.theta_size - 1] = bend
+    for _ in range(WIDTH_ROUNDS):
+        inside = points[np.hypot(*(points[:, :2] - theta[:2]).T) <= theta[HALF_WIDTH]]
+        fits = [approach(inside, shape, start, free or REGULAR[shape.name]) for start in starts]
+        theta = min(fits, key=lambda one: one[0])[1]
+        starts = [theta]
+    return theta
+
+
+def approach(
+    points: np.ndarray, shape: Primitive, theta: np.ndarray, free: tuple[int, ...]
+) -> tuple[float, np.ndarray]:
+    """Move the numbers `free` of theta to where points (n, 3) lie near.
+
+    Returns how far they lie (m, mean), each at most twice LEAST_REACH_M, and theta (9,).
+    """
+    numbers = list(range(Q1, shape.theta_size))
+    lowest, highest = np.transpose(shape.bounds)
+    for _ in range(REGULAR_ROUNDS):
+        slopes = np.hypot(*(measure_change(points, shape, theta, k, PLAN_STEP_M) for k in (CX, CY)))
+        weights = 1.0 / np.hypot(1.0, slopes)
+        off = points[:, 2] - shape.height_at(theta, points[:, :2])
+        distances = np.abs(off) * weights
+        reach = max(LEAST_REACH_M, MEDIANS * float(np.median(distances))) if len(off) else 0.0
+        left = float(np.minimum(distances, 2.0 * LEAST_REACH_M).mean()) if len(off) else 0.0
+        weights *= distances <= reach
+        if np.count_nonzero(weights) < 2 * len(free):
+            break
+        design = np.column_stack([measure_change(points, shape, theta, k, STEP) for k in free])
+        move = np.linalg.lstsq(design * weights[:, None], off * weights, rcond=None)[0]
+        theta = theta.copy()
+        theta[list(free)] += move
+        theta[numbers] = np.clip(theta[numbers], lowest, highest)
+        theta[HALF_LENGTH] = theta[HALF_WIDTH]
+    return left, theta
+
+
+def measure_change(
+    points: np.ndarray, shape: Primitive, theta: np.ndarray, k: int, step: float
+) -> np.ndarray:
+    """Measure how the heights (n,) of a shape change with number `k` of theta."""
+    ends = []
+    for way in (-step, step):
+        moved = theta.copy()
+        moved[k] += way
+        moved[HALF_LENGTH] = moved[HALF_WIDTH]
+        ends.append(shape.height_at(moved, points[:, :2]))
+    return (ends[1] - ends[0]) / (2.0 * step)
+
+
+def list_heights(shape: Primitive) -> tuple[int, ...]:
+    """List the numbers of theta that do not change a shape's plan."""
+    return tuple(range(Q0, shape.theta_size))
