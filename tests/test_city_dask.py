@@ -10,6 +10,8 @@ import pytest
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.tasks import WORK
+from hiproof.city.workers import stop_server
 from hiproof.errors import InputError, OutputError
 from hiproof.update import run as update_run
 from hiproof.update.request import UpdateRequest
@@ -17,11 +19,24 @@ from hiproof.update.run import update_area
 from run_records import records
 from tiny_town import make_town, write_cloud
 
+dask = pytest.importorskip("dask", reason="needs dask[distributed], the extra `city`")
 distributed = pytest.importorskip("distributed", reason="needs dask[distributed], the extra `city`")
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def forked_workers():
+    """Let Dask fork workers from one process that has imported what they need.
+
+    Tests start a dozen.
+    """
+    with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
+        distributed.utils.get_mp_context().set_forkserver_preload([*WORK, "distributed"])
+        stop_server()  # the next one imports these
+        yield
+
+
+@pytest.fixture(scope="module")
+def cluster(forked_workers):
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
@@ -111,7 +126,11 @@ def test_the_example_runs(town_files, tmp_path):
         example,
         capture_output=True,
         text=True,
-        env={**os.environ, "PYTHONPATH": "src"},
+        env={
+            **os.environ,
+            "PYTHONPATH": "src",
+            "DASK_DISTRIBUTED__WORKER__MULTIPROCESSING_METHOD": "forkserver",
+        },
         check=False,
         timeout=300,
     )
