@@ -37,12 +37,19 @@ STREAMS = (1, 2)  # files of the standard output and of errors
 
 def choose_context() -> Any:
     """Return the context of multiprocessing in which workers begin."""
+    return get_context("forkserver" if start_server() else "spawn")
+
+
+def start_server() -> bool:
+    """Start the process from which workers are forked, if none runs.
+
+    It imports while this process goes on. Return whether workers can be forked here.
+    """
     if sys.platform != "linux" or len(tempfile.gettempdir()) > LONGEST_FOLDER:
-        return get_context("spawn")
+        return False
     from multiprocessing import forkserver
 
-    context = get_context("forkserver")
-    context.set_forkserver_preload(list(WORK))
+    forkserver.set_forkserver_preload(list(WORK))
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Ctrl-C is for this process
     try:
         with limit_threads():
@@ -50,7 +57,7 @@ def choose_context() -> Any:
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     stop_server_at_exit()
-    return context
+    return True
 
 
 @functools.cache
