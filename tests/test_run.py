@@ -118,7 +118,8 @@ def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp
         evaluate_run(tmp_path)
 
 
-def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path):
+def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     reconstruct_area(Request((str(files[0]),), tmp_path / "own", str(files[1])))
     old_records = records(tmp_path / "own")
     refused = CliRunner().invoke(app, ["demo", "--out", str(tmp_path / "own")])
