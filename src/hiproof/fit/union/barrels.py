@@ -27,7 +27,7 @@ def list_barrels(
 
     They are tried if a curve across the part is nearer to its points than its planes.
     """
-    if part.type not in BARREL_LIKE or len(part.pieces) > 1:
+    if part.type not in BARREL_LIKE:
         return
     beside = [other for other in roof.parts if is_as_long(part, other)]
     for group in ([part], beside) if len(beside) > 1 else ([part],):
