@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from scipy.special import expit
 
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
@@ -26,6 +27,7 @@ BEYOND_DRUM = 1.5  # Points within so many radii show the step.
 STEP_SECTORS = 12  # Directions in which the step is sought.
 FEWEST_STEPS = 10  # Of these must show it: points may miss the others.
 CIRCLE_ROUNDS = 3  # Rounds in which the circle is found.
+EDGE_SOFTNESS_M = (0.3, 0.2, 0.1, 0.05)  # How far off its side (m) points may lie, round by round.
 FEWEST_LEVEL_POINTS = 12  # Fewer show no circle.
 LEAST_DRUM_NATS = 8.0  # A roof with a drum must be so much likelier (nats).
 LEAST_DRUM_NATS_ON_ARC = 0.0  # The same over an arc of the outline, which speaks for the circle.
@@ -150,6 +152,27 @@ def find_circle(
         design = np.column_stack([np.cos(ahead), np.sin(ahead), np.ones(len(ahead))])
         dx, dy, radius = np.linalg.lstsq(design, distances, rcond=None)[0].tolist()
         centre = centre + (dx, dy)
+    return separate_by_circle(xy, is_level, centre, radius)
+
+
+def separate_by_circle(
+    xy: np.ndarray, is_level: np.ndarray, centre: np.ndarray, radius: float
+) -> tuple[np.ndarray, float]:
+    """Move a circle to where it best separates level points from others, as in a logistic fit.
+
+    Points are at `xy` (n, 2). Those nearer to the circle count more, the more so the sharper it is.
+    """
+    sign = np.where(is_level, 1.0, -1.0)
+    for softness in EDGE_SOFTNESS_M:
+        for _ in range(CIRCLE_ROUNDS):
+            way = xy - centre
+            r = np.maximum(np.hypot(*way.T), softness)
+            wrong = expit(sign * (r - radius) / softness)
+            change = np.column_stack([way.T[0] / r, way.T[1] / r, np.ones_like(r)]) / softness
+            hessian = (change.T * (wrong * (1.0 - wrong))) @ change + np.eye(3)
+            move = np.linalg.solve(hessian, change.T @ (sign * wrong))
+            dx, dy, wider = np.clip(move, -softness, softness).tolist()
+            centre, radius = centre + (dx, dy), radius + wider
     return centre, radius
 
 
