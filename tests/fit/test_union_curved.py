@@ -116,6 +116,17 @@ def test_a_drum_is_found(setting):
     assert is_drum_found(setting, 20, 8.0)
 
 
+@pytest.mark.parametrize("seed", [7, 14, 15])
+def test_the_edge_of_a_drum_lies_between_points(seed):
+    """Three percent of its plan are a few centimetres of its radius."""
+    assert is_drum_found("in a gable", seed, 8.0)
+
+
+@pytest.mark.parametrize("seed", [5, 18, 19])
+def test_a_ring_is_found_from_two_points_a_square_metre(seed):
+    assert is_drum_found("ring", seed, 2.0)
+
+
 @pytest.mark.parametrize("step", [-3.0, 1.5])
 def test_a_drum_in_a_drum_leaves_a_ring(step):
     disc, middle = make_disc(0.0, 0.0, 5.0), make_disc(0.0, 0.0, 2.5)

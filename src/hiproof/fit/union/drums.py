@@ -1,7 +1,7 @@
 """Find drums: level discs that stand on other parts, or lie in them.
 
-The search makes a few level rectangles of one. Its step follows a circle, which the directions
-around its middle show. A ring is what a drum leaves of the level part around it.
+The search makes a few level rectangles of one. Its step follows a circle, which separates
+level points from others. A ring is what a drum leaves of the level part around it.
 """
 
 from __future__ import annotations
@@ -24,14 +24,12 @@ from .round_ends import TURRET_DEG, RoundEnd, cut_to_outline
 
 SAME_LEVEL_M = 0.15  # Points so near to a level (m) belong to it.
 BEYOND_DRUM = 1.5  # Points within so many radii show the step.
-STEP_SECTORS = 12  # Directions in which the step is sought.
-FEWEST_STEPS = 10  # Of these must show it: points may miss the others.
 CIRCLE_ROUNDS = 3  # Rounds in which the circle is found.
 EDGE_SOFTNESS_M = (0.3, 0.2, 0.1, 0.05)  # How far off its side (m) points may lie, round by round.
 FEWEST_LEVEL_POINTS = 12  # Fewer show no circle.
 LEAST_DRUM_NATS = 8.0  # A roof with a drum must be so much likelier (nats).
 LEAST_DRUM_NATS_ON_ARC = 0.0  # The same over an arc of the outline, which speaks for the circle.
-FEWEST_WRONG = 6  # Fewer points off the roof are stray ones.
+FEWEST_WRONG = 3  # Fewer points off the roof are stray ones.
 RIGHT_SHARE = 0.95  # Share of the points around it on the right side of a drum's step.
 
 
@@ -121,46 +119,21 @@ def fit_drum(roof: JudgedRoof, level: float) -> Iterator[Part]:
     near = np.hypot(*(roof.points[:, :2] - centre).T) <= BEYOND_DRUM * radius
     xy, z = roof.points[near, :2], roof.points[near, 2]
     is_level = np.abs(z - level) <= SAME_LEVEL_M
-    circle = find_circle(xy, is_level, centre)
-    if circle is not None:
-        centre, radius = circle
-        is_inside = np.hypot(*(xy - centre).T) <= radius
-        if np.mean(is_inside == is_level) >= RIGHT_SHARE:
-            drum = make_drum(centre, radius, level)
-            if shapely.covers(roof.outline, drum.outlines[0]):
-                yield drum
-
-
-def find_circle(
-    xy: np.ndarray, is_level: np.ndarray, centre: np.ndarray
-) -> tuple[np.ndarray, float] | None:
-    """Return the middle (2,) and the radius of the circle around level points.
-
-    Points are at `xy` (n, 2). Returns None where too few directions show a step.
-    """
-    radius = 0.0
-    for _ in range(CIRCLE_ROUNDS):
-        way = xy - centre
-        r, turns = np.hypot(*way.T), np.arctan2(way[:, 1], way[:, 0]) / (2.0 * math.pi) % 1.0
-        sectors = (turns * STEP_SECTORS).astype(int) % STEP_SECTORS
-        counts = np.bincount(2 * sectors + is_level, minlength=2 * STEP_SECTORS).reshape(-1, 2)
-        seen = np.flatnonzero(counts.all(axis=1))
-        if len(seen) < FEWEST_STEPS:
-            return None
-        ahead = (seen + 0.5) * 2.0 * math.pi / STEP_SECTORS
-        distances = np.array([find_step(r[s], is_level[s]) for s in (sectors == k for k in seen)])
-        design = np.column_stack([np.cos(ahead), np.sin(ahead), np.ones(len(ahead))])
-        dx, dy, radius = np.linalg.lstsq(design, distances, rcond=None)[0].tolist()
-        centre = centre + (dx, dy)
-    return separate_by_circle(xy, is_level, centre, radius)
+    centre, radius = separate_by_circle(xy, is_level, centre, radius)
+    is_inside = np.hypot(*(xy - centre).T) <= radius
+    if np.mean(is_inside == is_level) >= RIGHT_SHARE:
+        drum = make_drum(centre, radius, level)
+        if shapely.covers(roof.outline, drum.outlines[0]):
+            yield drum
 
 
 def separate_by_circle(
     xy: np.ndarray, is_level: np.ndarray, centre: np.ndarray, radius: float
 ) -> tuple[np.ndarray, float]:
-    """Move a circle to where it best separates level points from others, as in a logistic fit.
+    """Move a circle to where it best separates level points from others.
 
-    Points are at `xy` (n, 2). Those nearer to the circle count more, the more so the sharper it is.
+    It is a logistic fit of points at `xy` (n, 2). Those nearer to the circle count more, the more
+    so the sharper it is.
     """
     sign = np.where(is_level, 1.0, -1.0)
     for softness in EDGE_SOFTNESS_M:
@@ -174,17 +147,6 @@ def separate_by_circle(
             dx, dy, wider = np.clip(move, -softness, softness).tolist()
             centre, radius = centre + (dx, dy), radius + wider
     return centre, radius
-
-
-def find_step(r: np.ndarray, is_level: np.ndarray) -> float:
-    """Return the distance up to which points are level.
-
-    Those beyond are not, but for as few as possible.
-    """
-    order = np.argsort(r, kind="stable")
-    r, right = r[order], np.cumsum(np.where(is_level[order], 1, -1))
-    last = int(np.argmax(right))
-    return float(0.5 * (r[last] + r[min(last + 1, len(r) - 1)]))
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:
