@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hiproof.errors import InputError
-from hiproof.learn.data import open_source
+from hiproof.learn.data import CURVED_TYPES, open_source
 from hiproof.learn.houses import lengthen, resize, training_house, without_a_corner
 from hiproof.learn.sample import TEST, TRAINING, VALIDATION
 from hiproof.learn.shapes import read_shapes
@@ -73,7 +73,22 @@ def test_simulated_labels_are_types_or_not_roof():
         assert len(sample.labels) == len(sample.xyz) and np.isfinite(sample.xyz).all()
 
 
-@pytest.mark.parametrize("type", ROOF_TYPES)
+@pytest.mark.parametrize("type", CURVED_TYPES)
+def test_curved_roofs_are_simulated_where_they_are_named(type):
+    source = open_source("simulated", ("flat", type))
+    samples = [source.sample(TRAINING, i) for i in range(12)]
+    assert {sample.type for sample in samples} == {0, 1}
+    for curved in (sample for sample in samples if sample.type == 1):
+        roof = curved.xyz[curved.labels == 1]
+        assert len(roof) >= 10
+        # It has a round or bent top: its highest points lie around the middle of its plan.
+        top = roof[roof[:, 2] >= np.percentile(roof[:, 2], 90), :2]
+        assert np.linalg.norm(top.mean(axis=0) - roof[:, :2].mean(axis=0)) < 0.3 * np.ptp(top) + 1.0
+    with pytest.raises(InputError, match="half_cone"):
+        open_source("simulated", ("half_cone",))
+
+
+@pytest.mark.parametrize("type", [*ROOF_TYPES, *CURVED_TYPES])
 def test_an_annexed_house_keeps_its_type(type):
     for seed in range(10):
         house = training_house(np.random.default_rng(seed), type, annex_share=1.0)
@@ -81,7 +96,7 @@ def test_an_annexed_house_keeps_its_type(type):
         assert house.outline.geom_type == "Polygon"
 
 
-@pytest.mark.parametrize("type", ROOF_TYPES)
+@pytest.mark.parametrize("type", [*ROOF_TYPES, *CURVED_TYPES])
 def test_varied_houses_are_whole_and_keep_their_type(type):
     for seed in range(30):
         house = training_house(np.random.default_rng([3, seed]), type, annex_share=0.3)

@@ -61,6 +61,14 @@ def test_a_killed_run_goes_on_to_the_same_weights(tmp_path):
     assert set(segment(points, settings).types) == {"flat", "gable"}
 
 
+def test_curved_types_are_classes_where_they_are_named(tmp_path):
+    settings = TrainSettings(**{**vars(TINY), "types": ("flat", "dome"), "samples": 24})
+    path = train("simulated", tmp_path, settings)
+    points = training_sample(np.random.default_rng(0), ("dome",))[0]
+    result = segment(points, Settings().replace({"segment": {"weights": str(path)}}))
+    assert set(result.types) == {"flat", "dome"}
+
+
 def test_the_loss_of_a_repeated_batch_falls(tmp_path):
     trainer = Trainer(open_source("simulated", TINY.types), TINY, tmp_path)
     batch = [trainer.training_cloud(i) for i in range(8)]

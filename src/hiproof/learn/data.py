@@ -11,15 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..primitives.catalogue import CATALOGUE, CURVED
 from ..segment.inference import NOT_ROOF
 from ..simulate import ROOF_TYPES, Scan, scan, scan_solids
 from ..simulate.scene import SOURCE_ROOF
+from ..simulate.shapes import find_label
 from ..simulate.training import random_settings
 from .houses import training_house
 from .roofn3d import RoofN3D
 from .sample import TRAINING, Sample, Source
 from .shapes import Shape, read_shapes
 
+# Curved types of whole roofs: half cones are those of apses alone.
+CURVED_TYPES = tuple(name for name in CURVED if name != "half_cone")
 DENSITY = (1.0, 20.0)  # points/m2, from the sparsest to the densest of national surveys
 # points of a training cloud: fewer show no roof, more are thinned away by the network anyway
 POINTS = (60, 1500)
@@ -133,9 +137,9 @@ def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Gen
     """
     if len(cloud) > POINTS[1]:
         cloud = cloud.select(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
-    index = np.full(len(ROOF_TYPES) + 1, NOT_ROOF)
+    index = np.full(len(CATALOGUE) + 1, NOT_ROOF)  # the last for what is no roof
     for position, name in enumerate(types):
-        index[ROOF_TYPES.index(name)] = position
+        index[find_label(name)] = position
     return Sample(cloud.points - cloud.points.mean(axis=0), index[cloud.label], type)
 
 
@@ -144,15 +148,15 @@ def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 
 
     Names are "simulated", "denhaag:FILE" or "roofn3d:DIR".
 
-    `types` empty means all of them.
+    `types` empty means all planar ones of whole roofs. Curved ones are simulated where they are
+    named.
 
     Raises InputError for names, types or files that cannot be used.
     """
-    unknown = [name for name in types if name not in ROOF_TYPES]
+    known = (*ROOF_TYPES, *CURVED_TYPES)
+    unknown = [name for name in types if name not in known]
     if unknown:
-        raise InputError(
-            f"expected roof types among {', '.join(ROOF_TYPES)}, got {', '.join(unknown)}"
-        )
+        raise InputError(f"expected roof types among {', '.join(known)}, got {', '.join(unknown)}")
     names = [data] if isinstance(data, str) else list(data)
     if not names:
         raise InputError(

@@ -12,13 +12,15 @@ import numpy as np
 import shapely
 
 from ..model import Part
+from ..primitives.catalogue import ROUND
 from ..simulate.roofs import SimBuilding, assemble, random_building, random_parameters
 from ..simulate.shapes import make_part
 
 ANNEX_TYPES = ("flat", "monopitch", "gable", "hip")
 LENGTHS = ("length", "ridge_length", "top_length")
-HEIGHTS = ("height", "hip_height", "break_height", "eave_step")
+HEIGHTS = ("height", "neck_height", "hip_height", "break_height", "eave_step")
 COUNTS = ("teeth",)
+AS_LONG_AS_WIDE = ("pyramid", *ROUND)  # A longer one is not built.
 LOWEST_EAVE_M = 2.2  # m above the ground; a door fits below
 OVERLAP_M = 0.05  # m that an annex reaches into the house, so that no gap opens between them
 
@@ -38,7 +40,7 @@ def training_house(rng: np.random.Generator, type: str, annex_share: float) -> S
     else:
         if type == "hip" and rng.random() < 0.3:
             main = with_short_ridge(rng, main)
-        elif type != "pyramid" and rng.random() < 0.2:
+        elif type not in AS_LONG_AS_WIDE and rng.random() < 0.2:
             main = lengthen(rng, main)
         if rng.random() < 0.3:
             main = resize(rng, main)
@@ -130,6 +132,8 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
     depth = rng.uniform(1.5, 0.4 * 2 * reach + 1.5)
     level = rng.random() < 0.4
     inside = reach * rng.uniform(0.3, 1.0) if level else OVERLAP_M
+    if main.type in ROUND:  # Its walls are round, and lie further in beside.
+        inside = reach
     eave = main.translation[2] - (0.0 if level else rng.uniform(0.3, 2.8))
     type = "gable" if level else str(rng.choice(ANNEX_TYPES))
     parameters = annex_parameters(
