@@ -4,12 +4,20 @@ import importlib
 
 import numpy as np
 import pytest
+import shapely
 
 from hiproof.compose import compose
 from hiproof.fit import union
 from hiproof.fit.union import fit_building
+from hiproof.fit.union.allowed import list_allowed_shapes
+from hiproof.fit.union.drawn_plan import DrawnPlan
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.repairs import find_repairs, transform_places
+from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side
+from hiproof.fit.union.volumes import COLUMNS, LEVEL
 from hiproof.simulate import Defects, ScanSettings, random_compound, scan_solids
+from points_of_roofs import sample_heights
 
 weld = importlib.import_module("hiproof.fit.union.weld")
 
@@ -97,3 +105,24 @@ def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):
                 )
                 moved = state._replace(sides=back, planes=planes)
                 assert price_box(moved, problem)[1] <= price_box(settled, problem)[1]
+
+
+def test_a_side_may_take_the_line_of_the_edge_that_carries_it_on():
+    outline = shapely.box(0, 0, 20, 10)
+    points = sample_heights(lambda x, y: np.full(np.shape(x), 5.0), outline, 4.0, 0.02)
+    plan = lay_out_plan(points, outline)
+    scene = make_scene(plan, outline, [0.0], 3.0, 0.2, list_allowed_shapes(()))
+    places = np.array([[0.0, 5.0], [10.0, 5.0], [10.3, 5.4], [20.0, 5.9]])
+    edges, beside = np.array([[0, 1], [2, 3]]), np.array([[0, 1], [2, 1]])
+    levels = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 3.0], [0.0, 0.0, 6.0]])
+    owner = np.array([[1, LEVEL], [0, LEVEL], [2, LEVEL]])
+    drawn = DrawnPlan(places, edges, beside, levels, owner, corners=4)
+    own_places = transform_places(places, 0, plan, scene)
+    edge = int(2 * np.argmin(np.ptp(own_places[:2], axis=0)))  # across which axis the side lies
+    x, y = own_places[:, edge // 2], own_places[:, 1 - edge // 2]
+    sides = [Side(1e3)] * 4
+    sides[edge] = Side(float(x[0]))
+    repairs = find_repairs(drawn, np.zeros((2, COLUMNS)), [[Side(1e3)] * 4, sides], plan, scene)
+    lines = [repair.sides[1, edge] for repair in repairs]
+    off = [np.abs(line.offset + line.lean * y[2:] - x[2:]).max() for line in lines]
+    assert min(off) < 1e-9

@@ -37,6 +37,7 @@ places      further growth where points are unexplained
 groups      passes after the search, on groups of neighbouring volumes
 slivers     planes of which only a narrow strip is visible
 apart       volumes that are visible in several places, split
+gaps        volumes over gaps, split there
 sides       each side on the line of the outline that it nearly follows
 finish      all planes fitted to all points, with level eaves where the points allow them
 cants       planes over walls that cut a volume's corners off
@@ -87,6 +88,7 @@ from .cants import Cache
 from .clamp import clamp_parts
 from .curved import fit_curved_shapes
 from .fit import BuildingFit
+from .gaps import split_at_gaps
 from .groups import draw_in_groups, run_in_groups
 from .larger import combine_parts
 from .names import name_part
@@ -177,7 +179,8 @@ def tidy_volumes(
     is_house = site.outline.area <= LARGE_ROOF_M2
 
     def tidy(rows: np.ndarray, scene: Scene) -> np.ndarray:
-        return split_volumes(drop_slivers(drop_specks(rows, scene), scene), scene)
+        rows = drop_slivers(drop_specks(rows, scene), scene)
+        return split_at_gaps(split_volumes(rows, scene), scene)
 
     def unite(rows: np.ndarray, scene: Scene) -> np.ndarray:
         if scene is site.scene:

@@ -90,7 +90,8 @@ def list_side_moves(
     """Yield moves of one side where it is visible on edges of its own.
 
     `key` is (volume, edge), and `is_own` (e,) are the volume's edges. The side may move parallel to
-    a place nearby, to one at each end, or to the line where its planes meet.
+    a place nearby, to one at each end, to the line of a side that carries it on, or to the line
+    where its planes meet.
     """
     edge = key[1]
     x, y = places[:, edge // 2], places[:, 1 - edge // 2]
@@ -117,6 +118,7 @@ def list_side_moves(
             lean = float((x[j] - x[i]) / (y[j] - y[i]))
             moved = Side(float(x[i] - lean * y[i]), lean, False, side.sigma)
             yield Repair(float(size), {key: moved})
+    yield from list_line_moves(plan_drawn, x, y, on_side, key, side)
     for e in np.flatnonzero(on_side & is_low_step(gaps)):
         line = find_fold_line(plan_drawn, places, int(e), edge)
         if line is not None:
@@ -126,6 +128,34 @@ def list_side_moves(
             ).max()
             if shift < REPAIR_REACH_M:
                 yield Repair(float(shift), {key: moved})
+
+
+def list_line_moves(
+    plan_drawn: DrawnPlan,
+    x: np.ndarray,
+    y: np.ndarray,
+    on_side: np.ndarray,
+    key: tuple[int, int],
+    side: Side,
+) -> Iterator[Repair]:
+    """Yield moves of a side onto the lines of edges that carry it on.
+
+    One wall has one line. Such an edge begins beside an end of the side. x and y (m,) are the
+    plan's places across and along the side, and `on_side` (e,) are its edges.
+    """
+    ends = np.unique(plan_drawn.edges[on_side])
+    side_ends = ends[[y[ends].argmin(), y[ends].argmax()]]
+    x_edges, y_edges = x[plan_drawn.edges], y[plan_drawn.edges]
+    across, along = np.diff(x_edges)[:, 0], np.diff(y_edges)[:, 0]
+    carries_on = ~on_side & (np.hypot(across, along) > REPAIR_REACH_M)
+    carries_on &= np.abs(across) < MOST_REPAIR_LEAN * np.abs(along)
+    distances = np.hypot(x_edges[..., None] - x[side_ends], y_edges[..., None] - y[side_ends])
+    for e in np.flatnonzero(carries_on & (distances.min(axis=(1, 2)) < REPAIR_REACH_M)):
+        lean = across[e] / along[e]
+        line = Side(float(x_edges[e, 0] - lean * y_edges[e, 0]), float(lean), False, side.sigma)
+        shift = np.abs(line.offset + lean * y[side_ends] - x[side_ends]).max()
+        if ON_M < shift < REPAIR_REACH_M:
+            yield Repair(float(shift), {key: line})
 
 
 def find_fold_line(

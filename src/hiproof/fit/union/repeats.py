@@ -76,13 +76,18 @@ def add_copy(volumes: np.ndarray, copy: np.ndarray, strip: Scene, scene: Scene) 
     settled = settled.copy()
     context = measure_context(settled, scene.U, scene.V, scene.order, last)
     move_edges(settled, scene, last, value, COPY_REACH_M, context)
-    saved = compute_strip_costs(volumes, strip).sum() - compute_strip_costs(settled, strip).sum()
+    saved = sum_costs(volumes, strip) - sum_costs(settled, strip)
     return settled if saved > COPY_UNITS * scene.evidence else with_copy
 
 
 def compute_strip_costs(volumes: np.ndarray, strip: Scene) -> np.ndarray:
     """Return what each point and unobserved cell (n,) of a strip costs."""
     return compute_costs(compute_roof_heights(volumes, strip.U, strip.V, strip.order)[0], strip)
+
+
+def sum_costs(volumes: np.ndarray, scene: Scene) -> float:
+    """Sum up what all points and unobserved cells cost."""
+    return float(compute_strip_costs(volumes, scene).sum())
 
 
 def find_copy(
