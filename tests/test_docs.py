@@ -190,9 +190,9 @@ def test_every_named_number_has_a_reason():
     [
         ("hiproof", "'torch', 'dask', 'numba', 'scipy', 'onnxruntime'"),
         (
-            "hiproof.city.run, hiproof.city.solve",
+            "hiproof.city.run, hiproof.city.solve, hiproof.fit.union",
             "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.sparse', 'scipy.spatial', "
-            "'onnxruntime', 'rasterio', 'xml.etree'",
+            "'scipy.special', 'onnxruntime', 'rasterio', 'xml.etree'",
         ),
         ("hiproof.classify.split", "'scipy.ndimage', 'scipy.spatial'"),
     ],

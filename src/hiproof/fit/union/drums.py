@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
-from scipy.special import expit
 
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
@@ -135,6 +134,8 @@ def separate_by_circle(
     It is a logistic fit of points at `xy` (n, 2). Those nearer to the circle count more, the more
     so the sharper it is.
     """
+    from scipy.special import expit  # not before a roof has a circle
+
     sign = np.where(is_level, 1.0, -1.0)
     for softness in EDGE_SOFTNESS_M:
         for _ in range(CIRCLE_ROUNDS):
