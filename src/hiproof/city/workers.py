@@ -54,6 +54,8 @@ def start_server() -> bool:
     try:
         with limit_threads():
             forkserver.ensure_running()
+    except OSError:  # a sandbox without sockets, or a fork of a process that has its own
+        return False
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     stop_server_at_exit()
