@@ -24,6 +24,7 @@ from .moves import (
 )
 from .objective import compute_objective
 from .prices import BEGIN_SHARE, BEGIN_UNITS
+from .steps import enclose_volume
 from .volumes import DIRECTION, LEVEL, N_SIDES, OFFSET0, SETTLED, SLOPE0, U0, U1, V0, V1, is_fixed
 
 DIGEST_REACH_M = 0.5  # Volumes nearer than this (m) belong to each other's surroundings.
@@ -43,20 +44,20 @@ def improve(volumes, scene, value, slopes, rounds):
     for _ in range(rounds):
         value_before = value
         for k in range(len(volumes)):
-            if is_unsettled(volumes, k) or (k == 0 and not is_fixed(volumes, k)):
+            if is_unsettled(volumes, scene.turn, k) or (k == 0 and not is_fixed(volumes, k)):
                 volumes, value = refit_volume(volumes, scene, value, k)
         for k in range(1, len(volumes)):
-            if is_unsettled(volumes, k):
+            if is_unsettled(volumes, scene.turn, k):
                 context = measure_context(volumes, scene.U, scene.V, scene.order, k)
                 value = move_edges(volumes, scene, k, value, EVERYWHERE, context)
         volumes, value = drop_volumes(volumes, scene, value)
         k = 1
         while k < len(volumes):
             count, start = len(volumes), value
-            if is_unsettled(volumes, k):
+            if is_unsettled(volumes, scene.turn, k):
                 volumes, value = change_structure(volumes, scene, value, k, slopes)
                 if value == start:
-                    volumes[k, SETTLED] = digest_surroundings(volumes, k)
+                    volumes[k, SETTLED] = digest_surroundings(volumes, scene.turn, k)
             k = k + 1 if len(volumes) == count else 1
         volumes, value = drop_base(volumes, scene, value)
         if value > value_before - 0.05 * scene.evidence:
@@ -85,9 +86,9 @@ def change_planes(volumes, scene, value, k, slopes):
 @compiled
 def drop_base(volumes, scene, value):
     """Lower the base below everything, if the volumes can cover the outline alone."""
-    if volumes[0, OFFSET0 + LEVEL] <= scene.low - 0.6 or not is_unsettled(volumes, 0):
+    if volumes[0, OFFSET0 + LEVEL] <= scene.low - 0.6 or not is_unsettled(volumes, scene.turn, 0):
         return volumes, value
-    volumes[0, SETTLED] = digest_surroundings(volumes, 0)
+    volumes[0, SETTLED] = digest_surroundings(volumes, scene.turn, 0)
     trial = volumes.copy()
     trial[0, OFFSET0 + LEVEL] = scene.low - 0.7
     trial_value = compute_objective(trial, scene, value + 0.3 * scene.n)
@@ -97,25 +98,26 @@ def drop_base(volumes, scene, value):
 
 
 @compiled
-def is_unsettled(volumes, k):
+def is_unsettled(volumes, turn, k):
     """Return whether volume k may change, and its surroundings did since the last try."""
-    return not is_fixed(volumes, k) and volumes[k, SETTLED] != digest_surroundings(volumes, k)
+    return not is_fixed(volumes, k) and volumes[k, SETTLED] != digest_surroundings(volumes, turn, k)
 
 
 @compiled
-def digest_surroundings(volumes, k):
+def digest_surroundings(volumes, turn, k):
     """Compute a digest of volume k and of what may meet it.
 
-    These are the base's height, and volumes whose rectangles meet its own or that have another
-    direction.
+    These are the base's height, and volumes whose rectangles may meet its own.
     """
     total = math.floor(volumes[0, OFFSET0 + LEVEL] / DIGEST_STEP)
+    direction = int(volumes[k, DIRECTION])
     for j in range(1, len(volumes)):
-        if volumes[j, DIRECTION] == volumes[k, DIRECTION] and (
-            volumes[j, U0] > volumes[k, U1] + DIGEST_REACH_M
-            or volumes[j, U1] < volumes[k, U0] - DIGEST_REACH_M
-            or volumes[j, V0] > volumes[k, V1] + DIGEST_REACH_M
-            or volumes[j, V1] < volumes[k, V0] - DIGEST_REACH_M
+        low_u, high_u, low_v, high_v = enclose_volume(volumes, j, turn, direction)
+        if (
+            low_u > volumes[k, U1] + DIGEST_REACH_M
+            or high_u < volumes[k, U0] - DIGEST_REACH_M
+            or low_v > volumes[k, V1] + DIGEST_REACH_M
+            or high_v < volumes[k, V0] - DIGEST_REACH_M
         ):
             continue
         term = 1

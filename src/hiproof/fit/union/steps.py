@@ -61,13 +61,7 @@ def list_near(volumes, turn, moving):
         direction, count = int(volumes[k, DIRECTION]), 0
         for j in range(len(volumes)):
             if len(volumes) > FEW_VOLUMES and j != moving and k != moving and j != k:
-                other = int(volumes[j, DIRECTION])
-                low_u, high_u, low_v, high_v = enclose_volume(
-                    volumes,
-                    j,
-                    turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1],
-                    turn[other, 1] * turn[direction, 0] - turn[other, 0] * turn[direction, 1],
-                )
+                low_u, high_u, low_v, high_v = enclose_volume(volumes, j, turn, direction)
                 if low_u > volumes[k, U1] or high_u < volumes[k, U0]:
                     continue
                 if low_v > volumes[k, V1] or high_v < volumes[k, V0]:
@@ -79,8 +73,11 @@ def list_near(volumes, turn, moving):
 
 
 @compiled(inline="always")
-def enclose_volume(volumes, j, cosine, sine):
-    """Return the bounds of volume j, a little widened, in axes turned from its own."""
+def enclose_volume(volumes, j, turn, direction):
+    """Return the bounds of volume j, a little widened, in the axes of a direction."""
+    other = int(volumes[j, DIRECTION])
+    cosine = turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1]
+    sine = turn[other, 1] * turn[direction, 0] - turn[other, 0] * turn[direction, 1]
     half_u, half_v = (
         0.5 * (volumes[j, U1] - volumes[j, U0]),
         0.5 * (volumes[j, V1] - volumes[j, V0]),
