@@ -243,6 +243,8 @@ def run_round(
             present = RepairTrial(state, window, plan, problem)
         repaired_state = apply_repair(state, repair, present.window, problem)
         if repaired_state is None:
+            if not repair.equations:  # what a side costs does not depend on the other sides
+                trials[repair.key] += 1
             continue
         trials.update((repair.key, *repair.sides))
         trial = present.draw_if_cheaper(repaired_state)
