@@ -104,11 +104,13 @@ class Window(NamedTuple):
 class Drawing(NamedTuple):
     """What a window shows of a roof: one part and its plan by site.
 
-    A plan is None where its part makes none.
+    A plan is None where its part makes none. `regions` are those of the window's volumes in each
+    site, None where they were only sketched.
     """
 
     parts: list[Part]
     plans: list[DrawnPlan | None]
+    regions: list[list[list[shapely.Polygon]]] | None
 
     @property
     def corners(self) -> float:
@@ -134,7 +136,10 @@ def weld(
         if next_state is state:
             break
         state, drawing = next_state, better_drawing or draw_window(next_state, whole, problem)
-    regions = cut_regions(volumes, state.planes, state.sides, site, base)
+    if drawing.regions is not None and len(whole.numbers) == len(volumes):
+        (regions,) = drawing.regions
+    else:
+        regions = cut_regions(volumes, state.planes, state.sides, site, base)
     return state.sides, state.planes, regions
 
 
@@ -166,13 +171,14 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     sides = [state.sides[k] for k in window.numbers]
     is_cut = window.base or len(volumes) == 1
     sketch = None if is_cut else sketch_regions(volumes, sides, problem.site)
-    parts, plans = [], []
+    parts, plans, all_regions = [], [], []
     for site in window.sites:
         regions = sketch or cut_regions(volumes, planes, sides, site, window.base)
         part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
         parts.append(part)
         plans.append(draw_plan(part, owner, site.outline))
-    return Drawing(parts, plans)
+        all_regions.append(regions)
+    return Drawing(parts, plans, all_regions if sketch is None else None)
 
 
 @dataclass
