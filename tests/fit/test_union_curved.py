@@ -47,6 +47,15 @@ def test_a_curved_roof_is_found(kind, setting):
     assert outcome.volume_error == pytest.approx(0.0, abs=0.03)
 
 
+def test_a_cone_is_no_onion_of_any_width():
+    """No bulge lies along a cone, so its points do not determine that of an onion."""
+    scene = draw_scene("cone", "tower", 105, 8.0)
+    parts = fit_building(scene.points, scene.outline).roof_parts
+    assert sorted(part.type for part in parts if part.type != "flat") == ["cone"]
+    (cone,) = [part for part in parts if part.type == "cone"]
+    assert cone.parameters["width"] == pytest.approx(7.47, rel=0.05)
+
+
 @pytest.mark.parametrize(("setting", "seed"), [("alone", 10), ("tower", 10)])
 def test_two_halves_of_a_spire_become_one_with_equal_sides(setting, seed):
     """Planes follow the points as well, but there are more of them."""

@@ -22,6 +22,7 @@ LEAST_REACH_M = 0.12  # Points nearer than this, at right angles, always count.
 MEDIANS = 3.0  # Points further off than so many medians of the distances do not count.
 WIDTH_ROUNDS = 2  # Rounds in which points are taken from within the plan.
 BENDS_STARTED = 4  # Starts of a shape with a top of its own, by how far that bends up.
+MOST_MOVE = 0.3  # Share of its half width by which a plan moves or widens at most.
 STEP = 1e-4  # Step (m, rad or slope) of numerical derivatives.
 PLAN_STEP_M = 0.05  # Step (m) over which slopes are measured: as far as points lie off in plan.
 
@@ -59,6 +60,8 @@ def approach(
     """
     numbers = list(range(Q1, shape.theta_size))
     lowest, highest = np.transpose(shape.bounds)
+    plan, reach_m = [CX, CY, HALF_WIDTH], MOST_MOVE * theta[HALF_WIDTH]
+    nearest, farthest = theta[plan] - reach_m, theta[plan] + reach_m
     for _ in range(REGULAR_ROUNDS):
         slopes = np.hypot(*(measure_change(points, shape, theta, k, PLAN_STEP_M) for k in (CX, CY)))
         weights = 1.0 / np.hypot(1.0, slopes)
@@ -74,6 +77,7 @@ def approach(
         theta = theta.copy()
         theta[list(free)] += move
         theta[numbers] = np.clip(theta[numbers], lowest, highest)
+        theta[plan] = np.clip(theta[plan], nearest, farthest)
         theta[HALF_LENGTH] = theta[HALF_WIDTH]
     return left, theta
 
