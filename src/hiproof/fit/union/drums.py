@@ -30,6 +30,7 @@ LEAST_DRUM_NATS = 8.0  # A roof with a drum must be so much likelier (nats).
 LEAST_DRUM_NATS_ON_ARC = 0.0  # The same over an arc of the outline, which speaks for the circle.
 FEWEST_WRONG = 3  # Fewer points off the roof are stray ones.
 RIGHT_SHARE = 0.95  # Share of the points around it on the right side of a drum's step.
+HOPELESS_SHARE = 0.85  # A circle with fewer on the right side after a round is given up.
 
 
 def place_drums(roof: JudgedRoof, ends: list[RoundEnd]) -> JudgedRoof:
@@ -118,35 +119,34 @@ def fit_drum(roof: JudgedRoof, level: float) -> Iterator[Part]:
     near = np.hypot(*(roof.points[:, :2] - centre).T) <= BEYOND_DRUM * radius
     xy, z = roof.points[near, :2], roof.points[near, 2]
     is_level = np.abs(z - level) <= SAME_LEVEL_M
-    centre, radius = separate_by_circle(xy, is_level, centre, radius)
-    is_inside = np.hypot(*(xy - centre).T) <= radius
-    if np.mean(is_inside == is_level) >= RIGHT_SHARE:
-        drum = make_drum(centre, radius, level)
-        if shapely.covers(roof.outline, drum.outlines[0]):
-            yield drum
+    for softness in EDGE_SOFTNESS_M:
+        centre, radius = separate_by_circle(xy, is_level, centre, radius, softness)
+        right_share = np.mean((np.hypot(*(xy - centre).T) <= radius) == is_level)
+        if right_share < HOPELESS_SHARE:
+            return
+    drum = make_drum(centre, radius, level)
+    if right_share >= RIGHT_SHARE and shapely.covers(roof.outline, drum.outlines[0]):
+        yield drum
 
 
 def separate_by_circle(
-    xy: np.ndarray, is_level: np.ndarray, centre: np.ndarray, radius: float
+    xy: np.ndarray, is_level: np.ndarray, centre: np.ndarray, radius: float, softness: float
 ) -> tuple[np.ndarray, float]:
     """Move a circle to where it best separates level points from others.
 
     It is a logistic fit of points at `xy` (n, 2). Those nearer to the circle count more, the more
-    so the sharper it is.
+    so the smaller its `softness` (m).
     """
-    from scipy.special import expit  # not before a roof has a circle
-
     sign = np.where(is_level, 1.0, -1.0)
-    for softness in EDGE_SOFTNESS_M:
-        for _ in range(CIRCLE_ROUNDS):
-            way = xy - centre
-            r = np.maximum(np.hypot(*way.T), softness)
-            wrong = expit(sign * (r - radius) / softness)
-            change = np.column_stack([way.T[0] / r, way.T[1] / r, np.ones_like(r)]) / softness
-            hessian = (change.T * (wrong * (1.0 - wrong))) @ change + np.eye(3)
-            move = np.linalg.solve(hessian, change.T @ (sign * wrong))
-            dx, dy, wider = np.clip(move, -softness, softness).tolist()
-            centre, radius = centre + (dx, dy), radius + wider
+    for _ in range(CIRCLE_ROUNDS):
+        way = xy - centre
+        r = np.maximum(np.hypot(*way.T), softness)
+        wrong = 0.5 + 0.5 * np.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
+        change = np.column_stack([way.T[0] / r, way.T[1] / r, np.ones_like(r)]) / softness
+        hessian = (change.T * (wrong * (1.0 - wrong))) @ change + np.eye(3)
+        move = np.linalg.solve(hessian, change.T @ (sign * wrong))
+        dx, dy, wider = np.clip(move, -softness, softness).tolist()
+        centre, radius = centre + (dx, dy), radius + wider
     return centre, radius
 
 

@@ -51,6 +51,8 @@ def split_once(volumes: np.ndarray, k: int, scene: Scene) -> np.ndarray | None:
     the pieces of a row have lines and heights in common.
     """
     numbers, gain = measure_gain_without(volumes, k, scene)
+    if np.maximum(gain, 0.0).sum() < scene.evidence:
+        return None
     gap = max(find_gap(volumes, k, axis, numbers, gain, scene) for axis in (0, 1))
     if gap.gain < scene.evidence:
         return None
