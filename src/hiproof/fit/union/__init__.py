@@ -158,7 +158,7 @@ def fit_building(
     ]
     visible = keep_visible(parts, plan, scene)
     parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
-    parts = fit_curved_shapes(parts, points_local, outline, settings)
+    parts = fit_curved_shapes(parts, plan.points, outline, settings)
     parts = [restrict_type(part, types, points_local) for part in parts]
     z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
     parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))

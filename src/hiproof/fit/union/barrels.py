@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...model import Part
 from ...settings import Settings
 from .judged import COMPARED_M, JudgedRoof
@@ -20,52 +21,64 @@ CURVE_ROUNDS = 2  # The second leaves out points beside the vault, such as those
 ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
 
 
-def list_barrels(
-    roof: JudgedRoof, part: Part, own: np.ndarray, settings: Settings
-) -> Iterator[Part]:
+def list_barrels(roof: JudgedRoof, part: Part, settings: Settings) -> Iterator[Part]:
     """Yield barrel vaults over a part, alone and with those beside it along its ridge.
 
     They are tried if a curve across the part is nearer to its points than its planes.
     """
     if part.type not in BARREL_LIKE:
         return
-    beside = [other for other in roof.parts if is_as_long(part, other)]
-    for group in ([part], beside) if len(beside) > 1 else ([part],):
-        covered = list_polygons(unite_outlines(group))
-        numbers = [k for k, p in enumerate(roof.parts) if any(p is member for member in group)]
-        which = own | np.isin(roof.highest[1], numbers)
-        way = -math.sin(part.kappa), math.cos(part.kappa)
+    x = roof.points[:, :2] @ np.array([-math.sin(part.kappa), math.cos(part.kappa)])
+    for group in list_groups(roof.parts, part):
+        is_member = [any(p is member for member in group) for p in roof.parts]
+        which = np.array(is_member)[roof.highest[1]]
+        before = roof.measure_distances(MOST_DISTANCE_M)[which].mean()
         most_left = BENT if len(group) == 1 else AS_NEAR
-        if len(covered) == 1 and is_bent(roof.points[:, :2] @ way, roof, which, most_left):
+        if measure_arc_misfit(x[which], roof.points[which, 2]) > most_left * before:
+            continue
+        covered = list_polygons(unite_outlines(group))
+        if len(covered) == 1:
             inside = shapely.contains_xy(covered[0], *roof.points[:, :2].T)
             shape = fit_types(roof.points[inside], covered[0], ("barrel",), settings)
             if shape is not None:
                 yield cut_part(shape, covered[0])
 
 
-def is_as_long(part: Part, other: Part) -> bool:
-    """Return whether another part begins and ends where a part does along its ridge."""
-    way = np.array([math.cos(part.kappa), math.sin(part.kappa)])
-    ends = []
-    for one in (part, other):
-        along = np.concatenate([shapely.get_coordinates(p.outline) @ way for p in one.pieces])
-        ends.append((along.min(), along.max()))
-    return bool(np.abs(np.diff(ends, axis=0)).max() <= ENDS_M)
+def list_groups(parts: list[Part], part: Part) -> list[list[Part]]:
+    """List a part alone, and with all that begin and end where it does along its ridge."""
+    if len(parts) == 1:
+        return [parts]
+    along = np.array([math.cos(part.kappa), math.sin(part.kappa)])
+    ends = find_ends(part, along)
+    beside = [p for p in parts if np.abs(find_ends(p, along) - ends).max() <= ENDS_M]
+    return [[part], beside] if len(beside) > 1 else [[part]]
 
 
-def is_bent(x: np.ndarray, roof: JudgedRoof, which: np.ndarray, most_left: float) -> bool:
-    """Return whether an arc over x (n,) leaves little of the misfit of the roof.
+def find_ends(part: Part, along: np.ndarray) -> np.ndarray:
+    """Return where a part begins and ends along a unit vector (2,)."""
+    places = shapely.get_coordinates([piece.outline for piece in part.pieces]) @ along
+    return np.array([places.min(), places.max()])
 
-    `which` (n,) are the points that count, and `most_left` the largest share that may be left.
+
+@compiled
+def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
+    """Return how far heights z (n,) lie from an arc over x (n,), in the mean (m).
+
+    Each counts up to MOST_DISTANCE_M. The arc is the best sum of a line, a parabola and a half
+    ellipse.
     """
-    x, z = x[which], roof.points[which, 2]
-    middle, wide = 0.5 * (x.min() + x.max()), max(0.5 * float(np.ptp(x)), COMPARED_M)
+    middle, wide = 0.5 * (x.min() + x.max()), max(0.5 * (x.max() - x.min()), COMPARED_M)
     x = (x - middle) / wide
     under = 1.0 - np.minimum(x * x, 1.0)
-    design = np.column_stack([np.ones_like(x), x, under, np.sqrt(under)])
-    used = np.ones(len(z), bool)
+    used = np.ones(len(z))
     for _ in range(CURVE_ROUNDS):
-        distances = np.abs(z - design @ np.linalg.lstsq(design[used], z[used], rcond=None)[0])
-        used = distances <= max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
-    left = np.minimum(distances, MOST_DISTANCE_M).mean()
-    return bool(left <= most_left * roof.measure_distances(MOST_DISTANCE_M)[which].mean())
+        columns = np.stack((np.ones_like(x), x, under, np.sqrt(under), z))
+        for k in range(4):  # What one column explains is taken from those after it.
+            weighted = used * columns[k]
+            square = (weighted * columns[k]).sum()
+            for other in range(k + 1, 5 if square > 1e-9 else 0):
+                columns[other] -= (weighted * columns[other]).sum() / square * columns[k]
+        distances = np.abs(columns[4])
+        reach = max(MOST_DISTANCE_M, 2.0 * np.median(distances))
+        used = np.where(distances <= reach, 1.0, 0.0)
+    return np.minimum(distances, MOST_DISTANCE_M).mean()

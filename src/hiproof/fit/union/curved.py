@@ -39,11 +39,10 @@ FEWEST_CURVE_POINTS = 12  # A curve takes five numbers, and as many points again
 def fit_curved_shapes(
     parts: list[Part], points: np.ndarray, outline: shapely.Polygon, settings: Settings
 ) -> list[Part]:
-    """Replace parts by curved shapes that follow the points (n, 3) better."""
+    """Replace parts by curved shapes that follow the points (n, 3) inside the outline better."""
     allowed = settings.fit.types or CURVED
     names = [name for name in CURVED if name in allowed]
-    inside = points[shapely.contains_xy(outline, points[:, 0], points[:, 1])]
-    roof = JudgedRoof(parts, inside, outline)
+    roof = JudgedRoof(parts, points, outline)
     ends = find_round_ends(outline)
     if not settings.fit.types or "flat" in settings.fit.types:
         roof = place_drums(roof, ends)
@@ -101,7 +100,7 @@ def find_better_roof(roof: JudgedRoof, names: list[str], settings: Settings) -> 
         elif distances[own].mean() >= LEAST_MISFIT_M or list_cants(part.parameters):
             shapes = chain(
                 list_round_shapes(roof, part, own, tops, settings),
-                list_barrels(roof, part, own, settings) if "barrel" in names else (),
+                list_barrels(roof, part, settings) if "barrel" in names else (),
             )
         else:
             continue

@@ -9,15 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
 from .judged import JudgedRoof, make_flat, measure_gain, replace_parts, trim_parts
 from .own import MOST_DISTANCE_M
+from .planes import solve_masked
 from .regions import exclude_parts, list_polygons, unite_outlines
 from .round_ends import TURRET_DEG, RoundEnd, cut_to_outline
 
@@ -30,7 +33,7 @@ LEAST_DRUM_NATS = 8.0  # A roof with a drum must be so much likelier (nats).
 LEAST_DRUM_NATS_ON_ARC = 0.0  # The same over an arc of the outline, which speaks for the circle.
 FEWEST_WRONG = 3  # Fewer points off the roof are stray ones.
 RIGHT_SHARE = 0.95  # Share of the points around it on the right side of a drum's step.
-HOPELESS_SHARE = 0.85  # A circle with fewer on the right side after a round is given up.
+HOPELESS_SHARE = 0.85  # A circle with fewer on the right side is given up.
 
 
 def place_drums(roof: JudgedRoof, ends: list[RoundEnd]) -> JudgedRoof:
@@ -78,7 +81,8 @@ def draw_ring(roof: JudgedRoof, drum: Part) -> list[tuple[float, JudgedRoof]]:
     if not is_around.any():
         return []
     level = float(np.median(z[is_around]))
-    group = [*select_level(roof, level), *select_level(roof, float(drum.translation[2]))]
+    levels = level, float(drum.translation[2])
+    group = [part for part in roof.parts if any(is_at_level(part, z) for z in levels)]
     ring = shapely.difference(unite_outlines(group), plan, grid_size=OVERLAY_GRID_M)
     judged = inside | shapely.contains_xy(ring, *xy.T)
     around = make_flat(list_polygons(ring), drum, z[judged & ~inside])
@@ -88,66 +92,98 @@ def draw_ring(roof: JudgedRoof, drum: Part) -> list[tuple[float, JudgedRoof]]:
     return [(measure_gain(roof, new, judged, MOST_DISTANCE_M), new)]
 
 
-def select_level(roof: JudgedRoof, level: float) -> list[Part]:
-    """Return the flat parts near a level (m)."""
-    return [
-        part
-        for part in roof.parts
-        if part.type == "flat" and abs(part.translation[2] - level) <= SAME_LEVEL_M
-    ]
+def is_at_level(part: Part, level: float) -> bool:
+    """Return whether a part is flat and near a level (m)."""
+    return part.type == "flat" and abs(part.translation[2] - level) <= SAME_LEVEL_M
 
 
 def list_drums(roof: JudgedRoof) -> Iterator[Part]:
-    """Yield drums around level parts."""
-    wrong = roof.points[roof.measure_distances(math.inf) > SAME_LEVEL_M, :2]
+    """Yield drums around level parts, all those at one level together or one alone."""
+    z, top = roof.points[:, 2], roof.highest[1]
     for k, part in enumerate(roof.parts):
-        own = roof.highest[1] == k
+        own = top == k
         if part.type == "flat" and np.count_nonzero(own) >= FEWEST_LEVEL_POINTS:
-            middle = roof.points[own, :2].mean(axis=0)
-            reach = BEYOND_DRUM * np.hypot(*(roof.points[own, :2] - middle).T).max()
-            if np.count_nonzero(np.hypot(*(wrong - middle).T) <= reach) >= FEWEST_WRONG:
-                yield from fit_drum(roof, float(np.median(roof.points[own, 2])))
+            level = float(np.median(z[own]))
+            is_level = np.array([is_at_level(other, level) for other in roof.parts])
+            starts = (is_level[top], own) if np.count_nonzero(is_level) > 1 else (own,)
+            drums = (fit_drum(roof, level, start) for start in starts)
+            yield from islice((drum for drum in drums if drum is not None), 1)
 
 
-def fit_drum(roof: JudgedRoof, level: float) -> Iterator[Part]:
-    """Yield the drum of the level parts at a `level` (m)."""
-    areas = list_polygons(unite_outlines(select_level(roof, level)))
-    if not areas:
-        return
-    largest = max(areas, key=lambda polygon: polygon.area)
-    centre, radius = np.array(largest.centroid.coords[0]), math.sqrt(largest.area / math.pi)
-    near = np.hypot(*(roof.points[:, :2] - centre).T) <= BEYOND_DRUM * radius
-    xy, z = roof.points[near, :2], roof.points[near, 2]
-    is_level = np.abs(z - level) <= SAME_LEVEL_M
-    for softness in EDGE_SOFTNESS_M:
-        centre, radius = separate_by_circle(xy, is_level, centre, radius, softness)
-        right_share = np.mean((np.hypot(*(xy - centre).T) <= radius) == is_level)
-        if right_share < HOPELESS_SHARE:
-            return
-    drum = make_drum(centre, radius, level)
-    if right_share >= RIGHT_SHARE and shapely.covers(roof.outline, drum.outlines[0]):
-        yield drum
+def fit_drum(roof: JudgedRoof, level: float, start: np.ndarray) -> Part | None:
+    """Fit a drum at a `level` (m), beginning with the points `start` (n,) on it.
 
-
-def separate_by_circle(
-    xy: np.ndarray, is_level: np.ndarray, centre: np.ndarray, radius: float, softness: float
-) -> tuple[np.ndarray, float]:
-    """Move a circle to where it best separates level points from others.
-
-    It is a logistic fit of points at `xy` (n, 2). Those nearer to the circle count more, the more
-    so the smaller its `softness` (m).
+    There is none where hardly any points near it are off the roof.
     """
-    sign = np.where(is_level, 1.0, -1.0)
-    for _ in range(CIRCLE_ROUNDS):
-        way = xy - centre
-        r = np.maximum(np.hypot(*way.T), softness)
-        wrong = 0.5 + 0.5 * np.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
-        change = np.column_stack([way.T[0] / r, way.T[1] / r, np.ones_like(r)]) / softness
-        hessian = (change.T * (wrong * (1.0 - wrong))) @ change + np.eye(3)
-        move = np.linalg.solve(hessian, change.T @ (sign * wrong))
-        dx, dy, wider = np.clip(move, -softness, softness).tolist()
-        centre, radius = centre + (dx, dy), radius + wider
-    return centre, radius
+    x, y, radius, right_share = find_circle(roof.points, level, start)
+    if right_share < RIGHT_SHARE:
+        return None
+    centre = np.array([x, y])
+    drum = make_drum(centre, radius, level)
+    is_near = np.hypot(*(roof.points[:, :2] - centre).T) <= BEYOND_DRUM * radius
+    is_wrong = is_near & (roof.measure_distances(math.inf) > SAME_LEVEL_M)
+    is_inside = shapely.covers(roof.outline, drum.outlines[0])
+    return drum if is_inside and np.count_nonzero(is_wrong) >= FEWEST_WRONG else None
+
+
+@compiled
+def find_circle(
+    points: np.ndarray, level: float, start: np.ndarray
+) -> tuple[float, float, float, float]:
+    """Find the circle that best separates the points (n, 3) at a level from others.
+
+    It begins with the disc that has the middle and the spread of the points `start` (n,). Returns
+    its middle and radius, and which share of the points around the start is on its right side. It
+    is given up, and the share is 0, where too few are.
+    """
+    x, y = points[start, 0].mean(), points[start, 1].mean()
+    squares = (points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2
+    radius = math.sqrt(2.0 * squares[start].mean())
+    near = points[squares <= (BEYOND_DRUM * radius) ** 2]
+    is_level = np.abs(near[:, 2] - level) <= SAME_LEVEL_M
+    right_share = measure_right_share(near, is_level, x, y, radius)
+    for softness in EDGE_SOFTNESS_M:
+        if right_share < HOPELESS_SHARE:
+            return x, y, radius, 0.0
+        for _ in range(CIRCLE_ROUNDS):
+            move = move_circle(near, is_level, x, y, radius, softness)
+            x, y, radius = x + move[0], y + move[1], radius + move[2]
+        right_share = measure_right_share(near, is_level, x, y, radius)
+    return x, y, radius, right_share
+
+
+@compiled
+def measure_right_share(
+    points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float
+) -> float:
+    """Return which share of points (n, 3) is on the right side of a circle."""
+    is_inside = (points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2 <= radius * radius
+    return np.mean(is_inside == is_level)
+
+
+@compiled
+def move_circle(
+    points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float, softness: float
+) -> np.ndarray:
+    """Return by how much (3,) to move and to widen a circle so that it separates points better.
+
+    It is a step of a logistic fit. Points nearer to the circle count more, the more so the smaller
+    its `softness` (m).
+    """
+    hessian, right, change = np.eye(3), np.zeros(3), np.ones(3)
+    for i in range(len(points)):
+        way_x, way_y = points[i, 0] - x, points[i, 1] - y
+        r = max(math.hypot(way_x, way_y), softness)
+        sign = 1.0 if is_level[i] else -1.0
+        wrong = 0.5 + 0.5 * math.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
+        change[0], change[1] = way_x / r, way_y / r
+        weight = wrong * (1.0 - wrong) / softness**2
+        for j in range(3):
+            right[j] += change[j] * sign * wrong / softness
+            for k in range(3):
+                hessian[j, k] += weight * change[j] * change[k]
+    move, _ = solve_masked(hessian, right, np.ones(3, np.bool_))
+    return np.minimum(np.maximum(move, -softness), softness)
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:

@@ -26,14 +26,14 @@ def list_onions(roof: JudgedRoof, part: Part, settings: Settings) -> Iterator[Pa
     """Yield onions fitted to discs of points around a round part and beyond it."""
     if part.type not in ROUND:
         return
-    xy, z = roof.points[:, :2], roof.points[:, 2]
-    way, wide = xy - part.translation[:2], math.sqrt(part.area / math.pi)
+    xy, centre = roof.points[:, :2], part.translation[:2]
+    wide = math.sqrt(part.area / math.pi)
     is_beside = ~shapely.contains_xy(unite_outlines([part]), *xy.T)
     for radius in (share * wide for share in WIDER_RADII):
-        near = np.hypot(*way.T) <= radius
+        near = np.hypot(*(xy - centre).T) <= radius
         if (
             np.count_nonzero(near & is_beside) >= FEWEST_AROUND
-            and measure_fall(way, z, radius, ALL_ROUND) is not None
+            and measure_fall(roof.points, centre, radius, ALL_ROUND) > 0.0
         ):
             shape = fit_round(roof, roof.points[near], ("onion",), settings)
             if shape is not None:

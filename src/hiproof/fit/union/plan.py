@@ -43,7 +43,8 @@ class Plan:
     """Everything that the search needs of one building.
 
     `density` is in points per square metre of covered outline. `border` (3, m) are u, v, z of
-    points next to the outline that do not count: they may be of the walls.
+    points next to the outline that do not count: they may be of the walls. `points` (n, 3) are all
+    inside the outline, in the frame of the building.
     """
 
     frame: PlanFrame
@@ -52,6 +53,7 @@ class Plan:
     unobserved: UnobservedCells
     density: float
     border: np.ndarray
+    points: np.ndarray
 
 
 @compiled
@@ -142,9 +144,8 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
     cloud = Cloud(u, v, z, find_cells(u_lines, u), find_cells(v_lines, v))
     border = frame.to_plan(all_points[~counts]).T
-    return Plan(
-        frame, cloud, grid, lay_unobserved_cells(frame, grid, cloud, outline), density, border
-    )
+    unobserved = lay_unobserved_cells(frame, grid, cloud, outline)
+    return Plan(frame, cloud, grid, unobserved, density, border, all_points)
 
 
 def find_roof_points(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:

@@ -82,12 +82,12 @@ class RoundEnd:
 def find_round_ends(outline: shapely.Polygon) -> list[RoundEnd]:
     """Find the arcs of an outline that are long enough for a roof of their own."""
     ring = counterclockwise(outline.exterior)
-    ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
-    sides = np.roll(ring, -1, axis=0) - ring
-    angles = np.arctan2(sides[:, 1], sides[:, 0])
-    turns = np.degrees((angles - np.roll(angles, 1) + math.pi) % (2.0 * math.pi) - math.pi)
+    angles = np.arctan2(*np.diff(ring, axis=0).T[::-1])
+    turns = np.degrees((np.diff(angles, prepend=angles[-1]) + math.pi) % (2.0 * math.pi) - math.pi)
     is_bend = (turns >= LEAST_TURN_DEG) & (turns <= MOST_TURN_DEG)
-    ends = (fit_round_end(ring[run]) for run in list_runs(is_bend))
+    if np.count_nonzero(is_bend) < FEWEST_CORNERS:
+        return []
+    ends = (fit_round_end(ring[:-1][run]) for run in list_runs(is_bend))
     return [end for end in ends if end is not None]
 
 

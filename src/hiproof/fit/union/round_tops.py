@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
 from ...primitives.cants import list_cants
@@ -52,17 +53,17 @@ def list_round_shapes(
 
     `own` (n,) are the points at which the part is visible.
     """
-    xy, z = roof.points[:, :2], roof.points[:, 2]
-    own_xy, wide = roof.points[own, :2], math.sqrt(part.area / math.pi)
-    starts = own_xy[np.argmax(z[own])], own_xy.mean(axis=0)
-    round_starts = (s for s in starts if measure_fall(xy - s, z, wide, LOOSELY) is not None)
+    points, visible, wide = roof.points, roof.points[own], math.sqrt(part.area / math.pi)
+    starts = visible[np.argmax(visible[:, 2]), :2], visible[:, :2].mean(axis=0)
+    round_starts = (s for s in starts if measure_fall(points, s, wide, LOOSELY) > 0.0)
     start = next(round_starts, None) if names else None
     if start is None:
         return
+    xy = points[:, :2]
     for radius in (share * wide for share in RADII):
-        centre = find_centre(xy, z, start, radius)
-        fall = measure_fall(xy - centre, z, radius, ALL_ROUND)
-        if fall is None:
+        centre = find_centre(points, start, radius)
+        fall = measure_fall(points, centre, radius, ALL_ROUND)
+        if fall == 0.0:
             continue
         cap = scale_cap(fall / radius)
         disc = np.hypot(*(xy - centre).T) <= radius
@@ -78,38 +79,43 @@ def list_round_shapes(
             yield shape
 
 
-def find_centre(xy: np.ndarray, z: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
-    """Return the middle (2,) of what rises above the rest of a disc."""
-    centre = start
+@compiled
+def find_centre(points: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
+    """Return the middle (2,) of what rises above the rest of a disc of points (n, 3)."""
+    centre = start.copy()
     for _ in range(CENTRE_ROUNDS):
-        near = np.hypot(*(xy - centre).T) <= radius
-        if not near.any():
+        ways = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
+        near = points[ways <= radius]
+        if len(near) == 0:
             break
-        above = np.maximum(z[near] - z[near].mean(), COMPARED_M)
-        centre = above @ xy[near] / above.sum()
+        above = np.maximum(near[:, 2] - near[:, 2].mean(), COMPARED_M)
+        centre[0] = (above * near[:, 0]).sum() / above.sum()
+        centre[1] = (above * near[:, 1]).sum() / above.sum()
     return centre
 
 
-def measure_fall(way: np.ndarray, z: np.ndarray, radius: float, alike: float) -> float | None:
+@compiled
+def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: float) -> float:
     """Return how far (m) heights fall from a disc's middle to its outer half.
 
-    `way` (n, 2) leads from the middle to the points. Returns None where they hardly fall, or not
-    `alike` in all directions.
+    It is 0 where the points (n, 3) hardly fall, or not `alike` in all directions.
     """
-    near = (np.abs(way) <= radius).all(axis=1)
-    way, z = way[near], z[near]
-    distances = np.hypot(*way.T)
-    outer = (distances > 0.5 * radius) & (distances <= radius)
-    inner = distances <= 0.25 * radius
-    if np.count_nonzero(outer) < FEWEST_AROUND or not inner.any():
-        return None
-    turns = np.arctan2(way[outer, 1], way[outer, 0]) / (2.0 * math.pi) % 1.0
-    sectors = np.minimum((turns * TURN_SECTORS).astype(int), TURN_SECTORS - 1)
-    counts = np.bincount(sectors, minlength=TURN_SECTORS)
-    means = np.bincount(sectors, z[outer], TURN_SECTORS)[counts > 0] / counts[counts > 0]
-    fall = float(z[inner].mean() - means.mean())
-    is_alike = len(means) >= FEWEST_SECTORS and means.std() <= alike * fall
-    return fall if is_alike and fall >= LEAST_FALL_M else None
+    n_inner, inner = 0, 0.0
+    counts, means = np.zeros(TURN_SECTORS), np.zeros(TURN_SECTORS)
+    for x, y, z in points:
+        x, y = x - centre[0], y - centre[1]
+        distance = math.hypot(x, y)
+        if distance <= 0.25 * radius:
+            n_inner, inner = n_inner + 1, inner + z
+        elif 0.5 * radius < distance <= radius:
+            turn = math.atan2(y, x) / (2.0 * math.pi) % 1.0
+            sector = min(int(turn * TURN_SECTORS), TURN_SECTORS - 1)
+            counts[sector], means[sector] = counts[sector] + 1.0, means[sector] + z
+    if counts.sum() < FEWEST_AROUND or n_inner == 0 or np.count_nonzero(counts) < FEWEST_SECTORS:
+        return 0.0
+    means = means[counts > 0] / counts[counts > 0]
+    fall = inner / n_inner - means.mean()
+    return fall if fall >= LEAST_FALL_M and means.std() <= alike * fall else 0.0
 
 
 def fit_radially(points: np.ndarray, centre: np.ndarray, cap_m: float) -> tuple[np.ndarray, float]:
