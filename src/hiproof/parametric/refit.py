@@ -4,8 +4,9 @@ Types, rectangles and fixed values stay, and the points determine the rest.
 
 One robust least squares over all parts at once (Levenberg and Marquardt, re-weighted by Tukey's
 biweight from coarse to fine): the residual of a point is its height over the roof, which is the
-highest part there. Each part's planes follow from its own parameters, so a column of the Jacobian
-asks one part again. The result is never further from the points than the start.
+highest part there, or its distance at right angles from a curved part. Each part's planes follow
+from its own parameters, so a column of the Jacobian asks one part again. The result is never
+further from the points than the start.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import shapely
 from ..compose.settle import make_pieces
 from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
+from ..primitives.catalogue import CATALOGUE, CURVED
 from ..primitives.parameters import SIDED, refuse_no_shape
 from ..write.parameters import building_record
 from .edit import rebuild
@@ -38,6 +40,7 @@ FEWEST_REFIT_POINTS = 3  # points; fewer span no plane
 # m, degrees: bounds in which heights and pitches stay, short of level and of upright
 LEAST_HEIGHT_M, PITCHES_DEG = 0.01, (0.5, 85.0)
 Z = "z"
+NO_PART = -1  # Points beside the roof have none.
 UNBOUNDED_M = 100.0  # m; larger than any length of a roof: as good as no bound
 
 
@@ -171,11 +174,12 @@ def find_bounds(name: str, parameters: Mapping[str, float]) -> tuple[float, floa
 class RefitSurface:
     """The roof at the points.
 
-    It has their heights (n,) above it, the part (n,) there, the row (n,) among that part's planes,
-    and all planes (k, 3) of every part.
+    It has how far they lie above it (n,), in height times their `leans` (n,), the part (n,) there,
+    the row (n,) among that part's planes, and all planes (k, 3) of every part.
     """
 
     gaps: np.ndarray
+    leans: np.ndarray
     part: np.ndarray
     row: np.ndarray
     planes: list[np.ndarray]
@@ -201,17 +205,21 @@ class Heights:
             for outlines in self.outlines
         ]
 
-    def planes(self, index: int, x: np.ndarray) -> list[np.ndarray] | None:
-        """Return the planes (k, 3) of each piece of a part.
-
-        It is None where the part's parameters make none.
-        """
+    def place(self, index: int, x: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
+        """Return the parameters of a part, and where it lies (3,)."""
         part = self.parts[index]
         values = {
             self.unknowns.names[column][1]: float(x[column]) for column in self.columns[index]
         }
         parameters = {name: values.get(name, value) for name, value in part.parameters.items()}
-        translation = np.array([*part.translation[:2], values.get(Z, part.translation[2])])
+        return parameters, np.array([*part.translation[:2], values.get(Z, part.translation[2])])
+
+    def planes(self, index: int, x: np.ndarray) -> list[np.ndarray] | None:
+        """Return the planes (k, 3) of each piece of a part.
+
+        It is None where the part's parameters make none.
+        """
+        part, (parameters, translation) = self.parts[index], self.place(index, x)
         try:
             refuse_no_shape(part.type, parameters, f"part {index}")
             pieces = make_pieces(
@@ -229,7 +237,7 @@ class Heights:
         for index, inside in enumerate(self.inside):
             planes, first = self.planes(index, x), 0
             if planes is None:
-                return RefitSurface(np.full(count, UNBOUNDED_M), part, row, [])
+                return RefitSurface(np.full(count, UNBOUNDED_M), np.ones(count), part, row, [])
             masks = (mask for mask in inside for _ in range(len(planes) // len(inside)))
             for point_mask, own_planes in zip(masks, planes, strict=True):
                 heights = self.terms[point_mask] @ own_planes.T
@@ -244,10 +252,28 @@ class Heights:
                 )
                 first += len(own_planes)
             result.append(np.concatenate(planes))
-        return RefitSurface(np.clip(self.z - top, -UNBOUNDED_M, UNBOUNDED_M), part, row, result)
+        gaps = np.clip(self.z - top, -UNBOUNDED_M, UNBOUNDED_M)
+        leans = self.leans(x, np.where(np.isfinite(top), part, NO_PART))
+        return RefitSurface(gaps * leans, leans, part, row, result)
+
+    def leans(self, x: np.ndarray, part: np.ndarray) -> np.ndarray:
+        """Return what share (n,) of heights above curved parts (n,) is at right angles to them.
+
+        It is 1 over others: points lie as far off in plan as in height, which steep slopes show.
+        """
+        result = np.ones(len(part))
+        for index in (k for k, one in enumerate(self.parts) if one.type in CURVED):
+            from ..fit.union.regular import measure_leans  # with compiled code that planes need not
+
+            parameters, translation = self.place(index, x)
+            shape = CATALOGUE[self.parts[index].type].variant(parameters)
+            theta = shape.to_theta(parameters, self.parts[index].kappa, translation)
+            over = part == index
+            result[over] = measure_leans(self.terms[over], shape, theta)
+        return result
 
     def jacobian(self, x: np.ndarray, surface: RefitSurface) -> np.ndarray:
-        """Return the derivatives (n, p) of the roof's heights by the unknowns."""
+        """Return the derivatives (n, p) of the roof's heights by the unknowns, times the leans."""
         result = np.zeros((len(self.z), len(x)))
         covered = np.abs(surface.gaps) < UNBOUNDED_M
         for index, columns in enumerate(self.columns):
@@ -262,7 +288,8 @@ class Heights:
                 planes = self.planes(index, moved)
                 if planes is not None:
                     change = (np.concatenate(planes) - surface.planes[index]) / step
-                    result[indices, column] = np.einsum("ij,ij->i", terms, change[row])
+                    rise = np.einsum("ij,ij->i", terms, change[row])
+                    result[indices, column] = surface.leans[indices] * rise
         return result
 
 

@@ -63,8 +63,7 @@ def approach(
     plan, reach_m = [CX, CY, HALF_WIDTH], MOST_MOVE * theta[HALF_WIDTH]
     nearest, farthest = theta[plan] - reach_m, theta[plan] + reach_m
     for _ in range(REGULAR_ROUNDS):
-        slopes = np.hypot(*(measure_change(points, shape, theta, k, PLAN_STEP_M) for k in (CX, CY)))
-        weights = 1.0 / np.hypot(1.0, slopes)
+        weights = measure_leans(points, shape, theta)
         off = points[:, 2] - shape.height_at(theta, points[:, :2])
         distances = np.abs(off) * weights
         reach = max(LEAST_REACH_M, MEDIANS * float(np.median(distances))) if len(off) else 0.0
@@ -82,6 +81,15 @@ def approach(
     return left, theta
 
 
+def measure_leans(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.ndarray:
+    """Measure the distances (n,) at right angles to a shape of points 1 m above it.
+
+    Its slopes at the points (n, 3) are measured over as far as they lie off in plan.
+    """
+    slopes = (measure_change(points, shape, theta, k, PLAN_STEP_M) for k in (CX, CY))
+    return 1.0 / np.hypot(1.0, np.hypot(*slopes))
+
+
 def measure_change(
     points: np.ndarray, shape: Primitive, theta: np.ndarray, k: int, step: float
 ) -> np.ndarray:
@@ -89,8 +97,7 @@ def measure_change(
     ends = []
     for way in (-step, step):
         moved = theta.copy()
-        moved[k] += way
-        moved[HALF_LENGTH] = moved[HALF_WIDTH]
+        moved[[k, HALF_LENGTH] if k == HALF_WIDTH else k] += way
         ends.append(shape.height_at(moved, points[:, :2]))
     return (ends[1] - ends[0]) / (2.0 * step)
 
