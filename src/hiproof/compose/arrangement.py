@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from ..geometry.arrays import copy_row, copy_rows, sort_order, sort_values
 from ..geometry.point_in_polygon import flips
 from .joined import find_root, join
 
@@ -31,7 +32,7 @@ COLLINEAR_UNITS = 5.0
 def grow_array(array):
     """Return a copy of `array` with twice the rows."""
     larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
-    larger[: len(array)] = array
+    copy_rows(larger, array)
     return larger
 
 
@@ -215,7 +216,7 @@ def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
         if c >= 0 and (
             other == crossed or is_beside(xy[vertex], xy[c], xy[edges[other, 1]], reach)
         ):
-            stack[top] = edges[other]
+            copy_row(stack[top], edges[other])
             edges[other, 0] = edges[other, 1] = -1
             top += 1
     return top
@@ -237,7 +238,7 @@ def half_edge_order(xy, edges):
     start = np.cumsum(start)
     order = np.empty(size, np.int64)
     fill = start.copy()
-    for h in np.argsort(angle, kind="mergesort"):
+    for h in sort_order(angle):
         a = edges[h >> 1, h & 1]
         order[fill[a]] = h
         fill[a] += 1
@@ -308,7 +309,7 @@ def trace_faces(xy, edges, follow):
         if walk_area[w] > 0:
             face_of_walk[w], area[faces] = faces, walk_area[w]
             faces += 1
-    for w in np.argsort(xy[lowest[:walks], 0], kind="mergesort"):
+    for w in sort_order(1.0 * xy[lowest[:walks], 0]):
         if walk_area[w] <= 0:
             lower = lowest[w]
             hit = find_face_left(xy, edges, xy[lower, 0] - 0.5, xy[lower, 1] + 0.5)
@@ -529,8 +530,11 @@ def choose_heir(xy, edges, face, label, region, length, planes, sliver, anyone):
                         fits[r] = fits[r] and lower - BEYOND_UNITS < z < upper + BEYOND_UNITS
     if label[sliver] < 0 or (anyone and not (fits & (shared > 0.0)).any()):
         fits[:] = True
-    best = np.argmax(np.where(fits, shared, 0.0))
-    return label[best] if fits[best] and shared[best] > 0.0 else OUTSIDE
+    heir, longest = OUTSIDE, 0.0
+    for r in range(len(label)):
+        if fits[r] and shared[r] > longest:
+            heir, longest = label[r], shared[r]
+    return heir
 
 
 @compiled(inline="always")
@@ -574,10 +578,11 @@ def renumber_vertices(xy, edges, side):
         for end in range(2):
             v = edges[e, end]
             if number[v] < 0:
-                number[v], out_xy[count] = count, xy[v]
+                number[v] = count
+                copy_row(out_xy[count], xy[v])
                 count += 1
             out_edges[selection, end] = number[v]
-        out_side[selection] = side[e]
+        copy_row(out_side[selection], side[e])
         selection += 1
     return out_xy[:count].copy(), out_edges[:selection].copy(), out_side[:selection].copy()
 
@@ -595,7 +600,8 @@ def dissolve(xy, edges, side):
     count = 0
     for e in range(len(edges)):
         if side[e, 0] != side[e, 1]:
-            edges[count], side[count] = edges[e], side[e]
+            copy_row(edges[count], edges[e])
+            copy_row(side[count], side[e])
             count += 1
     edges, side = edges[:count].copy(), side[:count].copy()
     degree, touching = np.zeros(len(xy), np.int64), np.zeros((len(xy), 2), np.int64)
@@ -688,7 +694,7 @@ def inside_intervals(soup, lower, upper, px, py, dx, dy):
             )
             cuts[count] = dx * (x - px) + dy * (y - py)
             count += 1
-    return np.sort(cuts[:count])
+    return sort_values(cuts[:count])
 
 
 @compiled

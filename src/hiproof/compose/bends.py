@@ -11,7 +11,8 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
-from ..geometry.area_vectors import dot
+from ..geometry.area_vectors import cross, dot
+from ..geometry.arrays import copy_row
 
 # val3dity's limit of 20 degrees, and half of it, below which no pair needs to be compared
 FLAT_COSINE, SURELY_FLAT_COSINE = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(10.0))
@@ -74,11 +75,11 @@ def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
         lower, normal = ring_start[face_start[faces[k]]], normals[faces[k]]
         perpendicular = np.zeros(3)
         perpendicular[np.argmin(np.abs(normal))] = 1.0
-        u = np.cross(normal, perpendicular)
+        u = cross(normal, perpendicular)
         u /= np.sqrt(dot(u, u))
-        v = np.cross(normal, u)
+        v = cross(normal, u)
         for i in range(start[k], start[k + 1]):
-            corners[i] = vertices[index[lower + i - start[k]]]
+            copy_row(corners[i], vertices[index[lower + i - start[k]]])
             flat[i, 0], flat[i, 1] = dot(corners[i], u), dot(corners[i], v)
     return corners, flat, start
 
@@ -104,10 +105,11 @@ def triangle_normals(places, owner, corners, flat, start, normals):
         a = corners[corner_at(places[t, 0, 0], places[t, 0, 1], flat, lower, upper)]
         b = corners[corner_at(places[t, 1, 0], places[t, 1, 1], flat, lower, upper)]
         c = corners[corner_at(places[t, 2, 0], places[t, 2, 1], flat, lower, upper)]
-        normal = np.cross(b - a, c - a)
+        normal = cross(b - a, c - a)
         size = np.sqrt(dot(normal, normal))
         if size > 0:
-            result[t] = normal / (size if dot(normal, normals[owner[t]]) > 0 else -size)
+            size = size if dot(normal, normals[owner[t]]) > 0 else -size
+            copy_row(result[t], normal / size)
     return result
 
 

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.area_vectors import dot, enclosed_volume, newell
+from ..geometry.area_vectors import cross, dot, enclosed_volume, newell
+from ..geometry.arrays import copy_row, sort_order
 from ..geometry.point_in_polygon import flips
 from .bends import SURELY_FLAT_COSINE
 from .joined import find_root, join
@@ -31,7 +32,7 @@ def weld(vertices, tolerance):
     same = np.arange(len(vertices))
     # buildings are square to the axes: along none of them do so few vertices share a place
     along = SKEW[0] * vertices[:, 0] + SKEW[1] * vertices[:, 1] + SKEW[2] * vertices[:, 2]
-    order = np.argsort(along)
+    order = sort_order(along)
     for i in range(len(order)):
         v = order[i]
         for k in range(i - 1, -1, -1):
@@ -335,7 +336,8 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
             count += 1
             continue
         lower, upper = ring_start[first], ring_start[last]
-        normals[f], offsets[f], flatness[f] = best_plane(vertices, index, lower, upper, area / size)
+        normal, offsets[f], flatness[f] = best_plane(vertices, index, lower, upper, area / size)
+        copy_row(normals[f], normal)
         if flatness[f] > planarity:
             result[count, 0], result[count, 1], result[count, 2] = 203, f, -1
             count += 1
@@ -375,9 +377,9 @@ def best_plane(vertices, index, lower, upper, normal):
     centre /= upper - lower
     perpendicular = np.zeros(3)
     perpendicular[np.argmin(np.abs(normal))] = 1.0
-    u = np.cross(normal, perpendicular)
+    u = cross(normal, perpendicular)
     u /= np.sqrt(dot(u, u))
-    v = np.cross(normal, u)
+    v = cross(normal, u)
     uu = uv = vv = ud = vd = 0.0
     for k in range(lower, upper):
         p = vertices[index[k]] - centre
@@ -433,8 +435,8 @@ def directed_edges(index, ring_start, face_start):
                 edges[count, 0], edges[count, 1] = min(a, b), max(a, b)
                 edges[count, 2], edges[count, 3] = 1 if a < b else -1, f
                 count += 1
-    key = edges[:, 0] * (index.max() + 1) + edges[:, 1]
-    return edges[np.argsort(key, kind="mergesort")]
+    key = 1.0 * edges[:, 0] * (index.max() + 1) + edges[:, 1]
+    return edges[sort_order(key)]
 
 
 @compiled
@@ -492,7 +494,7 @@ def check_umbrellas(index, ring_start, face_start, result, count):
                     k - 1 if k > lower else upper - 1,
                     k + 1 if k + 1 < upper else lower,
                 )
-    by_vertex = np.argsort(index, kind="mergesort")
+    by_vertex = sort_order(1.0 * index)
     start = 0
     while start < corners:
         stop = start
@@ -627,13 +629,13 @@ def lies_across(flat, index, ring_start, first, last, a, b, slack):
 def face_boxes(vertices, index, ring_start, face_start):
     """Return the lowest and highest corner (f, 3) of each face's box."""
     faces = len(face_start) - 1
-    low_box, high_box = np.empty((faces, 3)), np.empty((faces, 3))
+    low_box, high_box = np.full((faces, 3), np.inf), np.full((faces, 3), -np.inf)
     for f in range(faces):
-        lower, upper = ring_start[face_start[f]], ring_start[face_start[f + 1]]
-        low_box[f] = high_box[f] = vertices[index[lower]]
-        for k in range(lower, upper):
-            low_box[f] = np.minimum(low_box[f], vertices[index[k]])
-            high_box[f] = np.maximum(high_box[f], vertices[index[k]])
+        for k in range(ring_start[face_start[f]], ring_start[face_start[f + 1]]):
+            for axis in range(3):
+                place = vertices[index[k], axis]
+                low_box[f, axis] = min(low_box[f, axis], place)
+                high_box[f, axis] = max(high_box[f, axis], place)
     return low_box, high_box
 
 
@@ -663,7 +665,7 @@ def check_intersections(
     low_box, high_box = face_boxes(vertices, index, ring_start, face_start)
     slack = flatness + 2e-4
     widest, axis = slack.max(), sweep_axis(low_box, high_box)
-    order = np.argsort(low_box[:, axis])
+    order = sort_order(low_box[:, axis].copy())
     axis_of = largest_axes(normals)
     flat = np.empty((len(vertices), 2))
     for i in range(len(order)):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from ..geometry.arrays import copy_row, copy_rows, sort_order
 from .arrangement import OUTSIDE, half_edge_order, next_half_edges, trace_faces
 
 # levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
@@ -85,7 +86,9 @@ def split_at_crossings(xy, edges, side, planes, reach):
     out_xy = np.empty((len(xy) + room, 2), np.int64)
     out_edges, out_side = np.empty((2 * room, 2), np.int64), np.empty((2 * room, 2), np.int64)
     ties = np.empty((room, 3))
-    out_xy[: len(xy)], out_edges[:room], out_side[:room] = xy, edges, side
+    copy_rows(out_xy, xy)
+    copy_rows(out_edges, edges)
+    copy_rows(out_side, side)
     vertices, count, tied = len(xy), room, 0
     gap = LEVEL_GAP_M * 1e4
     for e in range(room):
@@ -112,7 +115,7 @@ def split_at_crossings(xy, edges, side, planes, reach):
         out_xy[vertices, 0], out_xy[vertices, 1] = np.int64(np.rint(x)), np.int64(np.rint(y))
         out_edges[e, 1] = vertices
         out_edges[count, 0], out_edges[count, 1] = vertices, edges[e, 1]
-        out_side[count] = side[e]
+        copy_row(out_side[count], side[e])
         vertices += 1
         count += 1
     return (
@@ -157,7 +160,7 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
                 if current == OUTSIDE
                 else evaluate_plane(planes, current, xy[v, 0], xy[v, 1])
             )
-        ranking = np.argsort(z)
+        ranking = sort_order(z)
         first = 0
         for k in range(len(surroundings)):
             top = k + 1 == len(surroundings)

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
+from ..geometry.arrays import sort_values
 
 # rad within which edges support a direction of an outline, and whose mean it is
 PEAK_RAD, NEAR_PEAK_RAD = math.radians(3.0), math.radians(5.0)
@@ -138,7 +139,7 @@ def rectangle_direction(points, trim, angles):
 @compiled
 def trimmed_range(values, trim):
     """Return the range of all `values` but a share `trim` at each end."""
-    ordered = np.sort(values)
+    ordered = sort_values(values)
     cut = int(trim * len(values))
     return ordered[cut], ordered[len(values) - 1 - cut]
 

@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled import compiled
+from ..geometry.arrays import copy_row
 
 MAX_PLANES = 64  # of a primitive: a dome's facets
 # places in theta (9,); after the last come q1, q2, q3
@@ -439,7 +440,7 @@ def minimise(problem, tables, kind, theta, lower, upper, noise, iterations, tole
             damping = max(8 * damping, 1e-3)
         if gain < 0:
             break
-        theta[:] = moved
+        copy_row(theta, moved)
         value, inliers, squares = value_new, inliers_new, squares_new
         gradient, gradient_new = gradient_new, gradient
         hessian, hessian_new = hessian_new, hessian
@@ -530,7 +531,7 @@ def sharpen_sides(problem, tables, kind, theta, lower, upper, noise, prior, taus
         total += first + second
         if value < best:
             best, best_noise, worse = value, noise, 0
-            theta[:] = moved
+            copy_row(theta, moved)
         else:
             worse += 1
             if worse == 2:
@@ -728,7 +729,7 @@ def vote_each(problem, tables, rectangles):
         for kind in range(len(tables.size)):
             for turn in range(tables.turns[kind]):
                 theta = thetas[count]
-                theta[:Q0] = rectangle
+                copy_row(theta, rectangle)
                 theta[KAPPA] += turn * math.pi / 2
                 if turn % 2 == 1:
                     theta[HALF_WIDTH], theta[HALF_LENGTH] = (

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from ..geometry.arrays import sort_order
 
 WALL_REACH_SPACINGS = 1.2  # how far around a point is looked
 STEEPEST_ROOF = 2.0  # slope of a roof: 63 degrees
@@ -26,8 +27,9 @@ def on_walls(points, neighbours, spacing):
     array([ True, False])
     """
     reach, result = WALL_REACH_SPACINGS * spacing, np.zeros(len(points), np.bool_)
-    order = np.argsort(neighbours[:, 0])
-    ascending = neighbours[order, 0]
+    x_of_neighbours = neighbours[:, 0].copy()
+    order = sort_order(x_of_neighbours)
+    ascending = x_of_neighbours[order]
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         k = np.searchsorted(ascending, x - reach)

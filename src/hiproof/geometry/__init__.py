@@ -6,5 +6,6 @@ point_in_polygon    whether a point lies in rings, compiled
 components          which members of a set are connected by links
 grid                cells of a grid in plan, numbered
 alpha_shape         the outline of a set of points
+arrays              sorting and copying in compiled code
 area_vectors        area vectors and enclosed volumes, compiled
 """

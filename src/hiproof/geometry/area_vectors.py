@@ -18,6 +18,19 @@ def dot(a, b):
 
 
 @compiled
+def cross(a, b):
+    """Return the vector product (3,) of two vectors (3,).
+
+    Numba's own takes a second to compile.
+    """
+    result = np.empty(3)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        result[k] = a[i] * b[j] - a[j] * b[i]
+    return result
+
+
+@compiled
 def newell(vertices, index, lower, upper):
     """Return the area vector (3,) of the ring index[lower:upper].
 

@@ -315,7 +315,9 @@ def inverse_shares(distances):
     """Return inverse-distance weights (s, k) with a sum of 1."""
     weights = 1.0 / (distances + 1e-3)
     for s in range(len(weights)):
-        weights[s] /= weights[s].sum()
+        total = weights[s].sum()
+        for k in range(weights.shape[1]):
+            weights[s, k] /= total
     return weights.astype(np.float32)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from ..geometry.arrays import list_distinct
 
 LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is level
 
@@ -41,7 +42,7 @@ def find_level(share, z, plan):
     target = share * plan.sum()
     # so that rounding does not decide where the share ends just at a level part
     is_enough = target * (1 - 1e-12)
-    knots = np.unique(z.ravel())
+    knots = list_distinct(z.ravel())
     count, upper = 0, len(knots) - 1
     if measure_area_below(knots[count], z, plan) >= is_enough:
         return knots[count]

@@ -26,6 +26,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import copy_row
 from ...geometry.point_in_polygon import flips
 from .lines import SAME_RAD, compute_area, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
@@ -246,7 +247,7 @@ def compute_changed_corners(lines, drawing, i, count, new_items, border):
     """
     corners, old = np.empty((len(lines), 2)), drawing.corners
     for k in range(new_items, len(lines)):
-        corners[k] = old[(i + count + 1 + k - new_items) % len(old)]
+        copy_row(corners[k], old[(i + count + 1 + k - new_items) % len(old)])
     if (
         len(lines) < 3
         or not find_corners(lines, corners, new_items)

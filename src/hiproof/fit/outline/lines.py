@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import copy_row, copy_rows
 from .. import direction
 
 # sine of the angle between neighbours: lines closer to parallel have no corner to speak of
@@ -126,9 +127,9 @@ def replaced_by(lines, i, count, flight):
     """
     n, m = len(lines), len(flight)
     result = np.empty((m + n - count, 2))
-    result[:m] = flight
+    copy_rows(result, flight)
     for k in range(n - count):
-        result[m + k] = lines[(i + count + k) % n]
+        copy_row(result[m + k], lines[(i + count + k) % n])
     return result
 
 

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import copy_row
 from .cost import Drawing, apply_change, evaluate_change, make_drawing
 from .lines import SAME_RAD, drop_line, quarter_gap, replace_lines, shares_direction
 
@@ -120,7 +121,8 @@ def joint_lines(drawing, i, count):
             result[m] = way, middle[0] * math.cos(way) + middle[1] * math.sin(way)
             m += 1
     if count == LONGEST_RUN:
-        result[m], result[m + 1] = first, last
+        copy_row(result[m], first)
+        copy_row(result[m + 1], last)
         m += 2
     return result[:m]
 

@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import sort_values
 from .lines import find_corners
 from .soft import SURE_BLURS, share_inside
 
@@ -154,7 +155,13 @@ def interpolate_offset(depth, length, density, table):
     a_metre = max(inside / ((DEEP_M - SHALLOW_M) * length), LEAST_DENSITY * density) * length
     logs = log_likelihoods(depth, a_metre, table)
     likely = np.exp(logs - logs.max())
-    mean = (likely.sum(axis=0) * OFFSETS_M).sum() / likely.sum()
+    moment = 0.0
+    for q in range(len(OFFSETS_M)):
+        share = 0.0
+        for walls in range(len(likely)):
+            share += likely[walls, q]
+        moment += share * OFFSETS_M[q]
+    mean = moment / likely.sum()
     behind = depth[depth + mean > -ROW_M]
     return mean + min(max(half_gap(behind) - 1.0 / a_metre, 0.0), FARTHEST_MOVE_M)
 
@@ -197,10 +204,13 @@ def half_gap(depth):
     """
     if len(depth) < 2:
         return 0.0
-    depth = np.sort(depth)
-    gaps = np.diff(depth)
+    depth = sort_values(depth)
+    gaps = depth[1:] - depth[:-1]
     if gaps[gaps > ROW_M].sum() > MOSTLY_ON_POINTS * gaps.sum():
-        starts = np.append(np.append(0, np.flatnonzero(gaps > ROW_M) + 1), len(depth))
-        rows = np.array([depth[starts[r] : starts[r + 1]].mean() for r in range(len(starts) - 1)])
-        gaps = np.diff(rows)
+        rows, count, first = np.empty(len(depth)), 0, 0
+        for k in range(len(depth)):
+            if k == len(gaps) or gaps[k] > ROW_M:
+                rows[count] = depth[first : k + 1].mean()
+                count, first = count + 1, k + 1
+        gaps = rows[1:count] - rows[: count - 1]
     return (gaps**2).sum() / (2.0 * gaps.sum()) if len(gaps) > 1 and gaps.sum() > 0.0 else 0.0

@@ -7,6 +7,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import sort_order
 from .around import measure_context
 from .candidates import find_best_rectangles
 from .edges import EVERYWHERE, MIN_SIDE_M, NO_GAIN, move_edges
@@ -123,7 +124,7 @@ def find_best_addition(volumes, value, ground, candidates):
         gains, cells = find_best_rectangles(
             scene, candidates, ground.cell_u, ground.cell_v, cost_now, z_now, replacing
         )
-        for m in np.argsort(-gains, kind="mergesort")[:TRIED_EACH_WAY]:
+        for m in sort_order(-gains)[:TRIED_EACH_WAY]:
             if not gains[m] > 0.0:
                 break
             extended = np.concatenate((volumes, candidates[m : m + 1]))

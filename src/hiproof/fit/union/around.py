@@ -40,7 +40,7 @@ def measure_context(volumes, U, V, order, k):
     earlier, later, roof_without = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, -np.inf)
     for j in range(len(volumes)):
         if j == k:
-            earlier[:] = roof_without
+            earlier = roof_without.copy()
             continue
         direction = int(volumes[j, DIRECTION])
         u, v, ends = U[direction], V[direction], read_rectangle(volumes, j)
@@ -70,7 +70,7 @@ def measure_context(volumes, U, V, order, k):
             height = np.inf if replaces else h
             later[i] = height if is_inside & (height > later[i]) else later[i]
     if k == len(volumes):
-        earlier[:] = roof_without
+        earlier = roof_without.copy()
     return Context(earlier, later, roof_without)
 
 

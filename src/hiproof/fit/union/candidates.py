@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import copy_row, copy_rows, sort_values
 from .objective import compute_cell_cost, compute_point_cost
 from .plan import find_cells
 from .planes import (
@@ -122,7 +123,7 @@ def list_candidates_along(
     if len(pool) == 0:
         return np.empty((0, COLUMNS))
     gables, counts = pool_gables(cloud, grid, pool, tolerance, evidence, effort.gables)
-    middle = np.array([np.sort(u)[len(u) // 2], np.sort(v)[len(v) // 2]])
+    middle = np.array([sort_values(u)[len(u) // 2], sort_values(v)[len(v) // 2]])
     along = turn_to_walls(pool, middle, scene.leans[direction])
     groups, sizes = group_planes(along, gables, counts, grid)
     return make_volumes(direction, groups, sizes, scene.allowed)
@@ -144,12 +145,12 @@ def turn_to_walls(pool, middle, leans):
                 break
             turn = plane[1 - axis] + lean * plane[axis]
             if abs(turn) < ALONG_AXIS * abs(plane[axis]):
-                turned_planes[m] = plane
+                copy_row(turned_planes[m], plane)
                 turned_planes[m, 1 - axis] = -lean * plane[axis]
                 turned_planes[m, 2] += turn * middle[1 - axis]
                 m += 1
         if m == first:
-            turned_planes[m] = plane
+            copy_row(turned_planes[m], plane)
             m += 1
     return turned_planes[:m]
 
@@ -171,22 +172,26 @@ def group_planes(planes, gables, counts, grid):
         + MOST_TOPS * (2 * MOST_PAIRS + MOST_PAIRS**2)
     )
     groups, sizes = np.empty((most_groups, N_PLANES, 3)), np.empty(most_groups, np.int64)
-    groups[:n, 0], sizes[:n] = planes, 1
-    groups[n : n + len(gables)], sizes[n : n + len(gables)] = gables, counts
+    for m in range(n):
+        copy_row(groups[m, 0], planes[m])
+        sizes[m] = 1
+    for m in range(n, n + len(gables)):
+        copy_rows(groups[m], gables[m - n])
+        sizes[m] = counts[m - n]
     m = n + len(gables)
     for i in range(n):
         for j in range(i):
             if has_ridge(planes[i], planes[j], grid.u, grid.v):
-                groups[m, 0], groups[m, 1], sizes[m] = planes[i], planes[j], 2
+                copy_row(groups[m, 0], planes[i])
+                copy_row(groups[m, 1], planes[j])
+                sizes[m] = 2
                 m += 1
     pairs = m
     for first_pair in select_strongest(groups, sizes, n, pairs, 0):
         for second_pair in select_strongest(groups, sizes, n, pairs, 1):
-            groups[m, :2], groups[m, 2:4], sizes[m] = (
-                groups[first_pair, :2],
-                groups[second_pair, :2],
-                4,
-            )
+            copy_rows(groups[m], groups[first_pair, :2])
+            copy_rows(groups[m, 2:], groups[second_pair, :2])
+            sizes[m] = 4
             m += 1
     last, tops = m, 0
     for i in range(n):
@@ -195,10 +200,14 @@ def group_planes(planes, gables, counts, grid):
         tops += 1
         for axis in range(2):
             for pair in select_strongest(groups, sizes, n, pairs, axis):
-                groups[m, :2], groups[m, 2], sizes[m] = groups[pair, :2], planes[i], 3
+                copy_rows(groups[m], groups[pair, :2])
+                copy_row(groups[m, 2], planes[i])
+                sizes[m] = 3
                 m += 1
         for hip in range(pairs, last):
-            groups[m, :4], groups[m, 4], sizes[m] = groups[hip, :4], planes[i], 5
+            copy_rows(groups[m], groups[hip, :4])
+            copy_row(groups[m, 4], planes[i])
+            sizes[m] = 5
             m += 1
     return groups[:m], sizes[:m]
 
@@ -224,7 +233,7 @@ def make_volumes(direction, groups, sizes, allowed):
     for q in range(len(groups)):
         volume, is_one = make_volume(direction, groups[q, : sizes[q]], allowed)
         if is_one:
-            volumes[m] = volume
+            copy_row(volumes[m], volume)
             m += 1
     return volumes[:m]
 
@@ -298,6 +307,15 @@ def find_tie(volume):
 
 
 @compiled
+def count_cells(lines):
+    """Count the cells between `lines`, which are infinite where there are none."""
+    count = -1
+    for line in lines:
+        count += line < np.inf
+    return count
+
+
+@compiled
 def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, replacing):
     """Find, for each candidate, the rectangle of cells (m, 4) in which it gains most.
 
@@ -311,7 +329,7 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
         np.full(len(z_now), -np.inf) if replacing else z_now + LEAST_ABOVE_M,
         np.empty(len(z_now)),
     )
-    threshold, most_gain, cell_counts = 0.0, cost_now.sum(), (scene.lines < np.inf).sum(axis=2) - 1
+    threshold, most_gain = 0.0, cost_now.sum()
     for m in range(len(candidates)):
         direction = int(candidates[m, DIRECTION])
         price = scene.evidence * (price_volume(candidates[m]) + NEW_EDGES)
@@ -321,7 +339,7 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
             or fill_gains(scene, candidates, m, cost_now, floor, gain) <= least_gain
         ):
             continue
-        nu, nv = cell_counts[direction]
+        nu, nv = count_cells(scene.lines[direction, 0]), count_cells(scene.lines[direction, 1])
         cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
         for i in range(len(gain)):
             cells[cell_u[direction, i], cell_v[direction, i]] += gain[i]
@@ -331,7 +349,8 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
         score, i0, i1, j0, j1 = find_best_rectangle(cells, max(least_gain, 1e-6), reach, column)
         if i1 > i0:
             gains[m] = score - price
-            rectangles[m] = (i0, i1, j0, j1)
+            rectangles[m, 0], rectangles[m, 1] = i0, i1
+            rectangles[m, 2], rectangles[m, 3] = j0, j1
             threshold = max(threshold, 0.5 * gains[m])
     return gains, rectangles
 

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import copy_row
 from .objective import compute_point_cost
 from .prices import PARAMETER_COST
 from .scene import Scene
@@ -274,7 +275,7 @@ def solve_least_squares(rows, design, points, dead, width):
         rows = np.full_like(rows, np.nan)
         for k in range(len(rows)):
             if is_present[k]:
-                rows[k] = multiply(design[k], unknowns)
+                copy_row(rows[k], multiply(design[k], unknowns))
     return rows, inverse * share, sum_point_costs(rows, points, dead, width)
 
 

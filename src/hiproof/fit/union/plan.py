@@ -72,7 +72,9 @@ def measure_depth(x, y, starts, ends):
             inside[i] ^= flips(x0, y0, x1, y1, x[i], y[i])
             t = min(max(((x[i] - x0) * dx + (y[i] - y0) * dy) / square, 0.0), 1.0)
             nearest[i] = min(nearest[i], (x0 + t * dx - x[i]) ** 2 + (y0 + t * dy - y[i]) ** 2)
-    return np.where(inside, np.sqrt(nearest), -np.sqrt(nearest))
+    for i in range(len(x)):
+        nearest[i] = np.sqrt(nearest[i]) if inside[i] else -np.sqrt(nearest[i])
+    return nearest
 
 
 def lay_lines(

@@ -13,6 +13,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import copy_row, copy_rows, list_distinct, sort_order, sort_values
 from .prices import KIND_COST
 
 MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.
@@ -274,7 +275,7 @@ def find_median(values):
 @compiled
 def list_flat_planes(z, out):
     """List a level plane at every height (0.1 m apart) of a point, and count them."""
-    steps = np.unique(np.round(z / 0.1))
+    steps = list_distinct(np.rint(z / 0.1))
     count = min(len(steps), len(out))
     for q in range(count):
         out[q, 2] = steps[q * len(steps) // count] * 0.1
@@ -331,7 +332,7 @@ def list_hypotheses(cloud, most_seeds, most_pairs):
             if min(n_nearest, size) >= 5:
                 plane, ok = fit_local_plane(cloud, nearest, min(n_nearest, size))
                 if ok:
-                    out[m] = plane
+                    copy_row(out[m], plane)
                     m += 1
         for _ in range(pairs_per_seed):
             fraction = (fraction + 0.6180339887498949) % 1.0
@@ -345,14 +346,14 @@ def select_distinct(planes, centre_u, centre_v):
 
     Bins are those of slopes and of height at the centre.
     """
-    keys = np.empty(len(planes), np.int64)
+    keys = np.empty(len(planes))
     for q in range(len(planes)):
         a, b, c = planes[q]
         height = a * centre_u + b * centre_v + c
         keys[q] = 0
         for value in (a, b, height):
-            keys[q] = keys[q] * 100003 + np.int64(np.floor(value / PLANE_BIN + 0.5))
-    order = np.argsort(keys, kind="mergesort")
+            keys[q] = keys[q] * 100003 + np.floor(value / PLANE_BIN + 0.5)
+    order = sort_order(keys)
     first = np.ones(len(planes), np.bool_)
     for q in range(1, len(planes)):
         first[order[q]] = keys[order[q]] != keys[order[q - 1]]
@@ -478,7 +479,7 @@ def find_best_candidate(cloud, candidates, counts, bounds, current, tau, least_g
             )
     best, number, rectangle = least_gain, -1, (0, 0, 0, 0)
     reach, column = np.empty(len(gain) + 1), np.empty(gain.shape[1])
-    for m in np.argsort(-bounds, kind="mergesort"):
+    for m in sort_order(-bounds):
         if bounds[m] <= best:
             break
         bounds[m] = fill_point_gains(cloud, candidates[m], counts[m], current, tau, gain_of_point)
@@ -529,7 +530,7 @@ def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
             return pool[:k]
         members = select_members(cloud, rectangle)
         plane, _ = fit_plane(cloud, members, candidates[m], tau, evidence)
-        pool[k] = plane
+        copy_row(pool[k], plane)
         lower_costs(cloud, members, plane.reshape((1, 3)), 1, tau, current)
         lower_costs(cloud, members, stacked[m], 1, tau, current)
     return pool
@@ -555,7 +556,7 @@ def mirror_gables(pool, grid):
             continue
         ridge = lines[0] + 0.5
         while ridge < lines[-1] - 0.4:
-            out[m, 0] = plane
+            copy_row(out[m, 0], plane)
             out[m, 1, kind - 1] = -slope
             out[m, 1, 2] = plane[2] + 2.0 * slope * ridge
             ridge += RIDGE_STEP_M
@@ -588,7 +589,8 @@ def fit_template(z, drop, slope, tau):
 
     It begins with a start slope. The slope is 0 if it fails.
     """
-    height = np.median(z + slope * drop)
+    ordered = sort_values(z + slope * drop)
+    height = 0.5 * (ordered[(len(z) - 1) // 2] + ordered[len(z) // 2])
     for step in range(5):
         scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
         n = sx = sy = sxx = sxy = 0.0
@@ -684,10 +686,11 @@ def pool_gables(cloud, grid, pool, tau, evidence, most_gables):
         if m < 0:
             return gables[:k], gable_counts[:k]
         members = select_members(cloud, rectangle)
-        gables[k], gable_counts[k] = candidates[m], counts[m]
+        copy_rows(gables[k], candidates[m])
+        gable_counts[k] = counts[m]
         if counts[m] == 2:
             fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
             if ok:
-                gables[k, :2] = fitted
+                copy_rows(gables[k], fitted)
         lower_costs(cloud, members, candidates[m], counts[m], tau, current)
     return gables, gable_counts

@@ -1,0 +1,69 @@
+"""Sorting and copying for compiled code.
+
+Numba compiles its own sorting anew for each kind of array, and with its own assignment of one array
+to a part of another a check of their shapes: several seconds, in each process that compiles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiled import compiled
+
+
+@compiled
+def sort_order(values):
+    """Return the order (n,) in which `values` (n,), float64, ascend.
+
+    Equal ones keep their order. No value may be NaN.
+
+    >>> sort_order(np.array([2.0, 3.0, 1.0, 2.0]))
+    array([2, 0, 3, 1])
+    """
+    n, width = len(values), 1
+    order, merged = np.arange(n), np.empty(n, np.int64)
+    while width < n:
+        for start in range(0, n, 2 * width):
+            middle, stop = min(start + width, n), min(start + 2 * width, n)
+            i, j = start, middle
+            for k in range(start, stop):
+                if i < middle and (j >= stop or values[order[i]] <= values[order[j]]):
+                    merged[k] = order[i]
+                    i += 1
+                else:
+                    merged[k] = order[j]
+                    j += 1
+        order, merged = merged, order
+        width *= 2
+    return order
+
+
+@compiled
+def sort_values(values):
+    """Return `values` (n,), float64, in ascending order."""
+    return values[sort_order(values)]
+
+
+@compiled
+def list_distinct(values):
+    """Return the distinct ones of `values` (n,), float64, in ascending order."""
+    ordered, count = sort_values(values), 0
+    for i in range(len(ordered)):
+        if i == 0 or ordered[i] != ordered[i - 1]:
+            ordered[count] = ordered[i]
+            count += 1
+    return ordered[:count]
+
+
+@compiled
+def copy_row(target, row):
+    """Copy `row` (n,) into the first n elements of `target`."""
+    for k in range(len(row)):
+        target[k] = row[k]
+
+
+@compiled
+def copy_rows(target, rows):
+    """Copy `rows` (n, m) into the first n rows of `target`."""
+    for k in range(len(rows)):
+        copy_row(target[k], rows[k])
