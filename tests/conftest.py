@@ -1,5 +1,6 @@
 """Fixtures that several test files share."""
 
+import os
 import signal
 import warnings
 
@@ -26,6 +27,14 @@ def pytest_configure(config):
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         news.listener = news.Lines(print)
         make_ready(ALL)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def leave_files_to_the_system():
+    """Wait for no disk: files of tests need not outlast a power cut, and runs sync dozens each."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -61,7 +70,7 @@ def reference_run(town_files, tmp_path_factory):
     return out
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser():
     """Debian's Chromium without a window."""
     playwright = pytest.importorskip(

@@ -105,20 +105,23 @@ def iterate_statements(node: ast.AST) -> Iterator[ast.AST]:
 
 @dataclass(frozen=True)
 class FileNames:
-    """The names of a file: of functions with their locals, and of classes."""
+    """The names of a file: of functions with their locals, of classes, of constants with values."""
 
     functions: tuple[tuple[str, frozenset[str]], ...]
     classes: tuple[str, ...]
+    constants: tuple[tuple[str, str], ...]
 
 
 @cache
 def read_names(file: Path) -> FileNames:
     """Return the names of a file, without those of properties, which are nouns."""
-    statements = list(iterate_statements(parse(file)))
+    tree = parse(file)
+    statements = list(iterate_statements(tree))
     functions = (node for node in statements if isinstance(node, ast.FunctionDef))
     return FileNames(
         tuple((node.name, list_locals(node)) for node in functions if not is_property(node)),
         tuple(node.name for node in statements if isinstance(node, ast.ClassDef)),
+        tuple(iterate_constants(tree)),
     )
 
 
@@ -177,9 +180,9 @@ def find_duplicate_classes(files: list[Path]) -> dict[str, list[str]]:
     return {name: files for name, files in places.items() if len(files) > 1}
 
 
-def iterate_constants(file: Path) -> Iterator[tuple[str, str]]:
+def iterate_constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
     """Yield the constants at the top of a file with their values as text."""
-    for node in parse(file).body:
+    for node in tree.body:
         if isinstance(node, ast.AnnAssign):
             targets: list[ast.expr] = [node.target] if node.value else []
         else:
@@ -198,7 +201,7 @@ def find_ambiguous_constants(files: list[Path]) -> list[str]:
     """Return the names that constants with different values share."""
     values = defaultdict(set)
     for file in files:
-        for name, value in iterate_constants(file):
+        for name, value in read_names(file).constants:
             values[name].add(value)
     return sorted(
         name for name in values if len(values[name]) > 1 and name not in ALLOWED_CONSTANTS

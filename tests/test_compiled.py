@@ -388,10 +388,9 @@ def outside_functions(node):
             yield from outside_functions(inner)
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_the_stamp_follows_every_import_at_the_top(source):
-    """The regular expression of imports against Python's own parser: all but those inside functions
-    and for types alone.
+def list_parsed_imports(source):
+    """The package's files that a source imports, by Python's own parser: all but those inside
+    functions and for types alone.
     """
     results = set()
     for node in outside_functions(ast.parse(source.read_text())):
@@ -406,9 +405,16 @@ def test_the_stamp_follows_every_import_at_the_top(source):
         results |= {
             file for module in modules for file in (Path(f"{module}.py"), module / "__init__.py")
         }
-    assert {
-        file for file in results if file.is_file() and file.is_relative_to(PACKAGE)
-    } <= stamp.list_imports(source)
+    return {file for file in results if file.is_file() and file.is_relative_to(PACKAGE)}
+
+
+def test_the_stamp_follows_every_import_at_the_top():
+    """The regular expression finds what the parser does."""
+    missing = {
+        source: list_parsed_imports(source) - stamp.list_imports(source) for source in SOURCES
+    }
+    assert {source: files for source, files in missing.items() if files} == {}
+    assert len(missing) > 300
 
 
 def test_a_stamp_does_not_change_with_what_is_imported_inside_functions(tmp_path):
