@@ -17,21 +17,22 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...geometry.rings import counterclockwise
 from ...primitives.cants import MOST_CANTS
 from .finish import (
     FLATTEST,
     OutlineWall,
     Planes,
+    find_lowest_row,
     find_visible_points,
     fit_volume_planes,
     is_proper,
     solve_least_squares,
-    sum_point_costs,
     take_points,
 )
 from .members import is_inside_sides
-from .objective import compute_misfits
+from .objective import compute_misfits, compute_point_cost
 from .plan import Plan
 from .prices import PARAMETER_COST
 from .scene import Scene
@@ -173,10 +174,15 @@ def price_planes(planes: Planes) -> float:
 def add_one_cant(
     planes: Planes, walls: list[OutlineWall], sides: list[Side], points: np.ndarray, scene: Scene
 ) -> Iterator[Planes]:
-    """Yield the planes with one more over one of the `walls`, in every form."""
+    """Yield the planes with one more over one of the `walls`, in every form.
+
+    Over a wall where no plane to begin with explains more, none is fitted.
+    """
     places = find_meeting_places(planes, sides)
     for wall in walls:
         start = find_start_plane(wall, planes, points, scene)
+        if start is None:
+            continue
         for form in list_forms(wall, planes, places):
             trial = fit_with_cant(planes, wall, form, start, points, scene)
             if is_proper(trial.rows, trial.walls):
@@ -298,10 +304,10 @@ def compute_quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[flo
 
 def find_start_plane(
     wall: OutlineWall, planes: Planes, points: np.ndarray, scene: Scene
-) -> np.ndarray:
-    """Find the plane (3,) over `wall` that explains most of `points` (3, m).
+) -> np.ndarray | None:
+    """Find the plane (3,) over `wall` with which `points` (3, m) cost least.
 
-    Some slopes and heights are tried.
+    Some slopes and heights are tried. Returns None if the points cost no less with any.
     """
     inclined = planes.rows[np.isfinite(planes.rows[:, 2])][:, :2]
     slopes = {round(x, 2) for x in np.hypot(*inclined.T).tolist() if x > FLATTEST} | set(
@@ -310,12 +316,27 @@ def find_start_plane(
     deep = wall.depth[:2] @ points[:2] + wall.depth[2]
     (near_m,) = compute_quantiles(deep, (0.2,))
     lows = compute_quantiles(points[2, deep < near_m], (0.02, 0.25, 0.5))
-    rows = np.vstack([planes.rows, np.zeros(3)])
-    trial_rows = [
-        slope * wall.depth + [0.0, 0.0, eave] for slope in sorted(slopes) for eave in lows
-    ]
-    costs = []
-    for row in trial_rows:
-        rows[-1] = row
-        costs.append(sum_point_costs(rows, points, scene.dead, scene.width))
-    return trial_rows[int(np.argmin(costs))]
+    trial_rows = np.array(
+        [slope * wall.depth + [0.0, 0.0, eave] for slope in sorted(slopes) for eave in lows]
+    )
+    savings = measure_savings(planes.rows, trial_rows, points, scene.dead, scene.width)
+    best = int(np.argmax(savings))
+    return trial_rows[best] if savings[best] > 0.0 else None
+
+
+@compiled
+def measure_savings(rows, trial_rows, points, dead, width):
+    """Return what `points` (3, m) cost less with each of the trial rows (t, 3) besides.
+
+    They lie under planes `rows` (k, 3), which a further one can only lower.
+    """
+    savings = np.zeros(len(trial_rows))
+    for i in range(points.shape[1]):
+        u, v, z = points[0, i], points[1, i], points[2, i]
+        height, _ = find_lowest_row(rows, u, v)
+        cost = compute_point_cost(z, height, dead, width)
+        for t in range(len(trial_rows)):
+            h = trial_rows[t, 0] * u + trial_rows[t, 1] * v + trial_rows[t, 2]
+            if h < height:
+                savings[t] += cost - compute_point_cost(z, h, dead, width)
+    return savings
