@@ -239,7 +239,9 @@ def run_round(
     quads = list_quads(state, problem) if area > WINDOW_M2 else []
     present = RepairTrial(state, whole, plan, problem, drawing)
     for repair in find_repairs(plan, problem.volumes, state.sides, problem.plan, problem.scene):
-        if trials[repair.key] or any(trials[side] >= TRIALS_A_SIDE for side in repair.sides):
+        # Planes are as they were until another equation holds, and so is what one more costs.
+        key = repair.key, state.basis.shape[1] if repair.equations else 0
+        if trials[key] or any(trials[side] >= TRIALS_A_SIDE for side in repair.sides):
             continue
         box = frame_repair(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
@@ -249,10 +251,9 @@ def run_round(
             present = RepairTrial(state, window, plan, problem)
         repaired_state = apply_repair(state, repair, present.window, problem)
         if repaired_state is None:
-            if not repair.equations:  # what a side costs does not depend on the other sides
-                trials[repair.key] += 1
+            trials[key] += 1
             continue
-        trials.update((repair.key, *repair.sides))
+        trials.update((key, *repair.sides))
         trial = present.draw_if_cheaper(repaired_state)
         if trial is not None:
             state, after_drawing = repaired_state, trial if present.window is whole else None
