@@ -57,11 +57,10 @@ RISEN_SHARE = 0.1  # Share by which the points of one volume may cost more under
 class CommonFit:
     """The fit of all members together.
 
-    `unknowns` (p,) have this `covariance` (p, p), and are `basis` (p, q) times any. `rows` (k, 3)
+    Its unknowns (p,) have this `covariance` (p, p), and are `basis` (p, q) times any. `rows` (k, 3)
     are every member's planes, `cost` is that of the points.
     """
 
-    unknowns: np.ndarray
     covariance: np.ndarray
     rows: list[np.ndarray]
     cost: float
@@ -190,45 +189,78 @@ def fit_conditions(
     Returns None if no condition holds. The covariance is what the points determine: a corner of the
     outline gives the place where planes meet, but not how precise it is.
     """
-    equations, point_equations, basis = (
-        np.zeros((0, len(start))),
-        np.zeros((0, len(start))),
-        np.eye(len(start)),
-    )
     begun = sum_at_start(members, scene)
-    best = free = fit_members(members, basis, start, scene, begun)
-    # With an improper fit, members keep their planes until a proper one is found.
-    if not math.isfinite(free.cost):
-        rows = [member.rows for member in members]
-        best = CommonFit(start, free.covariance, rows, sum_row_costs(members, rows, scene), basis)
+    accepted = choose_conditions(members, start, conditions, begun, scene)
+    if not accepted:
+        return None
+    basis = find_null_space(np.vstack([condition.equation for condition in accepted]))
+    fit = fit_members(members, basis, start, scene, begun)
+    if not math.isfinite(fit.cost):
+        return None
+    by_points = [condition.equation for condition in accepted if not condition.spared]
+    if len(by_points) < len(accepted):
+        free = find_null_space(np.vstack(by_points)) if by_points else np.eye(len(start))
+        covariance = fit_members(members, free, start, scene, begun).covariance
+        fit = replace(fit, covariance=covariance)
+    return fit
+
+
+def choose_conditions(
+    members: list[LinearVolume],
+    start: np.ndarray,
+    conditions: list[Condition],
+    sums: NormalSums,
+    scene: Scene,
+) -> list[Condition]:
+    """Choose the conditions that hold, by the normal equations of all members alone.
+
+    What a condition costs is a quadratic form of how far it fails.
+    """
+    accepted: list[Condition] = []
+    solution = solve_normal(sums, np.eye(len(start)), start)
+    covariance = solution.inverse * (sums.misfit / max(sums.weight, 1.0))
     while conditions:
-        later, n_before = [], len(equations)
+        later, n_before = [], len(accepted)
         for condition in conditions:
+            equation = condition.equation
             is_near = (
                 condition.gap <= condition.allowed
-                or condition.gap * measure_remainder(condition, start, best) <= REACHED_M
+                or condition.gap * measure_remainder(equation, start, solution.unknowns)
+                <= REACHED_M
             )
-            if not is_near and not is_within_noise(condition.equation, start, free.covariance):
+            if not is_near and not is_within_noise(equation, start, covariance):
                 later.append(condition)  # accepted ones may bring it nearer
                 continue
-            n_saved = int(np.linalg.matrix_rank(condition.equation @ basis, tol=NO_REMAINDER))
+            n_saved = int(np.linalg.matrix_rank(equation @ solution.basis, tol=NO_REMAINDER))
             if n_saved == 0:
                 continue
-            with_it = np.vstack([equations, condition.equation])
-            free_basis = find_null_space(with_it)
-            trial = fit_members(members, free_basis, start, scene, begun)
-            if trial.cost <= best.cost + compute_allowance(condition, n_saved, members, scene):
-                equations, basis, best = with_it, free_basis, trial
-                point_equations = (
-                    point_equations
-                    if condition.spared
-                    else np.vstack([point_equations, condition.equation])
-                )
-        conditions = later if len(equations) > n_before else []
-    if len(equations) > len(point_equations):
-        point_fit = fit_members(members, find_null_space(point_equations), start, scene, begun)
-        best = replace(best, covariance=point_fit.covariance)
-    return best if len(equations) else None
+            basis = solution.basis @ find_null_space(equation @ solution.basis)
+            trial = solve_normal(sums, basis, start)
+            cost = estimate_cost(trial.unknowns - solution.unknowns, sums, scene)
+            if cost <= compute_allowance(condition, n_saved, members, scene) and all(
+                is_proper(place_planes(member, trial.unknowns), member.walls) for member in members
+            ):
+                accepted, solution = [*accepted, condition], trial
+        conditions = later if len(accepted) > n_before else []
+    return accepted
+
+
+def solve_normal(sums: NormalSums, basis: np.ndarray, start: np.ndarray) -> Solution:
+    """Solve normal equations for unknowns (p,) that are `basis` (p, q) times any."""
+    ridge = RIDGE * max(np.trace(sums.normal) / len(start), 1e-6)
+    matrix = basis.T @ sums.normal @ basis + ridge * np.eye(basis.shape[1])
+    inverse = basis @ np.linalg.inv(matrix) @ basis.T
+    return Solution(inverse @ (sums.right + ridge * start), inverse, basis)
+
+
+def place_planes(member: LinearVolume, unknowns: np.ndarray) -> np.ndarray:
+    """Return a member's planes (k, 3) under the unknowns (p,), NaN where it has none."""
+    return np.where(np.isfinite(member.rows), member.full_design @ unknowns, np.nan)
+
+
+def estimate_cost(shift: np.ndarray, sums: NormalSums, scene: Scene) -> float:
+    """Estimate what points cost more where the unknowns are off the best by `shift` (p,)."""
+    return float(shift @ sums.normal @ shift) / scene.width**2
 
 
 def compute_allowance(
@@ -242,11 +274,10 @@ def compute_allowance(
     return float(scene.evidence * (PARAMETER_COST * n_saved + condition.spared) + slack)
 
 
-def measure_remainder(condition: Condition, start: np.ndarray, fit: CommonFit) -> float:
+def measure_remainder(equation: np.ndarray, start: np.ndarray, unknowns: np.ndarray) -> float:
     """Return the share by which an equation still fails, of how far it did at `start`."""
     return float(
-        np.abs(condition.equation @ fit.unknowns).max()
-        / max(np.abs(condition.equation @ start).max(), NO_REMAINDER)
+        np.abs(equation @ unknowns).max() / max(np.abs(equation @ start).max(), NO_REMAINDER)
     )
 
 
@@ -405,6 +436,17 @@ class NormalSums(NamedTuple):
     misfit: float
 
 
+class Solution(NamedTuple):
+    """The unknowns (p,) that solve normal equations among those of a `basis` (p, q).
+
+    `inverse` (p, p) is that of the equations there.
+    """
+
+    unknowns: np.ndarray
+    inverse: np.ndarray
+    basis: np.ndarray
+
+
 def sum_at_start(members: list[LinearVolume], scene: Scene) -> NormalSums:
     """Return the sums in the first round of a fit, from the members' own planes."""
     return sum_equations(
@@ -447,11 +489,8 @@ def fit_members(
     sums = begun or sum_at_start(members, scene)
     for turn in range(ROUNDS):
         sums = sums if turn == 0 else sum_equations(members, rows, 1.5 * scale)
-        ridge = RIDGE * max(np.trace(sums.normal) / len(start), 1e-6)
-        matrix = basis.T @ sums.normal @ basis + ridge * np.eye(basis.shape[1])
-        inverse = basis @ np.linalg.inv(matrix) @ basis.T
-        unknowns = inverse @ (sums.right + ridge * start)
-        all_rows = designs @ unknowns
+        solution = solve_normal(sums, basis, start)
+        all_rows = designs @ solution.unknowns
         all_rows[absent] = np.nan
         rows = [all_rows[begin:end] for begin, end in pairwise(ends)]
     cost = sum_row_costs(members, rows, scene)
@@ -460,7 +499,8 @@ def fit_members(
         for member, volume_rows in zip(members, rows, strict=True)
     ):
         cost = np.inf
-    return CommonFit(unknowns, inverse * sums.misfit / max(sums.weight, 1.0), rows, cost, basis)
+    covariance = solution.inverse * sums.misfit / max(sums.weight, 1.0)
+    return CommonFit(covariance, rows, cost, basis)
 
 
 def sum_row_costs(members: list[LinearVolume], rows: list[np.ndarray], scene: Scene) -> float:

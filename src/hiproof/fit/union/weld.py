@@ -20,10 +20,19 @@ import shapely
 
 from ...model import Part
 from ...model.heights import find_highest
-from .agree import Agreement, find_null_space, fit_members
+from .agree import (
+    Agreement,
+    NormalSums,
+    estimate_cost,
+    find_null_space,
+    fit_members,
+    solve_normal,
+    sum_at_start,
+)
 from .around import compute_roof_everywhere, measure_context
 from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
 from .finish import Planes
+from .members import LinearVolume
 from .objective import compute_costs, compute_misfits
 from .plan import Plan
 from .prices import CORNER_COST, PARAMETER_COST, REPAIR_UNITS
@@ -40,6 +49,7 @@ MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
 TRIALS_A_SIDE = 2
 MOST_ROUNDS = 20  # Most rounds of repairs.
 MOST_JUDGES = 1500  # Most points of a window that judge. Of more, every k-th does.
+ESTIMATE_EXCESS = 4.0  # A quadratic form says at most so many times what fitting finds.
 LEFT_OVER = 1e-9  # An equation of which the others leave less (m) holds because of them.
 ONE_LINE_M = 0.02  # Sides of two volumes nearer than this (m) are one line.
 
@@ -163,6 +173,14 @@ def compute_member_cost(agreement: Agreement, scene: Scene) -> float:
     """Return what the points of members cost under the accepted equations."""
     members = list(agreement.members.values())
     return fit_members(members, agreement.basis, agreement.start, scene).cost
+
+
+def sum_at_planes(
+    planes: list[Planes], agreement: Agreement, scene: Scene
+) -> tuple[list[LinearVolume], NormalSums]:
+    """Return the members with these planes, and the normal equations there."""
+    members = [replace(member, rows=planes[k].rows) for k, member in agreement.members.items()]
+    return members, sum_at_start(members, scene)
 
 
 def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawing:
@@ -430,8 +448,13 @@ def fit_repair(
     free = state.basis @ find_null_space(equations)
     if not free.shape[1]:
         return None
-    current_members = [replace(member, rows=state.planes[k].rows) for k, member in members.items()]
-    fit = fit_members(current_members, free, start, problem.scene)
+    current_members, sums = problem.site.recall(
+        sum_at_planes, state.planes, problem.agreement, problem.scene
+    )
+    now, then = (solve_normal(sums, basis, start).unknowns for basis in (state.basis, free))
+    if estimate_cost(then - now, sums, problem.scene) > ESTIMATE_EXCESS * most_cost:
+        return None
+    fit = fit_members(current_members, free, start, problem.scene, sums)
     cost_before = state.cost
     if cost_before is None:
         cost_before = problem.site.recall(compute_member_cost, problem.agreement, problem.scene)
