@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import accumulate, combinations, pairwise
+from itertools import combinations
 from statistics import median
 from typing import NamedTuple
 
@@ -85,15 +85,13 @@ class Agreement(NamedTuple):
     """The planes of all volumes fitted together.
 
     `members` are by their volume's number. `basis` (p, q) spans the unknowns that the accepted
-    equations leave free, and `start` (p,) is where they began. `cost` is that of the members'
-    points, None if nothing was fitted together.
+    equations leave free, and `start` (p,) is where they began.
     """
 
     planes: list[Planes]
     members: dict[int, LinearVolume]
     basis: np.ndarray
     start: np.ndarray
-    cost: float | None = None
 
 
 def agree_planes(
@@ -128,7 +126,7 @@ def agree_planes(
     worse = sum_misfit(volumes, agreed_planes, scene) - sum_misfit(volumes, planes, scene)
     if worse > MOST_WORSE_SHARE * scene.n:
         return separate
-    return Agreement(agreed_planes, members, common.basis, start, common.cost)
+    return Agreement(agreed_planes, members, common.basis, start)
 
 
 def sum_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
@@ -212,13 +210,15 @@ def choose_conditions(
     sums: NormalSums,
     scene: Scene,
 ) -> list[Condition]:
-    """Choose the conditions that hold, by the normal equations of all members alone.
+    """Choose the conditions that hold, one after another.
 
-    What a condition costs is a quadratic form of how far it fails.
+    The normal equations of all members give the planes under a condition, and the points say what
+    these cost.
     """
     accepted: list[Condition] = []
     solution = solve_normal(sums, np.eye(len(start)), start)
     covariance = solution.inverse * (sums.misfit / max(sums.weight, 1.0))
+    cost = sum_row_costs(members, place_planes(members, solution.unknowns), scene)
     while conditions:
         later, n_before = [], len(accepted)
         for condition in conditions:
@@ -234,15 +234,17 @@ def choose_conditions(
             n_saved = int(np.linalg.matrix_rank(equation @ solution.basis, tol=NO_REMAINDER))
             if n_saved == 0:
                 continue
-            basis = solution.basis @ find_null_space(equation @ solution.basis)
-            trial = solve_normal(sums, basis, start)
-            cost = estimate_cost(trial.unknowns - solution.unknowns, sums, scene)
-            if cost <= compute_allowance(condition, n_saved, members, scene) and all(
-                is_proper(place_planes(member, trial.unknowns), member.walls) for member in members
-            ):
-                accepted, solution = [*accepted, condition], trial
+            trial = solve_normal(sums, constrain(solution.basis, equation), start)
+            trial_cost = price_rows(members, place_planes(members, trial.unknowns), scene)
+            if trial_cost <= cost + compute_allowance(condition, n_saved, members, scene):
+                accepted, solution, cost = [*accepted, condition], trial, trial_cost
         conditions = later if len(accepted) > n_before else []
     return accepted
+
+
+def constrain(basis: np.ndarray, equation: np.ndarray) -> np.ndarray:
+    """Return a basis (p, r) of those unknowns of `basis` (p, q) that solve `equation` (m, p)."""
+    return basis @ find_null_space(equation @ basis)
 
 
 def solve_normal(sums: NormalSums, basis: np.ndarray, start: np.ndarray) -> Solution:
@@ -253,14 +255,20 @@ def solve_normal(sums: NormalSums, basis: np.ndarray, start: np.ndarray) -> Solu
     return Solution(inverse @ (sums.right + ridge * start), inverse, basis)
 
 
-def place_planes(member: LinearVolume, unknowns: np.ndarray) -> np.ndarray:
-    """Return a member's planes (k, 3) under the unknowns (p,), NaN where it has none."""
-    return np.where(np.isfinite(member.rows), member.full_design @ unknowns, np.nan)
+def place_planes(members: list[LinearVolume], unknowns: np.ndarray) -> list[np.ndarray]:
+    """Return each member's planes (k, 3) under the unknowns (p,), NaN where it has none."""
+    return [
+        np.where(np.isfinite(member.rows), member.full_design @ unknowns, np.nan)
+        for member in members
+    ]
 
 
-def estimate_cost(shift: np.ndarray, sums: NormalSums, scene: Scene) -> float:
-    """Estimate what points cost more where the unknowns are off the best by `shift` (p,)."""
-    return float(shift @ sums.normal @ shift) / scene.width**2
+def price_rows(members: list[LinearVolume], rows: list[np.ndarray], scene: Scene) -> float:
+    """Return what the points of members cost, infinite where planes are improper."""
+    pairs = zip(members, rows, strict=True)
+    if not all(is_proper(planes, member.walls) for member, planes in pairs):
+        return math.inf
+    return sum_row_costs(members, rows, scene)
 
 
 def compute_allowance(
@@ -480,27 +488,14 @@ def fit_members(
     The unknowns (p,) are `basis` (p, q) times any. `begun` are the sums of the first round, if
     these are known.
     """
-    designs, rows = (
-        np.concatenate([member.full_design for member in members]),
-        [member.rows for member in members],
-    )
-    ends = [*accumulate(map(len, rows), initial=0)]
-    absent, scale = np.isnan(np.concatenate(rows)), scene.dead + scene.width
+    rows, scale = [member.rows for member in members], scene.dead + scene.width
     sums = begun or sum_at_start(members, scene)
     for turn in range(ROUNDS):
         sums = sums if turn == 0 else sum_equations(members, rows, 1.5 * scale)
         solution = solve_normal(sums, basis, start)
-        all_rows = designs @ solution.unknowns
-        all_rows[absent] = np.nan
-        rows = [all_rows[begin:end] for begin, end in pairwise(ends)]
-    cost = sum_row_costs(members, rows, scene)
-    if not all(
-        is_proper(volume_rows, member.walls)
-        for member, volume_rows in zip(members, rows, strict=True)
-    ):
-        cost = np.inf
+        rows = place_planes(members, solution.unknowns)
     covariance = solution.inverse * sums.misfit / max(sums.weight, 1.0)
-    return CommonFit(covariance, rows, cost, basis)
+    return CommonFit(covariance, rows, price_rows(members, rows, scene), basis)
 
 
 def sum_row_costs(members: list[LinearVolume], rows: list[np.ndarray], scene: Scene) -> float:

@@ -23,16 +23,16 @@ from ...model.heights import find_highest
 from .agree import (
     Agreement,
     NormalSums,
-    estimate_cost,
-    find_null_space,
-    fit_members,
+    constrain,
+    place_planes,
+    price_rows,
     solve_normal,
     sum_at_start,
+    sum_row_costs,
 )
 from .around import compute_roof_everywhere, measure_context
 from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
 from .finish import Planes
-from .members import LinearVolume
 from .objective import compute_costs, compute_misfits
 from .plan import Plan
 from .prices import CORNER_COST, PARAMETER_COST, REPAIR_UNITS
@@ -49,7 +49,6 @@ MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
 TRIALS_A_SIDE = 2
 MOST_ROUNDS = 20  # Most rounds of repairs.
 MOST_JUDGES = 1500  # Most points of a window that judge. Of more, every k-th does.
-ESTIMATE_EXCESS = 4.0  # A quadratic form says at most so many times what fitting finds.
 LEFT_OVER = 1e-9  # An equation of which the others leave less (m) holds because of them.
 ONE_LINE_M = 0.02  # Sides of two volumes nearer than this (m) are one line.
 
@@ -83,14 +82,12 @@ class WeldProblem(NamedTuple):
 class RoofState(NamedTuple):
     """A roof: its sides and planes.
 
-    `basis` (p, q) spans the unknowns that its equations leave free. `cost` is what the points of
-    its members cost under these, None if they have not been fitted together yet.
+    `basis` (p, q) spans the unknowns that its equations leave free.
     """
 
     sides: list[list[Side]]
     planes: list[Planes]
     basis: np.ndarray
-    cost: float | None
 
 
 class Window(NamedTuple):
@@ -166,21 +163,17 @@ def make_problem(
 def begin_state(sides: list[list[Side]], problem: WeldProblem) -> RoofState:
     """Return the roof as volumes agree on it."""
     agreement = problem.agreement
-    return RoofState(sides, list(agreement.planes), agreement.basis, agreement.cost)
-
-
-def compute_member_cost(agreement: Agreement, scene: Scene) -> float:
-    """Return what the points of members cost under the accepted equations."""
-    members = list(agreement.members.values())
-    return fit_members(members, agreement.basis, agreement.start, scene).cost
+    return RoofState(sides, list(agreement.planes), agreement.basis)
 
 
 def sum_at_planes(
     planes: list[Planes], agreement: Agreement, scene: Scene
-) -> tuple[list[LinearVolume], NormalSums]:
-    """Return the members with these planes, and the normal equations there."""
+) -> tuple[NormalSums, float]:
+    """Return the normal equations of members at these planes, and what their points cost."""
     members = [replace(member, rows=planes[k].rows) for k, member in agreement.members.items()]
-    return members, sum_at_start(members, scene)
+    return sum_at_start(members, scene), sum_row_costs(
+        members, [member.rows for member in members], scene
+    )
 
 
 def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawing:
@@ -407,7 +400,7 @@ def apply_repair(
 ) -> RoofState | None:
     """Return the roof after a repair, None if its points cost too much more."""
     most_cost = REPAIR_UNITS * problem.scene.evidence
-    sides, planes, basis, cost = state
+    sides, planes, basis = state
     for (k, edge), side in repair.sides.items():
         position = int(np.flatnonzero(window.numbers == k)[0])
         volumes = problem.volumes[window.numbers]
@@ -418,18 +411,17 @@ def apply_repair(
             return None
         sides = move_line(sides, k, edge, side, problem)
     if not repair.equations:
-        return RoofState(sides, planes, basis, cost)
+        return RoofState(sides, planes, basis)
     fit = fit_repair(repair, state, most_cost, problem)
     return None if fit is None else RoofState(sides, *fit)
 
 
 def fit_repair(
     repair: Repair, state: RoofState, most_cost: float, problem: WeldProblem
-) -> tuple[list[Planes], np.ndarray, float] | None:
+) -> tuple[list[Planes], np.ndarray] | None:
     """Fit planes under a repair's equations, too.
 
-    Returns them, the unknowns left free, and the points' cost. Returns None if points cost over
-    `most_cost` more.
+    Returns them and the unknowns left free, None if points cost over `most_cost` more.
     """
     members, start = problem.agreement.members, problem.agreement.start
     rows = []
@@ -442,29 +434,24 @@ def fit_repair(
         rows.append(
             sum(weight * (position @ members[k].common_design[p]) for weight, (k, p) in terms)
         )
-    equations = np.array(rows) @ state.basis
-    if not np.abs(equations).max() > LEFT_OVER:
+    equation = np.array(rows)
+    if not np.abs(equation @ state.basis).max() > LEFT_OVER:
         return None
-    free = state.basis @ find_null_space(equations)
+    free = constrain(state.basis, equation)
     if not free.shape[1]:
         return None
-    current_members, sums = problem.site.recall(
+    sums, cost_before = problem.site.recall(
         sum_at_planes, state.planes, problem.agreement, problem.scene
     )
-    now, then = (solve_normal(sums, basis, start).unknowns for basis in (state.basis, free))
-    if estimate_cost(then - now, sums, problem.scene) > ESTIMATE_EXCESS * most_cost:
-        return None
-    fit = fit_members(current_members, free, start, problem.scene, sums)
-    cost_before = state.cost
-    if cost_before is None:
-        cost_before = problem.site.recall(compute_member_cost, problem.agreement, problem.scene)
-    if not math.isfinite(fit.cost) or fit.cost > cost_before + most_cost:
+    member_list = list(members.values())
+    member_rows = place_planes(member_list, solve_normal(sums, free, start).unknowns)
+    if price_rows(member_list, member_rows, problem.scene) > cost_before + most_cost:
         return None
     planes = list(state.planes)
-    for k, plane_rows in zip(members, fit.rows, strict=True):
+    for k, plane_rows in zip(members, member_rows, strict=True):
         # The covariance stays: that planes meet somewhere does not make their place more precise.
         planes[k] = replace(planes[k], rows=plane_rows)
-    return planes, free, fit.cost
+    return planes, free
 
 
 def move_line(
