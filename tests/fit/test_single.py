@@ -39,6 +39,17 @@ def test_a_generated_roof_is_recovered_with_its_type(name):
     assert fit.noise_m == pytest.approx(0.05, abs=0.03)
 
 
+@pytest.mark.parametrize("name", ["hexagonal_spire", "broach"])
+def test_a_lone_spire_stands_on_a_regular_polygon(name):
+    """A hexagon is 15 % longer from corner to corner than across."""
+    points = sample_roof(name, typical_theta(name, 7.0, 7.0, 9.0), density=8.0)
+    fit = fit_roof(points)
+    assert fit.type == name
+    assert fit.parameters["width"] == pytest.approx(fit.parameters["length"], abs=1e-9)
+    assert fit.parameters["width"] == pytest.approx(7.0, rel=0.04)
+    assert fit.parameters["height"] / fit.parameters["width"] == pytest.approx(9.0 / 7.0, rel=0.02)
+
+
 def test_errors_are_a_few_standard_deviations():
     theta = typical_theta("hip")
     truth, _, _ = CATALOGUE["hip"].from_theta(theta)

@@ -233,6 +233,18 @@ def test_a_refit_of_an_untouched_building_stays_near_its_fit(kind, setting, seed
     assert again == pytest.approx(fitted, abs=0.2)
 
 
+@pytest.mark.parametrize(("kind", "setting"), [("onion", "alone"), ("cone", "turret")])
+def test_errors_of_curved_parts_are_a_few_standard_deviations(kind, setting):
+    scores = []
+    for seed in range(16, 24):
+        scene = draw_scene(kind, setting, seed, 8.0)
+        parts = fit_building(scene.points, scene.outline).roof_parts
+        (part,) = [part for part in parts if part.type == kind]
+        true, _, _ = CATALOGUE[kind].from_theta(scene.theta)
+        scores.append((part.parameters["height"] - true["height"]) / part.sigma["height"])
+    assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.5)
+
+
 def test_a_type_that_is_not_allowed_is_not_found():
     scene = draw_scene("dome", "alone", 20, 8.0)
     settings = Settings.from_dict({"fit": {"types": ["flat", "pyramid", "mansard"]}})

@@ -13,11 +13,20 @@ from ..frames import LocalFrame
 from ..log import count_things
 from ..model import Fit
 from ..primitives import CATALOGUE, get
-from ..primitives.contract import HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, RECTANGLE, place_vertices
+from ..primitives.contract import (
+    HALF_LENGTH,
+    HALF_WIDTH,
+    KAPPA,
+    Q0,
+    RECTANGLE,
+    Primitive,
+    place_vertices,
+)
 from ..read.plausible import is_plausible
 from ..settings import Settings
 from .direction import outline_rectangle
 from .likelihood import Estimate, fit_heights, fit_likelihood, plan_extents
+from .regular import REGULAR, find_covariance, fit_regular, measure_misfit
 
 FEWEST_POINTS = 4  # points; a plane and one to contradict it
 THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
@@ -25,6 +34,9 @@ UNTOLD = 100.0  # m, rad; a deviation as large is none: heights tell no directio
 # Points of a round roof lie so near its axis (shares of the first radius), and to its surface.
 HULL_REACH, HULL_SIGMAS = 1.3, 4.0
 HULL_ROUNDS = 2  # The first plan of a half disc is far too narrow.
+# A regular plan may lie so much further (m, in the mean) from the points than a free one.
+FARTHER_M = 0.01
+ROOF_WEIGHT = 0.5  # From this weight on, a point is of the roof.
 HULL_SPACINGS = 0.3  # The hull of points lies so much inside of what they are drawn from.
 
 
@@ -76,6 +88,8 @@ def fit_roof(
     estimate = fit_likelihood(local, names, outline_local, taus, type_log_prior)
     if outline is None and estimate.primitive.rim != RECTANGLE:
         estimate = fit_within_hull(local, estimate)
+    if outline is None and estimate.primitive.name in REGULAR:
+        estimate = make_regular(local, estimate)
     return as_fit(estimate, frame, len(local))
 
 
@@ -99,6 +113,22 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
         theta[:Q0] = outline_rectangle(hull, theta[KAPPA])
         theta, noise = fit_heights(inside, shape, theta)
     return replace(estimate, theta=theta, noise=noise)
+
+
+def make_regular(cloud: np.ndarray, estimate: Estimate) -> Estimate:
+    """Fit a spire or an onion again, as long as wide, if points (n, 4) lie as near to it then.
+
+    A width that these do not show keeps the variance of the free plan.
+    """
+    points, shape = cloud[cloud[:, 3] >= ROOF_WEIGHT, :3], estimate.primitive
+    theta = fit_regular(points, shape, estimate.theta)
+    inside = points[np.hypot(*(points[:, :2] - theta[:2]).T) <= theta[HALF_WIDTH]]
+    before, after = (measure_misfit(inside, shape, one) for one in (estimate.theta, theta))
+    if after > before + FARTHER_M:
+        return estimate
+    width_variance = max(estimate.covariance[k, k] for k in (HALF_WIDTH, HALF_LENGTH))
+    covariance = find_covariance(points, shape, theta, width_variance=width_variance)
+    return replace(estimate, theta=theta, covariance=covariance)
 
 
 def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
@@ -179,7 +209,7 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
     """
     theta_p, kappa, translation = estimate.primitive.from_theta(estimate.theta)
     shape = estimate.primitive.variant(theta_p)
-    sigma = standard_deviations(estimate)
+    sigma = find_deviations(shape, estimate.theta, estimate.covariance)
     vertices = place_vertices(shape.vertices(theta_p), kappa, translation)
     return Fit(
         type=shape.name,
@@ -202,16 +232,17 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
     )
 
 
-def standard_deviations(estimate: Estimate) -> dict[str, float]:
-    """Return standard deviations by name, by the delta method.
+def find_deviations(
+    shape: Primitive, theta: np.ndarray, covariance: np.ndarray
+) -> dict[str, float]:
+    """Find standard deviations by name, by the delta method.
 
-    Gradients of the named formulas go through theta's covariance.
+    Gradients of the named formulas go through theta's covariance (9, 9).
 
     What the points do not tell has none, as in a fit of several parts; what a given outline tells
     is exact, 0.
     """
-    shape, covariance = estimate.primitive, estimate.covariance
-    values = estimate.theta[HALF_WIDTH:]
+    values = theta[HALF_WIDTH:]
     names = {**shape.measures, "t_z": shape.eave}
     gradients = np.zeros((len(names), 9))
     for row, measure in zip(gradients, names.values(), strict=True):

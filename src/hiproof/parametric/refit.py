@@ -20,6 +20,7 @@ import shapely
 
 from ..compose.settle import make_pieces
 from ..errors import FitError, InputError
+from ..fit.regular import measure_leans
 from ..model import Building, Part, Roof, as_xyz
 from ..primitives.catalogue import CATALOGUE, CURVED
 from ..primitives.parameters import SIDED, refuse_no_shape
@@ -263,8 +264,6 @@ class Heights:
         """
         result = np.ones(len(part))
         for index in (k for k, one in enumerate(self.parts) if one.type in CURVED):
-            from ..fit.union.regular import measure_leans  # with compiled code that planes need not
-
             parameters, translation = self.place(index, x)
             shape = CATALOGUE[self.parts[index].type].variant(parameters)
             theta = shape.to_theta(parameters, self.parts[index].kappa, translation)

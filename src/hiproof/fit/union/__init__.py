@@ -58,7 +58,6 @@ larger      gambrels combined from their parts
 own         custom shapes instead of neighbouring parts
 judged      roofs judged by points, with one shape in place of several parts
 round_ends  cones, spires, domes, onions and half cones over round stretches of the outline
-regular     spires of equal sides and round onions fitted at once
 spires      how near points lie to spires
 round_tops  cones, spires, domes and onions around the tops of parts
 onions      onions around round parts, which may be their tops

@@ -20,11 +20,11 @@ from ...model import Part
 from ...primitives.catalogue import CATALOGUE
 from ...primitives.contract import HALF_LENGTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
+from ..regular import REGULAR, fit_regular, list_heights
 from .judged import JudgedRoof
 from .own import cut_part
 from .regions import list_polygons
-from .regular import REGULAR, fit_regular, list_heights
-from .round_tops import FOLLOW_M, is_top_seen
+from .round_tops import FOLLOW_M, is_top_seen, make_part
 from .spires import SIDES_OF_SPIRES
 
 # Turns (degrees) between sides that follow a circle, or a polygon of six sides or more.
@@ -174,10 +174,10 @@ def fit_over_circle(roof: JudgedRoof, end: RoundEnd, name: str, radius: float) -
         theta, _ = fit_heights(cloud[follows], shape, theta)
         reach = FOLLOW_M * math.hypot(1.0, theta[Q1 : Q1 + len(shape.bounds)].sum())
         follows = np.abs(points[:, 2] - shape.height_at(theta, points[:, :2])) <= reach
+    heights = list_heights(shape)
     if name in REGULAR:
-        theta = fit_regular(points, shape, theta, list_heights(shape))
-    parameters, _, _ = shape.from_theta(theta)
-    part = shape.variant(parameters).part(theta)
+        theta = fit_regular(points, shape, theta, heights)
+    part = make_part(points[follows], shape, theta, heights)
     if is_top_seen(part, points):
         yield from cut_to_outline(part, end, roof.outline)
 

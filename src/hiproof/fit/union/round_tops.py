@@ -17,13 +17,13 @@ from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
 from ...primitives.cants import list_cants
 from ...primitives.catalogue import CATALOGUE
-from ...primitives.contract import Q0
+from ...primitives.contract import Q0, Primitive
 from ...settings import Settings
 from ..direction import outline_rectangle
+from ..regular import REGULAR, find_covariance, fit_regular, is_regular, list_heights
 from .judged import COMPARED_M, JudgedRoof, scale_cap
 from .own import cut_part, fit_types
 from .regions import list_polygons
-from .regular import REGULAR, fit_regular
 from .spires import measure_spires
 
 RADII = (0.6, 0.85, 1.15, 1.5)  # Of discs around a part's top, in radii of a circle of its area.
@@ -202,13 +202,13 @@ def fit_free(points: np.ndarray, names: tuple[str, ...], settings: Settings) -> 
     Spires and onions are as long as wide.
     """
     part = fit_types(points, None, names, settings)
-    if part is None or part.type not in REGULAR:
+    if part is None or part.type not in REGULAR or is_regular(part.parameters):
         return part
     shape = CATALOGUE[part.type]
     theta = shape.to_theta(part.parameters, part.kappa, part.translation)
     theta = fit_regular(points, shape, theta)
-    parameters, _, _ = shape.from_theta(theta)
-    return shape.variant(parameters).part(theta, part.sigma)
+    width_variance = (0.5 * part.sigma.get("width", 0.0)) ** 2
+    return make_part(points, shape, theta, REGULAR[part.type], width_variance)
 
 
 def fit_over(outline: shapely.Polygon, part: Part, points: np.ndarray) -> Part:
@@ -219,7 +219,26 @@ def fit_over(outline: shapely.Polygon, part: Part, points: np.ndarray) -> Part:
     theta = shape.to_theta(part.parameters, part.kappa, part.translation)
     theta[:Q0] = outline_rectangle(outline, part.kappa)
     theta, _ = fit_heights(np.column_stack([points, np.ones(len(points))]), shape, theta)
+    free = REGULAR.get(part.type, list_heights(shape))
     if part.type in REGULAR:
         theta = fit_regular(points, shape, theta)
-    parameters, _, _ = shape.from_theta(theta)
-    return cut_part(shape.variant(parameters).part(theta, part.sigma), outline)
+    width_variance = (0.5 * part.sigma.get("width", 0.0)) ** 2
+    return cut_part(make_part(points, shape, theta, free, width_variance), outline)
+
+
+def make_part(
+    points: np.ndarray,
+    shape: Primitive,
+    theta: np.ndarray,
+    free: tuple[int, ...],
+    width_variance: float = 0.0,
+) -> Part:
+    """Make a part of theta (9,), of which the numbers `free` were fitted to points (n, 3).
+
+    Its standard deviations follow from these, and from the variance (m2) of half its width.
+    """
+    from ..single import find_deviations  # compiled code that most roofs never need
+
+    variant = shape.variant(shape.from_theta(theta)[0])
+    covariance = find_covariance(points, variant, theta, free, width_variance)
+    return variant.part(theta, find_deviations(variant, theta, covariance))

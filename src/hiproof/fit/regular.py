@@ -7,9 +7,11 @@ else the points determine are fitted at once, by distances at right angles.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from ...primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Q2, Primitive
+from ..primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Q2, Primitive
 
 # What points determine of each shape. Of a spire, they show no width.
 REGULAR = {
@@ -67,7 +69,7 @@ def approach(
         off = points[:, 2] - shape.height_at(theta, points[:, :2])
         distances = np.abs(off) * weights
         reach = max(LEAST_REACH_M, MEDIANS * float(np.median(distances))) if len(off) else 0.0
-        left = float(np.minimum(distances, 2.0 * LEAST_REACH_M).mean()) if len(off) else 0.0
+        left = average_distances(distances)
         weights *= distances <= reach
         if np.count_nonzero(weights) < 2 * len(free):
             break
@@ -79,6 +81,52 @@ def approach(
         theta[plan] = np.clip(theta[plan], nearest, farthest)
         theta[HALF_LENGTH] = theta[HALF_WIDTH]
     return left, theta
+
+
+def find_covariance(
+    points: np.ndarray,
+    shape: Primitive,
+    theta: np.ndarray,
+    free: tuple[int, ...] = (),
+    width_variance: float = 0.0,
+) -> np.ndarray:
+    """Find the covariance (9, 9) of the numbers `free` of theta, as `fit_regular` finds them.
+
+    It follows from the distances at right angles of those points (n, 3) that count. All other
+    numbers are taken as known, but for half a width with a variance (m2).
+    """
+    free = free or REGULAR[shape.name]
+    shape = shape.variant(shape.from_theta(theta)[0])
+    inside = points[np.isfinite(shape.part(theta).height_at(points[:, :2]))]
+    leans = measure_leans(inside, shape, theta)
+    off = (inside[:, 2] - shape.height_at(theta, inside[:, :2])) * leans
+    counts = np.abs(off) <= max(LEAST_REACH_M, MEDIANS * float(np.median(np.abs(off))))
+    changes = [measure_change(inside, shape, theta, k, STEP) for k in free]
+    design = np.column_stack(changes)[counts] * leans[counts, None]
+    spread = float((off[counts] ** 2).sum()) / max(len(design) - len(free), 1)
+    inverse, result = np.linalg.pinv(design.T @ design), np.zeros((9, 9))
+    both = [HALF_WIDTH, HALF_LENGTH]
+    result[np.ix_(both, both)] = width_variance
+    rows = [*free, HALF_LENGTH] if HALF_WIDTH in free else list(free)
+    ties = [free.index(HALF_WIDTH if k == HALF_LENGTH else k) for k in rows]
+    result[np.ix_(rows, rows)] = spread * inverse[np.ix_(ties, ties)]
+    return result
+
+
+def measure_misfit(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> float:
+    """Measure how far points (n, 3) lie from a shape (m, mean), at right angles."""
+    off = points[:, 2] - shape.height_at(theta, points[:, :2])
+    return average_distances(np.abs(off) * measure_leans(points, shape, theta))
+
+
+def average_distances(distances: np.ndarray) -> float:
+    """Return the mean of distances (n,), each at most twice LEAST_REACH_M."""
+    return float(np.minimum(distances, 2.0 * LEAST_REACH_M).mean()) if len(distances) else 0.0
+
+
+def is_regular(parameters: Mapping[str, float]) -> bool:
+    """Return whether a plan is as long as wide."""
+    return parameters["width"] == parameters["length"]
 
 
 def measure_leans(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.ndarray:
