@@ -69,6 +69,18 @@ def test_two_halves_of_a_spire_become_one_with_equal_sides(setting, seed):
     assert spire.translation[:2] == pytest.approx(place[:2], abs=0.05)
 
 
+@pytest.mark.parametrize("seed", [10, 18, 103])
+def test_a_spire_on_a_tower_stands_on_one_level_part(seed):
+    """Strips beside it would leave a moat where they lie higher than its eave."""
+    scene = draw_scene("broach", "tower", seed, 8.0)
+    parts = fit_building(scene.points, scene.outline).roof_parts
+    assert sorted(part.type for part in parts) == ["broach", "flat"]
+    xy = np.random.default_rng(seed).uniform(*np.reshape(scene.outline.bounds, (2, 2)), (4000, 2))
+    xy = xy[shapely.contains_xy(scene.outline, *xy.T)]
+    too_low = find_highest(parts, xy)[0] < scene.height_at(xy) - 0.15
+    assert too_low.mean() <= 0.02
+
+
 @pytest.mark.parametrize("kind", ["cone", "dome", "onion"])
 def test_facets_over_an_arc_stand_on_its_sides(kind):
     """So the eave is level."""

@@ -25,6 +25,7 @@ MEDIANS = 3.0  # Points further off than so many medians of the distances do not
 WIDTH_ROUNDS = 2  # Rounds in which points are taken from within the plan.
 BENDS_STARTED = 4  # Starts of a shape with a top of its own, by how far that bends up.
 MOST_MOVE = 0.3  # Share of its half width by which a plan moves or widens at most.
+UNKNOWN_M2 = 1e8  # Variance (m2) of what no points show.
 STEP = 1e-4  # Step (m, rad or slope) of numerical derivatives.
 PLAN_STEP_M = 0.05  # Step (m) over which slopes are measured: as far as points lie off in plan.
 
@@ -98,6 +99,8 @@ def find_covariance(
     free = free or REGULAR[shape.name]
     shape = shape.variant(shape.from_theta(theta)[0])
     inside = points[np.isfinite(shape.part(theta).height_at(points[:, :2]))]
+    if len(inside) < 2 * len(free):
+        return np.diag(np.full(9, UNKNOWN_M2))
     leans = measure_leans(inside, shape, theta)
     off = (inside[:, 2] - shape.height_at(theta, inside[:, :2])) * leans
     counts = np.abs(off) <= max(LEAST_REACH_M, MEDIANS * float(np.median(np.abs(off))))

@@ -63,6 +63,7 @@ round_tops  cones, spires, domes and onions around the tops of parts
 onions      onions around round parts, which may be their tops
 drums       level discs over arcs of the outline and around level parts
 barrels     barrel vaults over parts with slopes to two sides
+bases       one level part under and around a curved shape
 curved      these shapes where points follow them better
 shown       hidden parts removed
 clamp       heights limited to the range of the points

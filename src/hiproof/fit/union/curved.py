@@ -18,6 +18,7 @@ from ...primitives.cants import list_cants
 from ...primitives.catalogue import CURVED, ROUND
 from ...settings import Settings
 from .barrels import list_barrels
+from .bases import lay_base
 from .drums import place_drums
 from .judged import JudgedRoof, measure_gain, measure_slope, replace_parts, scale_cap, trim_parts
 from .onions import list_onions
@@ -107,5 +108,5 @@ def find_better_roof(roof: JudgedRoof, names: list[str], settings: Settings) -> 
         gains = [replace_parts(roof, shape) for shape in shapes]
         gain, better = max(gains, key=lambda one: one[0], default=(0.0, roof))
         if gain > LEAST_NATS:
-            return better
+            return lay_base(better)
     return None
