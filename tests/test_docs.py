@@ -117,8 +117,9 @@ def test_the_example_of_a_new_primitive_runs(tmp_path):
 def test_the_notebook_runs_and_is_stored_with_its_outputs():
     """Its cells run in order, and each gives outputs of the kinds that are stored with it."""
     pytest.importorskip("matplotlib", reason="the notebook plots (extra `report`)").use("Agg")
-    from docs.run_notebook import NOTEBOOK, run_notebook
+    from docs.run_notebook import NOTEBOOK, draw_figures, run_notebook
 
+    draw_figures()  # closes those of other tests
     text = NOTEBOOK.read_text(encoding="utf-8")
     stored, notebook = json.loads(text), json.loads(text)
     names = run_notebook(notebook)

@@ -80,5 +80,5 @@ def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
                 columns[other] -= (weighted * columns[other]).sum() / square * columns[k]
         distances = np.abs(columns[4])
         reach = max(MOST_DISTANCE_M, 2.0 * np.median(distances))
-        used = np.where(distances <= reach, 1.0, 0.0)
+        used = 1.0 * (distances <= reach)
     return np.minimum(distances, MOST_DISTANCE_M).mean()
