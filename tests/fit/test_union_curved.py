@@ -132,6 +132,21 @@ def test_a_turret_is_found_from_two_points_a_square_metre():
     assert all(found)
 
 
+def test_the_top_of_a_turret_may_lie_beside_the_middle_of_its_arc():
+    """Walls bulge more to one side than roofs do; steep facets show 0.2 m as 0.5 m of height."""
+    disc = make_disc(0.0, 0.0, 1.7)
+    outline = shapely.union(shapely.box(0.0, 0.0, 14.0, 9.0), disc)
+
+    def height_at(x, y):
+        cone = 14.0 - 2.2 * np.hypot(x - 0.2, y - 0.15)
+        house = 6.0 + 0.9 * (4.5 - np.abs(y - 4.5))
+        return np.where(shapely.contains_xy(disc, x, y), cone, house)
+
+    parts = fit_building(sample_heights(height_at, outline), outline).roof_parts
+    (cone,) = [part for part in parts if part.type == "cone"]
+    assert cone.translation[:2] == pytest.approx([0.2, 0.15], abs=0.05)
+
+
 @pytest.mark.parametrize("setting", DRUM_SETTINGS)
 def test_a_drum_is_found(setting):
     assert is_drum_found(setting, 20, 8.0)

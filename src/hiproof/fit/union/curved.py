@@ -23,7 +23,7 @@ from .drums import place_drums
 from .judged import JudgedRoof, measure_gain, measure_slope, replace_parts, scale_cap, trim_parts
 from .onions import list_onions
 from .own import MOST_DISTANCE_M
-from .round_ends import RoundEnd, find_round_ends, list_end_shapes
+from .round_ends import MOVABLE, RoundEnd, find_round_ends, list_end_shapes
 from .round_tops import LEAST_FALL_M, list_round_shapes
 
 LEAST_MISFIT_M = 0.03  # Nobody sees that a part lies nearer (m, mean) to its points than this.
@@ -70,15 +70,24 @@ def roof_round_end(roof: JudgedRoof, end: RoundEnd, names: list[str]) -> JudgedR
     heights = [new.highest[0] for _, new in options]
     judged = np.any([z != roof.highest[0] for z in heights], axis=0)
     best, least = roof, LEAST_NATS_ON_ARC if end.is_round else LEAST_NATS_OF_SPIRE
-    for shape, new in options:
+    for shape, new in sorted(options, key=lambda option: is_aside(option[0], end)):
         if new is roof or measure_visible_share(new) < LEAST_VISIBLE:
             continue
+        aside = is_aside(shape, end)
+        if aside and best is not roof and best.parts[-1].type == "half_cone":
+            break  # Its top is where the house's ridge ends.
         price = WHOLE_NATS if end.is_half_disc and shape.type != "half_cone" else 0.0
-        price += LEAST_NATS if shape.type == "onion" else 0.0  # It is a cone or a dome and more.
+        # An onion is a cone or a dome and more, and a top beside the middle needs two numbers more.
+        price += LEAST_NATS if shape.type == "onion" or aside else 0.0
         gain = measure_gain(roof, new, judged, scale_cap(measure_slope(shape))) - price
         if gain > least:
             best, least = new, gain
     return best
+
+
+def is_aside(shape: Part, end: RoundEnd) -> bool:
+    """Return whether the top of a whole shape lies beside the middle of a round end."""
+    return shape.type in MOVABLE and not np.array_equal(shape.translation[:2], end.centre)
 
 
 def measure_visible_share(roof: JudgedRoof) -> float:

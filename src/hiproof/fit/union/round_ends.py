@@ -18,7 +18,7 @@ from shapely import affinity
 from ...geometry.rings import OVERLAY_GRID_M, counterclockwise
 from ...model import Part
 from ...primitives.catalogue import CATALOGUE
-from ...primitives.contract import HALF_LENGTH, KAPPA, Q0, Q1, Primitive
+from ...primitives.contract import CX, CY, HALF_LENGTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
 from ..regular import REGULAR, fit_regular, list_heights
 from .judged import JudgedRoof
@@ -34,6 +34,7 @@ FEWEST_CORNERS = 4  # Fewer lie on some circle by chance.
 SHORTEST_ARC_DEG = 120.0  # Shorter arcs are round corners of a roof, not shapes of their own.
 APSE_DEG = (140.0, 220.0)  # Arcs of half discs.
 WHOLE_DISCS = ("cone", "dome", "onion")  # Types over a whole disc.
+MOVABLE = ("cone", "dome")  # Types whose top may lie beside the middle of the arc.
 TURRET_DEG = 150.0  # Shortest arc of a whole disc.
 ON_CIRCLE = 0.03  # Farthest that a corner lies off its circle, in shares of the radius.
 WHOLE_CIRCLE_DEG = 359.0  # Longer arcs are whole circles.
@@ -177,7 +178,22 @@ def fit_over_circle(roof: JudgedRoof, end: RoundEnd, name: str, radius: float) -
     heights = list_heights(shape)
     if name in REGULAR:
         theta = fit_regular(points, shape, theta, heights)
-    part = make_part(points[follows], shape, theta, heights)
+    yield from make_end_part(points, shape, theta, heights, end, roof)
+    if name in MOVABLE:
+        theta = fit_regular(points, shape, theta, (CX, CY, *heights))
+        yield from make_end_part(points, shape, theta, (CX, CY, *heights), end, roof)
+
+
+def make_end_part(
+    points: np.ndarray,
+    shape: Primitive,
+    theta: np.ndarray,
+    free: tuple[int, ...],
+    end: RoundEnd,
+    roof: JudgedRoof,
+) -> Iterator[Part]:
+    """Yield the part of theta (9,) up to the arc, if points (n, 3) show its top."""
+    part = make_part(points, shape, theta, free)
     if is_top_seen(part, points):
         yield from cut_to_outline(part, end, roof.outline)
 
