@@ -132,6 +132,9 @@ def weld(
     base: bool,
 ) -> tuple[list[list[Side]], list[Planes], list[list[shapely.Polygon]]]:
     """Return the sides, planes and regions of all volumes with every repair that pays."""
+    if len(volumes) - 1 + base < 2:  # one volume meets no other
+        planes = list(agreement.planes)
+        return sides, planes, cut_regions(volumes, planes, sides, site, base)
     problem = make_problem(volumes, agreement, site, base)
     state = begin_state(sides, problem)
     whole = make_window(make_whole_box(problem), list_quads(state, problem), base, problem)
