@@ -58,18 +58,16 @@ class PlanSite(NamedTuple):
             )
         return self.cache[key][0]
 
-    def cut_quad(
-        self, volume: np.ndarray, sides: list[Side]
-    ) -> tuple[shapely.Polygon, shapely.Geometry]:
-        """Return a volume's plan, and the part of it inside the outline."""
+    def draw_quad(self, volume: np.ndarray, sides: list[Side]) -> shapely.Polygon:
+        """Return a volume's plan."""
         key = volume[POSITION].tobytes(), *sides
         if key not in self.cache:
-            quad = draw_quad(volume, sides, self.plan, self.scene)
-            self.cache[key] = (
-                quad,
-                shapely.intersection(quad, self.outline, grid_size=OVERLAY_GRID_M),
-            )
+            self.cache[key] = draw_quad(volume, sides, self.plan, self.scene)
         return self.cache[key]
+
+    def cut_quad(self, quad: shapely.Polygon) -> shapely.Geometry:
+        """Return the part of a volume's plan inside the outline."""
+        return self.recall(cut_to_outline, quad, self.outline)
 
     def find_rest(self, quads: list[shapely.Polygon]) -> list[shapely.Polygon]:
         """Return the part of the outline that lies in no quad."""
@@ -85,6 +83,14 @@ class PlanSite(NamedTuple):
             for remainder in self.recall(subtract_hole, polygon, hole)
         ]
 
+    def cut_out_of_all(self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon) -> None:
+        """Cut the `hole` out of the polygons of all regions."""
+        places = [k for k, polygons in enumerate(regions) for _ in polygons]
+        polygons = [polygon for region in regions for polygon in region]
+        is_near = shapely.dwithin(polygons, hole, OVERLAY_GAP_M)
+        for k in {places[n] for n in np.flatnonzero(is_near).tolist()}:
+            regions[k] = self.cut_out(regions[k], hole)
+
 
 def cut_regions(
     volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: PlanSite, base: bool
@@ -94,24 +100,19 @@ def cut_regions(
     They are in local coordinates, and overlap as volumes do. What a later volume replaces is cut
     out. With `base`, the base has what no other volume covers, and what rises through others.
     """
-    cut = [
-        site.cut_quad(volume, volume_sides)
-        for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True)
-    ]
+    pairs = zip(volumes[1:], sides[1:], strict=True)
+    quads = [site.draw_quad(volume, volume_sides) for volume, volume_sides in pairs]
     regions = [list_polygons(site.outline) if base or len(volumes) == 1 else []]
-    for k, (quad, inside_quad) in enumerate(cut, start=1):
+    for k, quad in enumerate(quads, start=1):
+        inside_quad = site.cut_quad(quad)
         if volumes[k, REPLACES]:
-            regions = [site.cut_out(earlier, quad) for earlier in regions]
+            site.cut_out_of_all(regions, quad)
         elif regions[0] and not is_base_above(
             volumes[0, OFFSET0 + LEVEL], volumes[k], planes[k], inside_quad, site
         ):
             regions[0] = site.cut_out(regions[0], quad)
         regions.append(list_polygons(inside_quad))
-    return (
-        regions
-        if len(volumes) == 1
-        else fill_gaps(volumes, planes, regions, [quad for quad, _ in cut], site)
-    )
+    return regions if len(volumes) == 1 else fill_gaps(volumes, planes, regions, quads, site)
 
 
 def sketch_regions(
@@ -124,9 +125,9 @@ def sketch_regions(
     """
     regions: list[list[shapely.Polygon]] = [[]]
     for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True):
-        quad, _ = site.cut_quad(volume, volume_sides)
+        quad = site.draw_quad(volume, volume_sides)
         if volume[REPLACES]:
-            regions = [site.cut_out(earlier, quad) for earlier in regions]
+            site.cut_out_of_all(regions, quad)
         regions.append([quad])
     return regions
 
@@ -252,6 +253,11 @@ def compute_volume_heights(
 def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     parts = getattr(geometry, "geoms", (geometry,))
     return [part for part in parts if part.geom_type == "Polygon" and part.area > 1e-9]
+
+
+def cut_to_outline(quad: shapely.Polygon, outline: shapely.Polygon) -> shapely.Geometry:
+    """Return the part of a volume's plan inside the outline."""
+    return shapely.intersection(quad, outline, grid_size=OVERLAY_GRID_M)
 
 
 def subtract_hole(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shapely.Polygon]:

@@ -303,7 +303,7 @@ def frame_repair(repair: Repair, state: RoofState, problem: WeldProblem) -> shap
     It lies around the sides that move and the volumes whose planes change.
     """
     owners = {k for _, terms in repair.equations for _, (k, _) in terms}
-    quads = [problem.site.cut_quad(problem.volumes[k], state.sides[k])[0] for k in owners if k > 0]
+    quads = [problem.site.draw_quad(problem.volumes[k], state.sides[k]) for k in owners if k > 0]
     places = [shapely.get_coordinates(quad) for quad in quads]
     places += [
         list_line_ends(state.sides, k, edge, side, problem)
@@ -340,7 +340,7 @@ def list_line_ends(
 def list_quads(state: RoofState, problem: WeldProblem) -> list[shapely.Polygon]:
     """Return the plans of all volumes but the base, in local coordinates."""
     pairs = zip(problem.volumes[1:], state.sides[1:], strict=True)
-    return [problem.site.cut_quad(volume, volume_sides)[0] for volume, volume_sides in pairs]
+    return [problem.site.draw_quad(volume, volume_sides) for volume, volume_sides in pairs]
 
 
 def make_window(
