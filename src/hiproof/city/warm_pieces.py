@@ -115,7 +115,7 @@ def single() -> None:
     fit_roof(house())
 
 
-def curved() -> None:
+def curves() -> None:
     """Compile what shows that a part is none of the curved shapes."""
     from ..fit.union.barrels import measure_arc_misfit
     from ..fit.union.drums import find_circle
@@ -166,7 +166,7 @@ def points() -> None:
 
 PIECES: dict[str, Callable[[], None]] = {
     piece.__name__: piece
-    for piece in (moves, planes, outlines, solid, check, points, single, curved, warm_recognition)
+    for piece in (moves, planes, outlines, solid, check, points, single, curves, warm_recognition)
 }
 
 

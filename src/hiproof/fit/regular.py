@@ -91,7 +91,7 @@ def find_covariance(
     free: tuple[int, ...] = (),
     width_variance: float = 0.0,
 ) -> np.ndarray:
-    """Find the covariance (9, 9) of the numbers `free` of theta, as `fit_regular` finds them.
+    """Find the covariance (9, 9) of theta whose numbers `free` `fit_regular` finds.
 
     It follows from the distances at right angles of those points (n, 3) that count. All other
     numbers are taken as known, but for half a width with a variance (m2).

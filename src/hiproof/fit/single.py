@@ -116,7 +116,7 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
 
 
 def make_regular(cloud: np.ndarray, estimate: Estimate) -> Estimate:
-    """Fit a spire or an onion again, as long as wide, if points (n, 4) lie as near to it then.
+    """Fit a spire or an onion as long as wide, if points (n, 4) lie as near then.
 
     A width that these do not show keeps the variance of the free plan.
     """

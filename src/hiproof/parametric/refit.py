@@ -258,7 +258,7 @@ class Heights:
         return RefitSurface(gaps * leans, leans, part, row, result)
 
     def leans(self, x: np.ndarray, part: np.ndarray) -> np.ndarray:
-        """Return what share (n,) of heights above curved parts (n,) is at right angles to them.
+        """Return the share (n,) of heights over curved parts that is at right angles.
 
         It is 1 over others: points lie as far off in plan as in height, which steep slopes show.
         """
@@ -272,7 +272,7 @@ class Heights:
         return result
 
     def jacobian(self, x: np.ndarray, surface: RefitSurface) -> np.ndarray:
-        """Return the derivatives (n, p) of the roof's heights by the unknowns, times the leans."""
+        """Return derivatives (n, p) of the heights by the unknowns, times the leans."""
         result = np.zeros((len(self.z), len(x)))
         covered = np.abs(surface.gaps) < UNBOUNDED_M
         for index, columns in enumerate(self.columns):

@@ -243,7 +243,7 @@ def choose_conditions(
 
 
 def constrain(basis: np.ndarray, equation: np.ndarray) -> np.ndarray:
-    """Return a basis (p, r) of those unknowns of `basis` (p, q) that solve `equation` (m, p)."""
+    """Return a basis (p, r) of what solves `equation` (m, p) in a `basis` (p, q)."""
     return basis @ find_null_space(equation @ basis)
 
 
@@ -256,7 +256,7 @@ def solve_normal(sums: NormalSums, basis: np.ndarray, start: np.ndarray) -> Solu
 
 
 def place_planes(members: list[LinearVolume], unknowns: np.ndarray) -> list[np.ndarray]:
-    """Return each member's planes (k, 3) under the unknowns (p,), NaN where it has none."""
+    """Return each member's planes (k, 3) under unknowns (p,), NaN without one."""
     return [
         np.where(np.isfinite(member.rows), member.full_design @ unknowns, np.nan)
         for member in members

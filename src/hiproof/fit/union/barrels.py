@@ -45,7 +45,7 @@ def list_barrels(roof: JudgedRoof, part: Part, settings: Settings) -> Iterator[P
 
 
 def list_groups(parts: list[Part], part: Part) -> list[list[Part]]:
-    """List a part alone, and with all that begin and end where it does along its ridge."""
+    """List a part alone, and with all that begin and end with it along its ridge."""
     if len(parts) == 1:
         return [parts]
     along = np.array([math.cos(part.kappa), math.sin(part.kappa)])

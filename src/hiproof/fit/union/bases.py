@@ -16,7 +16,7 @@ from .regions import exclude_parts, list_polygons, unite_outlines
 
 
 def lay_base(roof: JudgedRoof) -> JudgedRoof:
-    """Return the roof with one level part under its last, if points lie as near to it then.
+    """Return the roof with a level part under its last, if points lie as near then.
 
     It replaces the level parts beside the shape that are as high as the largest of them.
     """

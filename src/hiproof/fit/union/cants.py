@@ -326,7 +326,7 @@ def find_start_plane(
 
 @compiled
 def measure_savings(rows, trial_rows, points, dead, width):
-    """Return what `points` (3, m) cost less with each of the trial rows (t, 3) besides.
+    """Return what `points` (3, m) cost less with each of the trial rows (t, 3).
 
     They lie under planes `rows` (k, 3), which a further one can only lower.
     """

@@ -40,7 +40,7 @@ FEWEST_CURVE_POINTS = 12  # A curve takes five numbers, and as many points again
 def fit_curved_shapes(
     parts: list[Part], points: np.ndarray, outline: shapely.Polygon, settings: Settings
 ) -> list[Part]:
-    """Replace parts by curved shapes that follow the points (n, 3) inside the outline better."""
+    """Replace parts by curved shapes that follow points (n, 3) in the outline better."""
     allowed = settings.fit.types or CURVED
     names = [name for name in CURVED if name in allowed]
     roof = JudgedRoof(parts, points, outline)

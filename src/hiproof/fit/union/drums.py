@@ -165,7 +165,7 @@ def measure_right_share(
 def move_circle(
     points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float, softness: float
 ) -> np.ndarray:
-    """Return by how much (3,) to move and to widen a circle so that it separates points better.
+    """Return the step (3,) in place and radius by which a circle separates better.
 
     It is a step of a logistic fit. Points nearer to the circle count more, the more so the smaller
     its `softness` (m).

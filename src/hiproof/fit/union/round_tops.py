@@ -233,7 +233,7 @@ def make_part(
     free: tuple[int, ...],
     width_variance: float = 0.0,
 ) -> Part:
-    """Make a part of theta (9,), of which the numbers `free` were fitted to points (n, 3).
+    """Make a part of theta (9,), whose numbers `free` were fitted to points (n, 3).
 
     Its standard deviations follow from these, and from the variance (m2) of half its width.
     """

@@ -171,7 +171,7 @@ def begin_state(sides: list[list[Side]], problem: WeldProblem) -> RoofState:
 def sum_at_planes(
     planes: list[Planes], agreement: Agreement, scene: Scene
 ) -> tuple[NormalSums, float]:
-    """Return the normal equations of members at these planes, and what their points cost."""
+    """Return the normal equations of members at these planes, and their points' cost."""
     members = [replace(member, rows=planes[k].rows) for k, member in agreement.members.items()]
     return sum_at_start(members, scene), sum_row_costs(
         members, [member.rows for member in members], scene
