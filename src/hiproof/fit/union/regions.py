@@ -83,7 +83,7 @@ class PlanSite(NamedTuple):
             for remainder in self.recall(subtract_hole, polygon, hole)
         ]
 
-    def cut_all(self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon) -> None:
+    def carve_regions(self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon) -> None:
         """Cut the `hole` out of the polygons of all regions."""
         places = [k for k, polygons in enumerate(regions) for _ in polygons]
         polygons = [polygon for region in regions for polygon in region]
@@ -106,7 +106,7 @@ def cut_regions(
     for k, quad in enumerate(quads, start=1):
         inside_quad = site.cut_quad(quad)
         if volumes[k, REPLACES]:
-            site.cut_all(regions, quad)
+            site.carve_regions(regions, quad)
         elif regions[0] and not is_base_above(
             volumes[0, OFFSET0 + LEVEL], volumes[k], planes[k], inside_quad, site
         ):
@@ -127,7 +127,7 @@ def sketch_regions(
     for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True):
         quad = site.draw_quad(volume, volume_sides)
         if volume[REPLACES]:
-            site.cut_all(regions, quad)
+            site.carve_regions(regions, quad)
         regions.append([quad])
     return regions
 
