@@ -13,7 +13,7 @@ from hiproof import Status, reconstruct
 from hiproof.compose import check_solid
 from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
-from hiproof.fit.outline import estimate_outline, with_courts
+from hiproof.fit.outline import close_slits, estimate_outline, with_courts
 from hiproof.fit.outline.cost import (
     Border,
     apply_change,
@@ -221,6 +221,21 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     result = add_steps(drawing, border, RUN)
     assert len(result.lines) == 8 and result.cost < drawing.cost
     assert iou(shapely.Polygon(result.corners), truth) > 0.96
+
+
+def test_a_slit_beside_a_high_wall_is_closed_and_a_wide_bay_stays():
+    house, annex = shapely.box(0, 0, 14, 8), shapely.box(2, 8.9, 9, 12)
+    touching = shapely.union_all([house, annex, shapely.box(8, 8, 9, 8.9)])
+    outline = estimate_outline(points_in(touching, 18.0, angle=0.0)[0], 0.0)
+    assert count_corners(outline) == 8
+    assert iou(outline, house | shapely.box(2, 8, 9, 12)) > 0.97
+    bay = house - shapely.box(5, 4, 7, 8)
+    assert count_corners(estimate_outline(points_in(bay, 18.0, angle=0.0)[0], 0.0)) == 8
+
+
+def test_a_slit_that_becomes_wide_is_left_as_it_is():
+    wedge = shapely.Polygon([(0, 0), (14, 0), (14, 8), (9, 8), (7, 2), (5, 8), (0, 8)])
+    assert close_slits(wedge) is wedge
 
 
 def test_an_outline_ends_in_no_spike():

@@ -126,3 +126,13 @@ def test_a_side_may_take_the_line_of_the_edge_that_carries_it_on():
     lines = [repair.sides[1, edge] for repair in repairs]
     off = [np.abs(line.offset + line.lean * y[2:] - x[2:]).max() for line in lines]
     assert min(off) < 1e-9
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_long_steps_of_a_hand_on_a_large_level_roof_go(seed):
+    rng = np.random.default_rng(seed)
+    x, y = rng.random((2, 20 * 24 * 14)) * [[24.0], [14.0]]
+    z = 3.0 + 0.08 * (x > 7.2) - 0.08 * (x > 16.8) + rng.normal(0.0, 0.02, len(x))
+    fit = fit_building(np.column_stack([x, y, z]), shapely.box(0, 0, 24, 14))
+    rows = np.concatenate([piece.planes for part in fit.roof_parts for piece in part.pieces])
+    assert np.ptp(rows, axis=0) == pytest.approx(np.zeros(3), abs=1e-6)

@@ -47,6 +47,11 @@ class DrawnPlan:
         return np.unique(self.beside[self.beside >= 0])
 
     @property
+    def lengths(self) -> np.ndarray:
+        """The length (m) of each edge (e,)."""
+        return np.linalg.norm(np.diff(self.places[self.edges], axis=1)[:, 0], axis=1)
+
+    @property
     def gaps(self) -> np.ndarray:
         """How far apart (m) the planes beside each edge are at its ends (e, 2).
 

@@ -65,6 +65,7 @@ EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loo
 (lower than `low_step`, in metres), more in line with no corner, less where it ends in one.
 """
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # in this order
+LOW_STEP_COST_A_METRE = EDGE_PRICES.a_metre + EDGE_PRICES.low_a_metre  # of the drawn roof, too
 
 CORNER_COST = 0.5  # a corner of the drawn roof; above, recall and the share of points fall
 LOOSE_COST, UNSUPPORTED_COST, FAR_COST_A_METRE = 1.2, 0.3, 0.1
@@ -109,7 +110,7 @@ LEFT_OUT_UNITS, LEFT_OUT_SHARE = 4.0, 0.1  # leaving a volume out; besides, a sh
 CUT_UNITS = 10.0  # cutting a volume short, before its neighbours are drawn out
 ALONG_AXES_UNITS = 20.0  # fewer volumes along the axes, before planes face walls: 9 were the most
 FITTING_UNITS = 2.0  # that fitting may still gain
-REPAIR_UNITS = 2.5  # a repair, by its points alone: it may save no more
+REPAIR_UNITS = 2.5  # a repair, by its points alone: but for low steps, it may save no more
 
 # How much the points of a place must cost for a volume to be looked for.
 

@@ -31,12 +31,14 @@ class Repair:
     """What is to be moved and by how much (m): sides or planes.
 
     Sides are {(volume, edge): line}. An equation is a place (2,) in local coordinates and pairs of
-    weights and owners of planes: the sum of their heights there, so weighted, is zero.
+    weights and owners of planes: the sum of their heights there, so weighted, is zero. `length` is
+    that (m) of the low step that goes.
     """
 
     size: float
     sides: dict[tuple[int, int], Side] = field(default_factory=dict)
     equations: tuple[tuple[np.ndarray, tuple[tuple[float, tuple[int, int]], ...]], ...] = ()
+    length: float = 0.0
 
     @property
     def key(self) -> tuple:
@@ -179,7 +181,7 @@ def find_fold_line(
 
 def list_low_steps(plan_drawn: DrawnPlan, gaps: np.ndarray) -> Iterator[Repair]:
     """Yield repairs of low steps: two planes meet along the step, or are one."""
-    highest = gaps.max(axis=1)
+    highest, lengths = gaps.max(axis=1), plan_drawn.lengths
     low_edges = np.flatnonzero(is_low_step(gaps))
     pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
     for pair in np.unique(pairs, axis=0):
@@ -188,13 +190,13 @@ def list_low_steps(plan_drawn: DrawnPlan, gaps: np.ndarray) -> Iterator[Repair]:
         spread = np.linalg.norm(places[:, None] - places, axis=2)
         i, j = np.unravel_index(spread.argmax(), spread.shape)
         terms = equate_heights(plan_drawn, *pair)
-        size = float(highest[edges].max())
-        yield Repair(size, equations=((places[i], terms), (places[j], terms)))
+        size, length = float(highest[edges].max()), float(lengths[edges].sum())
+        yield Repair(size, equations=((places[i], terms), (places[j], terms)), length=length)
         slope_break = np.hypot(*(plan_drawn.planes[pair[0]] - plan_drawn.planes[pair[1]])[:2])
         if slope_break < LEAST_BREAK:
             third_place = places[i] + np.array([[0.0, -1.0], [1.0, 0.0]]) @ (places[j] - places[i])
             equations = tuple((place, terms) for place in (places[i], places[j], third_place))
-            yield Repair(size, equations=equations)
+            yield Repair(size, equations=equations, length=length)
 
 
 def is_low_step(gaps: np.ndarray) -> np.ndarray:
@@ -203,6 +205,11 @@ def is_low_step(gaps: np.ndarray) -> np.ndarray:
     `gaps` (e, 2) are how far apart their planes are at their ends.
     """
     return (gaps.max(axis=1) > NO_STEP_M) & (gaps.max(axis=1) < LOW_STEP_M)
+
+
+def measure_low_steps(plan_drawn: DrawnPlan) -> float:
+    """Return the length (m) of all low steps of the drawn plan."""
+    return float(plan_drawn.lengths[is_low_step(plan_drawn.gaps)].sum())
 
 
 def equate_heights(

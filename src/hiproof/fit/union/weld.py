@@ -1,8 +1,9 @@
 """Make what nearly meets meet, if the roof gets cheaper by it.
 
-    misfit + units * (visible parameters + corners)
+    misfit + units * (visible parameters + corners + length of low steps)
 
-This concerns sides, corners and low steps. A corner has a price because a draughtsman counts it.
+This concerns sides, corners and low steps. A corner has a price because a draughtsman counts it. A
+metre of a low step has that of the search.
 Repairs are tried the smallest first, each in a window around it, and one that pays is kept. After a
 round, the roof is drawn again, until no repair pays. The outline never moves.
 """
@@ -35,9 +36,15 @@ from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
 from .finish import Planes
 from .objective import compute_costs, compute_misfits
 from .plan import Plan
-from .prices import CORNER_COST, LARGE_ROOF_M2, PARAMETER_COST, REPAIR_UNITS
+from .prices import (
+    CORNER_COST,
+    LARGE_ROOF_M2,
+    LOW_STEP_COST_A_METRE,
+    PARAMETER_COST,
+    REPAIR_UNITS,
+)
 from .regions import PlanSite, cut_regions, list_polygons, sketch_regions
-from .repairs import Repair, find_repairs
+from .repairs import Repair, find_repairs, measure_low_steps
 from .scene import Scene, select_points
 from .sides import Side, cross_lines
 from .volumes import DIRECTION, U0, V0, V1
@@ -382,10 +389,11 @@ def price_window(
     results.
     """
     scene, numbers = problem.scene, window.numbers
-    owners = set(other_owners)
+    owners, low_steps_m = set(other_owners), 0.0
     for plan_drawn in drawing.plans:
         if plan_drawn is None:
             return math.inf
+        low_steps_m += measure_low_steps(plan_drawn)
         owners |= {
             (int(numbers[k]), p) for k, p in plan_drawn.owner[plan_drawn.visible_planes].tolist()
         }
@@ -394,6 +402,7 @@ def price_window(
     height, _ = find_highest(drawing.parts, window.xy)
     misfit = window.weight * float(compute_misfits(window.z, height, scene).sum())
     units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * drawing.corners
+    units += LOW_STEP_COST_A_METRE * low_steps_m
     return misfit + scene.evidence * units
 
 
@@ -401,7 +410,8 @@ def apply_repair(
     state: RoofState, repair: Repair, window: Window, problem: WeldProblem
 ) -> RoofState | None:
     """Return the roof after a repair, None if its points cost too much more."""
-    most_cost = REPAIR_UNITS * problem.scene.evidence
+    most_units = REPAIR_UNITS + LOW_STEP_COST_A_METRE * repair.length
+    most_cost = most_units * problem.scene.evidence
     sides, planes, basis = state
     for (k, edge), side in repair.sides.items():
         position = int(np.flatnonzero(window.numbers == k)[0])
