@@ -38,7 +38,6 @@ from .objective import compute_costs, compute_misfits
 from .plan import Plan
 from .prices import (
     CORNER_COST,
-    LARGE_ROOF_M2,
     LOW_STEP_COST_A_METRE,
     PARAMETER_COST,
     REPAIR_UNITS,
@@ -49,6 +48,7 @@ from .scene import Scene, select_points
 from .sides import Side, cross_lines
 from .volumes import DIRECTION, U0, V0, V1
 
+WINDOW_M2 = 400.0  # A roof of so many square metres is one window.
 MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
 # Repairs that are drawn for each side: of 78 after the second, 4 paid, of 229 first ones 84 did.
 # Drawing one costs as much as composing its window.
@@ -256,14 +256,14 @@ def run_round(
     area = problem.outline.area
     changed: list[shapely.Polygon] = []
     after_drawing = None
-    quads = list_quads(state, problem) if area > LARGE_ROOF_M2 else []
+    quads = list_quads(state, problem) if area > WINDOW_M2 else []
     present = RepairTrial(state, whole, plan, problem, drawing)
     for repair in find_repairs(plan, problem.volumes, state.sides, problem.plan, problem.scene):
         # Planes are as they were until another equation holds, and so is what one more costs.
         key = repair.key, state.basis.shape[1] if repair.equations else 0
         if trials[key] or any(trials[side] >= TRIALS_A_SIDE for side in repair.sides):
             continue
-        box = frame_repair(repair, state, problem) if area > LARGE_ROOF_M2 else whole.box
+        box = frame_repair(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
             continue
         if present.window.box is not box and not present.window.box.equals(box):
