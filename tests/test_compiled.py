@@ -324,6 +324,9 @@ def write_wheel(folder, factor):
 
 
 def test_the_runtime_of_numba_is_kept_and_a_damaged_one_compiled_again(town, monkeypatch):
+    # a copy of the package: beside its own sources the runtime may be kept already
+    shutil.copytree(PACKAGE, town / "hiproof", ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setenv("PYTHONPATH", str(town))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(town / "kept"))
     script = "from town.library import answer; import numpy as np; print(answer(np.arange(3.0)))"
     (town / "town" / "library.py").write_text(LIBRARY.format(function="cumsum"))
