@@ -45,6 +45,13 @@ def sort_values(values):
 
 
 @compiled
+def compute_median(values):
+    """Return the median of `values` (n,), float64, of which there is one at least."""
+    ordered = sort_values(values)
+    return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+
+
+@compiled
 def list_distinct(values):
     """Return the distinct ones of `values` (n,), float64, in ascending order."""
     ordered, count = sort_values(values), 0

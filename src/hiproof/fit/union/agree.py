@@ -481,15 +481,13 @@ def fit_members(
     basis: np.ndarray,
     start: np.ndarray,
     scene: Scene,
-    begun: NormalSums | None = None,
+    sums: NormalSums,
 ) -> CommonFit:
     """Fit all planes by biweighted least squares.
 
-    The unknowns (p,) are `basis` (p, q) times any. `begun` are the sums of the first round, if
-    these are known.
+    The unknowns (p,) are `basis` (p, q) times any. `sums` are those of the first round.
     """
     rows, scale = [member.rows for member in members], scene.dead + scene.width
-    sums = begun or sum_at_start(members, scene)
     for turn in range(ROUNDS):
         sums = sums if turn == 0 else sum_equations(members, rows, 1.5 * scale)
         solution = solve_normal(sums, basis, start)

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
+from ...geometry.arrays import compute_median
 from ...model import Part
 from ...settings import Settings
 from .judged import COMPARED_M, JudgedRoof
@@ -79,6 +80,6 @@ def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
             for other in range(k + 1, 5 if square > 1e-9 else 0):
                 columns[other] -= (weighted * columns[other]).sum() / square * columns[k]
         distances = np.abs(columns[4])
-        reach = max(MOST_DISTANCE_M, 2.0 * np.median(distances))
+        reach = max(MOST_DISTANCE_M, 2.0 * compute_median(distances))
         used = 1.0 * (distances <= reach)
     return np.minimum(distances, MOST_DISTANCE_M).mean()

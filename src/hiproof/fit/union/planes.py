@@ -13,7 +13,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ...geometry.arrays import copy_row, copy_rows, list_distinct, sort_order, sort_values
+from ...geometry.arrays import compute_median, copy_row, copy_rows, list_distinct, sort_order
 from .prices import KIND_COST
 
 MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.
@@ -589,8 +589,7 @@ def fit_template(z, drop, slope, tau):
 
     It begins with a start slope. The slope is 0 if it fails.
     """
-    ordered = sort_values(z + slope * drop)
-    height = 0.5 * (ordered[(len(z) - 1) // 2] + ordered[len(z) // 2])
+    height = compute_median(z + slope * drop)
     for step in range(5):
         scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
         n = sx = sy = sxx = sxy = 0.0

@@ -83,14 +83,6 @@ class PlanSite(NamedTuple):
             for remainder in self.recall(subtract_hole, polygon, hole)
         ]
 
-    def carve_regions(self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon) -> None:
-        """Cut the `hole` out of the polygons of all regions."""
-        places = [k for k, polygons in enumerate(regions) for _ in polygons]
-        polygons = [polygon for region in regions for polygon in region]
-        is_near = shapely.dwithin(polygons, hole, OVERLAY_GAP_M)
-        for k in {places[n] for n in np.flatnonzero(is_near).tolist()}:
-            regions[k] = self.cut_out(regions[k], hole)
-
 
 def cut_regions(
     volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: PlanSite, base: bool
@@ -106,7 +98,7 @@ def cut_regions(
     for k, quad in enumerate(quads, start=1):
         inside_quad = site.cut_quad(quad)
         if volumes[k, REPLACES]:
-            site.carve_regions(regions, quad)
+            regions = [site.cut_out(earlier, quad) for earlier in regions]
         elif regions[0] and not is_base_above(
             volumes[0, OFFSET0 + LEVEL], volumes[k], planes[k], inside_quad, site
         ):
@@ -127,7 +119,7 @@ def sketch_regions(
     for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True):
         quad = site.draw_quad(volume, volume_sides)
         if volume[REPLACES]:
-            site.carve_regions(regions, quad)
+            regions = [site.cut_out(earlier, quad) for earlier in regions]
         regions.append([quad])
     return regions
 

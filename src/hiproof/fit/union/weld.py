@@ -3,9 +3,9 @@
     misfit + units * (visible parameters + corners + length of low steps)
 
 This concerns sides, corners and low steps. A corner has a price because a draughtsman counts it. A
-metre of a low step has that of the search.
-Repairs are tried the smallest first, each in a window around it, and one that pays is kept. After a
-round, the roof is drawn again, until no repair pays. The outline never moves.
+metre of a low step has that of the search. Repairs are tried the smallest first, each in a window
+around it, and one that pays is kept. After a round, the roof is drawn again, until no repair pays.
+The outline never moves.
 """
 
 from __future__ import annotations
@@ -36,12 +36,7 @@ from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
 from .finish import Planes
 from .objective import compute_costs, compute_misfits
 from .plan import Plan
-from .prices import (
-    CORNER_COST,
-    LOW_STEP_COST_A_METRE,
-    PARAMETER_COST,
-    REPAIR_UNITS,
-)
+from .prices import CORNER_COST, LOW_STEP_COST_A_METRE, PARAMETER_COST, REPAIR_UNITS
 from .regions import PlanSite, cut_regions, list_polygons, sketch_regions
 from .repairs import Repair, find_repairs, measure_low_steps
 from .scene import Scene, select_points
