@@ -1,10 +1,11 @@
 """Garbage is collected seldom while a run works, and then as the caller has it."""
 
 import gc
+import weakref
 
 import pytest
 
-from hiproof.garbage import RARELY, collect_rarely
+from hiproof.garbage import RARELY, collect_rarely, leave_garbage
 
 
 def test_garbage_is_collected_rarely_inside_and_as_before_afterwards():
@@ -32,3 +33,16 @@ def test_objects_that_refer_to_each_other_are_still_freed():
         for _ in range(3 * RARELY):
             Ring()
         assert Ring.count <= 2 * RARELY
+
+
+def test_no_garbage_is_collected_once_a_command_has_ended():
+    class Ring:
+        pass
+
+    ring = Ring()
+    ring.ring = ring
+    kept = weakref.ref(ring)
+    leave_garbage()
+    del ring
+    gc.collect()
+    assert kept() is not None

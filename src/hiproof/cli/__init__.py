@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from itertools import takewhile
 
 from ..early import INTERRUPTED, end_at_once_on_interrupt
-from ..garbage import collect_rarely
+from ..garbage import collect_rarely, leave_garbage
 
 KEPT = (
     "interrupted; no file is left half written. What a run had finished is kept: the same command "
@@ -21,13 +21,15 @@ KEPT = (
 def main() -> None:
     """Run `hiproof`, which collects garbage rarely from its first import on.
 
-    Once all is done, Ctrl-C ends the command at once, without a traceback.
+    Once all is done, Ctrl-C ends the command at once, without a traceback, and no garbage is
+    collected any more.
     """
     with collect_rarely():
         try:
             run_command()
         finally:
             end_at_once_on_interrupt()
+            leave_garbage()
 
 
 def run_command() -> None:
