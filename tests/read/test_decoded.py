@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hiproof import Request, Settings, reconstruct_area
-from hiproof.read import decoded
+from hiproof.read import decoded, las
 from hiproof.read.decoded import HOLDER, forget_points, hold_points
 from hiproof.read.pointcloud import iter_points
 from tiny_town import make_town, write_cloud, write_town
@@ -27,22 +27,16 @@ def files(tmp_path):
 
 @pytest.fixture
 def decoded_points(monkeypatch):
-    """How many points laspy decodes, by file."""
+    """How many points are decoded, by file."""
     counts = Counter()
-    open_file = laspy.open
+    read_points = las.read_points
 
-    def open_counted(file, **options):
-        reader = open_file(file, **options)
-        read = reader.read_points
+    def read_counted(file, *options):
+        for chunk in read_points(file, *options):
+            counts[file.name] += len(chunk.classes)
+            yield chunk
 
-        def read_points(count):
-            counts[file.name] += count
-            return read(count)
-
-        reader.read_points = read_points
-        return reader
-
-    monkeypatch.setattr(laspy, "open", open_counted)
+    monkeypatch.setattr(las, "read_points", read_counted)
     return counts
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError, OutputError
 from ..frames import Units
 from ..read.crs import find_units, parse_crs
-from ..read.las import read_checked_facts, read_las_header, translate_errors
+from ..read.las import read_checked_facts, translate_errors
 from ..read.las_crs import las_crs
 from ..read.overlap import refuse_degrees
 from ..read.pointcloud import common_crs, file_kind, refuse_implausible
@@ -101,7 +101,7 @@ def read_whole(path: Path) -> laspy.LasData:
             f"expected a LAS, LAZ or COPC file at {path}, got another kind of point cloud; convert "
             "it first"
         )
-    if not read_las_header(path).point_count:
+    if not read_checked_facts(path).count:
         raise InputError(f"expected points in {path}, got none; copy or download it again")
     with translate_errors(path):
         las = laspy.read(path)

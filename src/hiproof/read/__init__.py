@@ -2,7 +2,8 @@
 
 pointcloud    points of any kind of file, in chunks; `read_points`
 remote        files by address
-las           LAS, LAZ and COPC: laspy's points
+las           LAS, LAZ and COPC, checked against what their headers say
+las_points    the points of such a file, decoded by lazrs
 las_header    whether what such a file says of itself is possible
 geokeys       the reference system of its GeoTIFF keys
 las_crs       the one that its records define
@@ -45,8 +46,8 @@ solids        solids of CityJSON and CityGML as they stand
 roofn3d       the RoofN3D data set
 
 Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is
-said by `errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a
-third of a second.
+said by `errors.InputWarning`. The names below are imported when first used: GDAL costs a third of a
+second.
 """
 
 from importlib import import_module

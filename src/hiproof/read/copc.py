@@ -10,29 +10,24 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
-import laspy
 import lazrs
 import numpy as np
-from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
 
+from .decoded import Decoded
 from .las_header import LasFacts, Octree
+from .las_points import SELECTION, take_fields
 from .plausible import Implausible
 
 Box = tuple[float, float, float, float]
 
 
-def copc_record(
-    file: BinaryIO,
-    facts: LasFacts,
-    octree: Octree,
-    box: Box,
-    selection: laspy.DecompressionSelection,
-):
-    """Read the points in all nodes that meet `box`, as laspy's record.
+def copc_points(
+    file: BinaryIO, facts: LasFacts, octree: Octree, box: Box
+) -> tuple[np.ndarray, Decoded]:
+    """Return the nodes that meet `box`, and the points in all of them.
 
-    `box` is (xmin, ymin, xmax, ymax). Returns also the first point of each node.
+    `box` is (xmin, ymin, xmax, ymax). The nodes' points follow one another.
     """
-    header = laspy.LasHeader.read_from(file, read_evlrs=False)
     nodes = find_nodes(facts, octree, box)
     chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
     content = np.zeros(sum(points for points, _ in chunks) * facts.point_bytes, np.uint8)
@@ -41,13 +36,8 @@ def copc_record(
             b"".join(read_node_bytes(file, node) for node in nodes), np.uint8
         )
         laszip = np.frombuffer(facts.laszip, np.uint8)
-        lazrs.decompress_points_with_chunk_table(
-            compressed, laszip, content, chunks, selection.to_lazrs()
-        )
-    packed = PackedPointRecord.from_buffer(content, header.point_format)
-    return nodes, ScaleAwarePointRecord(
-        packed.array, packed.point_format, header.scales, header.offsets
-    )
+        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, SELECTION)
+    return nodes, take_fields(content, facts)
 
 
 def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:

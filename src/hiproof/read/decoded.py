@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -42,17 +42,6 @@ class Decoded(NamedTuple):
             np.multiply(self.steps[:, axis], self.scales[axis], out=xyz[:, axis])
             xyz[:, axis] += self.offsets[axis]
         return xyz
-
-
-def take_decoded(record: Any) -> Decoded:
-    """Take from a record of laspy what hiproof needs."""
-    return Decoded(
-        np.column_stack([record.array[name] for name in "XYZ"]),
-        np.array(record["classification"], np.uint8),
-        np.array(record["withheld"], bool),
-        np.array(record.scales),
-        np.array(record.offsets),
-    )
 
 
 FileKey: TypeAlias = tuple[str, tuple[int, int] | None]

@@ -1,9 +1,9 @@
-"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk.
+"""LAS, LAZ and COPC files through lazrs, chunk by chunk.
 
 Files are read by path or by address (remote.py).
 
-Before laspy opens a file, `las_header` has held its header against its size; what is decoded is
-held against the header.
+Before points are decoded, `las_header` has held the header against the file's size; what is decoded
+is held against the header.
 """
 
 from __future__ import annotations
@@ -14,27 +14,25 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import laspy
 import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..log import count_things
-from .copc import check_nodes, copc_record
-from .decoded import Decoded, decode_or_release, note_places, take_decoded
+from .copc import check_nodes, copc_points
+from .decoded import Decoded, decode_or_release, note_places
 from .las_header import LasFacts, check_all_points, check_points, read_facts
+from .las_points import read_points
 from .plausible import Implausible
 from .remote import is_url, open_binary
 from .runs import compute_run_boxes
 
 # xyz (n, 3) float64, classification (n,) uint8 or None
 Chunk = tuple[np.ndarray, np.ndarray | None]
-FIELDS = laspy.DecompressionSelection
-WANTED = FIELDS.base() | FIELDS.Z | FIELDS.CLASSIFICATION | FIELDS.FLAGS
 
 
 @contextmanager
 def translate_errors(path: str | Path) -> Iterator[None]:
-    """Turn whatever laspy and lazrs raise on a damaged file into one InputError."""
+    """Turn whatever lazrs raises on a damaged file into one InputError."""
     try:
         yield
     except InputError:
@@ -57,16 +55,6 @@ def translate_errors(path: str | Path) -> Iterator[None]:
             "it may be truncated: copy or download it again, and compare its size with the "
             "original's"
         ) from error
-
-
-def read_las_header(path: str | Path) -> laspy.LasHeader:
-    """Return the header of a LAS, LAZ or COPC file.
-
-    Raises InputError when it cannot be read or cannot be true.
-    """
-    read_checked_facts(path)
-    with translate_errors(path), open_binary(path) as file, laspy.open(file) as reader:
-        return reader.header
 
 
 def read_checked_facts(path: str | Path) -> LasFacts:
@@ -114,7 +102,7 @@ def las_chunks(
     if noted is None and runs is None:
         noted = note_places(path)
     with translate_errors(path):
-        for points in decode_runs(path, chunk_points, facts.count, runs):
+        for points in decode_runs(path, chunk_points, facts, runs):
             xyz = points.xyz
             lowest, highest = check_points(xyz, facts)
             lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
@@ -129,37 +117,27 @@ def las_chunks(
 
 
 def decode_runs(
-    path: str | Path, chunk_points: int, count: int, runs: np.ndarray | None
+    path: str | Path, chunk_points: int, facts: LasFacts, runs: np.ndarray | None
 ) -> Iterator[Decoded]:
     """Yield the decoded points of the `runs` (k, 2), or of a whole file.
 
-    A whole file has `count` points, and need not be decoded twice (decoded.py).
+    A whole file need not be decoded twice (decoded.py).
     """
     if runs is not None:
-        return decode(path, chunk_points, runs.tolist())
-    return decode_or_release(path, chunk_points, count, decode(path, chunk_points, [(0, count)]))
+        return decode(path, chunk_points, facts, runs.tolist())
+    whole = decode(path, chunk_points, facts, [(0, facts.count)])
+    return decode_or_release(path, chunk_points, facts.count, whole)
 
 
-def decode(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Decoded]:
+def decode(
+    path: str | Path, chunk_points: int, facts: LasFacts, runs: list[tuple[int, int]]
+) -> Iterator[Decoded]:
     """Yield the decoded `runs` of points, [first, end).
 
     Each holds at most `chunk_points` points, and none is empty.
     """
-    with (
-        open_binary(path) as file,
-        laspy.open(file, decompression_selection=WANTED, read_evlrs=False) as reader,
-    ):
-        for first, end in runs:
-            if first:
-                reader.seek(first)
-            for start in range(first, end, chunk_points):
-                count = min(chunk_points, end - start)
-                record = reader.read_points(count)
-                if len(record) != count:
-                    raise ValueError(
-                        f"it ends {count_things(count - len(record), 'point')} too early"
-                    )
-                yield take_decoded(record)
+    with open_binary(path) as file:
+        yield from read_points(file, facts, runs, chunk_points)
 
 
 def is_copc(path: str | Path) -> bool:
@@ -176,8 +154,7 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
             raise Implausible(
                 "its first record says that it is COPC, and none tells of an octree; it is damaged"
             )
-        nodes, record = copc_record(file, facts, facts.octree, box, WANTED)
-        points = take_decoded(record)
+        nodes, points = copc_points(file, facts, facts.octree, box)
         xyz = points.xyz
         lower, upper = check_points(xyz, facts)
         check_nodes(xyz, nodes, facts, facts.octree)

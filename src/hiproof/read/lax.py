@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputWarning
-from .las import read_las_header
+from .las import read_checked_facts
 from .remote import is_url
 from .runs import RunIndex
 
@@ -37,7 +37,7 @@ def read_lax(path: str | Path) -> RunIndex | None:
     )
     if lax_path is None:
         return None
-    points = read_las_header(path).point_count
+    points = read_checked_facts(path).count
     try:
         index, indexed_points = parse_index(np.fromfile(lax_path, "<u4"))
         if indexed_points != points or index.runs.max(initial=0) > points:

@@ -241,16 +241,11 @@ def las_file_header(path: str | Path) -> PointFileHeader | None:
     """Return the header of a LAS, LAZ or COPC file, None for another kind."""
     if file_kind(path) != "las":
         return None
-    header = las.read_las_header(path)
-    bounds = (*header.mins.tolist(), *header.maxs.tolist())
-    steps = (float(max(header.scales[:2])), float(header.scales[2]))
+    facts = las.read_checked_facts(path)
+    bounds = (*facts.mins.tolist(), *facts.maxs.tolist())
+    steps = (float(max(facts.scales[:2])), float(facts.scales[2]))
     return PointFileHeader(
-        str(path),
-        bounds,
-        header.point_count,
-        las_crs(las.read_checked_facts(path).projection),
-        header.point_format.id,
-        steps,
+        str(path), bounds, facts.count, las_crs(facts.projection), facts.point_format, steps
     )
 
 
