@@ -190,12 +190,19 @@ def folders(function: Callable, file: str) -> tuple[Path, ...]:
 
     The first choice comes first.
     """
-    kinds = [caching.InTreeCacheLocator, caching.UserWideCacheLocator]
-    if numba.config.CACHE_DIR:
-        kinds.insert(0, caching.UserProvidedCacheLocator)
-    places = (Path(kind(function, file).get_cache_path()) for kind in kinds)
-    # a user without a home has "~/.cache"
-    return tuple(place for place in places if place.is_absolute())
+    key = file, numba.config.CACHE_DIR
+    if key not in FOLDERS:
+        kinds = [caching.InTreeCacheLocator, caching.UserWideCacheLocator]
+        if numba.config.CACHE_DIR:
+            kinds.insert(0, caching.UserProvidedCacheLocator)
+        places = (Path(kind(function, file).get_cache_path()) for kind in kinds)
+        # a user without a home has "~/.cache"
+        FOLDERS[key] = tuple(place for place in places if place.is_absolute())
+    return FOLDERS[key]
+
+
+FOLDERS: dict[tuple[str, str], tuple[Path, ...]] = {}
+"""The folders by file and by numba's setting: all functions of a file have the same."""
 
 
 @functools.cache

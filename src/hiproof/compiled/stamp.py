@@ -52,10 +52,16 @@ def count_compiled() -> int:
 
 @functools.cache
 def compiled_files() -> tuple[Path, ...]:
-    return tuple(file for file in iterate_sources(PACKAGE) if b"\n@compiled" in file.read_bytes())
+    return tuple(Path(file) for file in iterate_sources(PACKAGE) if compiles(file))
 
 
-def iterate_sources(folder: str | Path) -> Iterator[Path]:
+def compiles(file: str) -> bool:
+    """Return whether a source file holds a function that is compiled."""
+    with open(file, "rb") as source:
+        return b"\n@compiled" in source.read()
+
+
+def iterate_sources(folder: str | Path) -> Iterator[str]:
     """Yield the source files in a folder and in those below it.
 
     Folders of compiled code hold thousands of files, and are not looked into.
@@ -63,7 +69,7 @@ def iterate_sources(folder: str | Path) -> Iterator[Path]:
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith(".py"):
-                yield Path(entry.path)
+                yield entry.path
             elif entry.name != "__pycache__" and entry.is_dir():
                 yield from iterate_sources(entry.path)
 
@@ -117,15 +123,16 @@ def list_imports(file: Path) -> frozenset[Path]:
 
     These are files of the two packages.
     """
-    result: set[str] = set()
-    for statement in IMPORT.finditer(file.read_bytes().decode()):
-        for path in resolve_import(file, statement):
-            result.update(
-                source
-                for source in (f"{path}.py", os.path.join(path, "__init__.py"))
-                if os.path.isfile(source)
-            )
-    return frozenset(map(Path, result))
+    statements = IMPORT.finditer(file.read_bytes().decode())
+    paths = {path for statement in statements for path in resolve_import(file, statement)}
+    return frozenset().union(*map(find_sources, paths))
+
+
+@functools.cache
+def find_sources(path: str) -> frozenset[Path]:
+    """Return the source files of the module or the package at a path without ending."""
+    sources = (f"{path}.py", os.path.join(path, "__init__.py"))
+    return frozenset(Path(source) for source in sources if os.path.isfile(source))
 
 
 def resolve_import(file: Path, statement: re.Match) -> Iterator[str]:
@@ -148,7 +155,7 @@ def resolve_import(file: Path, statement: re.Match) -> Iterator[str]:
         base = os.path.join(start, *parts)
         yield base
         # a module holds no others
-        if os.path.isdir(base):
+        if is_folder(base):
             yield from (os.path.join(base, name) for name in re.findall(r"\w+", statement["names"]))
 
 
@@ -160,6 +167,9 @@ def starts(file: Path, package: str) -> Iterator[Path]:
     for top in {find_top_folder(file), PACKAGE}:
         if top.name == package:
             yield top.parent
+
+
+is_folder = functools.cache(os.path.isdir)
 
 
 @functools.cache
