@@ -14,8 +14,6 @@ from itertools import groupby, takewhile, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import typer
-
 import hiproof
 from hiproof.cli.app import app
 from hiproof.cli.commands import COMMANDS
@@ -35,7 +33,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 def describe_commands() -> str:
     """Describe every command: its purpose, its arguments, its options."""
-    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    commands = app.commands  # type: ignore[attr-defined]
     return "# Commands\n\n`hiproof COMMAND --help` prints the same.\n" + "".join(
         describe_command(name, command) for name, command in sorted(commands.items())
     )

@@ -8,8 +8,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof.city.plan import make_jobs
 from hiproof.city.prepare import make_plan
@@ -24,7 +23,7 @@ from hiproof.settings import Settings
 from run_records import by_id
 
 OPTIONED = [option for option in declared_settings() if option.field.metadata["option"]]
-PARAMETERS = {p.name: p for p in typer.main.get_command(app).commands["reconstruct"].params}
+PARAMETERS = {p.name: p for p in app.commands["reconstruct"].params}
 HOUSES = {f"house-{i}": shapely.box(20 * i, 0, 20 * i + 10, 8) for i in range(5)}
 
 

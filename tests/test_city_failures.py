@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof import stages
 from hiproof.city import solve

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import hiproof
 import planted

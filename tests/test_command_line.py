@@ -8,8 +8,7 @@ import time
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof import progress
 from hiproof.cli.app import app
@@ -22,7 +21,7 @@ from hiproof.progress import show_progress
 from sample_models import sample_points, write_sample_run
 
 GROUPS = ["Reconstruct", "Inspect", "Edit", "Export", "Network"]
-COMMAND_LINE = typer.main.get_command(app).commands
+COMMAND_LINE = app.commands
 
 
 def invoke(*arguments, **options):
@@ -93,14 +92,14 @@ def test_reconstruct_shows_ten_options_first_and_all_on_request():
 def test_a_shell_completes_commands_and_options():
     def complete(words):
         environment = {
-            "_HIPROOF_COMPLETE": "complete_bash",
+            "_HIPROOF_COMPLETE": "bash_complete",
             "COMP_WORDS": words,
             "COMP_CWORD": str(words.count(" ")),
         }
         return invoke(env=environment).output.split()
 
-    assert sorted(complete("hiproof rep")) == ["report", "repro"]
-    assert complete("hiproof reconstruct --building") == ["--building-class"]
+    assert sorted(complete("hiproof rep")) == ["plain,report", "plain,repro"]
+    assert complete("hiproof reconstruct --building") == ["plain,--building-class"]
 
 
 def test_quiet_and_verbose_choose_what_is_shown():

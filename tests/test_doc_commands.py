@@ -12,7 +12,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof import build, read_footprints
 from hiproof.cli.app import app

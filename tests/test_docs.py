@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 import shapely
-import typer
 
 import hiproof
 from hiproof.cli.app import app
@@ -33,7 +32,7 @@ ENVIRONMENT = {
     "PATH": "/usr/bin:/bin",
     "OPENBLAS_NUM_THREADS": "1",
 }
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = app.commands
 MODULES = {
     m.name: Path(m.module_finder.find_spec(m.name).origin)
     for m in pkgutil.walk_packages(hiproof.__path__, "hiproof.")

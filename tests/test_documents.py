@@ -5,7 +5,6 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-import typer
 
 from hiproof.cli.app import app
 from hiproof.settings import Settings
@@ -18,7 +17,7 @@ DOCUMENTS = [
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 # by docs/generated.py, when the site is built
 MADE = ("commands.md", "settings.md", "constants.md")
-COMMANDS = typer.main.get_command(app).commands
+COMMANDS = app.commands
 OPTIONS = {
     name
     for command in COMMANDS.values()

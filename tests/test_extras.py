@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import hiproof
 from hiproof.city.run import Request, reconstruct_area

@@ -9,14 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
 
 from hiproof.cli.app import app
 from hiproof.formats import FORMATS, choose_format
 from hiproof.simulate import demo_files
 
 PLUGINS = Path(__file__).parents[1] / "qgis"
-COMMANDS = dict(typer.main.get_command(app).commands)  # imported now, before the plugin
+COMMANDS = dict(app.commands)  # imported now, before the plugin
 # Debian's script around the program adds an option that the program of QGIS 3.22 does not know
 QGIS = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
 

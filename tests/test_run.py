@@ -14,7 +14,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import planted
 from hiproof import read_parameters

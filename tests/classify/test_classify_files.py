@@ -5,7 +5,7 @@ classified.
 import laspy
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof.classify.files import classify_file, merge_classes
 from hiproof.cli.app import app

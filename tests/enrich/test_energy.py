@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from lxml import etree
-from typer.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich.energy import ENERGY_NAMESPACE

@@ -4,8 +4,8 @@ import json
 import sqlite3
 
 import pytest
+from click.testing import CliRunner
 from lxml import etree
-from typer.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich import run as enrich_module

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich import far

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich.run import enrich_run

@@ -9,9 +9,9 @@ import math
 import numpy as np
 import pytest
 import shapely
-import typer
 from pyogrio import raw
 
+from hiproof.cli.app import import_command
 from hiproof.cli.evaluate import evaluate
 from hiproof.errors import HiproofError, InputWarning
 from hiproof.evaluate.evaluation import (
@@ -198,9 +198,7 @@ def test_a_building_without_a_model_misses_all_its_points():
 
 
 def test_the_command_writes_both_tables(run_folder, tmp_path):
-    app = typer.Typer()
-    app.command()(evaluate)
-    app(
+    import_command("evaluate")(
         [str(run_folder), str(run_folder / "points.xyz"), "--out", str(tmp_path)],
         standalone_mode=False,
     )

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.cli.running import describe_overview

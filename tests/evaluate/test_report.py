@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import typer
 
+from hiproof.cli.app import import_command
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
 from hiproof.evaluate.report import embed_json, report_html, worst_indices
@@ -206,9 +206,7 @@ def test_text_of_the_data_is_not_taken_for_a_place_in_the_page(run):
 
 def test_a_run_without_points_is_reported_too(tmp_path):
     write_sample_run(tmp_path)
-    app = typer.Typer()
-    app.command()(report)
-    app([str(tmp_path)], standalone_mode=False)
+    import_command("report")([str(tmp_path)], standalone_mode=False)
     page = (tmp_path / "report.html").read_text()
     assert "no residuals" in page and "No points are given" in page
 

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import typer
+import click
 
 from hiproof.cli import check
 from hiproof.cli.convert import FormatName, convert
@@ -251,7 +251,7 @@ def find_fault(read: Callable[[Path], Any], folder: Path) -> str:
             sentence(error)
         except (AssertionError, UnicodeError):
             return f"no sentence: {error!r:.2000}"
-    except typer.Exit as end:
+    except click.exceptions.Exit as end:
         return "" if end.exit_code == 2 else f"exit code {end.exit_code}"
     except Exception:
         return traceback.format_exc()

@@ -4,8 +4,8 @@ traceback or a wrong file.
 
 import re
 
+import click
 import pytest
-import typer
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -44,7 +44,7 @@ def answer(command, *arguments):
         return command(*arguments) or 0, ""
     except HiproofError as error:
         return 2, str(error)
-    except typer.Exit as end:
+    except click.exceptions.Exit as end:
         return end.exit_code, ""
 
 

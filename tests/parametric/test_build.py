@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyogrio
 import pytest
+from click.testing import CliRunner
 from jsonschema import Draft202012Validator
-from typer.testing import CliRunner
 
 import hiproof
 from hiproof.city.overrides import override_records

@@ -5,10 +5,9 @@ import csv
 import laspy
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
-from hiproof.cli.segment import segment as command
+from hiproof.cli.app import import_command
 from hiproof.errors import InputError, OutputError
 from hiproof.segment import segment
 from hiproof.segment.files import segment_files
@@ -40,15 +39,13 @@ def test_points_and_table_say_what_segment_says(tmp_path):
 def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path):
     write_cloud(tmp_path / "good.xyz", 1)
     np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
-    app = typer.Typer()
-    app.command()(command)
     arguments = [
         str(tmp_path / "few.xyz"),
         str(tmp_path / "good.xyz"),
         "--out",
         str(tmp_path / "out.laz"),
     ]
-    result = CliRunner().invoke(app, arguments)
+    result = CliRunner().invoke(import_command("segment"), arguments)
     assert result.exit_code == 1
     assert "at least 10 points" in result.output
     assert len((tmp_path / "out.csv").read_text().splitlines()) == 2

@@ -9,7 +9,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof.errors import InputError, OutputError
 from hiproof.simulate import ROOF_TYPES

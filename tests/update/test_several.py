@@ -6,7 +6,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof import InputError
 from hiproof.cli.app import app

@@ -11,7 +11,7 @@ import numpy as np
 import pyogrio
 import pytest
 import shapely
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from hiproof import InputError, OutputError, SettingsError
 from hiproof.city.request import Request

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import typer
 
 from glb_files import accessor_values, parse_glb
+from hiproof.cli.app import import_command
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
 from hiproof.geometry.rings import ring_normal
@@ -123,9 +123,7 @@ def test_no_buildings_make_a_valid_empty_file(tmp_path):
 @pytest.mark.parametrize("format", ["glb", "obj"])
 def test_the_command_converts_a_run(tmp_path, format):
     write_sample_run(tmp_path)
-    app = typer.Typer()
-    app.command()(convert)
-    app([str(tmp_path), "--format", format], standalone_mode=False)
+    import_command("convert")([str(tmp_path), "--format", format], standalone_mode=False)
     assert (tmp_path / f"buildings.{format}").stat().st_size > 500
 
 

@@ -55,7 +55,7 @@ def run_command() -> None:
         log.LOGGER.error(error)
         sys.exit(2)
     except SystemExit as end:
-        if end.code == INTERRUPTED:  # Ctrl-C, of which typer says nothing
+        if end.code == INTERRUPTED:  # Ctrl-C
             log.LOGGER.error(KEPT)
         raise
     except (Exception, KeyboardInterrupt) as error:

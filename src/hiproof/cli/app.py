@@ -10,15 +10,16 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import groupby
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-from typer.core import TyperGroup
+import click
 
 from .. import __version__
+from ..early import INTERRUPTED
 from ..masking import mask
 from .command import Command, with_log_options, write_example, write_parameters
 from .commands import COMMANDS
+from .parameters import HeadedOption, list_parameters
 
 
 class CommandTable(Mapping[str, Any]):
@@ -37,20 +38,15 @@ class CommandTable(Mapping[str, Any]):
 
 
 @functools.cache
-def import_command(name: str) -> Any:
+def import_command(name: str) -> Command:
     """Return the command `name`, whose module and function have its name."""
-    function = getattr(import_module(f".{name}", __package__), name)
-    single = typer.Typer(
-        add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
-    )
-    entry = COMMANDS[name]
-    single.command(name, cls=Command)(with_log_options(function))
-    command: Any = typer.main.get_command(single)
-    command.first_options, command.example = entry.first_options, entry.example
-    return command
+    function = with_log_options(getattr(import_module(f".{name}", __package__), name))
+    return Command(
+        name, params=list_parameters(function), callback=function, help=function.__doc__
+    ).with_entry(COMMANDS[name])
 
 
-class Commands(TyperGroup):
+class Commands(click.Group):
     """The commands in groups.
 
     Complaints about wrong usage hold no password of an argument.
@@ -84,40 +80,39 @@ class Commands(TyperGroup):
 
 @contextmanager
 def mask_complaints() -> Iterator[None]:
-    """Mask click's complaints about wrong usage.
+    """Mask click's complaints about wrong usage, which name arguments as they are.
 
-    They name arguments as they are. Some versions of typer hold click inside.
+    Ctrl-C ends the program, of which click would say that it was aborted.
     """
     try:
         yield
-    except Exception as error:
-        if hasattr(error, "format_message"):
-            message = mask(error.format_message())
-            error.format_message = lambda: message
+    except KeyboardInterrupt:
+        raise SystemExit(INTERRUPTED) from None
+    except click.ClickException as error:
+        message = mask(error.format_message())
+        error.format_message = lambda: message  # type: ignore[method-assign]
         raise
 
 
-app = typer.Typer(
-    cls=Commands,
+def print_version(context: click.Context, _: click.Parameter, is_requested: bool) -> None:
+    if is_requested and not context.resilient_parsing:
+        click.echo(f"hiproof {__version__}")
+        context.exit()
+
+
+app = Commands(
     name="hiproof",
     help="Turn airborne LiDAR point clouds into watertight, semantic, parametric LoD2 models.",
     no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+    params=[
+        HeadedOption(
+            ["--version"],
+            "Options",
+            is_flag=True,
+            is_eager=True,
+            expose_value=False,
+            callback=print_version,
+            help="print the version",
+        )
+    ],
 )
-
-
-def print_version(is_asked_for: bool) -> None:
-    if is_asked_for:
-        print(f"hiproof {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def common(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=print_version, is_eager=True, help="print the version"),
-    ] = False,
-) -> None:
-    pass

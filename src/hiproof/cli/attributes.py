@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import typer
+import click
 
 
 def attributes() -> None:
@@ -12,4 +12,4 @@ def attributes() -> None:
     """
     from ..write.attribute_list import attributes_text
 
-    typer.echo(attributes_text(), nl=False)
+    click.echo(attributes_text(), nl=False)

@@ -5,41 +5,40 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..log import count_things
 from ..progress import show_progress
 from .options import with_settings
+from .parameters import Argument, Option
 
 
-def print_shapes(targets: bool) -> None:
-    if targets:
+def print_shapes(_: click.Context, __: click.Parameter, is_requested: bool) -> None:
+    if is_requested:
         from ..primitives.catalogue import CATALOGUE
         from ..primitives.parameters import list_parameters
 
         for name in CATALOGUE:
-            typer.echo(f"{name}: {', '.join(list_parameters(name))}")
-        raise typer.Exit
+            click.echo(f"{name}: {', '.join(list_parameters(name))}")
+        raise click.exceptions.Exit
 
 
-def print_schema(targets: bool) -> None:
-    if targets:
+def print_schema(_: click.Context, __: click.Parameter, is_requested: bool) -> None:
+    if is_requested:
         from ..parametric.schema import schema_text
 
-        typer.echo(schema_text(), nl=False)
-        raise typer.Exit
+        click.echo(schema_text(), nl=False)
+        raise click.exceptions.Exit
 
 
 @with_settings("write")
 def build(
-    parameters: Annotated[
-        Path, typer.Argument(help="the parameters.jsonl of a run, changed or not")
-    ],
-    out: Annotated[Path, typer.Option(help="folder for the results")],
+    parameters: Annotated[Path, Argument(help="the parameters.jsonl of a run, changed or not")],
+    out: Annotated[Path, Option(help="folder for the results")],
     shapes: Annotated[
         bool,
-        typer.Option(
-            "--shapes",
+        Option(
+            name="--shapes",
             callback=print_shapes,
             is_eager=True,
             help="print the parameters of every roof type",
@@ -47,8 +46,8 @@ def build(
     ] = False,
     schema: Annotated[
         bool,
-        typer.Option(
-            "--schema",
+        Option(
+            name="--schema",
             callback=print_schema,
             is_eager=True,
             help="print the JSON schema of parameters.jsonl",
@@ -70,12 +69,12 @@ def build(
 
         built = build_file(parameters, out, lambda done: update("build", done), changes)
     for id, reason in built.not_built:
-        typer.echo(f"not built: building {id}: {reason}", err=True)
-    typer.echo(
+        click.echo(f"not built: building {id}: {reason}", err=True)
+    click.echo(
         f"{count_things(built.buildings, 'building')}: "
         + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common())
     )
     if built.by_quality:
-        typer.echo("quality: " + graded_words(built.by_quality))
-    typer.echo("models: " + ", ".join(map(str, built.models)))
-    raise typer.Exit(built.exit_code)
+        click.echo("quality: " + graded_words(built.by_quality))
+    click.echo("models: " + ", ".join(map(str, built.models)))
+    raise click.exceptions.Exit(built.exit_code)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..log import count_things
 from ..progress import Update, show_progress
+from .parameters import Argument, Option
 
 
 @dataclass
@@ -62,23 +63,23 @@ class CheckedFile:
 
 
 def check(
-    files: Annotated[list[Path], typer.Argument(help="CityJSON, CityJSONSeq or CityGML files")],
+    files: Annotated[list[Path], Argument(help="CityJSON, CityJSONSeq or CityGML files")],
     planarity: Annotated[
-        float, typer.Option(min=0.0, help="largest distance of a vertex from its face's plane, m")
+        float, Option(low=0.0, help="largest distance of a vertex from its face's plane, m")
     ] = 0.01,
-    as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of text")] = False,
+    as_json: Annotated[bool, Option(name="--json", help="print JSON instead of text")] = False,
 ) -> None:
     """Check that solids are valid by ISO 19107, with val3dity's codes.
 
     Exit code: 0 all solids are valid, 1 some are invalid or cannot be read, 2 unusable input.
     """
-    say = typer.echo if not as_json else lambda text: None
+    say = click.echo if not as_json else lambda text: None
     with show_progress("check") as update:
         checked = [check_file(path, planarity, say, update) for path in files]
     if as_json:
         result = {"valid": not count_bad(checked), "files": [file.to_dict() for file in checked]}
-        typer.echo(json.dumps(result, indent=1))
-    raise typer.Exit(1 if count_bad(checked) else 0)
+        click.echo(json.dumps(result, indent=1))
+    raise click.exceptions.Exit(1 if count_bad(checked) else 0)
 
 
 def count_bad(checked: list[CheckedFile]) -> int:
@@ -89,7 +90,7 @@ def count_bad(checked: list[CheckedFile]) -> int:
 def check_file(
     path: Path,
     planarity_m: float,
-    say: Callable[[str], None] = typer.echo,
+    say: Callable[[str], None] = click.echo,
     update: Update = lambda *_: None,
 ) -> CheckedFile:
     """Check every solid of a file.

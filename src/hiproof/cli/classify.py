@@ -8,19 +8,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 
 def classify(
-    cloud: Annotated[Path, typer.Argument(help="LAS, LAZ or COPC file")],
-    out: Annotated[Path, typer.Option(help="LAZ or LAS file to write")],
-    crs: Annotated[
-        str | None, typer.Option(help="CRS of the cloud (default: that of the file)")
-    ] = None,
+    cloud: Annotated[Path, Argument(help="LAS, LAZ or COPC file")],
+    out: Annotated[Path, Option(help="LAZ or LAS file to write")],
+    crs: Annotated[str | None, Option(help="CRS of the cloud (default: that of the file)")] = None,
     unit: Annotated[
-        str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
+        str | None, Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
     ] = None,
 ) -> None:
     """Find ground (class 2) and buildings (6), and write a copy with classes.
@@ -35,7 +34,7 @@ def classify(
 
         read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
         counts = classify_file(cloud, out, Settings().replace({"read": read}))
-    typer.echo(
+    click.echo(
         f"{out}: {counts['ground']:,} ground and {counts['building']:,} building points of "
         f"{counts['points']:,}"
     )

@@ -10,17 +10,18 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any
 
-import typer
-from typer.core import TyperCommand
+import click
 
 from ..early import interrupt_as_usual
 from ..errors import SettingsError
 from ..log import Level, start
+from .commands import Entry
+from .parameters import MAIN_HEADING, Option
 
 ALL_OPTIONS = "hiproof.all_options"  # key of a context whose help shows every option
 
 
-class Command(TyperCommand):
+class Command(click.Command):
     """A command whose help shows its `first_options`.
 
     `--help-all` shows every option; without `first_options` help always does. Help is plain text,
@@ -30,6 +31,14 @@ class Command(TyperCommand):
     first_options: tuple[str, ...] = ()
 
     example: str = ""
+
+    def with_entry(self, entry: Entry) -> Command:
+        """Return the command with what the help shows of it beside its parameters."""
+        self.first_options, self.example = entry.first_options, entry.example
+        return self
+
+    def format_arguments(self, ctx: Any, formatter: Any) -> None:
+        """Write nothing: arguments come with the options, before them."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         for heading, params in self.group_parameters(ctx).items():
@@ -47,24 +56,19 @@ class Command(TyperCommand):
                 (p for p in params if p.name in order), key=lambda p: order.index(p.name)
             )
             arguments = [param for param in params if param.param_type_name == "argument"]
-            return {"Arguments": arguments, "Options": first}
-        groups: dict[str, list[Any]] = {"Arguments": [], "Options": []}
+            return {"Arguments": arguments, MAIN_HEADING: first}
+        groups: dict[str, list[Any]] = {"Arguments": [], MAIN_HEADING: []}
         for param in params:
             is_argument = param.param_type_name == "argument"
-            heading = "Arguments" if is_argument else param_panel(param)
+            heading = "Arguments" if is_argument else getattr(param, "heading", MAIN_HEADING)
             groups.setdefault(heading, []).append(param)
         return {heading: group for heading, group in groups.items() if group}
-
-
-def param_panel(param: Any) -> str:
-    """Return the heading of an option."""
-    return getattr(param, "rich_help_panel", None) or "Options"
 
 
 def write_parameters(formatter: Any, heading: str, params: Iterable[Any], ctx: Any) -> None:
     """Write what each parameter does, under a heading.
 
-    Texts of typer's own options become phrases, as those of ours are.
+    Texts of click's own options become phrases, as those of ours are.
     """
     records = filter(None, [param.get_help_record(ctx) for param in params])
     with formatter.section(heading):
@@ -86,12 +90,12 @@ def write_example(formatter: Any, example: str) -> None:
         formatter.write(f"  {example}\n")
 
 
-def print_every_option(ctx: typer.Context, is_asked_for: bool) -> None:
+def print_every_option(ctx: click.Context, _: click.Parameter, is_requested: bool) -> None:
     """Show the whole help and end, as a callback of `--help-all`."""
-    if is_asked_for:
+    if is_requested:
         ctx.meta[ALL_OPTIONS] = True
-        typer.echo(ctx.get_help())
-        raise typer.Exit
+        click.echo(ctx.get_help())
+        raise click.exceptions.Exit
 
 
 def with_log_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -133,7 +137,7 @@ def join_lines(text: str) -> str:
 
 def make_switch(name: str, help: str) -> inspect.Parameter:
     """Make the parameter of an option that is on or off."""
-    kind: Any = Annotated[bool, typer.Option(f"--{name}", help=help)]
+    kind: Any = Annotated[bool, Option(help, name=f"--{name}")]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
 
 

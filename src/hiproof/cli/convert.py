@@ -6,13 +6,14 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..errors import InputError, OutputError
 from ..formats import CONVERTED, choose_format
 from ..log import count_things
 from ..progress import Update, count_progress, show_progress
 from ..read.damage import SkippedBuildings
+from .parameters import Argument, Option
 
 FormatName = StrEnum("FormatName", {name: name for name in CONVERTED})  # type: ignore[misc]
 FORMAT_HELP = ", ".join(CONVERTED)
@@ -22,31 +23,31 @@ DEFAULT = "glb"
 def convert(
     source: Annotated[
         Path,
-        typer.Argument(
+        Argument(
             help="output folder of a run, or a file: parameters.jsonl, CityJSON, CityJSONSeq or "
             "CityGML 2.0"
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Argument(
+        Argument(
             help="file to write, whose suffix chooses the format (default: a file beside the "
             "models)"
         ),
     ] = None,
     format: Annotated[
         FormatName | None,
-        typer.Option(
+        Option(
             metavar="<format>",
             help=f"{FORMAT_HELP} (default: by the suffix of OUT, otherwise {DEFAULT})",
         ),
     ] = None,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the models (default: that of their file)")
+        str | None, Option(help="CRS of the models (default: that of their file)")
     ] = None,
     geoid_height: Annotated[
         float | None,
-        typer.Option(
+        Option(
             help="height of the geoid above the ellipsoid, m, for 3dtiles (default: that of "
             "pyproj's grid)"
         ),
@@ -74,9 +75,9 @@ def convert(
         except OutputError as error:
             command = f"hiproof convert {source} OUT"
             raise elsewhere(error, command) if out is None else error from error
-    typer.echo(text)
+    click.echo(text)
     if left_out.exit_code:
-        raise typer.Exit(left_out.exit_code)
+        raise click.exceptions.Exit(left_out.exit_code)
 
 
 def convert_models(

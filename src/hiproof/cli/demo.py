@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
+
+from .parameters import Option
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="folder for the results")] = Path("demo"),
+    out: Annotated[Path, Option(help="folder for the results")] = Path("demo"),
 ) -> None:
     """Model the 26 houses of a bundled, simulated neighbourhood.
 
@@ -17,7 +19,7 @@ def demo(
     """
     from .running import run_request
 
-    raise typer.Exit(run_request(lambda: make_request(out)))
+    raise click.exceptions.Exit(run_request(lambda: make_request(out)))
 
 
 def make_request(out: Path) -> Any:

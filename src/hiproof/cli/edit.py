@@ -6,38 +6,38 @@ import getpass
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..log import count_things
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 
 def edit(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    folder: Annotated[Path, Argument(help="output folder of a run")],
     who: Annotated[
-        str | None, typer.Option(help="name to keep with each edit (default: your user name)")
+        str | None, Option(help="name to keep with each edit (default: your user name)")
     ] = None,
     clouds: Annotated[
         Path | None,
-        typer.Option(
-            exists=True,
-            file_okay=False,
+        Option(
+            is_folder=True,
             help="folder of the run's inputs, where they were moved since",
         ),
     ] = None,
     only: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="buildings to list: doubtful, no_points, changed, failed or ids, separated by "
             "commas (default: all)"
         ),
     ] = None,
     port: Annotated[
         int,
-        typer.Option(
-            min=0,
-            max=65535,
-            show_default=False,
+        Option(
+            low=0,
+            high=65535,
+            shows_default=False,
             help="port on this machine (default: a free one)",
         ),
     ] = 0,
@@ -57,10 +57,10 @@ def edit(
     with Server(service, port) as server:
         desk = service.desk
         count = count_things(len(desk.select_rows()), "building")
-        typer.echo(f"{count}, the most doubtful first; edits go into {folder / EDITS_FILE}")
+        click.echo(f"{count}, the most doubtful first; edits go into {folder / EDITS_FILE}")
         if desk.points.missing:
-            typer.echo(desk.points.missing, err=True)
-        typer.echo(f"open {service.address}")
+            click.echo(desk.points.missing, err=True)
+        click.echo(f"open {service.address}")
         server.serve_until_stopped()  # all that was accepted is on disk
 
 

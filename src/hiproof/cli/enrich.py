@@ -6,12 +6,13 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+import click
 
 from ..log import Level, console_level, count_things
 from ..progress import show_progress
 from ..settings import EnrichSettings, Settings
 from .options import with_settings
+from .parameters import Argument, Option
 
 if TYPE_CHECKING:
     from ..enrich.run import Enriched
@@ -19,19 +20,19 @@ if TYPE_CHECKING:
 
 @with_settings("enrich")
 def enrich(
-    run: Annotated[Path, typer.Argument(help="output folder of a run, or its parameters.jsonl")],
+    run: Annotated[Path, Argument(help="output folder of a run, or its parameters.jsonl")],
     out: Annotated[
-        Path | None, typer.Option(help="folder for the results (default: enriched, in the run)")
+        Path | None, Option(help="folder for the results (default: enriched, in the run)")
     ] = None,
     terrain: Annotated[
         str,
-        typer.Option(help="terrain model (GeoTIFF; extra `terrain`) that shades, for --sun"),
+        Option(help="terrain model (GeoTIFF; extra `terrain`) that shades, for --sun"),
     ] = "",
     jobs: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="number of worker processes (default: up to one per core, fewer for a small run)",
-            min=1,
+            low=1,
         ),
     ] = None,
     changes: dict[str, dict[str, Any]] | None = None,
@@ -45,7 +46,7 @@ def enrich(
     make no valid solid, or unusable input.
     """
     settings = Settings().replace(changes or {}).enrich
-    raise typer.Exit(enrich_folder(run, out, with_terrain(settings, terrain), jobs))
+    raise click.exceptions.Exit(enrich_folder(run, out, with_terrain(settings, terrain), jobs))
 
 
 def with_terrain(settings: EnrichSettings, terrain: str | None) -> EnrichSettings:
@@ -62,7 +63,7 @@ def enrich_folder(run: Path, out: Path | None, settings: EnrichSettings, jobs: i
             run, out, settings, jobs, lambda done, total: update("enrich", done, total)
         )
     for failure in result.failures:
-        typer.echo(f"not enriched: building {failure.id}: {failure.reason}", err=True)
+        click.echo(f"not enriched: building {failure.id}: {failure.reason}", err=True)
     if console_level() is not Level.error:
         print_result(result)
     return result.exit_code
@@ -72,5 +73,5 @@ def print_result(result: Enriched) -> None:
     """Print how many buildings have answers, and the files."""
     failed = len(result.failures)
     enriched = f"{result.buildings - failed:,} of " if failed else ""
-    typer.echo(f"{enriched}{count_things(result.buildings, 'building')} enriched")
-    typer.echo("files: " + ", ".join(map(str, result.files)))
+    click.echo(f"{enriched}{count_things(result.buildings, 'building')} enriched")
+    click.echo("files: " + ", ".join(map(str, result.files)))

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..errors import InputError, OutputError
 from ..log import count_things
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 SHOWN_FIGURES = {
     "psd_mean": "PSD",
@@ -38,27 +39,27 @@ DIFFERENCES = "ridge in m, slope in degrees, volume as a share of the reference'
 
 
 def evaluate(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    folder: Annotated[Path, Argument(help="output folder of a run")],
     clouds: Annotated[
         list[str] | None,
-        typer.Argument(help="point files to measure against (default: those of the run)"),
+        Argument(help="point files to measure against (default: those of the run)"),
     ] = None,
     footprints: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="building polygons (default: those of the run, otherwise the models' outlines)"
         ),
     ] = None,
     layer: Annotated[
-        str | None, typer.Option(help="layer of the footprints, where a file has several")
+        str | None, Option(help="layer of the footprints, where a file has several")
     ] = None,
-    reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
+    reference: Annotated[str | None, Option(help="CityJSON model to compare with")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="folder for evaluation.csv and .json (default: that of the run)"),
+        Option(help="folder for evaluation.csv and .json (default: that of the run)"),
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="print the figures as JSON instead of tables")
+        bool, Option(name="--json", help="print the figures as JSON instead of tables")
     ] = False,
 ) -> None:
     """Measure the models of a run.
@@ -93,16 +94,16 @@ def evaluate(
             elsewhere(error, f"hiproof evaluate {folder} --out FOLDER") if out is None else error
         ) from error
     if as_json:
-        typer.echo(json.dumps(summarise(run.figures), indent=1, allow_nan=False))
+        click.echo(json.dumps(summarise(run.figures), indent=1, allow_nan=False))
     else:
         print_summary(summarise(run.figures), reference is not None)
-        typer.echo(
+        click.echo(
             f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: "
             f"{count_things(len(run.figures), 'building')}{left_out.describe()}"
         )
         describe_gaps(run.figures)
     if left_out.exit_code:
-        raise typer.Exit(left_out.exit_code)
+        raise click.exceptions.Exit(left_out.exit_code)
 
 
 def describe_gaps(figures: Sequence[Any]) -> None:
@@ -110,7 +111,7 @@ def describe_gaps(figures: Sequence[Any]) -> None:
     unmeasured = sum(math.isnan(item.quality.psd_mean) for item in figures)
     if unmeasured:
         entries = count_things(unmeasured, "building")
-        typer.echo(f"{entries} without distances (no model, or no points) are not in the means")
+        click.echo(f"{entries} without distances (no model, or no points) are not in the means")
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:

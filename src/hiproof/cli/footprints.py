@@ -5,26 +5,27 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..errors import SettingsError
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 
 def footprints(
     clouds: Annotated[
         list[str],
-        typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
+        Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
     ],
-    out: Annotated[Path, typer.Option(help="GeoPackage to write")],
+    out: Annotated[Path, Option(help="GeoPackage to write")],
     layer: Annotated[
-        str | None, typer.Option(help="building or building_part (default: building)")
+        str | None, Option(help="building or building_part (default: building)")
     ] = None,
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the clouds (default: that of their files)")
+        str | None, Option(help="CRS of the clouds (default: that of their files)")
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(help="settings file (default: hiproof.toml next to the data)")
+        Path | None, Option(help="settings file (default: hiproof.toml next to the data)")
     ] = None,
 ) -> None:
     """Fetch building footprints from Overture Maps (extra `parquet`).
@@ -37,7 +38,7 @@ def footprints(
     with show_progress("fetch"):
         note = fetch_footprints(clouds, out, layer, crs, config)
     sources = ", ".join(source["dataset"] for source in note["sources"])
-    typer.echo(
+    click.echo(
         f"{out}: {note['footprints']:,} footprints of {note['name']} {note['release']} "
         f"({note['licence']}; from {sources or 'unnamed sources'}). Attribute them as "
         f"{note['attribution']}."

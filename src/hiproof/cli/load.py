@@ -5,36 +5,35 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..errors import InputError
 from ..log import count_things
 from ..progress import show_progress
 from ..read.damage import SkippedBuildings
+from .parameters import Argument, Option
 
 
 def load(
     folder: Annotated[
-        Path, typer.Argument(help="output folder of a run, or a file that `convert` reads")
+        Path, Argument(help="output folder of a run, or a file that `convert` reads")
     ],
     database: Annotated[
-        str, typer.Argument(help="address of the database, such as postgresql://user@host/database")
+        str, Argument(help="address of the database, such as postgresql://user@host/database")
     ],
     prefix: Annotated[
         str,
-        typer.Option(
-            help="first part of the table names, at most 48 letters, digits and underscores"
-        ),
+        Option(help="first part of the table names, at most 48 letters, digits and underscores"),
     ] = "hiproof",
     run: Annotated[
         str | None,
-        typer.Option(help="name of the run in the column `run` (default: the folder's name)"),
+        Option(help="name of the run in the column `run` (default: the folder's name)"),
     ] = None,
     replace: Annotated[
-        bool, typer.Option("--replace", help="replace all runs in the tables")
+        bool, Option(name="--replace", help="replace all runs in the tables")
     ] = False,
     append: Annotated[
-        bool, typer.Option("--append", help="add the run beside others in the tables")
+        bool, Option(name="--append", help="add the run beside others in the tables")
     ] = False,
 ) -> None:
     """Load the models of a run into PostGIS tables.
@@ -52,6 +51,6 @@ def load(
 
         count = load_postgis(folder, database, prefix, left_out, run, **how)
     tables = f"{prefix}_buildings, {prefix}_roofs and {prefix}_parts"
-    typer.echo(f"{count_things(count, 'building')} loaded into {tables}{left_out.describe()}")
+    click.echo(f"{count_things(count, 'building')} loaded into {tables}{left_out.describe()}")
     if left_out.exit_code:
-        raise typer.Exit(left_out.exit_code)
+        raise click.exceptions.Exit(left_out.exit_code)

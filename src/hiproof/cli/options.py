@@ -11,10 +11,9 @@ import inspect
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-import typer
-
 from ..errors import SettingsError
 from ..settings import Settings, format_value, toml_value
+from .parameters import Option
 
 
 class Declared(NamedTuple):
@@ -81,10 +80,10 @@ def declared_settings() -> list[Declared]:
 def make_parameter(item: Declared) -> inspect.Parameter:
     """Make the parameter of a setting, None where it is not given."""
     metadata = item.field.metadata
-    option = typer.Option(
+    option = Option(
         help=format_help(item.field),
         metavar="|".join(map(str, metadata["choices"])) or None,
-        rich_help_panel=item.heading,
+        heading=item.heading,
     )
     kind: Any = Annotated[OPTION_TYPES[item.field.type] | None, option]
     return inspect.Parameter(

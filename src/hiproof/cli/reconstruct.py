@@ -7,7 +7,7 @@ import functools
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ..errors import SettingsError
 from ..log import LOGGER, console_level, start
@@ -15,6 +15,7 @@ from ..settings import EnrichSettings, Settings
 from .command import print_every_option
 from .enrich import enrich_folder, with_terrain
 from .options import parse_box, with_settings
+from .parameters import Argument, Option
 
 SETTINGS_FILE = "hiproof.toml"
 FURTHER = "Further options"  # heading of those that fewer people need
@@ -22,105 +23,101 @@ FURTHER = "Further options"  # heading of those that fewer people need
 
 @with_settings()
 def reconstruct(
-    out: Annotated[Path, typer.Option(help="folder for the results")],
+    out: Annotated[Path, Option(help="folder for the results")],
     clouds: Annotated[
         list[str] | None,
-        typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
+        Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
     ] = None,
     epoch: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             help="instead of clouds, the clouds of several surveys: --epoch 2014=a/ --epoch "
             "2020=b/; each building is made of the newest that covers it, and of others that show "
             "the same roof",
-            rich_help_panel=FURTHER,
+            heading=FURTHER,
         ),
     ] = None,
     footprints: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="building polygons: a file, an address, a PostGIS table, or overture for those of "
             "Overture Maps (extra `parquet`); without this option hiproof finds the buildings"
         ),
     ] = None,
     layer: Annotated[
         str | None,
-        typer.Option(
-            help="layer of the footprints, where a file has several", rich_help_panel=FURTHER
-        ),
+        Option(help="layer of the footprints, where a file has several", heading=FURTHER),
     ] = None,
     where: Annotated[
         str | None,
-        typer.Option(
-            help='SQL condition on the footprints, such as "year < 1950"', rich_help_panel=FURTHER
-        ),
+        Option(help='SQL condition on the footprints, such as "year < 1950"', heading=FURTHER),
     ] = None,
     bbox: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="model only buildings in this box: xmin,ymin,xmax,ymax in the coordinates of the "
             "clouds"
         ),
     ] = None,
     id_attribute: Annotated[
-        str | None, typer.Option(help="footprint attribute that holds the buildings' ids")
+        str | None, Option(help="footprint attribute that holds the buildings' ids")
     ] = None,
     terrain: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="terrain model, a GeoTIFF (extra `terrain`); without it hiproof takes the "
             "ground points of the clouds"
         ),
     ] = None,
     overrides: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="values that you know of some buildings (JSONL or a table); hiproof keeps them "
             "and fits the rest"
         ),
     ] = None,
     underpasses: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="polygons of passages below buildings, a file or an address, with their "
             "clearance in a column (--clearance-column)",
-            rich_help_panel=FURTHER,
+            heading=FURTHER,
         ),
     ] = None,
     config: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             help="settings file, see `hiproof settings` (default: hiproof.toml next to the data)",
-            rich_help_panel=FURTHER,
+            heading=FURTHER,
         ),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="number of worker processes (default: up to one per core, fewer for a small run)"
         ),
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="address of a Dask scheduler (extra `city`)", rich_help_panel=FURTHER),
+        Option(help="address of a Dask scheduler (extra `city`)", heading=FURTHER),
     ] = None,
     restart: Annotated[
-        bool, typer.Option("--restart", help="discard an earlier run in this folder")
+        bool, Option(name="--restart", help="discard an earlier run in this folder")
     ] = False,
     enrich: Annotated[
         bool,
-        typer.Option(
-            "--enrich",
+        Option(
+            name="--enrich",
             help="also add party walls, house types and more, as `hiproof enrich` does",
         ),
     ] = False,
     log_file: Annotated[
-        Path | None, typer.Option(help="append the log to this file", rich_help_panel=FURTHER)
+        Path | None, Option(help="append the log to this file", heading=FURTHER)
     ] = None,
     help_all: Annotated[
         bool,
-        typer.Option(
-            "--help-all",
+        Option(
+            name="--help-all",
             is_eager=True,
             callback=print_every_option,
             help="show all options, in groups",
@@ -183,7 +180,7 @@ def reconstruct(
         answers = read_settings().enrich
         answers = with_terrain(answers, terrain if answers.sun else None)
         code = enrich_folder(out, None, answers, jobs) or code
-    raise typer.Exit(code)
+    raise click.exceptions.Exit(code)
 
 
 def refuse_before(settings: Settings) -> None:

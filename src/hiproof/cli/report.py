@@ -5,25 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..errors import OutputError
 from ..log import count_things
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    folder: Annotated[Path, Argument(help="output folder of a run")],
     clouds: Annotated[
         list[str] | None,
-        typer.Argument(help="point files (default: those of the run)"),
+        Argument(help="point files (default: those of the run)"),
     ] = None,
     footprints: Annotated[
-        str | None, typer.Option(help="building polygons (default: those of the run)")
+        str | None, Option(help="building polygons (default: those of the run)")
     ] = None,
-    layer: Annotated[str | None, typer.Option(help="layer of the footprints")] = None,
+    layer: Annotated[str | None, Option(help="layer of the footprints")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="file to write (default: report.html in the folder)")
+        Path | None, Option(help="file to write (default: report.html in the folder)")
     ] = None,
 ) -> None:
     """Write a self-contained HTML page about a run.
@@ -55,6 +56,6 @@ def report(
                 elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error
             ) from error
     size = f"{path.stat().st_size / 1e6:.1f} MB"
-    typer.echo(f"{path}: {count_things(len(run.models), 'building')}, {size}{left_out.describe()}")
+    click.echo(f"{path}: {count_things(len(run.models), 'building')}, {size}{left_out.describe()}")
     if left_out.exit_code:
-        raise typer.Exit(left_out.exit_code)
+        raise click.exceptions.Exit(left_out.exit_code)

@@ -8,16 +8,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 
 def repro(
     folder: Annotated[
-        Path, typer.Argument(help="folder in which a run kept a failed building (OUT/failures/ID)")
+        Path, Argument(help="folder in which a run kept a failed building (OUT/failures/ID)")
     ],
-    out: Annotated[Path, typer.Option(help="folder for the results")],
+    out: Annotated[Path, Option(help="folder for the results")],
 ) -> None:
     """Run a building again on which hiproof failed.
 
@@ -33,7 +34,7 @@ def repro(
 
         building, trace = solve_bundle(folder, out)
     if trace:
-        typer.echo(mask(trace), err=True)
-    typer.echo(f"building {building.id}: {building.detail or building.status.value}")
-    typer.echo(f"files: {out}")
-    raise typer.Exit(1 if building.status is Status.INTERNAL_ERROR else 0)
+        click.echo(mask(trace), err=True)
+    click.echo(f"building {building.id}: {building.detail or building.status.value}")
+    click.echo(f"files: {out}")
+    raise click.exceptions.Exit(1 if building.status is Status.INTERNAL_ERROR else 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-import typer
+import click
 
 from ..evaluate.overview import Overview, show_command
 from ..log import Level, console_level
@@ -52,21 +52,21 @@ def print_summary(summary: Summary, out: str) -> None:
     It has models, how well they fit, what needs attention, and the files.
     """
     for line in describe_overview(summary.overview, summary.by_quality, out):
-        typer.echo(line)
+        click.echo(line)
     if summary.doubts:
         remarks = ", ".join(f"{doubt.told} {count:,}" for doubt, count in summary.doubts.items())
-        typer.echo(f"buildings by remark in hiproof_detail: {remarks}")
+        click.echo(f"buildings by remark in hiproof_detail: {remarks}")
     for name, reason in summary.broken_inputs:
-        typer.echo(f"{typer.style('not read:', fg='red')} {name}: {reason}")
+        click.echo(f"{click.style('not read:', fg='red')} {name}: {reason}")
     for id, reason in summary.failures:
-        typer.echo(f"{typer.style('internal error:', fg='red')} building {id}: {reason}")
+        click.echo(f"{click.style('internal error:', fg='red')} building {id}: {reason}")
     if summary.bundles:
-        typer.echo(f"please report these, with the folders of the buildings in {summary.bundles}")
+        click.echo(f"please report these, with the folders of the buildings in {summary.bundles}")
     if not summary.units.are_metres:
-        typer.echo(f"coordinates are in {summary.units}; attributes and parameters in metres")
-    typer.echo("files: " + ", ".join(map(str, summary.models)))
+        click.echo(f"coordinates are in {summary.units}; attributes and parameters in metres")
+    click.echo("files: " + ", ".join(map(str, summary.models)))
     steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items())
-    typer.echo(f"time: {sum(summary.seconds.values()):.1f} s ({steps})")
+    click.echo(f"time: {sum(summary.seconds.values()):.1f} s ({steps})")
 
 
 def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: str) -> list[str]:
@@ -75,7 +75,7 @@ def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: st
     They are the result, how well the models fit, and what needs attention with the command that
     shows it.
     """
-    lines = [typer.style(overview.headline, bold=True), *filter(None, [overview.fit])]
+    lines = [click.style(overview.headline, bold=True), *filter(None, [overview.fit])]
     if by_quality:
         lines.append("quality: " + graded_words(by_quality))
     if overview.attention:

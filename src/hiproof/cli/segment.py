@@ -8,30 +8,31 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..progress import show_progress
+from .parameters import Argument, Option
 
 
 def segment(
     clouds: Annotated[
         list[Path],
-        typer.Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)"),
+        Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)"),
     ],
     out: Annotated[
         Path,
-        typer.Option(help="LAZ file for the labelled points; the table goes beside it as CSV"),
+        Option(help="LAZ file for the labelled points; the table goes beside it as CSV"),
     ],
     crs: Annotated[
-        str | None, typer.Option(help="CRS of the clouds (default: that of their files)")
+        str | None, Option(help="CRS of the clouds (default: that of their files)")
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
+        str | None, Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
     ] = None,
     weights: Annotated[
-        str, typer.Option(help="ONNX file with your own weights (default: those of hiproof)")
+        str, Option(help="ONNX file with your own weights (default: those of hiproof)")
     ] = "",
-    device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
+    device: Annotated[str, Option(help="cpu or cuda")] = "cpu",
 ) -> None:
     """Label every point with a roof type or not-roof (extra `network`).
 
@@ -50,6 +51,6 @@ def segment(
         settings = Settings().replace({"read": read, "segment": segment})
         failures = segment_files(clouds, out, settings)
     for path, reason in failures.items():
-        typer.echo(f"{path}: {reason}", err=True)
+        click.echo(f"{path}: {reason}", err=True)
     if failures:
-        raise typer.Exit(1)
+        raise click.exceptions.Exit(1)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..errors import OutputError
 from ..settings import Settings
+from .parameters import Option
 
 
 def settings(
-    config: Annotated[Path | None, typer.Option(help="settings file whose values to print")] = None,
-    write: Annotated[Path | None, typer.Option(help="file to write instead of printing")] = None,
+    config: Annotated[Path | None, Option(help="settings file whose values to print")] = None,
+    write: Annotated[Path | None, Option(help="file to write instead of printing")] = None,
 ) -> None:
     """Print every setting as TOML, with its default, unit, bounds and meaning.
 
@@ -21,7 +22,7 @@ def settings(
     """
     text = (Settings.from_toml(config) if config else Settings()).to_toml()
     if write is None:
-        typer.echo(text, nl=False)
+        click.echo(text, nl=False)
         return
     try:
         write.write_text(text, encoding="utf-8")

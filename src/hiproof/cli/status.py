@@ -10,9 +10,10 @@ import sqlite3
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+import click
 
 from ..errors import InputError
+from .parameters import Argument, Option
 from .running import describe_overview
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ CLOSED = ("done", "failed")
 
 
 def status(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
-    as_json: Annotated[bool, typer.Option("--json", help="print JSON instead of text")] = False,
+    folder: Annotated[Path, Argument(help="output folder of a run")],
+    as_json: Annotated[bool, Option(name="--json", help="print JSON instead of text")] = False,
 ) -> None:
     """Show the progress of a run and the state of its buildings.
 
@@ -46,7 +47,7 @@ def status(
             f"expected the ledger of a run at {path}, got: {error}; it may be damaged"
         ) from error
     for line in lines:
-        typer.echo(line)
+        click.echo(line)
 
 
 def read_state(ledger: Ledger) -> dict[str, Any]:

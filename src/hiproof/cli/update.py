@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+import click
 
 from ..log import Level, console_level
 from ..progress import show_progress
 from .options import with_settings
+from .parameters import Argument, Option
 
 if TYPE_CHECKING:
     from ..update.epochs import Surveys
@@ -18,72 +19,70 @@ if TYPE_CHECKING:
 
 @with_settings("read")
 def update(
-    run: Annotated[Path, typer.Argument(help="output folder of the earlier run")],
+    run: Annotated[Path, Argument(help="output folder of the earlier run")],
     clouds: Annotated[
         list[str],
-        typer.Argument(help="point files of the new survey, or folders of them"),
+        Argument(help="point files of the new survey, or folders of them"),
     ],
-    out: Annotated[Path, typer.Option(help="folder for the results")],
+    out: Annotated[Path, Option(help="folder for the results")],
     date: Annotated[
         str,
-        typer.Option(
+        Option(
             help="day of the new survey, such as 2014-02-09 (default: from the time of its points, "
             "or its files)"
         ),
     ] = "",
     significance: Annotated[
         float,
-        typer.Option(help="probability with which an unchanged building may be called changed"),
+        Option(help="probability with which an unchanged building may be called changed"),
     ] = 0.001,
     significance_over: Annotated[
         str,
-        typer.Option(
+        Option(
             help="what the significance holds for: `buildings`, each unchanged building alone, or "
             "`city`, the share of false alarms among all changes (Benjamini and Hochberg)"
         ),
     ] = "buildings",
     refine: Annotated[
         bool,
-        typer.Option(
-            "--refine",
+        Option(
+            name="--refine",
             help="estimate the parameters of unchanged buildings from the points of both surveys, "
             "where that makes them surer",
         ),
     ] = False,
     history: Annotated[
         bool,
-        typer.Option("--history", help="keep models that ended, in GeoPackage and PostGIS"),
+        Option(name="--history", help="keep models that ended, in GeoPackage and PostGIS"),
     ] = False,
     footprints: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="new building polygons (default: the outlines of the run); buildings keep their "
             "ids, and say what they succeed where they were split or merged"
         ),
     ] = None,
     layer: Annotated[
-        str | None, typer.Option(help="layer of the footprints, where a file has several")
+        str | None, Option(help="layer of the footprints, where a file has several")
     ] = None,
     id_attribute: Annotated[
-        str | None, typer.Option(help="footprint attribute that names new buildings")
+        str | None, Option(help="footprint attribute that names new buildings")
     ] = None,
     terrain: Annotated[
         str | None,
-        typer.Option(
-            help="terrain model (GeoTIFF; extra `terrain`); default: the clouds' ground points"
-        ),
+        Option(help="terrain model (GeoTIFF; extra `terrain`); default: the clouds' ground points"),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(
+        Option(
             help="number of worker processes (default: up to one per core, fewer for a small run)"
         ),
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")
+        str | None, Option(help="address of a Dask scheduler (extra `city`)")
     ] = None,
     restart: Annotated[
-        bool, typer.Option("--restart", help="discard an earlier update in this folder")
+        bool, Option(name="--restart", help="discard an earlier update in this folder")
     ] = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
@@ -119,20 +118,20 @@ def update(
         summary = update_area(request, changes, progress)
     if console_level() is not Level.error:
         print_update(summary)
-    raise typer.Exit(summary.run.exit_code)
+    raise click.exceptions.Exit(summary.run.exit_code)
 
 
 def print_update(summary: UpdateSummary) -> None:
     """Print what changed, how the surveys lie to each other, and the files."""
     counts = ", ".join(f"{n:,} {name}" for name, n in summary.by_change.items())
-    typer.echo(typer.style(f"{summary.run.buildings:,} buildings: {counts}", bold=True))
+    click.echo(click.style(f"{summary.run.buildings:,} buildings: {counts}", bold=True))
     if summary.by_kind:
-        typer.echo(
+        click.echo(
             "largest change of each: "
             + ", ".join(f"{name} {n:,}" for name, n in summary.by_kind.items())
         )
     if summary.outside:
-        typer.echo(
+        click.echo(
             "roofs outside all outlines: "
             + ", ".join(f"{name} {n:,}" for name, n in summary.outside.items())
         )
@@ -140,19 +139,19 @@ def print_update(summary: UpdateSummary) -> None:
     lies = ", ".join(
         f"{value:+.2f} ± {sigma:.2f}" for value, sigma in zip(shift.xyz, shift.sigma, strict=True)
     )
-    typer.echo(f"survey of {surveys.date}, beside the earlier one by ({lies}) m")
-    typer.echo(
+    click.echo(f"survey of {surveys.date}, beside the earlier one by ({lies}) m")
+    click.echo(
         f"{describe_significance(surveys)}; compared with the "
         + ("earlier points" if surveys.has_earlier else "earlier models alone")
     )
     for name, reason in summary.run.broken_inputs:
-        typer.echo(f"{typer.style('not read:', fg='red')} {name}: {reason}")
+        click.echo(f"{click.style('not read:', fg='red')} {name}: {reason}")
     for id, reason in summary.run.failures:
-        typer.echo(f"{typer.style('internal error:', fg='red')} building {id}: {reason}")
+        click.echo(f"{click.style('internal error:', fg='red')} building {id}: {reason}")
     files = [*summary.run.models, *summary.files]
-    typer.echo("files: " + ", ".join(map(str, files)))
+    click.echo("files: " + ", ".join(map(str, files)))
     steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.run.seconds.items())
-    typer.echo(f"time: {sum(summary.run.seconds.values()):.1f} s ({steps})")
+    click.echo(f"time: {sum(summary.run.seconds.values()):.1f} s ({steps})")
 
 
 def describe_significance(surveys: Surveys) -> str:

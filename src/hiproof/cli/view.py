@@ -8,32 +8,31 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 from ..errors import OutputError
 from ..formats import FORMATS
 from ..log import LOGGER
 from ..progress import Update, ignore_progress, show_progress
 from .convert import convert_models
+from .parameters import Argument, Option
 
 
 def view(
     folder: Annotated[
         Path,
-        typer.Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote"),
+        Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote"),
     ],
     port: Annotated[
         int,
-        typer.Option(
-            min=0,
-            max=65535,
-            show_default=False,
+        Option(
+            low=0,
+            high=65535,
+            shows_default=False,
             help="port on this machine (default: a free one)",
         ),
     ] = 0,
-    browser: Annotated[
-        bool, typer.Option(help="open the browser, or only print the address")
-    ] = True,
+    browser: Annotated[bool, Option(help="open the browser, or only print the address")] = True,
 ) -> None:
     """Show the models of a run in your browser, without a network.
 
@@ -49,7 +48,7 @@ def view(
             tiles = stack.enter_context(open_tiles(folder, update))
             title = f"hiproof: {folder.resolve().name}"
             server = stack.enter_context(make_server(tiles, title, port))
-        typer.echo(f"{server.address} shows {folder}; Ctrl-C ends")
+        click.echo(f"{server.address} shows {folder}; Ctrl-C ends")
         if browser:
             webbrowser.open(server.address)
         server.serve_until_stopped()
@@ -82,5 +81,5 @@ def open_tiles(folder: Path, update: Update = ignore_progress) -> Iterator[Path]
                 LOGGER.warning("%s. The tiles are made in a temporary folder instead", error)
                 tiles = Path(elsewhere) / tiles.name
                 text, _ = convert_models(folder, tiles, "3dtiles", None, update)
-            typer.echo(text)
+            click.echo(text)
         yield tiles

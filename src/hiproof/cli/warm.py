@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
+import click
 
 from ..progress import show_progress
+from .parameters import Option
 
 
 def warm(
     everything: Annotated[
         bool,
-        typer.Option(
-            "--all",
+        Option(
+            name="--all",
             help="also compile what only some runs use: those without footprints, with --parts "
             "one or with the network",
         ),
@@ -27,4 +28,4 @@ def warm(
 
     with show_progress("compile"):
         make_ready(ALL if everything else MAIN_JOB, own=True)
-    typer.echo("everything is compiled" if everything else "all that most runs use is compiled")
+    click.echo("everything is compiled" if everything else "all that most runs use is compiled")
