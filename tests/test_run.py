@@ -20,7 +20,7 @@ import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.tasks import ALL, make_ready
+from hiproof.city.tasks import ALL, MAIN_JOB, make_ready
 from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
@@ -242,6 +242,19 @@ def test_two_workers_change_no_byte_and_compile_nothing(finished_run, files, tmp
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
     assert records(tmp_path) == records(finished_run[0])
+
+
+def test_the_main_process_of_workers_imports_no_compiler(town_files, tmp_path):
+    make_ready(MAIN_JOB)
+    code = (
+        "import sys; from hiproof import Request, reconstruct_area\n"
+        "cloud, footprints, out = sys.argv[1:]\n"
+        "summary = reconstruct_area(Request((cloud,), out, footprints, processes=2))\n"
+        "print(summary.overview.headline, [m for m in ('numba', 'scipy') if m in sys.modules])"
+    )
+    command = [sys.executable, "-W", "ignore", "-c", code, *map(str, town_files), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout == "4 of 4 buildings modelled []\n", done.stderr
 
 
 def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_path, monkeypatch):

@@ -22,6 +22,7 @@ from_cloud    buildings of a cloud without footprints
 plan          which buildings there are, which work tile owns each, which point files there are
 sort          each point file, read once in chunks, leaves the points each work tile needs
 noted         where the points of each file lie, for whoever wants some of them again
+bundle_folders  the folders of bundles: their names, and which of them stay
 bundles       the input of buildings that hiproof failed on, kept to be sent and run again
 repro         such a building solved again
 solve         each work tile reconstructs its own buildings and writes them as text, ready to join

@@ -18,14 +18,12 @@ A run keeps at most 20. They go when the buildings are solved, or when the run b
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import re
 import secrets
 import shutil
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +38,12 @@ from ..model import Footprint
 from ..parametric.override import NOTE_KEYS, Override, read_override
 from ..read.las import translate_errors
 from ..settings import Settings
+from .bundle_folders import FACTS, FAILURES_FOLDER, bundles_in, folder_name
 from .overrides import OVERRIDES_FILE
 from .plan import Job, WorkPlan, neighbourhood
 from .sort import POINT_KINDS
 from .terrain_check import TerrainModel
 
-FAILURES_FOLDER, FACTS = "failures", "failure.json"
 MOST_BUNDLES = 20  # Bundles of a run: more failures have the same few causes, and take space.
 CLASSES = dict(zip(POINT_KINDS, (6, 2, 1, 18), strict=True))  # ASPRS classes by the kind of points.
 # Extra dimensions (float64); LAZ rounds to SCALE_M.
@@ -53,8 +51,6 @@ EXACT_COLUMNS = ("exact_x", "exact_y", "exact_z")
 SCALE_M = 0.001  # Steps (m) of the LAZ coordinates; enough to look at.
 MARGIN_M = 2.0  # Points so far beyond a building's reach complete its outermost ground cells.
 ROOF_REACH_M = 10.0  # Reach of the search for ground between roofs (BESIDE_ALL_M of solve.py).
-PLAIN_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,59}")
-RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)")  # Names of devices on Windows.
 
 
 class RecordedTerrain:
@@ -131,45 +127,6 @@ def keep_failure(
         LOGGER.warning(
             "the input of building %s could not be kept in %s: %s", job.id, FAILURES_FOLDER, error
         )
-
-
-def folder_name(id: str) -> str:
-    """Return a name for the bundle of building `id` on any file system.
-
-    >>> folder_name("0363100012168777"), folder_name("../Town Hall")
-    ('0363100012168777', 'town-hall-ea5e75b2')
-    """
-    if PLAIN_NAME.fullmatch(id) and not RESERVED_NAMES.fullmatch(id):
-        return id
-    digest = hashlib.sha256(id.encode("utf-8", "surrogatepass")).hexdigest()[:8]
-    words = re.sub(r"[^a-z0-9]+", "-", id.lower())[:40].strip("-")
-    return f"{words}-{digest}" if words else f"building-{digest}"
-
-
-def bundles_in(out: Path) -> list[Path]:
-    """Return the bundles in the output folder of a run.
-
-    Folders of others are left out.
-    """
-    return sorted(facts.parent for facts in (Path(out) / FAILURES_FOLDER).glob(f"[!.]*/{FACTS}"))
-
-
-def find_bundle_folder(out: Path) -> Path | None:
-    """Return the folder of the bundles of a run, None where it has none."""
-    return Path(out) / FAILURES_FOLDER if bundles_in(out) else None
-
-
-def remove_bundles(out: Path, failed_ids: Collection[str] = ()) -> None:
-    """Remove all bundles but those of buildings that failed, and unfinished ones."""
-    folder = Path(out) / FAILURES_FOLDER
-    selection = {folder_name(id) for id in failed_ids}
-    for bundle in bundles_in(out):
-        if bundle.name not in selection:
-            shutil.rmtree(bundle, ignore_errors=True)
-    for unfinished in folder.glob(".bundle-*"):
-        shutil.rmtree(unfinished, ignore_errors=True)
-    with suppress(OSError):  # it is not there, or holds something
-        folder.rmdir()
 
 
 def save_bundle(

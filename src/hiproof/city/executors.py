@@ -33,7 +33,7 @@ from ..errors import InputError, OutputError, is_interrupt
 from ..extras import import_extra
 from . import solved
 from .cores import limit_threads
-from .tasks import import_work, make_ready
+from .tasks import import_work, is_ready, make_ready
 from .workers import begin_worker, choose_context, describe_start
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
@@ -99,7 +99,13 @@ class Processes:
             self.submit(import_work, ())
 
     def prepare(self, pieces: Sequence[str]) -> None:
-        make_ready(pieces)
+        """Compile what no run compiled before.
+
+        A worker looks, so that this process imports the compiler only if it is needed.
+        """
+        answer = self.submit(is_ready, (pieces,))
+        if answer.exception() or not answer.result():
+            make_ready(pieces)
 
     def run(
         self, function: Callable, tasks: Iterable[tuple]

@@ -11,23 +11,24 @@ import json
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, InputWarning, OutputError
 from ..log import LOGGER, count_things
 from ..masking import mask
-from ..parametric.fallback import list_fallback_columns
-from ..parametric.file import HEAD_KEY, objects
-from ..parametric.override import KEYS, Override, read_override
 from ..read.attribute_columns import make_known_condition, restore_declared_types
 from ..read.footprints import attribute_rows
+from ..settings import ReadSettings
 from ..write.files import atomic
 from .ledger import Ledger
 from .merge import tile_parts
 from .plan import Job, WorkPlan
 from .table_values import SkippedValues
+
+if TYPE_CHECKING:
+    from ..parametric.override import Override
 
 OVERRIDES_FILE, REDO = "overrides.jsonl", "redo.json"
 TABLE_ENDINGS = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
@@ -88,6 +89,8 @@ def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
 
     Those of a parameters.jsonl are lists of parts.
     """
+    from ..parametric.override import read_override
+
     visited: dict[str, dict[str, Any]] = {}
     for where, record in override_records(path):
         try:
@@ -105,6 +108,8 @@ def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield (where, record) of every line or row."""
+    from ..parametric.file import objects
+
     if str(path).lower().endswith(TABLE_ENDINGS):
         yield from (
             (f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1)
@@ -127,6 +132,8 @@ def is_other_line(record: Any) -> bool:
 
     Its head and buildings without a model say nothing of how to build.
     """
+    from ..parametric.file import HEAD_KEY
+
     return isinstance(record, dict) and (
         HEAD_KEY in record or ("status" in record and not record.get("parts"))
     )
@@ -201,6 +208,8 @@ def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str)
     {'leave_out': True, 'z_ground': 2.5}
     """
     if of_columns:
+        from ..parametric.override import read_override
+
         read_override({**of_columns, "id": id})
     combined = dict(of_file)
     for key, value in of_columns.items():
@@ -210,6 +219,8 @@ def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str)
 
 
 def is_override(record: dict[str, Any]) -> bool:
+    from ..parametric.override import read_override
+
     try:
         read_override(record)
     except InputError:
@@ -225,8 +236,8 @@ def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
     Raises InputError for those that are not there.
     """
     pairs = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
-    fallbacks = list_fallback_columns(plan.settings.read)
-    if not plan.jobs:
+    fallbacks = name_fallback_columns(plan.settings.read)
+    if not plan.jobs or not (pairs or fallbacks):
         return []
     columns = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
     for column in fallbacks:
@@ -235,9 +246,20 @@ def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
                 f"expected a column of the footprints ({', '.join(sorted(columns)) or 'none'}) for "
                 f"heights of buildings without points, got {column!r}; name one of these"
             )
+    from ..parametric.override import KEYS
+
     refuse_others([column for column, _ in pairs], sorted(columns), "columns of the footprints")
     refuse_others([key for _, key in pairs], KEYS, "keys of an override")
     return pairs
+
+
+def name_fallback_columns(read: ReadSettings) -> list[str]:
+    """Return the columns that fallback heights come from, if there are any."""
+    if not (read.fallback_roof_height or read.fallback_ground_height):
+        return []
+    from ..parametric.fallback import list_fallback_columns
+
+    return list_fallback_columns(read)
 
 
 def refuse_others(names: list[str], allowed: Sequence[str], subject: str) -> None:
@@ -298,5 +320,7 @@ def load_overrides(state: Path) -> dict[int, Override]:
 
 @functools.lru_cache(maxsize=1)
 def parse_overrides(path: Path, stamp: int) -> dict[int, Override]:
+    from ..parametric.override import read_override
+
     with path.open(encoding="utf-8") as file:
         return {index: read_override(record) for index, record in map(json.loads, file)}

@@ -21,7 +21,7 @@ from ..log import LOGGER, count_things
 from ..masking import masked_values
 from ..write.files import atomic
 from . import noted
-from .bundles import remove_bundles
+from .bundle_folders import remove_bundles
 from .changed import take_over
 from .from_cloud import Progress
 from .ledger import Ledger, Task

@@ -33,7 +33,7 @@ from ..status import Doubt, Status
 from ..write.files import atomic
 from ..write.head import FileHead
 from . import solved
-from .bundles import find_bundle_folder, remove_bundles
+from .bundle_folders import find_bundle_folder, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
 from .executors import Arguments, Executor, Outcome, make_executor

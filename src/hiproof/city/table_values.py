@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import InputWarning
-from ..parametric.override import possible_range
 
 MOST_SHOWN_VALUES = 3  # values that a sentence shows
 
@@ -52,7 +51,7 @@ class SkippedValues:
     def warn(self) -> None:
         """Warn once for each key of which values were left out."""
         for key, values in self.values.items():
-            lower, upper = possible_range(key) or (0.0, 0.0)
+            lower, upper = find_range(key) or (0.0, 0.0)
             subset = ", ".join(values[:MOST_SHOWN_VALUES]) + (
                 ", ..." if len(values) > MOST_SHOWN_VALUES else ""
             )
@@ -72,7 +71,7 @@ def convert_value(key: str, value: Any) -> Any:
     """
     if key == "leave_out":
         return YES_OR_NO.get(str(value).strip().lower(), value)
-    if possible_range(key) and isinstance(value, str):
+    if find_range(key) and isinstance(value, str):
         try:
             return float(value) if value.strip() else None
         except ValueError:
@@ -100,8 +99,18 @@ def is_possible(key: str, value: Any) -> bool:
     ...     [{}]), is_possible("note", -9999)
     (False, False, True, True)
     """
-    bounds = possible_range(key)
+    bounds = find_range(key)
     if bounds is None or (key == "parts" and isinstance(value, list)):
         return True
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return is_number and bounds[0] <= value <= bounds[1]
+
+
+def find_range(key: str) -> tuple[float, float] | None:
+    """Return the least and largest possible value of a key, None where it is no number.
+
+    What checks overrides is imported only for runs that have some.
+    """
+    from ..parametric.override import possible_range
+
+    return possible_range(key)

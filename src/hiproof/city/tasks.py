@@ -52,6 +52,13 @@ def import_work() -> None:
         import_module(name)
 
 
+def is_ready(pieces: Sequence[str]) -> bool:
+    """Return whether everything was compiled before; see warm.py."""
+    from . import warm
+
+    return not warm.list_missing(pieces)
+
+
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     """Compile ahead of the work; see warm.py."""
     from . import warm

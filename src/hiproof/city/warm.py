@@ -33,20 +33,8 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
 
     Code that came with hiproof for processors like this one will do, unless it is to be its `own`.
     """
-    places = kept.folders(make_ready, str(PACKAGE / "__init__.py"))
-    stamp, processors = (
-        compute_common_stamp(),
-        (read_processor(), KIND)[: 1 if own else 1 + runs_kind()],
-    )
-    missing = []
-    for piece in pieces:
-        marks = [
-            place / mark(piece, stamp, processor) for processor in processors for place in places
-        ]
-        if created := next(filter(Path.exists, marks), None):
-            news.ready.update(created.read_text(encoding="utf-8", errors="replace").split())
-        else:
-            missing.append(piece)
+    missing = list_missing(pieces, own)
+    stamp, places = compute_common_stamp(), list_places()
     folder = kept.place_to_write(places) if missing else None
     # all is there, or nothing can be kept, so that every process has to compile anyway
     if folder is None:
@@ -64,6 +52,29 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
         for finished in [pool.submit(work_off) for _ in range(news.processes)]:
             finished.result()
     news.processes = 1
+
+
+def list_missing(pieces: Sequence[str], own: bool = False) -> list[str]:
+    """Return those of the `pieces` that no run compiled before.
+
+    The functions of the others count as ready. See `make_ready` for `own`.
+    """
+    stamp = compute_common_stamp()
+    processors = (read_processor(), KIND)[: 1 if own else 1 + runs_kind()]
+    missing = []
+    for piece in pieces:
+        names = [mark(piece, stamp, processor) for processor in processors]
+        marks = [place / name for name in names for place in list_places()]
+        if created := next(filter(Path.exists, marks), None):
+            news.ready.update(created.read_text(encoding="utf-8", errors="replace").split())
+        else:
+            missing.append(piece)
+    return missing
+
+
+def list_places() -> tuple[Path, ...]:
+    """Return the folders in which marks may lie."""
+    return kept.folders(make_ready, str(PACKAGE / "__init__.py"))
 
 
 def keep_mark(file: Path) -> None:
