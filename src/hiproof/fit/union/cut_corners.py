@@ -60,7 +60,7 @@ def draw_over_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> I
                 inside[numbers].sum() > WITHIN * len(numbers) for numbers in visible_points
             ]
             dropped = [j for j in range(1, len(volumes)) if j != k and is_over[j] and is_covered[j]]
-            if dropped or row is not joined:
+            if dropped:
                 trial = volumes.copy()
                 trial[k] = row
                 yield np.delete(trial, dropped, axis=0)

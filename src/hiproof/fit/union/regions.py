@@ -92,19 +92,24 @@ def cut_regions(
     They are in local coordinates, and overlap as volumes do. What a later volume replaces is cut
     out. With `base`, the base has what no other volume covers, and what rises through others.
     """
+    if len(volumes) == 1:
+        return [list_polygons(site.outline)]
     pairs = zip(volumes[1:], sides[1:], strict=True)
     quads = [site.draw_quad(volume, volume_sides) for volume, volume_sides in pairs]
-    regions = [list_polygons(site.outline) if base or len(volumes) == 1 else []]
+    inside_quads = [site.cut_quad(quad) for quad in quads]
+    level = volumes[0, OFFSET0 + LEVEL]
+    above = [
+        base and is_base_above(level, volume, volume_planes, region, site)
+        for volume, volume_planes, region in zip(volumes[1:], planes[1:], inside_quads, strict=True)
+    ]
+    regions = [list_polygons(site.outline) if any(above) else []]
     for k, quad in enumerate(quads, start=1):
-        inside_quad = site.cut_quad(quad)
         if volumes[k, REPLACES]:
             regions = [site.cut_out(earlier, quad) for earlier in regions]
-        elif regions[0] and not is_base_above(
-            volumes[0, OFFSET0 + LEVEL], volumes[k], planes[k], inside_quad, site
-        ):
+        elif not above[k - 1]:
             regions[0] = site.cut_out(regions[0], quad)
-        regions.append(list_polygons(inside_quad))
-    return regions if len(volumes) == 1 else fill_gaps(volumes, planes, regions, quads, site)
+        regions.append(list_polygons(inside_quads[k - 1]))
+    return fill_gaps(volumes, planes, regions, quads, site, base)
 
 
 def sketch_regions(
@@ -290,23 +295,24 @@ def fill_gaps(
     regions: list[list],
     quads: list[shapely.Polygon],
     site: PlanSite,
+    base: bool,
 ) -> list[list]:
     """Give every rest of the outline to the volume beside it, or to the base.
 
-    The base has it if points say so.
+    With `base`, the base has it if points say so.
     """
     for gap in site.find_rest(quads):
         wide_gap = site.recall(widen_gap, gap)
         k, q = find_neighbour(
             wide_gap, [[], *regions[1:]], partial(site.recall, measure_shared_area)
         )
-        if k > 0 and not (regions[0] and is_base_gap(gap, volumes[0], volumes[k], planes[k], site)):
+        if k > 0 and not (base and is_base_gap(gap, volumes[0], volumes[k], planes[k], site)):
             merged = site.recall(merge_inside, regions[k][q], wide_gap, site.outline)
             if len(merged) == 1:
                 regions[k][q] = merged[0]
                 regions[0] = site.cut_out(regions[0], wide_gap)
                 continue
-        if not is_covered(gap, regions[0]):
+        if not (regions[0] and is_covered(gap, regions[0])):
             regions[0].append(gap)
     return regions
 
