@@ -147,11 +147,10 @@ def fit_building(
     cache: Cache = {}
     volumes = repeat_volumes(tidy_volumes(volumes, ends, site, cache), scene)
     unit = compute_unit_points(plan.density, COMMON_HOUSE_M2, settings.compound)
-    roof, agreement = draw_in_groups(
-        add_bays(volumes, outline, plan, scene, unit), ends, site, cache
-    )
-    volumes, base = roof.volumes, bool(is_base_visible(roof.volumes, scene))
-    sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
+    volumes = add_bays(volumes, outline, plan, scene, unit)
+    sides, agreement = draw_in_groups(volumes, ends, site, cache)
+    base = bool(is_base_visible(volumes, scene))
+    sides, planes, regions = weld(volumes, sides, agreement, site, base)
     parts = [
         name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, types)
         for k, polygons in list_part_polygons(regions, outline, plan)

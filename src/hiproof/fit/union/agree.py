@@ -34,7 +34,7 @@ from .objective import compute_misfits
 from .prices import FOLD_UNITS, PARAMETER_COST
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, N_SIDES, REPLACES, U0, U1, V0, V1
+from .volumes import DIRECTION, N_SIDES, REPLACES, U0, U1, V0, V1, compute_roof_heights
 
 NEAR_M = 0.2  # Heights further apart (m) are not tried as one.
 LEVELLED_M = 0.01  # Difference in height (m) within a builder's tolerance, and a swath's.
@@ -99,8 +99,10 @@ def agree_planes(
 ) -> Agreement:
     """Fit the planes of all volumes together, with what they have in common equal.
 
-    Fold lines that end beside a corner of the outline are moved into it.
+    Planes that rise above other volumes are first restored. Fold lines that end beside a corner of
+    the outline are moved into it.
     """
+    planes, misfit = restore_risen_planes(volumes, planes, scene)
     members = list_members(volumes, sides, planes, scene)
     member_list = list(members.values())
     if not member_list:
@@ -123,15 +125,10 @@ def agree_planes(
         agreed_planes[k] = replace(
             planes[k], rows=rows, design=member.full_design, covariance=common.covariance
         )
-    worse = sum_misfit(volumes, agreed_planes, scene) - sum_misfit(volumes, planes, scene)
-    if worse > MOST_WORSE_SHARE * scene.n:
+    misfits, _ = measure_misfits(volumes, agreed_planes, scene)
+    if misfits.sum() - misfit > MOST_WORSE_SHARE * scene.n:
         return separate
     return Agreement(agreed_planes, members, common.basis, start)
-
-
-def sum_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
-    """Sum up what all points cost under `planes`, each volume within its rectangle."""
-    return float(measure_misfits(volumes, planes, scene)[0].sum())
 
 
 def measure_misfits(
@@ -154,29 +151,26 @@ def measure_misfits(
     return compute_misfits(scene.z[:n], heights, scene), top
 
 
-def restore_risen_planes(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> list[Planes]:
+def restore_risen_planes(
+    volumes: np.ndarray, planes: list[Planes], scene: Scene
+) -> tuple[list[Planes], float]:
     """Return the planes, as the search left them where a volume rises above others.
 
     Planes are fitted to the points over which their volume is visible. Where it is hidden, such as
     one of two gables of nearly the same slopes, they may come out above the other and fit less.
+    Also returns what all points cost.
     """
-    planes = list(planes)
-    search_planes = [read_volume_planes(row, scene) for row in volumes]
-    search_misfits, _ = measure_misfits(volumes, search_planes, scene)
+    planes, risen = list(planes), np.zeros(len(planes), bool)
+    heights, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    search_misfits = compute_misfits(scene.z[: scene.n], heights[: scene.n], scene)
     while True:
-        misfits_now, top = measure_misfits(volumes, planes, scene)
-        worse = np.bincount(top, misfits_now - search_misfits, len(planes))
-        worse[
-            [
-                volume_planes is as_found
-                for volume_planes, as_found in zip(planes, search_planes, strict=True)
-            ]
-        ] = 0.0
-        excess = worse - RISEN_SHARE * np.bincount(top, minlength=len(planes))
+        misfits, top = measure_misfits(volumes, planes, scene)
+        excess = np.bincount(top, misfits - search_misfits - RISEN_SHARE, len(planes))
+        excess[risen] = 0.0
         k = int(np.argmax(excess))
         if excess[k] <= 0.0:
-            return planes
-        planes[k] = search_planes[k]
+            return planes, float(misfits.sum())
+        planes[k], risen[k] = read_volume_planes(volumes[k], scene), True
 
 
 def fit_conditions(
@@ -231,10 +225,11 @@ def choose_conditions(
             if not is_near and not is_within_noise(equation, start, covariance):
                 later.append(condition)  # accepted ones may bring it nearer
                 continue
-            n_saved = int(np.linalg.matrix_rank(equation @ solution.basis, tol=NO_REMAINDER))
+            free = constrain(solution.basis, equation)
+            n_saved = solution.basis.shape[1] - free.shape[1]
             if n_saved == 0:
                 continue
-            trial = solve_normal(sums, constrain(solution.basis, equation), start)
+            trial = solve_normal(sums, free, start)
             trial_cost = price_rows(members, place_planes(members, trial.unknowns), scene)
             if trial_cost <= cost + compute_allowance(condition, n_saved, members, scene):
                 accepted, solution, cost = [*accepted, condition], trial, trial_cost

@@ -11,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from .agree import Agreement, agree_planes, restore_risen_planes
+from .agree import Agreement, agree_planes
 from .box import Box, enclose_boxes
 from .cants import Cache
 from .finish import Planes, read_volume_planes
 from .regions import PlanSite
 from .scene import Scene
 from .sides import Side
-from .unite import DrawnRoof, OutlineEnds, draw_roof, select_ends
+from .unite import OutlineEnds, draw_roof, select_ends
 from .volumes import SETTLED, U0, V1
 from .whole import POSITION, Whole
 from .window import forget_digests, open_window, restore_volumes
@@ -89,17 +89,15 @@ def open_group(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | 
 
 def draw_in_groups(
     volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
-) -> tuple[DrawnRoof, Agreement]:
-    """Draw the volumes with sides and planes, equal where they agree with neighbours.
+) -> tuple[list[list[Side]], Agreement]:
+    """Return the volumes' sides, and their planes, equal where they agree with neighbours.
 
     Planes in the `cache` are not fitted again if all volumes are drawn at once. Otherwise there are
     no common unknowns: the agreement has no members.
     """
     if len(volumes) <= MOST_AT_ONCE:
         roof = draw_roof(volumes, ends, site.scene, cache)
-        planes = restore_risen_planes(volumes, roof.planes, site.scene)
-        agreement = agree_planes(volumes, roof.sides, planes, site.scene)
-        return replace(roof, planes=agreement.planes), agreement
+        return roof.sides, agree_planes(volumes, roof.sides, roof.planes, site.scene)
     whole = Whole(site.scene, site.plan, site.outline, volumes)
     sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
     planes = [read_volume_planes(row, whole.scene) for row in volumes]
@@ -118,14 +116,7 @@ def draw_in_groups(
         for k in group:
             position = numbers.index(k)
             sides[k], planes[k] = roof.sides[position], together[position]
-    planes = restore_risen_planes(volumes, planes, site.scene)
-    agreement = Agreement(planes, {}, np.zeros((0, 0)), np.zeros(0))
-    return DrawnRoof(
-        volumes,
-        sides,
-        planes,
-        sum(volume_planes.cost + volume_planes.price for volume_planes in planes),
-    ), agreement
+    return sides, Agreement(planes, {}, np.zeros((0, 0)), np.zeros(0))
 
 
 def fix_planes(planes: Planes) -> Planes:
