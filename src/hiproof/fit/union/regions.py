@@ -69,10 +69,6 @@ class PlanSite(NamedTuple):
         """Return the part of a volume's plan inside the outline."""
         return self.recall(cut_to_outline, quad, self.outline)
 
-    def find_rest(self, quads: list[shapely.Polygon]) -> list[shapely.Polygon]:
-        """Return the part of the outline that lies in no quad."""
-        return self.recall(subtract_quads, self.outline, *quads)
-
     def cut_out(
         self, polygons: list[shapely.Polygon], hole: shapely.Polygon
     ) -> list[shapely.Polygon]:
@@ -89,44 +85,63 @@ def cut_regions(
 ) -> list[list[shapely.Polygon]]:
     """Return, for each volume, the polygons of the site's outline that it may roof.
 
-    They are in local coordinates, and overlap as volumes do. What a later volume replaces is cut
-    out. With `base`, the base has what no other volume covers, and what rises through others.
+    They are those of a sketch inside the outline. The volume beside a gap has it, too.
     """
-    if len(volumes) == 1:
-        return [list_polygons(site.outline)]
-    pairs = zip(volumes[1:], sides[1:], strict=True)
-    quads = [site.draw_quad(volume, volume_sides) for volume, volume_sides in pairs]
-    inside_quads = [site.cut_quad(quad) for quad in quads]
-    level = volumes[0, OFFSET0 + LEVEL]
-    above = [
-        base and is_base_above(level, volume, volume_planes, region, site)
-        for volume, volume_planes, region in zip(volumes[1:], planes[1:], inside_quads, strict=True)
-    ]
-    regions = [list_polygons(site.outline) if any(above) else []]
-    for k, quad in enumerate(quads, start=1):
-        if volumes[k, REPLACES]:
-            regions = [site.cut_out(earlier, quad) for earlier in regions]
-        elif not above[k - 1]:
-            regions[0] = site.cut_out(regions[0], quad)
-        regions.append(list_polygons(inside_quads[k - 1]))
-    return fill_gaps(volumes, planes, regions, quads, site, base)
+    base_region, *sketched = sketch_regions(volumes, planes, sides, site, base)
+    regions = [base_region]
+    for quads in sketched:
+        regions.append([p for quad in quads for p in list_polygons(site.cut_quad(quad))])
+    for gap in find_gaps(volumes, sides, site):
+        if any(gap is polygon for polygon in base_region):
+            continue
+        wide_gap = site.recall(widen_gap, gap)
+        k, q = find_neighbour(wide_gap, [[], *regions[1:]], site)
+        merged = site.recall(merge_inside, regions[k][q], wide_gap, site.outline) if k > 0 else []
+        if len(merged) == 1:
+            regions[k][q] = merged[0]
+        else:
+            base_region.append(gap)
+    return regions
 
 
 def sketch_regions(
-    volumes: np.ndarray, sides: list[list[Side]], site: PlanSite
+    volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: PlanSite, base: bool
 ) -> list[list[shapely.Polygon]]:
-    """Return, for each volume, the polygons that it may roof, as if no base showed.
+    """Return, for each volume, the polygons that it may roof.
 
-    They reach beyond the outline and leave gaps along it, both of which `compose.cells.arrange`
-    takes care of. So hardly an overlay is necessary.
+    They are in local coordinates, and overlap as volumes do. What a later volume replaces is cut
+    out. With `base`, the base has gaps between the volumes, and what rises through others. Polygons
+    of the others reach beyond the outline and leave gaps along it, both of which
+    `compose.cells.arrange` takes care of. So hardly an overlay is necessary.
     """
+    if len(volumes) == 1:
+        return [list_polygons(site.outline)]
     regions: list[list[shapely.Polygon]] = [[]]
-    for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True):
+    level = volumes[0, OFFSET0 + LEVEL]
+    for volume, volume_planes, volume_sides in zip(volumes[1:], planes[1:], sides[1:], strict=True):
         quad = site.draw_quad(volume, volume_sides)
         if volume[REPLACES]:
             regions = [site.cut_out(earlier, quad) for earlier in regions]
+        elif base and is_base_above(level, volume, volume_planes, quad, site):
+            regions[0] = [*regions[0], *list_polygons(site.cut_quad(quad))]
+        else:
+            regions[0] = site.cut_out(regions[0], quad)
         regions.append([quad])
+    for gap in find_gaps(volumes, sides, site) if base else ():
+        k, _ = find_neighbour(site.recall(widen_gap, gap), [[], *regions[1:]], site)
+        if k == 0 or is_base_gap(gap, volumes[0], volumes[k], planes[k], site):
+            regions[0].append(gap)
     return regions
+
+
+def find_gaps(
+    volumes: np.ndarray, sides: list[list[Side]], site: PlanSite
+) -> list[shapely.Polygon]:
+    """Return the part of the outline that lies in no volume but the base."""
+    gaps = [site.outline] if len(volumes) > 1 else []
+    for volume, volume_sides in zip(volumes[1:], sides[1:], strict=True):
+        gaps = site.cut_out(gaps, site.draw_quad(volume, volume_sides))
+    return gaps
 
 
 def list_part_polygons(
@@ -206,17 +221,18 @@ def is_convex(ring: list[list[float]]) -> bool:
 
 
 def is_base_above(
-    base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, site: PlanSite
+    base: float, volume: np.ndarray, planes: Planes, quad: shapely.Polygon, site: PlanSite
 ) -> bool:
-    """Return whether the level base is noticeably above the volume over its region.
+    """Return whether the level base is noticeably above the volume in its plan.
 
     It must be no worse for the points there.
     """
+    corners = shapely.get_coordinates(quad)  # No place between them is lower.
+    if not (compute_volume_heights(volume, planes, corners, site) < base - SHOWS_M).any():
+        return False
+    region = site.cut_quad(quad)
     corners = shapely.get_coordinates(region)
-    if (
-        not len(corners)
-        or not (compute_volume_heights(volume, planes, corners, site) < base - SHOWS_M).any()
-    ):
+    if not (compute_volume_heights(volume, planes, corners, site) < base - SHOWS_M).any():
         return False
     xy, z = select_points_in(region, site)
     height = compute_volume_heights(volume, planes, xy, site)
@@ -266,12 +282,6 @@ def subtract_hole(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shape
     return list_polygons(shapely.difference(polygon, hole, grid_size=OVERLAY_GRID_M))
 
 
-def subtract_quads(outline: shapely.Polygon, *quads: shapely.Polygon) -> list[shapely.Polygon]:
-    """Return the part of an outline that lies in no quad."""
-    covered_area = with_area(shapely.union_all(quads, grid_size=OVERLAY_GRID_M))
-    return subtract_hole(outline, covered_area)
-
-
 def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
     """Return what parts cover together.
 
@@ -287,34 +297,6 @@ def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
 def exclude_parts(parts: Iterable[Part], excluded: Iterable[Part]) -> list[Part]:
     """Return the parts that are none of `excluded`."""
     return [part for part in parts if not any(part is item for item in excluded)]
-
-
-def fill_gaps(
-    volumes: np.ndarray,
-    planes: list[Planes],
-    regions: list[list],
-    quads: list[shapely.Polygon],
-    site: PlanSite,
-    base: bool,
-) -> list[list]:
-    """Give every rest of the outline to the volume beside it, or to the base.
-
-    With `base`, the base has it if points say so.
-    """
-    for gap in site.find_rest(quads):
-        wide_gap = site.recall(widen_gap, gap)
-        k, q = find_neighbour(
-            wide_gap, [[], *regions[1:]], partial(site.recall, measure_shared_area)
-        )
-        if k > 0 and not (base and is_base_gap(gap, volumes[0], volumes[k], planes[k], site)):
-            merged = site.recall(merge_inside, regions[k][q], wide_gap, site.outline)
-            if len(merged) == 1:
-                regions[k][q] = merged[0]
-                regions[0] = site.cut_out(regions[0], wide_gap)
-                continue
-        if not (regions[0] and is_covered(gap, regions[0])):
-            regions[0].append(gap)
-    return regions
 
 
 def widen_gap(gap: shapely.Polygon) -> shapely.Polygon:
@@ -335,13 +317,11 @@ def measure_shared_area(polygon: shapely.Polygon, other: shapely.Polygon) -> flo
 
 
 def find_neighbour(
-    wide_gap: shapely.Polygon,
-    polygons: list[list[shapely.Polygon]],
-    area: Callable[..., float] = measure_shared_area,
+    wide_gap: shapely.Polygon, polygons: list[list[shapely.Polygon]], site: PlanSite | None = None
 ) -> tuple[int, int]:
-    """Return the two indices of the one of `polygons` that shares most `area`.
+    """Return the two indices of the one of `polygons` that shares most area with `wide_gap`.
 
-    It shares it with `wide_gap`. Without any, these are zeros.
+    Without any, these are zeros. The `site` keeps the areas.
     """
     places = [(k, q) for k, group in enumerate(polygons) for q in range(len(group))]
     if not places:
@@ -351,18 +331,10 @@ def find_neighbour(
         place for place, is_touching in zip(places, touch.tolist(), strict=True) if is_touching
     ]
     if len(neighbours) > 1:
+        area = partial(site.recall, measure_shared_area) if site else measure_shared_area
         areas = [area(wide_gap, polygons[k][q]) for k, q in neighbours]
         neighbours = [max(zip(areas, neighbours, strict=True))[1]]
     return neighbours[0] if neighbours else (0, 0)
-
-
-def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
-    """Return whether the polygons cover a gap together, but for a millimetre."""
-    if any(shapely.covers(polygon, gap) for polygon in polygons):
-        return True
-    return bool(
-        shapely.covers(shapely.union_all(polygons, grid_size=OVERLAY_GRID_M).buffer(1e-3), gap)
-    )
 
 
 def is_base_gap(

@@ -112,13 +112,11 @@ class Window(NamedTuple):
 class Drawing(NamedTuple):
     """What a window shows of a roof: one part and its plan by site.
 
-    A plan is None where its part makes none. `regions` are those of the window's volumes in each
-    site, None where they were only sketched.
+    A plan is None where its part makes none.
     """
 
     parts: list[Part]
     plans: list[DrawnPlan | None]
-    regions: list[list[list[shapely.Polygon]]] | None
 
     @property
     def corners(self) -> float:
@@ -147,11 +145,7 @@ def weld(
         if next_state is state:
             break
         state, drawing = next_state, better_drawing or draw_window(next_state, whole, problem)
-    if drawing.regions is not None and len(whole.numbers) == len(volumes):
-        (regions,) = drawing.regions
-    else:
-        regions = cut_regions(volumes, state.planes, state.sides, site, base)
-    return state.sides, state.planes, regions
+    return state.sides, state.planes, cut_regions(volumes, state.planes, state.sides, site, base)
 
 
 def make_problem(
@@ -184,16 +178,13 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     """Draw what a window shows of a roof."""
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
-    is_cut = window.base or len(volumes) == 1
-    sketch = None if is_cut else sketch_regions(volumes, sides, problem.site)
-    parts, plans, all_regions = [], [], []
+    parts, plans = [], []
     for site in window.sites:
-        regions = sketch or cut_regions(volumes, planes, sides, site, window.base)
+        regions = sketch_regions(volumes, planes, sides, site, window.base)
         part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
         parts.append(part)
         plans.append(draw_plan(part, owner, site.outline))
-        all_regions.append(regions)
-    return Drawing(parts, plans, all_regions if sketch is None else None)
+    return Drawing(parts, plans)
 
 
 @dataclass
@@ -366,7 +357,9 @@ def make_window(
         sites = [problem.site]
     else:
         polygons = list_polygons(shapely.intersection(outline, box))
-        sites = [PlanSite(part, problem.plan, window_scene, {}) for part in polygons]
+        sites = [
+            PlanSite(part, problem.plan, window_scene, problem.site.cache) for part in polygons
+        ]
     weight = len(inside) / max(count, 1)
     return Window(box, numbers, sites, window_scene, xy[judges], scene.z[judges], weight, base)
 
