@@ -115,18 +115,6 @@ def single() -> None:
     fit_roof(house())
 
 
-def curves() -> None:
-    """Compile what shows that a part is none of the curved shapes."""
-    from ..fit.union.barrels import measure_arc_misfit
-    from ..fit.union.drums import find_circle
-    from ..fit.union.round_tops import find_centre, measure_fall
-
-    xyz, middle = house(), np.array([3.0, 3.5])
-    measure_fall(xyz, find_centre(xyz, middle, 3.0), 3.0, 0.5)
-    measure_arc_misfit(xyz[:, 1].copy(), xyz[:, 2].copy())
-    find_circle(xyz, 3.0, xyz[:, 2] == 3.0)
-
-
 def warm_recognition() -> None:
     """Compile the arrangement of a cloud for the network."""
     from ..segment.arrange import Layout, arrange
@@ -166,7 +154,7 @@ def points() -> None:
 
 PIECES: dict[str, Callable[[], None]] = {
     piece.__name__: piece
-    for piece in (moves, planes, outlines, solid, check, points, single, curves, warm_recognition)
+    for piece in (moves, planes, outlines, solid, check, points, single, warm_recognition)
 }
 
 

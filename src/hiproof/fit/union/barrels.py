@@ -8,8 +8,6 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from ...compiled import compiled
-from ...geometry.arrays import compute_median
 from ...model import Part
 from ...settings import Settings
 from .judged import COMPARED_M, JudgedRoof
@@ -61,7 +59,6 @@ def find_ends(part: Part, along: np.ndarray) -> np.ndarray:
     return np.array([places.min(), places.max()])
 
 
-@compiled
 def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
     """Return how far heights z (n,) lie from an arc over x (n,), in the mean (m).
 
@@ -80,6 +77,6 @@ def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
             for other in range(k + 1, 5 if square > 1e-9 else 0):
                 columns[other] -= (weighted * columns[other]).sum() / square * columns[k]
         distances = np.abs(columns[4])
-        reach = max(MOST_DISTANCE_M, 2.0 * compute_median(distances))
+        reach = max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
         used = 1.0 * (distances <= reach)
     return np.minimum(distances, MOST_DISTANCE_M).mean()

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from ...compiled import compiled
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
 from ...primitives.cants import list_cants
@@ -79,7 +78,6 @@ def list_round_shapes(
             yield shape
 
 
-@compiled
 def find_centre(points: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
     """Return the middle (2,) of what rises above the rest of a disc of points (n, 3)."""
     centre = start.copy()
@@ -94,27 +92,25 @@ def find_centre(points: np.ndarray, start: np.ndarray, radius: float) -> np.ndar
     return centre
 
 
-@compiled
 def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: float) -> float:
     """Return how far (m) heights fall from a disc's middle to its outer half.
 
     It is 0 where the points (n, 3) hardly fall, or not `alike` in all directions.
     """
-    n_inner, inner = 0, 0.0
-    counts, means = np.zeros(TURN_SECTORS), np.zeros(TURN_SECTORS)
-    for x, y, z in points:
-        x, y = x - centre[0], y - centre[1]
-        distance = math.hypot(x, y)
-        if distance <= 0.25 * radius:
-            n_inner, inner = n_inner + 1, inner + z
-        elif 0.5 * radius < distance <= radius:
-            turn = math.atan2(y, x) / (2.0 * math.pi) % 1.0
-            sector = min(int(turn * TURN_SECTORS), TURN_SECTORS - 1)
-            counts[sector], means[sector] = counts[sector] + 1.0, means[sector] + z
-    if counts.sum() < FEWEST_AROUND or n_inner == 0 or np.count_nonzero(counts) < FEWEST_SECTORS:
+    (x, y), z = (points[:, :2] - centre).T, points[:, 2]
+    distances = np.hypot(x, y)
+    inner = z[distances <= 0.25 * radius]
+    outer = (distances > 0.5 * radius) & (distances <= radius)
+    if not len(inner) or np.count_nonzero(outer) < FEWEST_AROUND:
         return 0.0
+    turns = np.arctan2(y[outer], x[outer]) / (2.0 * math.pi) % 1.0
+    sectors = np.minimum((turns * TURN_SECTORS).astype(int), TURN_SECTORS - 1)
+    counts = np.bincount(sectors, minlength=TURN_SECTORS)
+    if np.count_nonzero(counts) < FEWEST_SECTORS:
+        return 0.0
+    means = np.bincount(sectors, z[outer], TURN_SECTORS)
     means = means[counts > 0] / counts[counts > 0]
-    fall = inner / n_inner - means.mean()
+    fall = float(inner.mean() - means.mean())
     return fall if fall >= LEAST_FALL_M and means.std() <= alike * fall else 0.0
 
 
