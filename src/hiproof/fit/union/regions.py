@@ -116,15 +116,18 @@ def sketch_regions(
     """
     if len(volumes) == 1:
         return [list_polygons(site.outline)]
-    regions: list[list[shapely.Polygon]] = [[]]
-    level = volumes[0, OFFSET0 + LEVEL]
-    for volume, volume_planes, volume_sides in zip(volumes[1:], planes[1:], sides[1:], strict=True):
-        quad = site.draw_quad(volume, volume_sides)
+    pairs = zip(volumes[1:], sides[1:], strict=True)
+    quads = [site.draw_quad(volume, volume_sides) for volume, volume_sides in pairs]
+    lower = [
+        base and is_base_above(volumes[0, OFFSET0 + LEVEL], volume, volume_planes, quad, site)
+        for volume, volume_planes, quad in zip(volumes[1:], planes[1:], quads, strict=True)
+    ]
+    lower_quads = [quad for quad, is_lower in zip(quads, lower, strict=True) if is_lower]
+    regions = [[p for quad in lower_quads for p in list_polygons(site.cut_quad(quad))]]
+    for volume, quad, is_lower in zip(volumes[1:], quads, lower, strict=True):
         if volume[REPLACES]:
             regions = [site.cut_out(earlier, quad) for earlier in regions]
-        elif base and is_base_above(level, volume, volume_planes, quad, site):
-            regions[0] = [*regions[0], *list_polygons(site.cut_quad(quad))]
-        else:
+        elif not is_lower:
             regions[0] = site.cut_out(regions[0], quad)
         regions.append([quad])
     for gap in find_gaps(volumes, sides, site) if base else ():

@@ -227,7 +227,12 @@ def find_near_places(volume, across_u, u, v):
     )
     u0, u1 = min(volume[U0], most_u) - reach_u, max(volume[U0 + 1], least_u) + reach_u
     v0, v1 = min(volume[V0], most_v) - reach_v, max(volume[V1], least_v) + reach_v
-    return np.nonzero((u >= u0) & (u <= u1) & (v >= v0) & (v <= v1))[0]
+    numbers, count = np.empty(len(u), np.int64), 0
+    for i in range(len(u)):
+        if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
+            numbers[count] = i
+            count += 1
+    return numbers[:count]
 
 
 @compiled
