@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from hiproof.fit.union import agree, fit_building
-from hiproof.fit.union.agree import restore_risen_planes, sum_misfit
+from hiproof.fit.union.agree import measure_misfits, restore_risen_planes
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.finish import read_volume_planes
 from hiproof.fit.union.plan import lay_out_plan
@@ -136,8 +136,10 @@ def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
     volumes[1, OFFSET0 + LEVEL] -= 0.01  # over all of it, hidden
     result = [read_volume_planes(volume, scene) for volume in volumes]
     risen = replace(result[1], rows=result[1].rows + [0.0, 0.0, 0.4])
-    assert sum_misfit(volumes, [result[0], risen, result[2]], scene) > 0.5 * scene.n
-    planes = restore_risen_planes(volumes, [result[0], risen, result[2]], scene)
-    assert sum_misfit(volumes, planes, scene) == sum_misfit(volumes, result, scene)
+    with_risen = [result[0], risen, result[2]]
+    assert measure_misfits(volumes, with_risen, scene)[0].sum() > 0.5 * scene.n
+    _, misfit = restore_risen_planes(volumes, with_risen, scene)
+    assert misfit == measure_misfits(volumes, result, scene)[0].sum()
     shifted = replace(result[2], rows=result[2].rows + [0.0, 0.0, 0.02])
-    assert restore_risen_planes(volumes, [*result[:2], shifted], scene)[2] is shifted
+    planes, _ = restore_risen_planes(volumes, [*result[:2], shifted], scene)
+    assert planes[2] is shifted

@@ -12,7 +12,7 @@ from hiproof.fit.union import fit_building
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.drawn_plan import DrawnPlan
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.repairs import find_repairs, transform_places
+from hiproof.fit.union.repairs import find_repairs
 from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side
 from hiproof.fit.union.volumes import COLUMNS, LEVEL
@@ -117,7 +117,7 @@ def test_a_side_may_take_the_line_of_the_edge_that_carries_it_on():
     levels = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 3.0], [0.0, 0.0, 6.0]])
     owner = np.array([[1, LEVEL], [0, LEVEL], [2, LEVEL]])
     drawn = DrawnPlan(places, edges, beside, levels, owner, corners=4)
-    own_places = transform_places(places, 0, plan, scene)
+    own_places = (places - plan.frame.origin[:2]) @ plan.frame.rotation.T
     edge = int(2 * np.argmin(np.ptp(own_places[:2], axis=0)))  # across which axis the side lies
     x, y = own_places[:, edge // 2], own_places[:, 1 - edge // 2]
     sides = [Side(1e3)] * 4

@@ -135,7 +135,7 @@ def test_a_roof_drawn_in_groups_is_drawn_as_all_at_once():
     ends = gather_ends(outline, plan, scene)
     at_once = draw_roof(volumes, ends, scene, {})
     in_groups, _ = draw_in_groups(volumes, ends, PlanSite(outline, plan, scene, {}), {})
-    for own_piece, theirs in zip(in_groups.sides[1:], at_once.sides[1:], strict=True):
+    for own_piece, theirs in zip(in_groups[1:], at_once.sides[1:], strict=True):
         assert [side.offset for side in own_piece] == pytest.approx(
             [side.offset for side in theirs], abs=1e-6
         )

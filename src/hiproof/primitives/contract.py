@@ -201,7 +201,7 @@ class Primitive:
             for a, b, _ in self.plane_formulas
         )
 
-    @property
+    @cached_property
     def is_of_family(self) -> bool:
         """Whether it has at most one plane a side and one level plane.
 

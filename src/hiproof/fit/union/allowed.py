@@ -30,9 +30,11 @@ def list_allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
     All are allowed if there are no types.
     """
     allowed = np.zeros((2, 3, 3, 2), bool)
-    names = {part for name in types or CATALOGUE for part in (name, *list_components(name))} | {
-        "flat"
-    }
+    if not types:
+        allowed[:] = True
+        allowed[0, 0, 0] = False  # no plane at all
+        return allowed
+    names = {part for name in types for part in (name, *list_components(name))} | {"flat"}
     kin = {name: base for base, *kin_names in KIN for name in kin_names}
     for (top, along, across), (shape, _) in GENERAL_SHAPES.items():
         ties = [

@@ -60,10 +60,10 @@ class PlanSite(NamedTuple):
 
     def draw_quad(self, volume: np.ndarray, sides: list[Side]) -> shapely.Polygon:
         """Return a volume's plan."""
-        key = volume[POSITION].tobytes(), *sides
+        key = volume[POSITION].tobytes(), id(sides)
         if key not in self.cache:
-            self.cache[key] = draw_quad(volume, sides, self.plan, self.scene)
-        return self.cache[key]
+            self.cache[key] = draw_quad(volume, sides, self.plan, self.scene), sides
+        return self.cache[key][0]
 
     def cut_quad(self, quad: shapely.Polygon) -> shapely.Geometry:
         """Return the part of a volume's plan inside the outline."""
@@ -263,7 +263,7 @@ def compute_volume_heights(
     c, s = scene.turn[int(volume[DIRECTION])]
     uv = (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
     rows = planes.rows[np.isfinite(planes.rows[:, 2])]
-    return (np.column_stack([uv, np.ones(len(uv))]) @ rows.T).min(axis=1)
+    return (uv @ rows[:, :2].T + rows[:, 2]).min(axis=1)
 
 
 def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:

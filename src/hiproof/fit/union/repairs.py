@@ -69,31 +69,32 @@ def find_repairs(
         )
         if not free:
             continue
-        places = transform_places(plan_drawn.places, int(volumes[k, DIRECTION]), plan, scene)
+        c, s = scene.turn[int(volumes[k, DIRECTION])]
+        axes = plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
+        places = (plan_drawn.places - plan.frame.origin[:2]) @ axes
+        slopes, heights = plan_drawn.planes[:, :2], plan_drawn.planes[:, 2]
+        planes = np.column_stack([slopes @ axes, slopes @ plan.frame.origin[:2] + heights])
         for edge in free:
-            repairs += list_side_moves(plan_drawn, gaps, places, is_own, (k, edge), sides[k][edge])
+            repairs += list_side_moves(
+                plan_drawn, gaps, places, planes, is_own, (k, edge), sides[k][edge]
+            )
     return sorted(repairs, key=lambda repair: repair.size)
-
-
-def transform_places(xy: np.ndarray, direction: int, plan: Plan, scene: Scene) -> np.ndarray:
-    """Return local places (n, 2) in the axes of a direction."""
-    c, s = scene.turn[direction]
-    return (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
 
 
 def list_side_moves(
     plan_drawn: DrawnPlan,
     gaps: np.ndarray,
     places: np.ndarray,
+    planes: np.ndarray,
     is_own: np.ndarray,
     key: tuple[int, int],
     side: Side,
 ) -> Iterator[Repair]:
     """Yield moves of one side where it is visible on edges of its own.
 
-    `key` is (volume, edge), and `is_own` (e,) are the volume's edges. The side may move parallel to
-    a place nearby, to one at each end, to the line of a side that carries it on, or to the line
-    where its planes meet.
+    `key` is (volume, edge), and `is_own` (e,) are the volume's edges. The plan's `places` (m, 2)
+    and `planes` (p, 3) are in its axes. The side may move parallel to a place nearby, to one at
+    each end, to the line of a side that carries it on, or to the line where its planes meet.
     """
     edge = key[1]
     x, y = places[:, edge // 2], places[:, 1 - edge // 2]
@@ -122,7 +123,7 @@ def list_side_moves(
             yield Repair(float(size), {key: moved})
     yield from list_line_moves(plan_drawn, x, y, on_side, key, side)
     for e in np.flatnonzero(on_side & is_low_step(gaps)):
-        line = find_fold_line(plan_drawn, places, int(e), edge)
+        line = find_fold_line(*planes[plan_drawn.beside[e]], edge)
         if line is not None:
             moved = Side(line[0], line[1], False, side.sigma)
             shift = np.abs(
@@ -160,23 +161,17 @@ def list_line_moves(
             yield Repair(float(shift), {key: line})
 
 
-def find_fold_line(
-    plan_drawn: DrawnPlan, places: np.ndarray, e: int, edge: int
-) -> tuple[float, float] | None:
-    """Find the line on which the planes beside edge `e` of the plan meet.
+def find_fold_line(plane: np.ndarray, other: np.ndarray, edge: int) -> tuple[float, float] | None:
+    """Find the line on which two planes (3,) in a volume's axes meet.
 
-    It is x = at + lean y in a volume's axes, with x across its side `edge`. Returns None without a
-    clear line.
+    It is x = at + lean y, with x across the volume's side `edge`. Returns None without a clear
+    line.
     """
-    left, right = plan_drawn.planes[plan_drawn.beside[e]]
-    positions = np.column_stack([plan_drawn.places, np.ones(len(places))])
-    gaps = positions @ (left - right)  # linear in the places: read off it in the volume's axes
-    own_positions = np.column_stack([places, np.ones(len(places))])
-    (a, b, c), *_ = np.linalg.lstsq(own_positions, gaps, rcond=None)
+    a, b, c = (plane - other).tolist()
     fall, across = (a, b) if edge < 2 else (b, a)
     if not abs(fall) > LEAST_BREAK or not abs(across / fall) < MOST_REPAIR_LEAN:
         return None
-    return float(-c / fall), float(-across / fall)
+    return -c / fall, -across / fall
 
 
 def list_low_steps(plan_drawn: DrawnPlan, gaps: np.ndarray) -> Iterator[Repair]:

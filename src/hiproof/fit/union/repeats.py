@@ -101,12 +101,14 @@ def find_copy(
     x = (strip.U, strip.V)[axis][int(volumes[k, DIRECTION])]
     lower, upper = volumes[k, U0 + 2 * axis : U0 + 2 * axis + 2]
     cost = compute_strip_costs(volumes, strip)
+    best, most_saved = None, COPY_UNITS * evidence
+    if cost.sum() <= most_saved:
+        return None
     order = np.argsort(x, kind="stable")
     total, x = np.concatenate([[0.0], np.cumsum(cost[order])]), x[order]
     back = np.arange(lower - upper, x[0] - lower, -COPY_STEP_M)
     steps = np.concatenate([back, np.arange(upper - lower, x[-1] - upper, COPY_STEP_M)])
     first, last = np.searchsorted(x, lower + steps), np.searchsorted(x, upper + steps, "right")
-    best, most_saved = None, COPY_UNITS * evidence
     for n in np.flatnonzero(total[last] - total[first] > most_saved):
         part = select_points(strip, np.sort(order[first[n] : last[n]]))
         copy = move_volume(volumes[k], axis, steps[n])

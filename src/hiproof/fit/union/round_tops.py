@@ -100,8 +100,10 @@ def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: f
     (x, y), z = (points[:, :2] - centre).T, points[:, 2]
     distances = np.hypot(x, y)
     inner = z[distances <= 0.25 * radius]
-    outer = (distances > 0.5 * radius) & (distances <= radius)
-    if not len(inner) or np.count_nonzero(outer) < FEWEST_AROUND:
+    outer = np.flatnonzero((distances > 0.5 * radius) & (distances <= radius))
+    if not len(inner) or len(outer) < FEWEST_AROUND:
+        return 0.0
+    if inner.mean() - z[outer].min() < LEAST_FALL_M:
         return 0.0
     turns = np.arctan2(y[outer], x[outer]) / (2.0 * math.pi) % 1.0
     sectors = np.minimum((turns * TURN_SECTORS).astype(int), TURN_SECTORS - 1)
