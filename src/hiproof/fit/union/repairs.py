@@ -123,7 +123,8 @@ def list_side_moves(
             yield Repair(float(size), {key: moved})
     yield from list_line_moves(plan_drawn, x, y, on_side, key, side)
     for e in np.flatnonzero(on_side & is_low_step(gaps)):
-        line = find_fold_line(*planes[plan_drawn.beside[e]], edge)
+        left, right = planes[plan_drawn.beside[e]]
+        line = find_fold_line(left, right, edge)
         if line is not None:
             moved = Side(line[0], line[1], False, side.sigma)
             shift = np.abs(

@@ -110,8 +110,8 @@ def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: f
     counts = np.bincount(sectors, minlength=TURN_SECTORS)
     if np.count_nonzero(counts) < FEWEST_SECTORS:
         return 0.0
-    means = np.bincount(sectors, z[outer], TURN_SECTORS)
-    means = means[counts > 0] / counts[counts > 0]
+    sums = np.bincount(sectors, z[outer], TURN_SECTORS)
+    means = sums[counts > 0] / counts[counts > 0]
     fall = float(inner.mean() - means.mean())
     return fall if fall >= LEAST_FALL_M and means.std() <= alike * fall else 0.0
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import chain, combinations
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -19,9 +19,9 @@ from .cants import Cache, fit_planes, list_walls
 from .cut_corners import draw_over_corners
 from .finish import SQUARE_LEAN, Planes
 from .moves import refit_volumes, remove_volume
-from .objective import compute_objective, is_base_visible, price_edges
+from .objective import compute_costs, compute_objective, is_base_visible, price_edges
 from .plan import Plan
-from .prices import ALONG_AXES_UNITS
+from .prices import ALONG_AXES_UNITS, FITTING_UNITS
 from .scene import Scene
 from .sides import (
     OUTLINE_REACH_M,
@@ -43,6 +43,7 @@ from .volumes import (
     U0,
     V0,
     V1,
+    compute_roof_heights,
     list_movable,
     measure_runs,
     price_volume,
@@ -52,6 +53,8 @@ UNITE_GAP_M = 0.4  # Largest distance (m) between the rectangles.
 UNITE_OFFSET_M = 1.0  # Largest distance (m) of their sides along the line of both.
 SLOPES_ALIKE = 0.15  # Volumes whose slopes (rise over run) differ more are not tried as one.
 HEIGHTS_ALIKE_M = 0.5  # Volumes whose heights (m) differ more are not tried as one.
+# Most volumes drawn out over walls that cut corners off: a house has one bay or two.
+MOST_CUT_CORNERS = 2
 
 
 class OutlineEnds(NamedTuple):
@@ -88,17 +91,17 @@ def unite_volumes(
 ) -> DrawnRoof:
     """Draw the volumes along their sides, and drop or merge those that do not pay.
 
-    A trial is drawn if it is no more than a little worse along the axes. Planes in the `cache` of
-    this scene are not fitted again. `covers_corners` says whether one volume may replace several
-    over walls that cut its corners off.
+    Planes in the `cache` of this scene are not fitted again. `covers_corners` says whether one
+    volume may replace several over walls that cut its corners off.
     """
     value = compute_objective(volumes, scene, np.inf)
     best = draw_roof(volumes, ends, scene, cache)
+    if covers_corners:
+        best = cover_cut_corners(best, ends, scene, cache)
     has_improved = True
     while has_improved:
         has_improved = False
-        corner_trials = draw_over_corners(best.volumes, ends.walls, scene) if covers_corners else ()
-        for trial in chain(corner_trials, list_reductions(best)):
+        for trial in list_reductions(best):
             if is_base_bared(trial, best.volumes, scene):
                 continue
             trial, trial_value = refit_volumes(
@@ -144,9 +147,41 @@ def is_reaching(lines: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.n
     return ((lines.min(axis=0) < upper) & (lines.max(axis=0) > lower)).all(axis=1)
 
 
+def cover_cut_corners(roof: DrawnRoof, ends: OutlineEnds, scene: Scene, cache: Cache) -> DrawnRoof:
+    """Replace several volumes by one over walls that cut its corners off, if cheaper.
+
+    This happens at most MOST_CUT_CORNERS times.
+    """
+    for _ in range(MOST_CUT_CORNERS):
+        roof_before = roof
+        for trial in draw_over_corners(roof_before.volumes, ends.walls, scene):
+            if bound_cost(trial, scene) > roof.cost + FITTING_UNITS * scene.evidence:
+                continue
+            if is_base_bared(trial, roof_before.volumes, scene):
+                continue
+            trial, _ = refit_volumes(trial, scene, compute_objective(trial, scene, np.inf))
+            trial_roof = draw_roof(trial, ends, scene, cache)
+            roof = trial_roof if trial_roof.cost < roof.cost else roof
+        if roof is roof_before:
+            break
+    return roof
+
+
 def is_base_bared(trial: np.ndarray, volumes: np.ndarray, scene: Scene) -> bool:
     """Return whether a trial bares the base, and the volumes that it replaces do not."""
     return bool(is_base_visible(trial, scene)) and not is_base_visible(volumes, scene)
+
+
+def bound_cost(volumes: np.ndarray, scene: Scene) -> float:
+    """Return what a roof costs at least, whatever further planes lower it.
+
+    It costs its volumes, its edges, and the points above it.
+    """
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    is_above = scene.z[: scene.n] > z[: scene.n]
+    return float(compute_costs(z, scene)[: scene.n][is_above].sum()) + price_structure(
+        volumes, scene
+    )
 
 
 def price_structure(volumes: np.ndarray, scene: Scene) -> float:
