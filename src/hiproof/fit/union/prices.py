@@ -108,7 +108,7 @@ Of 334 best additions 324 are still found.
 
 LEFT_OUT_UNITS, LEFT_OUT_SHARE = 4.0, 0.1  # leaving a volume out; besides, a share of the points
 CUT_UNITS = 10.0  # cutting a volume short, before its neighbours are drawn out
-ALONG_AXES_UNITS = 5.0  # fewer volumes along the axes, before planes face walls: more paid once
+ALONG_AXES_UNITS = 2.0  # fewer volumes along the axes, besides what planes that face walls gain
 FITTING_UNITS = 2.0  # that fitting may still gain
 REPAIR_UNITS = 2.5  # a repair, by its points alone: but for low steps, it may save no more
 

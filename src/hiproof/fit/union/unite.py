@@ -107,7 +107,8 @@ def unite_volumes(
             trial, trial_value = refit_volumes(
                 trial, scene, compute_objective(trial, scene, np.inf)
             )
-            if trial_value > value + ALONG_AXES_UNITS * scene.evidence:
+            gain = max(value - best.cost, 0.0)  # of planes that face walls
+            if trial_value > value + gain + ALONG_AXES_UNITS * scene.evidence:
                 continue
             roof = draw_roof(trial, ends, scene, cache)
             if roof.cost < best.cost:
