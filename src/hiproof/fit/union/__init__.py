@@ -50,7 +50,9 @@ agree       planes, slopes, ridges and eaves that volumes have in common
 corners     hips and valleys that end beside a corner of the outline, moved into it
 drawn_plan  the plan of the drawn roof: its corners, and the planes beside its edges
 repairs     what nearly meets in it and might be made to meet
-weld        the repairs that pay: sides that end in corners, low steps that become fold lines
+faces       the faces of the drawn plan, and who may take them
+weld        the repairs that pay: sides that end in corners, low steps that become fold lines,
+            faces handed to the volumes beside them
 regions     where each volume roofs the outline
 names       from volumes to named parts of the family of roof shapes
 teeth       rows of equal monopitches as saw-teeth

@@ -5,7 +5,7 @@
 This concerns sides, corners and low steps. A corner has a price because a draughtsman counts it. A
 metre of a low step has that of the search. Repairs are tried the smallest first, each in a window
 around it, and one that pays is kept. After a round, the roof is drawn again, until no repair pays.
-The outline never moves.
+Then faces are handed to the volumes beside them, at the same price. The outline never moves.
 """
 
 from __future__ import annotations
@@ -33,11 +33,18 @@ from .agree import (
 )
 from .around import compute_roof_everywhere, measure_context
 from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
+from .faces import PlanFace, Regions, assign_face, draw_out_sides, list_faces
 from .finish import Planes
 from .objective import compute_costs, compute_misfits
 from .plan import Plan
 from .prices import CORNER_COST, LOW_STEP_COST_A_METRE, PARAMETER_COST, REPAIR_UNITS
-from .regions import PlanSite, cut_regions, list_polygons, sketch_regions
+from .regions import (
+    PlanSite,
+    compute_volume_heights,
+    cut_regions,
+    list_polygons,
+    sketch_regions,
+)
 from .repairs import Repair, find_repairs, measure_low_steps
 from .scene import Scene, select_points
 from .sides import Side, cross_lines
@@ -83,12 +90,14 @@ class WeldProblem(NamedTuple):
 class RoofState(NamedTuple):
     """A roof: its sides and planes.
 
-    `basis` (p, q) spans the unknowns that its equations leave free.
+    `basis` (p, q) spans the unknowns that its equations leave free. `regions` are what each volume
+    may roof, empty as long as that follows from the sides.
     """
 
     sides: list[list[Side]]
     planes: list[Planes]
     basis: np.ndarray
+    regions: Regions = ()
 
 
 class Window(NamedTuple):
@@ -145,7 +154,9 @@ def weld(
         if next_state is state:
             break
         state, drawing = next_state, better_drawing or draw_window(next_state, whole, problem)
-    return state.sides, state.planes, cut_regions(volumes, state.planes, state.sides, site, base)
+    regions = cut_regions(volumes, state.planes, state.sides, site, base)
+    state = assign_faces(state._replace(regions=regions), drawing, whole, problem)
+    return state.sides, state.planes, list(state.regions)
 
 
 def make_problem(
@@ -178,9 +189,10 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     """Draw what a window shows of a roof."""
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
+    given_regions = [state.regions[k] for k in window.numbers] if state.regions else []
     parts, plans = [], []
     for site in window.sites:
-        regions = sketch_regions(volumes, planes, sides, site, window.base)
+        regions = given_regions or sketch_regions(volumes, planes, sides, site, window.base)
         part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
         parts.append(part)
         plans.append(draw_plan(part, owner, site.outline))
@@ -265,6 +277,78 @@ def run_round(
             state, after_drawing = repaired_state, trial if present.window is whole else None
             changed.append(box)
     return state, after_drawing
+
+
+def assign_faces(
+    state: RoofState, drawing: Drawing, whole: Window, problem: WeldProblem
+) -> RoofState:
+    """Return the roof with every face handed over that makes it cheaper.
+
+    The state has regions. Who takes a face gets its sides drawn out.
+    """
+    first_state, tried = state, set[tuple]()
+    while True:
+        next_state = run_face_round(state, drawing, whole, tried, problem)
+        if next_state is state:
+            break
+        state, drawing = next_state, draw_window(next_state, whole, problem)
+    sides = list(state.sides)
+    for k, region in enumerate(state.regions):
+        if region and region is not first_state.regions[k]:
+            sides[k] = draw_out_sides(problem.volumes[k], sides[k], region, problem.site)
+    return state._replace(sides=sides)
+
+
+def run_face_round(
+    state: RoofState, drawing: Drawing, whole: Window, tried: set[tuple], problem: WeldProblem
+) -> RoofState:
+    """Return the roof with faces handed over, at most one in each window."""
+    plan, is_large = drawing.plans[0], problem.outline.area > WINDOW_M2
+    if plan is None:
+        return state
+    changed: list[shapely.Polygon] = []
+    present = RepairTrial(state, whole, plan, problem)
+    for face in list_faces(plan):
+        box = shapely.box(*shapely.buffer(face.polygon, MARGIN_M).bounds) if is_large else whole.box
+        if face.key in tried or any(shapely.intersects(box, other) for other in changed):
+            continue
+        tried.add(face.key)
+        if is_large:
+            places = [shapely.MultiPolygon(polygons) for polygons in state.regions[1:]]
+            window = make_window(box, places, problem.base, problem)
+            present = RepairTrial(state, window, plan, problem)
+        new_state = assign_if_cheaper(face, present)
+        if new_state is not None:
+            state = new_state
+            changed.append(box)
+    return state
+
+
+def assign_if_cheaper(face: PlanFace, present: RepairTrial) -> RoofState | None:
+    """Return the roof with a face handed over, None if that is not cheaper."""
+    state, site = present.state, present.problem.site
+    for takers in rank_takers(face, present):
+        regions = assign_face(face, takers, state.regions, site)
+        new_state = state._replace(regions=regions)
+        if regions and present.draw_if_cheaper(new_state) is not None:
+            return new_state
+    return None
+
+
+def rank_takers(face: PlanFace, present: RepairTrial) -> list[frozenset[int]]:
+    """List who may take a face: first who explains its points best."""
+    window, planes, problem = present.window, present.state.planes, present.problem
+    inside = shapely.contains_xy(face.polygon, *window.xy.T)
+    heights = {
+        k: compute_volume_heights(problem.volumes[k], planes[k], window.xy[inside], problem.site)
+        for k in face.takers
+    }
+
+    def measure_misfit(takers: frozenset[int]) -> float:
+        highest = np.max([heights[k] for k in takers], axis=0)
+        return float(compute_misfits(window.z[inside], highest, problem.scene).sum())
+
+    return sorted(face.list_choices(), key=measure_misfit)
 
 
 def list_owners_beyond(plan_drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
@@ -400,7 +484,7 @@ def apply_repair(
     """Return the roof after a repair, None if its points cost too much more."""
     most_units = REPAIR_UNITS + LOW_STEP_COST_A_METRE * repair.length
     most_cost = most_units * problem.scene.evidence
-    sides, planes, basis = state
+    sides, planes, basis, _ = state
     for (k, edge), side in repair.sides.items():
         position = int(np.flatnonzero(window.numbers == k)[0])
         volumes = problem.volumes[window.numbers]
