@@ -70,7 +70,7 @@ def test_sides_are_drawn_out_to_what_the_volume_covers():
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_level_strips_along_the_eaves_of_a_gable_go(monkeypatch, seed):
-    """One level volume under a gable that ends 1.4 m before both eaves leaves no strip there."""
+    """One level volume under a gable that ends 1.4 m before both eaves leaves no strip."""
     rng = np.random.default_rng(seed)
     x, y = rng.random((2, 5 * 14 * 11)) * [[14.0], [11.0]]
     z = 5.0 - 0.2 * np.abs(y - 5.5) + rng.normal(0.0, 0.02, len(x))

@@ -73,9 +73,11 @@ def make_face(
     inner, outer = plan_drawn.beside[edges, ways], plan_drawn.beside[edges, 1 - ways]
     if inner[0] < 0:
         return None
-    owner, gaps = int(plan_drawn.owner[inner[0], 0]), plan_drawn.gaps[edges]
-    volumes = plan_drawn.owner[outer[gaps.max(axis=1) < LOW_STEP_M], 0]
-    takers = frozenset(volumes.tolist()) - {owner}
+    owner, is_low = (
+        int(plan_drawn.owner[inner[0], 0]),
+        plan_drawn.gaps[edges].max(axis=1) < LOW_STEP_M,
+    )
+    takers = frozenset(plan_drawn.owner[outer[is_low], 0].tolist()) - {owner}
     return PlanFace(polygon, owner, takers) if takers else None
 
 

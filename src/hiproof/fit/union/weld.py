@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -21,6 +22,7 @@ import shapely
 
 from ...model import Part
 from ...model.heights import find_highest
+from .add import FEWEST_UNEXPLAINED, UNEXPLAINED
 from .agree import (
     Agreement,
     NormalSums,
@@ -336,19 +338,29 @@ def assign_if_cheaper(face: PlanFace, present: RepairTrial) -> RoofState | None:
 
 
 def rank_takers(face: PlanFace, present: RepairTrial) -> list[frozenset[int]]:
-    """List who may take a face: first who explains its points best."""
+    """List who may take a face: first who explains its points best.
+
+    Who would leave points unexplained that are worth a volume is left out.
+    """
     window, planes, problem = present.window, present.state.planes, present.problem
     inside = shapely.contains_xy(face.polygon, *window.xy.T)
     heights = {
         k: compute_volume_heights(problem.volumes[k], planes[k], window.xy[inside], problem.site)
-        for k in face.takers
+        for k in (face.owner, *face.takers)
     }
 
-    def measure_misfit(takers: frozenset[int]) -> float:
-        highest = np.max([heights[k] for k in takers], axis=0)
-        return float(compute_misfits(window.z[inside], highest, problem.scene).sum())
+    def measure_misfits(volumes: Iterable[int]) -> np.ndarray:
+        highest = np.max([heights[k] for k in volumes], axis=0)
+        return compute_misfits(window.z[inside], highest, problem.scene)
 
-    return sorted(face.list_choices(), key=measure_misfit)
+    misfits = {takers: measure_misfits(takers) for takers in face.list_choices()}
+    most = count_unexplained(measure_misfits([face.owner])) + FEWEST_UNEXPLAINED
+    ranked = sorted(misfits, key=lambda takers: misfits[takers].sum())
+    return [takers for takers in ranked if count_unexplained(misfits[takers]) < most]
+
+
+def count_unexplained(misfits: np.ndarray) -> int:
+    return int(np.count_nonzero(misfits > UNEXPLAINED))
 
 
 def list_owners_beyond(plan_drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
