@@ -10,8 +10,7 @@ from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.drawn_plan import DrawnPlan
 from hiproof.fit.union.faces import assign_face, draw_out_sides, list_faces
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.regions import PlanSite
-from hiproof.fit.union.repairs import transform_places
+from hiproof.fit.union.regions import PlanSite, transform_places
 from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side
 from hiproof.fit.union.volumes import LEVEL, N_PLANES, N_SIDES, OFFSET0, SLOPE0, U0, V0, make_base
@@ -58,7 +57,7 @@ def test_who_takes_a_face_covers_it_and_who_had_it_does_not(number):
 def test_sides_are_drawn_out_to_what_the_volume_covers():
     _, site = draw_two_levels(0.1)
     volume, box = make_base(5.0)[0], shapely.box(3, 2, 9, 8)
-    x, y = transform_places(shapely.get_coordinates(box), 0, site.plan, site.scene).T
+    x, y = transform_places(shapely.get_coordinates(box), volume, site).T
     true_offsets = [x.min(), x.max(), y.min(), y.max()]
     inwards = np.array([1.0, -1.0, 1.0, -1.0])
     short = [Side(true_offsets[k] + 0.8 * inwards[k]) for k in range(N_SIDES)]

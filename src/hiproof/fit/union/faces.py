@@ -14,10 +14,16 @@ import numpy as np
 import shapely
 
 from .drawn_plan import DrawnPlan
-from .regions import PlanSite, find_neighbour, list_polygons, merge_inside, widen_gap
-from .repairs import LOW_STEP_M, ON_M, transform_places
+from .regions import (
+    PlanSite,
+    find_neighbour,
+    list_polygons,
+    merge_inside,
+    transform_places,
+    widen_gap,
+)
+from .repairs import LOW_STEP_M, ON_M
 from .sides import Side
-from .volumes import DIRECTION
 
 Regions = Sequence[list[shapely.Polygon]]
 
@@ -101,9 +107,7 @@ def draw_out_sides(
     volume: np.ndarray, sides: list[Side], region: list[shapely.Polygon], site: PlanSite
 ) -> list[Side]:
     """Return a volume's sides, with those drawn out beyond which its `region` reaches."""
-    places = transform_places(
-        shapely.get_coordinates(region), int(volume[DIRECTION]), site.plan, site.scene
-    )
+    places = transform_places(shapely.get_coordinates(region), volume, site)
     drawn_out = []
     for edge, side in enumerate(sides):
         x, y = places[:, edge // 2], places[:, 1 - edge // 2]

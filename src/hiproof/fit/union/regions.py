@@ -259,11 +259,15 @@ def compute_volume_heights(
     volume: np.ndarray, planes: Planes, xy: np.ndarray, site: PlanSite
 ) -> np.ndarray:
     """Return heights (n,) of a volume, in the plan's z, at local `xy` (n, 2)."""
-    _, plan, scene, _ = site
-    c, s = scene.turn[int(volume[DIRECTION])]
-    uv = (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
+    uv = transform_places(xy, volume, site)
     rows = planes.rows[np.isfinite(planes.rows[:, 2])]
     return (uv @ rows[:, :2].T + rows[:, 2]).min(axis=1)
+
+
+def transform_places(xy: np.ndarray, volume: np.ndarray, site: PlanSite) -> np.ndarray:
+    """Return local places (n, 2) in a volume's axes."""
+    frame, (c, s) = site.plan.frame, site.scene.turn[int(volume[DIRECTION])]
+    return (xy - frame.origin[:2]) @ frame.rotation.T @ np.array([[c, -s], [s, c]])
 
 
 def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
