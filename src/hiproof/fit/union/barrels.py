@@ -68,15 +68,9 @@ def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
     middle, wide = 0.5 * (x.min() + x.max()), max(0.5 * (x.max() - x.min()), COMPARED_M)
     x = (x - middle) / wide
     under = 1.0 - np.minimum(x * x, 1.0)
-    used = np.ones(len(z))
+    design = np.column_stack([np.ones_like(x), x, under, np.sqrt(under)])
+    used = np.ones(len(z), bool)
     for _ in range(CURVE_ROUNDS):
-        columns = np.stack((np.ones_like(x), x, under, np.sqrt(under), z))
-        for k in range(4):  # What one column explains is taken from those after it.
-            weighted = used * columns[k]
-            square = (weighted * columns[k]).sum()
-            for other in range(k + 1, 5 if square > 1e-9 else 0):
-                columns[other] -= (weighted * columns[other]).sum() / square * columns[k]
-        distances = np.abs(columns[4])
-        reach = max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
-        used = 1.0 * (distances <= reach)
-    return np.minimum(distances, MOST_DISTANCE_M).mean()
+        distances = np.abs(z - design @ np.linalg.lstsq(design[used], z[used], rcond=None)[0])
+        used = distances <= max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
+    return float(np.minimum(distances, MOST_DISTANCE_M).mean())
