@@ -249,10 +249,14 @@ def is_base_above(
 
 def select_points_in(region: shapely.Geometry, site: PlanSite) -> tuple[np.ndarray, np.ndarray]:
     """Return the points inside a region: local x, y (n, 2) and the plan's z (n,)."""
-    _, plan, scene, _ = site
-    xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
+    xy = site.recall(locate_points, site.scene, site.plan)
     inside = shapely.contains_xy(region, xy[:, 0], xy[:, 1])
-    return xy[inside], scene.z[: scene.n][inside]
+    return xy[inside], site.scene.z[: site.scene.n][inside]
+
+
+def locate_points(scene: Scene, plan: Plan) -> np.ndarray:
+    """Return local x, y (n, 2) of a scene's points."""
+    return plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
 
 
 def compute_volume_heights(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiled import compiled
 from .moves import refit_volumes, remove_volume
 from .objective import compute_objective
 from .prices import SLIVER_UNITS
@@ -24,10 +23,8 @@ from .volumes import (
     SLOPE0,
     UNSORTED,
     compute_roof_heights,
-    find_lowest_plane,
     list_movable,
-    measure_run,
-    read_coefficients,
+    measure_runs,
 )
 
 # Fewest points at which a volume of several is the highest: two on a wall at one height are chance.
@@ -104,29 +101,16 @@ def list_narrow_planes(
 
     The strip is below NARROW_M. `top` (n,) are the volumes visible at U, V.
     """
-    if not (top == k).any():
+    row, shown, direction = volumes[k], top == k, int(volumes[k, DIRECTION])
+    if not shown.any():
         return []
-    widths = measure_plane_widths(volumes, k, U, V, top)
-    return [p for p in range(N_SIDES) if volumes[k, OFFSET0 + p] < np.inf and widths[p] < NARROW_M]
-
-
-@compiled
-def measure_plane_widths(volumes, k, U, V, top):
-    """Return how wide each inclined plane (4,) of volume k is visible.
-
-    The width is along the plane's own fall, at those of U, V (directions, n) where the volume is
-    the `top`.
-    """
-    u, v, c = (
-        U[int(volumes[k, DIRECTION])],
-        V[int(volumes[k, DIRECTION])],
-        read_coefficients(volumes, k),
-    )
-    lower, upper = np.full(N_SIDES, np.inf), np.full(N_SIDES, -np.inf)
-    for i in range(len(top)):
-        if top[i] == k:
-            _, plane = find_lowest_plane(c, u[i], v[i])
-            if plane < LEVEL:
-                x = measure_run(volumes[k], plane, u[i], v[i])
-                lower[plane], upper[plane] = min(lower[plane], x), max(upper[plane], x)
-    return np.maximum(upper - lower, 0.0)
+    offsets, slopes = row[OFFSET0 : OFFSET0 + N_SIDES], row[SLOPE0 : SLOPE0 + N_SIDES]
+    runs = measure_runs(row, U[direction, shown], V[direction, shown])
+    heights = offsets[:, None] + slopes[:, None] * runs
+    lowest = np.where(heights.min(axis=0) <= row[OFFSET0 + LEVEL], heights.argmin(axis=0), LEVEL)
+    visible_runs = [runs[p, lowest == p] for p in range(N_SIDES)]
+    return [
+        p
+        for p, run in enumerate(visible_runs)
+        if offsets[p] < np.inf and (not len(run) or run.max() - run.min() < NARROW_M)
+    ]

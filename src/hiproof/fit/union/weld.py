@@ -45,6 +45,7 @@ from .regions import (
     compute_volume_heights,
     cut_regions,
     list_polygons,
+    locate_points,
     sketch_regions,
 )
 from .repairs import Repair, find_repairs, measure_low_steps
@@ -164,9 +165,7 @@ def weld(
 def make_problem(
     volumes: np.ndarray, agreement: Agreement, site: PlanSite, base: bool
 ) -> WeldProblem:
-    scene = site.scene
-    points = np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]])
-    xy = site.plan.frame.xy_local(points)
+    xy = site.recall(locate_points, site.scene, site.plan)
     order = np.argsort(xy[:, 0], kind="stable")
     return WeldProblem(volumes, site, agreement, base, xy, order)
 
