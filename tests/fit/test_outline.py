@@ -248,7 +248,7 @@ def test_an_outline_ends_in_no_spike():
     assert np.cos(azimuth - np.roll(azimuth, 1)).min() > BACK
     assert iou(outline, truth) > 0.95
     spike = np.array([(0, 0), (14, 0), (20, 8.2), (13.8, 7.7), (0, 8)], float)
-    assert not find_corners(make_lines(spike), np.empty_like(spike))
+    assert not find_corners(make_lines(spike), np.empty_like(spike), -1)
 
 
 @pytest.mark.parametrize("name", ["rectangle", "l"])

@@ -160,7 +160,7 @@ def draw_ring(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -
     # walls well inside stand below eaves that reach out
     lines = settle_lines(lines, cloud.xy[cloud.telling], cloud.density)
     corners = np.empty_like(lines)
-    find_corners(lines, corners)
+    find_corners(lines, corners, -1)
     return shapely.Polygon(corners)
 
 

@@ -55,7 +55,7 @@ def make_drawing(lines, kappa, border):
     Its cost is infinite where they are no polygon.
     """
     corners, costs = np.zeros((len(lines), 2)), np.zeros(len(border.x))
-    if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
+    if len(lines) < 3 or not find_corners(lines, corners, -1) or not is_allowed(corners, border):
         return Drawing(lines, kappa, corners, costs, np.inf, np.inf)
     squared, inside = nearest_sides(
         corners, border.x, border.y, border.court, SURE_BLURS * border.blur

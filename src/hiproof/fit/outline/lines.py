@@ -40,13 +40,13 @@ def make_lines(corners: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def find_corners(lines, corners, smallest=-1):
+def find_corners(lines, corners, smallest):
     """Write the corners (n, 2) of `lines`.
 
     False where they are no simple polygon run through in order.
 
-    With `smallest`, only the first so many: the others are there, and the sides between them run on
-    and cross none of each other.
+    Only the first `smallest` are written unless it is negative: the others are there, and the sides
+    between them run on and cross none of each other.
     """
     n = len(lines)
     smallest = n if smallest < 0 else min(smallest, n)

@@ -103,7 +103,7 @@ def simplify_corners(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray
         simple = largest(shapely.simplify(polygon, tolerance_m * COARSER**k))
         corners = without_straight_corners(counter_clockwise(simple))
         if 3 < len(corners) <= MOST_CORNERS and find_corners(
-            make_lines(corners), np.empty_like(corners)
+            make_lines(corners), np.empty_like(corners), -1
         ):
             return corners
     return counter_clockwise(shapely.minimum_rotated_rectangle(polygon))

@@ -49,11 +49,11 @@ ROW_M, MOSTLY_ON_POINTS = 0.1, 0.6
 def settle_lines(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
     """Move each of the `lines` (n, 2) to where the points `xy` (m, 2) put it."""
     corners, moved = np.empty_like(lines), lines.copy()
-    find_corners(lines, corners)
+    find_corners(lines, corners, -1)
     normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
     ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     moved[:, 1] += side_offsets(xy, normals, lines[:, 1], ends, density)
-    return moved if find_corners(moved, corners) else lines
+    return moved if find_corners(moved, corners, -1) else lines
 
 
 def side_offsets(
@@ -64,6 +64,7 @@ def side_offsets(
     Sides have `normals` (m, 2), lie `distances` (m,) from the origin along these and run between
     `ends` (m, 2, 2).
     """
+    distances = np.ascontiguousarray(distances)  # one kind of array is compiled
     return offsets_by(xy, normals, distances, ends, density, log_densities())
 
 
