@@ -6,7 +6,6 @@ Command line, TOML file and error texts derive from here.
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass, field, fields
 from numbers import Integral
 from pathlib import Path
@@ -475,6 +474,8 @@ class Settings:
 
         Raises SettingsError when it cannot be read.
         """
+        import tomllib  # few runs have such a file
+
         try:
             values = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         # undecodable, no TOML, or a number of 5,000 digits

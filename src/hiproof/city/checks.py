@@ -5,7 +5,6 @@ What is wrong is reported at once, and not after an hour.
 
 from __future__ import annotations
 
-import difflib
 from typing import Any
 
 from ..errors import InputError, SettingsError
@@ -90,6 +89,8 @@ def refuse_unknown_types(fit: Any) -> None:
     allowed = tuple(CATALOGUE)
     unknown = [name for name in fit.types if name not in allowed]
     if unknown:
+        import difflib
+
         nearby = [
             difflib.get_close_matches(name.lower(), allowed, n=1, cutoff=0.5) for name in unknown
         ]

@@ -152,12 +152,15 @@ def read_source(path: str | None) -> dict[str, Any] | None:
     """
     if not path or not is_geopackage(path):
         return None
-    from xml.etree import ElementTree
-
     try:
         with closing(open_database(path)) as database:
             texts = database.execute("select metadata from gpkg_metadata").fetchall()
+    except sqlite3.Error:
+        return None
+    from xml.etree import ElementTree
+
+    try:
         items = (item for (text,) in texts for item in ElementTree.fromstring(text).iter("MDI"))
         return next(json.loads(item.text or "") for item in items if item.get("key") == SOURCE)
-    except (sqlite3.Error, ElementTree.ParseError, ValueError, StopIteration):
+    except (ElementTree.ParseError, ValueError, StopIteration):
         return None

@@ -113,9 +113,7 @@ def ground_plane(
     is unknown.
     """
     outline = shapely.simplify(outline, NEEDLESS_M)
-    places = np.concatenate(
-        [places_along(shapely.buffer(outline, reach, quad_segs=2)) for reach in RINGS_M]
-    )
+    places = places_along(shapely.buffer(outline, RINGS_M, quad_segs=2))
     heights = height_at(places)
     mask = np.isfinite(heights)
     if mask.sum() < FEWEST_PLACES:
@@ -130,10 +128,8 @@ def ground_plane(
     return plane if np.median(off) < MOST_ROUGH_M else None
 
 
-def places_along(area: shapely.Geometry) -> np.ndarray:
-    """Return places (n, 2) along the outer ring of `area`."""
-    rings = [part.exterior for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
-    return np.concatenate(
-        [shapely.get_coordinates(shapely.segmentize(ring, PLACE_M))[:-1] for ring in rings]
-        or [np.zeros((0, 2))]
-    )
+def places_along(areas: np.ndarray) -> np.ndarray:
+    """Return places (n, 2) along the outer rings of `areas` (m,)."""
+    rings = shapely.get_exterior_ring(shapely.get_parts(areas))
+    places, ring = shapely.get_coordinates(shapely.segmentize(rings, PLACE_M), return_index=True)
+    return places[np.diff(ring, append=-1) == 0]  # without the last of each, which is its first
