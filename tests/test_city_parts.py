@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from hiproof.city import quarantine
-from hiproof.city.executors import InProcess, Processes, WorkerLost
+from hiproof.city.executors import InProcess
 from hiproof.city.ground import (
     BareAround,
     Cells,
@@ -21,7 +21,9 @@ from hiproof.city.ground import (
 )
 from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
+from hiproof.city.processes import Processes
 from hiproof.city.sort import Reach
+from hiproof.city.tasks import WorkerLost
 from small_tasks import die_at_second_task, double, has_imported, number_function
 
 

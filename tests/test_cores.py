@@ -6,7 +6,8 @@ import pytest
 
 from hiproof.city import cores, run
 from hiproof.city.cores import BUILDINGS_A_PROCESS, as_many_as_pay, limit_threads
-from hiproof.city.executors import InProcess, Processes
+from hiproof.city.executors import InProcess
+from hiproof.city.processes import Processes
 from hiproof.city.request import Request
 
 
@@ -52,7 +53,7 @@ def test_where_there_are_no_semaphores_one_process_does_all(monkeypatch, error):
 
     monkeypatch.setattr(cores, "cores", lambda: 4)
     assert as_many_as_pay(10**4, 100) == 4
-    monkeypatch.setattr(cores, "get_context", lambda kind: Context())
+    monkeypatch.setattr("multiprocessing.get_context", lambda kind: Context())
     assert as_many_as_pay(10**4, 100) == 1
 
 

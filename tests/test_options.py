@@ -9,7 +9,7 @@ import pytest
 
 from hiproof import log
 from hiproof.city.checks import refuse_unusable
-from hiproof.city.executors import Processes
+from hiproof.city.processes import Processes
 from hiproof.city.run import Summary
 from hiproof.cli import main
 from hiproof.errors import InputWarning

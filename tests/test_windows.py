@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import hiproof
-from hiproof.city import executors
+from hiproof.city import processes
 from hiproof.write.files import atomic_file
 from naming import iterate_statements, parse
 
@@ -65,5 +65,5 @@ def test_files_are_synced_through_descriptors_that_may_write(tmp_path, monkeypat
 
 
 def test_no_more_processes_are_started_than_windows_can_wait_for(monkeypatch):
-    monkeypatch.setattr(executors.sys, "platform", "win32")
-    assert executors.Processes(100).count == 61 and executors.Processes(4).count == 4
+    monkeypatch.setattr(processes.sys, "platform", "win32")
+    assert processes.Processes(100).count == 61 and processes.Processes(4).count == 4

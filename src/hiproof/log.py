@@ -15,7 +15,6 @@ import sys
 import warnings
 from contextlib import suppress
 from enum import StrEnum
-from multiprocessing import parent_process
 from pathlib import Path
 
 from .errors import HiproofWarning, OutputError
@@ -90,6 +89,8 @@ class KeptFile(logging.FileHandler):
         LOGGER.removeHandler(self)
         with suppress(OSError):
             self.close()
+        from multiprocessing import parent_process
+
         if parent_process() is None:  # of the processes that write to the file, the first tells
             text = f"{error.strerror or error}; the work goes on without the log"
             LOGGER.warning("expected to write the log to %s, got: %s", self.baseFilename, text)

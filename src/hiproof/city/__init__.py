@@ -37,6 +37,7 @@ outputs       digests of what was written
 ledger        which tasks are done, what came of each building: SQLite
 cores         how many processes pay on this machine
 executors     where tasks run: this process, processes, a Dask cluster
+processes     the second of these
 workers       how worker processes begin and end
 tasks         the tasks by name, for processes that have imported nothing yet
 quarantine    a task that kills its process, found by trying it alone

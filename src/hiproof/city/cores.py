@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import get_context
 from pathlib import Path
 
 # A process takes a second to start, as long as 50 buildings with footprints or five of those that a
@@ -52,6 +51,8 @@ def has_semaphores() -> bool:
 
     Sandboxes without shared memory lack what that takes.
     """
+    from multiprocessing import get_context
+
     try:
         get_context("spawn").Semaphore()
         return True

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .executors import WorkerLost
 from .plan import load_plan
+from .tasks import WorkerLost
 
 # deaths of its process, alone, until a task is taken for their cause: memory may run out by chance
 TRIES = 3

@@ -30,6 +30,10 @@ WORK = ("hiproof.city.sort", "hiproof.city.solve", "hiproof.fit.union")
 """Modules that a worker needs."""
 
 
+class WorkerLost(Exception):
+    """The process that ran the task died (killed, out of memory)."""
+
+
 def sort_cloud(folder: str, number: int, address: str) -> dict:
     """Sort a point file; see sort.py."""
     from . import sort

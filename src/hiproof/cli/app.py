@@ -6,6 +6,7 @@ Its commands are imported when they are named, so that its help shows at once.
 from __future__ import annotations
 
 import functools
+import textwrap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
@@ -20,6 +21,9 @@ from ..masking import mask
 from .command import Command, with_log_options, write_example, write_parameters
 from .commands import COMMANDS
 from .parameters import HeadedOption, list_parameters
+
+LONGEST_COMPLAINT = 500
+"""Characters of a complaint about wrong usage: a few lines of a terminal."""
 
 
 class CommandTable(Mapping[str, Any]):
@@ -90,6 +94,8 @@ def mask_complaints() -> Iterator[None]:
         raise SystemExit(INTERRUPTED) from None
     except click.ClickException as error:
         message = mask(error.format_message())
+        if len(message) > LONGEST_COMPLAINT:  # it repeats a value
+            message = textwrap.shorten(message, LONGEST_COMPLAINT, placeholder=" ...")
         error.format_message = lambda: message  # type: ignore[method-assign]
         raise
 

@@ -132,12 +132,13 @@ def reconstruct(
     Exit code: 0 every building has a model or a reason why not, 1 an internal error, 2 unusable
     input.
     """
-    from ..city.workers import start_server
     from .running import run_request
 
     start(console_level(), log_file)
     box = None if bbox is None else parse_box(bbox)
     if jobs and jobs > 1 and not scheduler:
+        from ..city.workers import start_server
+
         start_server()  # so that workers need not wait for imports
     if not enrich and "enrich" in (changes or {}):
         raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
