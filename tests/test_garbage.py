@@ -36,13 +36,13 @@ def test_objects_that_refer_to_each_other_are_still_freed():
 
 
 def test_no_garbage_is_collected_once_a_command_has_ended():
-    class Ring:
+    class Loop:
         pass
 
-    ring = Ring()
-    ring.ring = ring
-    kept = weakref.ref(ring)
+    loop = Loop()
+    loop.loop = loop
+    kept = weakref.ref(loop)
     leave_garbage()
-    del ring
+    del loop
     gc.collect()
     assert kept() is not None

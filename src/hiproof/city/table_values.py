@@ -107,7 +107,7 @@ def is_possible(key: str, value: Any) -> bool:
 
 
 def find_range(key: str) -> tuple[float, float] | None:
-    """Return the least and largest possible value of a key, None where it is no number.
+    """Return the least and largest possible value of a key, None without one.
 
     What checks overrides is imported only for runs that have some.
     """

@@ -141,7 +141,7 @@ def choose_type(kind: type, declared: Argument | Option) -> Any:
 
 
 def as_list(_: click.Context, parameter: click.Parameter, values: Any) -> list[Any] | None:
-    """Return the values of a parameter that may be repeated, None where there are none."""
+    """Return the values of a parameter that may be repeated, None without any."""
     return list(values) if values else None
 
 
