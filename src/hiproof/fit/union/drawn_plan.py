@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -41,17 +42,17 @@ class DrawnPlan:
     owner: np.ndarray
     corners: int
 
-    @property
+    @cached_property
     def visible_planes(self) -> np.ndarray:
         """The numbers of the visible planes."""
         return np.unique(self.beside[self.beside >= 0])
 
-    @property
+    @cached_property
     def lengths(self) -> np.ndarray:
         """The length (m) of each edge (e,)."""
         return np.linalg.norm(np.diff(self.places[self.edges], axis=1)[:, 0], axis=1)
 
-    @property
+    @cached_property
     def gaps(self) -> np.ndarray:
         """How far apart (m) the planes beside each edge are at its ends (e, 2).
 

@@ -102,9 +102,9 @@ def list_narrow_planes(
     The strip is below NARROW_M. `top` (n,) are the volumes visible at U, V.
     """
     row, shown, direction = volumes[k], top == k, int(volumes[k, DIRECTION])
-    if not shown.any():
-        return []
     offsets, slopes = row[OFFSET0 : OFFSET0 + N_SIDES], row[SLOPE0 : SLOPE0 + N_SIDES]
+    if offsets.min() == np.inf or not shown.any():
+        return []
     runs = measure_runs(row, U[direction, shown], V[direction, shown])
     heights = offsets[:, None] + slopes[:, None] * runs
     lowest = np.where(heights.min(axis=0) <= row[OFFSET0 + LEVEL], heights.argmin(axis=0), LEVEL)
