@@ -74,17 +74,14 @@ def make_house_scene() -> tuple:
 
 
 def check() -> None:
-    """Compile the check of a solid, and of a bent face."""
+    """Compile the check of a solid."""
     from ..compose import check_solid
-    from ..compose.bends import bent_faces
     from ..model import Face, Solid
 
     box = np.array([[x, y, z] for z in (0.0, 3.0) for y in (0.0, 5.0) for x in (0.0, 5.0)])
     rings = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     faces = tuple(Face((ring,), "WallSurface") for ring in rings)
     check_solid(Solid(box, faces))
-    one_face = np.array([0]), box[[0, 1, 7, 2]], np.arange(4), np.array([0, 4]), np.array([0, 1])
-    bent_faces(*one_face, np.array([[0.0, 0.0, 1.0]]))
 
 
 def solid() -> None:

@@ -10,10 +10,6 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from ..compiled import compiled
-from ..geometry.area_vectors import cross, dot
-from ..geometry.arrays import copy_row
-
 # val3dity's limit of 20 degrees, and half of it, below which no pair needs to be compared
 FLAT_COSINE, SURELY_FLAT_COSINE = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(10.0))
 
@@ -37,7 +33,7 @@ def bent_faces(
     """
     if len(faces) == 0:
         return faces
-    corners, flat, start = in_their_planes(faces, vertices, index, ring_start, face_start, normals)
+    corners, flat, start = lay_into_planes(faces, vertices, index, ring_start, face_start, normals)
     polygons = []
     for face, lower in zip(faces, start[:-1], strict=True):
         bounds = ring_start[face_start[face] : face_start[face + 1] + 1]
@@ -46,7 +42,9 @@ def bent_faces(
     collections = triangulate(polygons)
     triangles, owner = shapely.get_parts(collections, return_index=True)
     places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
-    bent = are_bent(places, owner, corners, flat, start, normals[faces])
+    face_normals = normals[faces]
+    triangle_normals = measure_triangle_normals(places, owner, corners, flat, start, face_normals)
+    bent = are_bent(triangle_normals, owner, face_normals)
     return faces[bent | shapely.is_missing(collections)]
 
 
@@ -60,75 +58,66 @@ def triangulate(polygons: list[shapely.Polygon]) -> np.ndarray:
         return np.concatenate([triangulate([polygon]) for polygon in polygons])
 
 
-@compiled
-def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
+def lay_into_planes(
+    faces: np.ndarray,
+    vertices: np.ndarray,
+    index: np.ndarray,
+    ring_start: np.ndarray,
+    face_start: np.ndarray,
+    normals: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the vertices (m, 3) of `faces`, and the same (m, 2) in their planes.
 
     They are those of all rings; each face's start comes with them.
     """
-    start = np.zeros(len(faces) + 1, np.int64)
-    for k in range(len(faces)):
-        face = faces[k]
-        start[k + 1] = start[k] + ring_start[face_start[face + 1]] - ring_start[face_start[face]]
-    corners, flat = np.empty((start[-1], 3)), np.empty((start[-1], 2))
-    for k in range(len(faces)):
-        lower, normal = ring_start[face_start[faces[k]]], normals[faces[k]]
-        perpendicular = np.zeros(3)
-        perpendicular[np.argmin(np.abs(normal))] = 1.0
-        u = cross(normal, perpendicular)
-        u /= np.sqrt(dot(u, u))
-        v = cross(normal, u)
-        for i in range(start[k], start[k + 1]):
-            copy_row(corners[i], vertices[index[lower + i - start[k]]])
-            flat[i, 0], flat[i, 1] = dot(corners[i], u), dot(corners[i], v)
+    lower, upper = ring_start[face_start[faces]], ring_start[face_start[faces + 1]]
+    owner = np.repeat(np.arange(len(faces)), upper - lower)
+    start = np.concatenate([[0], np.cumsum(upper - lower)])
+    corners = vertices[index[np.arange(start[-1]) + (lower - start[:-1])[owner]]]
+    normals = normals[faces]
+    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    axes = u, np.cross(normals, u)
+    flat = np.column_stack([(corners * axis[owner]).sum(axis=1) for axis in axes])
     return corners, flat, start
 
 
-@compiled
-def corner_at(x, y, flat, lower, upper):
-    """Return the vertex of flat[lower:upper] that lies at (x, y)."""
-    for i in range(lower, upper):
-        if flat[i, 0] == x and flat[i, 1] == y:
-            return i
-    return lower
-
-
-@compiled
-def triangle_normals(places, owner, corners, flat, start, normals):
+def measure_triangle_normals(
+    places: np.ndarray,
+    owner: np.ndarray,
+    corners: np.ndarray,
+    flat: np.ndarray,
+    start: np.ndarray,
+    normals: np.ndarray,
+) -> np.ndarray:
     """Return the unit normals (t, 3) of triangles, zero without an area.
 
-    Triangles have `places` (t, 4, 2) in their face's plane.
+    Triangles have `places` (t, 4, 2) in their face's plane. They face as the `normals` (k, 3) do.
     """
-    result = np.zeros((len(places), 3))
-    for t in range(len(places)):
-        lower, upper = start[owner[t]], start[owner[t] + 1]
-        a = corners[corner_at(places[t, 0, 0], places[t, 0, 1], flat, lower, upper)]
-        b = corners[corner_at(places[t, 1, 0], places[t, 1, 1], flat, lower, upper)]
-        c = corners[corner_at(places[t, 2, 0], places[t, 2, 1], flat, lower, upper)]
-        normal = cross(b - a, c - a)
-        size = np.sqrt(dot(normal, normal))
-        if size > 0:
-            size = size if dot(normal, normals[owner[t]]) > 0 else -size
-            copy_row(result[t], normal / size)
-    return result
+    faces = np.repeat(np.arange(len(normals)), np.diff(start)).tolist()
+    vertices = dict(zip(zip(faces, *flat.T.tolist(), strict=True), corners.tolist(), strict=True))
+    first_vertices = corners[start[:-1]].tolist()
+    triangles = [
+        [vertices.get((face, x, y), first_vertices[face]) for x, y in ring[:3]]
+        for face, ring in zip(owner.tolist(), places.tolist(), strict=True)
+    ]
+    a, b, c = np.array(triangles).reshape(-1, 3, 3).swapaxes(0, 1)
+    result = np.cross(b - a, c - a)
+    size = np.linalg.norm(result, axis=1)
+    size = np.where((result * normals[owner]).sum(axis=1) > 0.0, size, -size)
+    return result / np.where(size == 0.0, 1.0, size)[:, None]
 
 
-@compiled
-def are_bent(places, owner, corners, flat, start, normals):
+def are_bent(normals: np.ndarray, owner: np.ndarray, face_normals: np.ndarray) -> np.ndarray:
     """Return whether each face (k,) has two triangles over 20 degrees apart.
 
-    `owner` (t,) is the face of each triangle.
+    `normals` (t, 3) are those of the triangles, and `owner` (t,) is the face of each.
     """
-    bent = np.zeros(len(normals), np.bool_)
-    result = triangle_normals(places, owner, corners, flat, start, normals)
-    for t in range(len(result)):
-        if (
-            dot(result[t], normals[owner[t]]) >= SURELY_FLAT_COSINE
-            or not result[t].any()
-            or bent[owner[t]]
-        ):
-            continue  # two triangles within 10 degrees of the face are within 20 of one another
-        for s in range(len(result)):
-            if owner[s] == owner[t] and result[s].any() and dot(result[s], result[t]) < FLAT_COSINE:
-                bent[owner[t]] = True
+    has_area = normals.any(axis=1)
+    # Two triangles within 10 degrees of the face are within 20 of one another.
+    aside = has_area & ((normals * face_normals[owner]).sum(axis=1) < SURELY_FLAT_COSINE)
+    is_apart = (normals[aside] @ normals.T < FLAT_COSINE) & has_area
+    is_apart &= owner[aside, None] == owner
+    bent = np.zeros(len(face_normals), bool)
+    bent[owner[aside][is_apart.any(axis=1)]] = True
     return bent
