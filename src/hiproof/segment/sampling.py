@@ -1,9 +1,7 @@
-"""Compiled arrangement of a cloud.
+"""Arrangement of a cloud.
 
-These parts of PointNet++ choose, describe and group points; they carry no weights.
-
-`arrange_cloud` is the one entry; everything it calls is compiled into it, so that a process loads
-one function.
+These parts of PointNet++ choose, describe and group points; they carry no weights. Loops over all
+points are compiled.
 """
 
 from __future__ import annotations
@@ -36,7 +34,6 @@ INTERPOLATED = 3  # points that a feature is carried back from, as in PointNet++
 HARMONIC_WIDTH = math.radians(12.0)
 
 
-@compiled
 def arrange_cloud(xyz, count, level1, level2, level3, group_size):
     """Return all that the network needs of a cloud `xyz` (n, 3).
 
@@ -48,7 +45,7 @@ def arrange_cloud(xyz, count, level1, level2, level3, group_size):
     group_size) indices into the level above; their `radii` (3,) float32, metres; and for the way
     back (level1, 3) indices into level 3 and (count, 3) into level 1, with their weights.
     """
-    x, y, z = xyz[:, 0].copy(), xyz[:, 1].copy(), xyz[:, 2].copy()
+    x, y, z = (np.ascontiguousarray(axis) for axis in xyz.T)
     order, cover, nearest, reach = farthest_points(x, y, z, count)
     result = len(order)
     surface = local_surfaces(x, y, z, order, nearest, reach)
@@ -68,33 +65,30 @@ def arrange_cloud(xyz, count, level1, level2, level3, group_size):
     )
     up1, distance1 = group_points(x, y, z, level1, min(level3, result), INTERPOLATED, np.inf)
     up2, distance2 = group_points(x, y, z, count, min(level1, result), INTERPOLATED, np.inf)
-    weights = inverse_shares(distance1), inverse_shares(distance2)
+    weights = compute_inverse_shares(distance1), compute_inverse_shares(distance2)
     radii = np.array([radius1, radius2, radius3], np.float32)
     return order, features, groups, radii, (up1, up2), weights
 
 
-@compiled
 def describe_points(x, y, z, surface, spacing, count):
     """Return features (count, 11) of points in the building's own axes.
 
     There are points (s,) and their `surface` (s, 7), repeated to `count`.
     """
-    cosine, sine = canonical_axes(x, y, surface)
-    features = np.empty((count, len(POINT_FEATURES)), np.float32)
-    for row in range(count):
-        s = row % len(x)
-        features[row, 0] = (cosine * x[s] + sine * y[s]) / POSITION_SCALE[0]
-        features[row, 1] = (cosine * y[s] - sine * x[s]) / POSITION_SCALE[1]
-        features[row, 2] = z[s] / POSITION_SCALE[2]
-        features[row, 3] = cosine * surface[s, 0] + sine * surface[s, 1]
-        features[row, 4] = cosine * surface[s, 1] - sine * surface[s, 0]
-        features[row, 5] = surface[s, 2]
-        features[row, 6] = min(surface[s, 3] / 0.2, 5.0)
-        features[row, 7] = min(max(surface[s, 4] / 0.2, -5.0), 5.0)
-        features[row, 8] = cosine * surface[s, 5] + sine * surface[s, 6]
-        features[row, 9] = cosine * surface[s, 6] - sine * surface[s, 5]
-        features[row, 10] = spacing
-    return features
+    cosine, sine = find_canonical_axes(x, y, surface)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    features = np.column_stack(
+        [
+            np.column_stack([np.column_stack([x, y]) @ turn, z]) / POSITION_SCALE,
+            surface[:, :2] @ turn,
+            surface[:, 2],
+            np.minimum(surface[:, 3] / 0.2, 5.0),
+            np.clip(surface[:, 4] / 0.2, -5.0, 5.0),
+            surface[:, 5:] @ turn,
+            np.full(len(x), spacing),
+        ]
+    )
+    return features[np.arange(count) % len(x)].astype(np.float32)
 
 
 @compiled
@@ -239,8 +233,7 @@ def plane_normal(xx, xy, xz, yy, yz, zz):
     return nx, ny, nz, across[0] * nx + across[1] * ny + across[2] * nz
 
 
-@compiled
-def canonical_axes(x, y, surface):
+def find_canonical_axes(x, y, surface):
     """Return cosine and sine of the building's own direction in plan.
 
     The direction is in the full circle.
@@ -250,32 +243,19 @@ def canonical_axes(x, y, surface):
     twice; then its first axis is the one along which the points spread more, and points to the side
     to which the roof falls more.
     """
-    n = len(surface)
-    weight, azimuth = np.empty(n), np.empty(n)
-    for s in range(n):
-        weight[s] = (surface[s, 0] ** 2 + surface[s, 1] ** 2) * math.exp(-surface[s, 3] / 0.1)
-        azimuth[s] = math.atan2(surface[s, 1], surface[s, 0])
-    kappa = 0.0
+    weight = (surface[:, 0] ** 2 + surface[:, 1] ** 2) * np.exp(-surface[:, 3] / 0.1)
+    azimuth, kappa = np.arctan2(surface[:, 1], surface[:, 0]), 0.0
     for turn in range(3):
-        real, imaginary = 0.0, 0.0
-        for s in range(n):
-            perpendicular = azimuth[s] - kappa
-            perpendicular -= math.pi / 2 * round(perpendicular / (math.pi / 2))
-            nearby = (
-                weight[s]
-                if turn == 0
-                else weight[s] * math.exp(-((perpendicular / HARMONIC_WIDTH) ** 2))
-            )
-            real, imaginary = (
-                real + nearby * math.cos(4 * perpendicular),
-                imaginary + nearby * math.sin(4 * perpendicular),
-            )
+        aside = azimuth - kappa
+        aside -= math.pi / 2 * np.round(aside / (math.pi / 2))
+        nearby = weight * np.exp(-((aside / HARMONIC_WIDTH) ** 2)) if turn else weight
+        real, imaginary = nearby @ np.cos(4 * aside), nearby @ np.sin(4 * aside)
         kappa += math.atan2(imaginary, real) / 4
     cosine, sine = math.cos(kappa), math.sin(kappa)
     if np.var(cosine * y - sine * x) > np.var(cosine * x + sine * y):
         cosine, sine = -sine, cosine
-    along = cosine * surface[:, 0].sum() + sine * surface[:, 1].sum()
-    across = cosine * surface[:, 1].sum() - sine * surface[:, 0].sum()
+    falls = surface[:, :2].sum(axis=0)
+    along, across = cosine * falls[0] + sine * falls[1], cosine * falls[1] - sine * falls[0]
     if (along if abs(along) > abs(across) else across) < 0:
         cosine, sine = -cosine, -sine
     return cosine, sine
@@ -310,15 +290,10 @@ def group_points(x, y, z, centres, sources, count, radius):
     return indices, distances
 
 
-@compiled
-def inverse_shares(distances):
+def compute_inverse_shares(distances):
     """Return inverse-distance weights (s, k) with a sum of 1."""
     weights = 1.0 / (distances + 1e-3)
-    for s in range(len(weights)):
-        total = weights[s].sum()
-        for k in range(weights.shape[1]):
-            weights[s, k] /= total
-    return weights.astype(np.float32)
+    return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
 def thin_to_grid(xyz, count, chunk=500_000):
