@@ -570,7 +570,8 @@ def renumber_vertices(xy, edges, side):
     Their first vertex is not negative. Returns the edges, their sides and the vertices they use.
     """
     number = np.full(len(xy), -1, np.int64)
-    out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
+    out_xy, out_edges = np.empty((len(xy), 2), np.int64), np.empty((len(edges), 2), np.int64)
+    out_side = np.empty((len(edges), 2), np.int64)
     count, selection = 0, 0
     for e in range(len(edges)):
         if edges[e, 0] < 0:

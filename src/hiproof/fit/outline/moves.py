@@ -118,7 +118,8 @@ def joint_lines(drawing, i, count):
     for way in ways:
         unchanged = count == 1 and abs(math.sin(way - first[0])) < SAME_RAD
         if not unchanged and math.cos(way - chord) > math.cos(TURN_RAD):
-            result[m] = way, middle[0] * math.cos(way) + middle[1] * math.sin(way)
+            result[m, 0] = way
+            result[m, 1] = middle[0] * math.cos(way) + middle[1] * math.sin(way)
             m += 1
     if count == LONGEST_RUN:
         copy_row(result[m], first)

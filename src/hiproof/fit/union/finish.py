@@ -272,7 +272,7 @@ def solve_least_squares(rows, design, points, dead, width):
         ridge, share = 1e-6 * max(np.trace(normal) / len(normal), 1e-6), misfit / max(weight, 1.0)
         inverse = invert_matrix(normal, ridge)
         unknowns = multiply(inverse, right + ridge * anchor)
-        rows = np.full_like(rows, np.nan)
+        rows = np.full((len(rows), 3), np.nan)
         for k in range(len(rows)):
             if is_present[k]:
                 copy_row(rows[k], multiply(design[k], unknowns))
@@ -307,7 +307,10 @@ def invert_matrix(matrix, ridge):
     It uses the method of Gauss and Jordan. `ridge` is added along the diagonal.
     """
     size = len(matrix)
-    rows, inverse = matrix + ridge * np.eye(size), np.eye(size)
+    rows, inverse = matrix.copy(), np.zeros((size, size))
+    for k in range(size):
+        rows[k, k] += ridge
+        inverse[k, k] = 1.0
     for k in range(size):
         pivot = rows[k, k]
         for j in range(size):
