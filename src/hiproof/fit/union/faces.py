@@ -50,6 +50,10 @@ class PlanFace(NamedTuple):
 
 def list_faces(plan_drawn: DrawnPlan) -> Iterator[PlanFace]:
     """List the faces that others may take, the smallest first."""
+    owners = np.append(plan_drawn.owner[:, 0], -1)[plan_drawn.beside]  # -1 of -1, outside
+    is_low = (plan_drawn.gaps.max(axis=1) < LOW_STEP_M) & (owners[:, 0] != owners[:, 1])
+    if not is_low.any():
+        return
     ends = plan_drawn.places[plan_drawn.edges]
     sides = {tuple(e.ravel().tolist()): (n, 0) for n, e in enumerate(ends)}
     sides |= {tuple(e[::-1].ravel().tolist()): (n, 1) for n, e in enumerate(ends)}
@@ -57,9 +61,9 @@ def list_faces(plan_drawn: DrawnPlan) -> Iterator[PlanFace]:
     for polygon in sorted(polygons, key=lambda polygon: polygon.area):
         oriented = shapely.orient_polygons(polygon)
         edges, ways = np.array([sides[edge] for edge in list_ring_edges(oriented)]).T
-        face = make_face(polygon, edges, ways, plan_drawn)
-        if face is not None:
-            yield face
+        takers = owners[edges, 1 - ways][is_low[edges]]
+        if len(takers):
+            yield PlanFace(polygon, int(owners[edges[0], ways[0]]), frozenset(takers.tolist()))
 
 
 def list_ring_edges(polygon: shapely.Polygon) -> Iterator[tuple[float, ...]]:
@@ -67,24 +71,6 @@ def list_ring_edges(polygon: shapely.Polygon) -> Iterator[tuple[float, ...]]:
     for ring in (polygon.exterior, *polygon.interiors):
         xy = shapely.get_coordinates(ring)
         yield from map(tuple, np.hstack([xy[:-1], xy[1:]]).tolist())
-
-
-def make_face(
-    polygon: shapely.Polygon, edges: np.ndarray, ways: np.ndarray, plan_drawn: DrawnPlan
-) -> PlanFace | None:
-    """Make a face of what these `edges` (m,) enclose.
-
-    `ways` (m,) say on which side of each it lies. Returns None if no other volume may take it.
-    """
-    inner, outer = plan_drawn.beside[edges, ways], plan_drawn.beside[edges, 1 - ways]
-    if inner[0] < 0:
-        return None
-    owner, is_low = (
-        int(plan_drawn.owner[inner[0], 0]),
-        plan_drawn.gaps[edges].max(axis=1) < LOW_STEP_M,
-    )
-    takers = frozenset(plan_drawn.owner[outer[is_low], 0].tolist()) - {owner}
-    return PlanFace(polygon, owner, takers) if takers else None
 
 
 def assign_face(face: PlanFace, takers: Iterable[int], regions: Regions, site: PlanSite) -> Regions:
