@@ -272,7 +272,10 @@ def run_round(
         if repaired_state is None:
             trials[key] += 1
             continue
-        trials.update((key, *repair.sides))
+        moved = [
+            pair for side in repair.sides for pair in list_sides_on_line(state.sides, *side, problem)
+        ]
+        trials.update((key, *moved))
         trial = present.draw_if_cheaper(repaired_state)
         if trial is not None:
             state, after_drawing = repaired_state, trial if present.window is whole else None
