@@ -10,7 +10,12 @@ from hiproof.fit.union.around import (
     is_visible_at,
     measure_context,
 )
-from hiproof.fit.union.candidates import HOUSE, fill_gains, find_best_rectangles, list_candidates
+from hiproof.fit.union.candidates import (
+    MOST_PLANES,
+    fill_gains,
+    find_best_rectangles,
+    list_candidates,
+)
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.grow import prepare_growth
 from hiproof.fit.union.improve import digest_surroundings, improve, simplify
@@ -729,7 +734,7 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
 
 
 def prepare_grid(scene):
-    candidates = list_candidates(scene, np.arange(scene.n), HOUSE.planes)
+    candidates = list_candidates(scene, np.arange(scene.n), MOST_PLANES)
     return prepare_growth(scene, candidates), candidates
 
 

@@ -55,10 +55,10 @@ def moves() -> None:
 
 def planes() -> None:
     """Compile the planes and gables with which the search begins."""
-    from ..fit.union.candidates import HOUSE, list_candidates
+    from ..fit.union.candidates import MOST_PLANES, list_candidates
 
     _, scene = make_house_scene()
-    list_candidates(scene, np.arange(scene.n), HOUSE.planes)
+    list_candidates(scene, np.arange(scene.n), MOST_PLANES)
 
 
 def make_house_scene() -> tuple:

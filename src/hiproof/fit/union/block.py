@@ -22,9 +22,7 @@ SETTLE_POINTS = 3000
 SETTLE_REACH_M = 0.7  # Distance (m) that edges may move when more points settle them.
 # Growing more than one volume anew gains nothing in blocks and costs a quarter of the time
 # (Vienna's even places at 5 points/m2).
-BLOCK = Effort(
-    pool_points=1200, seeds=200, pairs=400, planes=30, new_planes=16, gables=10, regrown=1
-)
+BLOCK = Effort(pool_points=1200, seeds=200, regrown=1)
 BARE_BLOCK_SHARE = 0.01  # Share of a block above which a visible base becomes a level volume.
 
 

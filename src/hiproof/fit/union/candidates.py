@@ -51,29 +51,26 @@ MOST_PAIRS = 3  # Most pairs of slopes that make hips and mansards, strongest fi
 SAME_SLOPE = 1e-6  # Slopes (rise over run) that differ less are numerically equal.
 WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
 LEAST_ABOVE_M = 1e-9  # Height (m) by which a volume must be above the roof: numerically none.
+# Most planes that are found, of all points and of those that a roof leaves unexplained. Structure
+# that explains less stays unseen.
+MOST_PLANES, MOST_NEW_PLANES = 16, 10
 NEW_EDGES = 0.5  # Least price (units) of the edges of a new volume.
 
 
 class Effort(NamedTuple):
-    """How many candidates are searched: limits on time.
+    """How much is searched: limits on time.
 
-    Structure that explains less stays unseen beyond them. `pool_points` are the points among which
-    candidates are found, `seeds` those around which planes are fitted, and `pairs` the pairs of
-    points whose planes are tried. At most `planes` are kept of all points, `new_planes` of those
-    that a roof leaves unexplained, and `gables` of those that explain most. The first `regrown`
-    volumes are grown anew: of 40 that were better anew, none had grown later.
+    `pool_points` are the points among which candidates are found, and `seeds` those around which
+    planes are fitted. The first `regrown` volumes are grown anew: of 40 that were better anew, none
+    had grown later.
     """
 
     pool_points: int
     seeds: int
-    pairs: int
-    planes: int
-    new_planes: int
-    gables: int
     regrown: int
 
 
-HOUSE = Effort(pool_points=500, seeds=100, pairs=200, planes=16, new_planes=10, gables=6, regrown=3)
+HOUSE = Effort(pool_points=500, seeds=100, regrown=3)
 
 
 def list_candidates(
@@ -115,14 +112,14 @@ def list_candidates_along(
     pool = pool_planes(
         cloud,
         grid,
-        list_hypotheses(cloud, effort.seeds, effort.pairs),
+        list_hypotheses(cloud, effort.seeds),
         tolerance,
         evidence,
         most_planes,
     )
     if len(pool) == 0:
         return np.empty((0, COLUMNS))
-    gables, counts = pool_gables(cloud, grid, pool, tolerance, evidence, effort.gables)
+    gables, counts = pool_gables(cloud, grid, pool, tolerance, evidence)
     middle = np.array([sort_values(u)[len(u) // 2], sort_values(v)[len(v) // 2]])
     along = turn_to_walls(pool, middle, scene.leans[direction])
     groups, sizes = group_planes(along, gables, counts, grid)

@@ -16,7 +16,14 @@ from .add import (
     add_volumes,
     find_unexplained,
 )
-from .candidates import HOUSE, Effort, list_candidates, make_grids
+from .candidates import (
+    HOUSE,
+    MOST_NEW_PLANES,
+    MOST_PLANES,
+    Effort,
+    list_candidates,
+    make_grids,
+)
 from .improve import improve
 from .moves import remove_volume
 from .objective import compute_objective
@@ -42,7 +49,7 @@ def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
     """
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
     base = make_base(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
-    candidates = list_candidates(scene, np.arange(scene.n), effort.planes, effort)
+    candidates = list_candidates(scene, np.arange(scene.n), MOST_PLANES, effort)
     ground = prepare_growth(scene, candidates)
     volumes, value = grow_volumes(
         base, compute_objective(base, scene, np.inf), ground, candidates, effort
@@ -114,7 +121,7 @@ def grow_volumes(
         if len(unexplained_points) < FEWEST_UNEXPLAINED:
             break
         candidates, is_new = (
-            list_candidates(scene, unexplained_points, effort.new_planes, effort),
+            list_candidates(scene, unexplained_points, MOST_NEW_PLANES, effort),
             True,
         )
     return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)

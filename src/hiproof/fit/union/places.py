@@ -8,7 +8,7 @@ from .add import FEWEST_UNEXPLAINED, find_unexplained
 from .block import BLOCK
 from .blocks import BLOCK_M2
 from .box import Box
-from .candidates import list_candidates
+from .candidates import MOST_NEW_PLANES, list_candidates
 from .grow import grow_volumes, prepare_growth
 from .improve import improve
 from .prices import PLACE_UNITS
@@ -61,5 +61,5 @@ def grow_in_window(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.
     unexplained_points = find_unexplained(volumes, scene)
     if len(unexplained_points) < FEWEST_UNEXPLAINED:
         return volumes, value
-    candidates = list_candidates(scene, unexplained_points, BLOCK.new_planes, BLOCK)
+    candidates = list_candidates(scene, unexplained_points, MOST_NEW_PLANES, BLOCK)
     return grow_volumes(volumes, value, prepare_growth(scene, candidates), candidates, BLOCK)

@@ -25,6 +25,8 @@ NEIGHBOUR_RADIUS_M = 2.5  # Points further away (m) are no neighbours.
 LOCAL_POINTS = (9, 17)  # Numbers of points of a local plane.
 RIDGE_STEP_M = 0.4  # Distance (m) between the ridges tried.
 PLANE_BIN = 0.05  # Planes nearer to each other (rise over run, and m at the centre) are one.
+PAIRS_A_SEED = 2  # Pairs of a seed and a point near it whose planes are tried.
+MOST_GABLES = 6  # Most gables of a pool: a limit on time.
 TEMPLATE_POINTS = 150  # Points that templates are fitted to: few are enough for a start.
 
 Cloud = namedtuple("Cloud", "u v z i j")  # Points (n,) and the grid cell of each.
@@ -310,7 +312,7 @@ def find_neighbours(cloud, i, squares, near_points, distance2, nearest):
 
 
 @compiled
-def list_hypotheses(cloud, most_seeds, most_pairs):
+def list_hypotheses(cloud, most_seeds):
     """List candidate planes (m, 3): level, local, and through pairs of points.
 
     The last slope along the axes. Seeds and partners are spread evenly (golden-ratio sequence) over
@@ -319,8 +321,7 @@ def list_hypotheses(cloud, most_seeds, most_pairs):
     n = len(cloud.u)
     flats = min(n, 200)
     seeds = min(n, most_seeds)
-    pairs_per_seed = max(2, most_pairs // seeds)
-    out = np.zeros((flats + seeds * (2 + 2 * pairs_per_seed), 3))
+    out = np.zeros((flats + seeds * (2 + 2 * PAIRS_A_SEED), 3))
     m = list_flat_planes(cloud.z, out[:flats])
     near_points, nearest = np.empty(n, np.int64), np.empty(max(LOCAL_POINTS), np.int64)
     squares, distance2 = np.empty(n), np.empty(len(nearest))
@@ -334,7 +335,7 @@ def list_hypotheses(cloud, most_seeds, most_pairs):
                 if ok:
                     copy_row(out[m], plane)
                     m += 1
-        for _ in range(pairs_per_seed):
+        for _ in range(PAIRS_A_SEED):
             fraction = (fraction + 0.6180339887498949) % 1.0
             m = append_pair_slopes(cloud, i, near_points[int(fraction * count)], out, m)
     return select_distinct(out[:m], np.mean(cloud.u), np.mean(cloud.v))
@@ -665,7 +666,7 @@ def fit_whole_roofs(cloud, grid, tau):
 
 
 @compiled
-def pool_gables(cloud, grid, pool, tau, evidence, most_gables):
+def pool_gables(cloud, grid, pool, tau, evidence):
     """Pool symmetric gables, pyramids and hips (k, PART_PLANES, 3) greedily.
 
     Also returns their counts of planes. Gables are refitted.
@@ -677,8 +678,8 @@ def pool_gables(cloud, grid, pool, tau, evidence, most_gables):
     counts = np.concatenate((np.full(len(mirrored), 2, np.int64), whole_counts))
     bounds = np.full(len(candidates), np.inf)
     current = np.ones(len(cloud.u))
-    gables, gable_counts = np.zeros((most_gables, PART_PLANES, 3)), np.zeros(most_gables, np.int64)
-    for k in range(most_gables):
+    gables, gable_counts = np.zeros((MOST_GABLES, PART_PLANES, 3)), np.zeros(MOST_GABLES, np.int64)
+    for k in range(MOST_GABLES):
         _, m, rectangle = find_best_candidate(
             cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain
         )

@@ -273,7 +273,9 @@ def run_round(
             trials[key] += 1
             continue
         moved = [
-            pair for side in repair.sides for pair in list_sides_on_line(state.sides, *side, problem)
+            pair
+            for side in repair.sides
+            for pair in list_sides_on_line(state.sides, *side, problem)
         ]
         trials.update((key, *moved))
         trial = present.draw_if_cheaper(repaired_state)
