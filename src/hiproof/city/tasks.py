@@ -11,7 +11,7 @@ from importlib import import_module
 
 from .ledger import Outcome
 
-MAIN_JOB = ("moves", "planes", "solid", "check", "points")
+MAIN_JOB = ("moves", "planes", "solid", "check", "points", "curves")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
 ONE_PRIMITIVE = (*MAIN_JOB, "single")

@@ -112,6 +112,16 @@ def single() -> None:
     fit_roof(house())
 
 
+def curves() -> None:
+    """Compile what shows that a part is none of the curved shapes."""
+    from ..fit.union.drums import find_circle
+    from ..fit.union.round_tops import find_centre, measure_fall
+
+    xyz, middle = house(), np.array([3.0, 3.5])
+    measure_fall(xyz, find_centre(xyz, middle, 3.0), 3.0, 0.5)
+    find_circle(xyz, 3.0, xyz[:, 2] == 3.0)
+
+
 def warm_recognition() -> None:
     """Compile the arrangement of a cloud for the network."""
     from ..segment.arrange import Layout, arrange
@@ -151,7 +161,7 @@ def points() -> None:
 
 PIECES: dict[str, Callable[[], None]] = {
     piece.__name__: piece
-    for piece in (moves, planes, outlines, solid, check, points, single, warm_recognition)
+    for piece in (moves, planes, outlines, solid, check, points, single, curves, warm_recognition)
 }
 
 

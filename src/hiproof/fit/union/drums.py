@@ -14,11 +14,13 @@ from itertools import islice
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
 from .judged import JudgedRoof, make_flat, measure_gain, replace_parts, trim_parts
 from .own import MOST_DISTANCE_M
+from .planes import solve_masked
 from .regions import exclude_parts, list_polygons, unite_outlines
 from .round_ends import TURRET_DEG, RoundEnd, cut_to_outline
 
@@ -124,6 +126,7 @@ def fit_drum(roof: JudgedRoof, level: float, start: np.ndarray) -> Part | None:
     return drum if is_inside and np.count_nonzero(is_wrong) >= FEWEST_WRONG else None
 
 
+@compiled
 def find_circle(
     points: np.ndarray, level: float, start: np.ndarray
 ) -> tuple[float, float, float, float]:
@@ -149,6 +152,7 @@ def find_circle(
     return x, y, radius, right_share
 
 
+@compiled
 def measure_right_share(
     points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float
 ) -> float:
@@ -157,6 +161,7 @@ def measure_right_share(
     return np.mean(is_inside == is_level)
 
 
+@compiled
 def move_circle(
     points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float, softness: float
 ) -> np.ndarray:
@@ -165,14 +170,20 @@ def move_circle(
     It is a step of a logistic fit. Points nearer to the circle count more, the more so the smaller
     its `softness` (m).
     """
-    way = points[:, :2] - (x, y)
-    r = np.maximum(np.hypot(*way.T), softness)
-    sign = np.where(is_level, 1.0, -1.0)
-    wrong = 0.5 + 0.5 * np.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
-    change = np.column_stack([(way.T / r).T, np.ones_like(r)])
-    hessian = np.eye(3) + (change.T * (wrong * (1.0 - wrong) / softness**2)) @ change
-    move = np.linalg.solve(hessian, change.T @ (sign * wrong / softness))
-    return np.clip(move, -softness, softness)
+    hessian, right, change = np.eye(3), np.zeros(3), np.ones(3)
+    for i in range(len(points)):
+        way_x, way_y = points[i, 0] - x, points[i, 1] - y
+        r = max(math.hypot(way_x, way_y), softness)
+        sign = 1.0 if is_level[i] else -1.0
+        wrong = 0.5 + 0.5 * math.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
+        change[0], change[1] = way_x / r, way_y / r
+        weight = wrong * (1.0 - wrong) / softness**2
+        for j in range(3):
+            right[j] += change[j] * sign * wrong / softness
+            for k in range(3):
+                hessian[j, k] += weight * change[j] * change[k]
+    move, _ = solve_masked(hessian, right, np.ones(3, np.bool_))
+    return np.minimum(np.maximum(move, -softness), softness)
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:

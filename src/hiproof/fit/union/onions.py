@@ -17,7 +17,7 @@ from ...primitives.catalogue import ROUND
 from ...settings import Settings
 from .judged import JudgedRoof
 from .regions import unite_outlines
-from .round_tops import ALL_ROUND, FEWEST_AROUND, fit_round, measure_falls
+from .round_tops import ALL_ROUND, FEWEST_AROUND, fit_round, measure_fall
 
 WIDER_RADII = (1.2, 1.6, 2.2, 3.0)  # Of discs around a part, in radii of a circle of its area.
 
@@ -33,7 +33,7 @@ def list_onions(roof: JudgedRoof, part: Part, settings: Settings) -> Iterator[Pa
         near = np.hypot(*(xy - centre).T) <= radius
         if (
             np.count_nonzero(near & is_beside) >= FEWEST_AROUND
-            and measure_falls(roof.points, centre[None], radius, ALL_ROUND).any()
+            and measure_fall(roof.points, centre, radius, ALL_ROUND) > 0.0
         ):
             shape = fit_round(roof, roof.points[near], ("onion",), settings)
             if shape is not None:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
 from ...primitives.cants import list_cants
@@ -53,14 +54,15 @@ def list_round_shapes(
     `own` (n,) are the points at which the part is visible.
     """
     points, visible, wide = roof.points, roof.points[own], math.sqrt(part.area / math.pi)
-    starts = np.array([visible[np.argmax(visible[:, 2]), :2], visible[:, :2].mean(axis=0)])
-    falls = measure_falls(points, starts, wide, LOOSELY)
-    if not names or not falls.any():
+    starts = visible[np.argmax(visible[:, 2]), :2], visible[:, :2].mean(axis=0)
+    round_starts = (s for s in starts if measure_fall(points, s, wide, LOOSELY) > 0.0)
+    start = next(round_starts, None) if names else None
+    if start is None:
         return
-    start, xy = starts[np.argmax(falls > 0.0)], points[:, :2]
+    xy = points[:, :2]
     for radius in (share * wide for share in RADII):
         centre = find_centre(points, start, radius)
-        (fall,) = measure_falls(points, centre[None], radius, ALL_ROUND)
+        fall = measure_fall(points, centre, radius, ALL_ROUND)
         if fall == 0.0:
             continue
         cap = scale_cap(fall / radius)
@@ -77,45 +79,43 @@ def list_round_shapes(
             yield shape
 
 
+@compiled
 def find_centre(points: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
     """Return the middle (2,) of what rises above the rest of a disc of points (n, 3)."""
-    centre = start
+    centre = start.copy()
     for _ in range(CENTRE_ROUNDS):
-        near = points[np.hypot(*(points[:, :2] - centre).T) <= radius]
-        if not len(near):
+        ways = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
+        near = points[ways <= radius]
+        if len(near) == 0:
             break
         above = np.maximum(near[:, 2] - near[:, 2].mean(), COMPARED_M)
-        centre = above @ near[:, :2] / above.sum()
+        centre[0] = (above * near[:, 0]).sum() / above.sum()
+        centre[1] = (above * near[:, 1]).sum() / above.sum()
     return centre
 
 
-def measure_falls(
-    points: np.ndarray, centres: np.ndarray, radius: float, alike: float
-) -> np.ndarray:
-    """Return how far (m) heights fall from discs' middles to their outer halves (k,).
+@compiled
+def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: float) -> float:
+    """Return how far (m) heights fall from a disc's middle to its outer half.
 
-    The discs have `centres` (k, 2). A fall is 0 where the points (n, 3) hardly fall, or not `alike`
-    in all directions.
+    It is 0 where the points (n, 3) hardly fall, or not `alike` in all directions.
     """
-    (x, y), heights = points[:, :2].T[:, None] - centres.T[:, :, None], points[:, 2]
-    distances, shape = np.hypot(x, y), (len(centres), TURN_SECTORS)
-    disc, i = np.nonzero((distances > 0.5 * radius) & (distances <= radius))
-    turns = np.arctan2(y[disc, i], x[disc, i]) / (2.0 * math.pi) % 1.0
-    sectors = np.minimum((turns * TURN_SECTORS).astype(int), TURN_SECTORS - 1) + TURN_SECTORS * disc
-    counts, sums = (
-        np.bincount(sectors, weights, math.prod(shape)).reshape(shape).tolist()
-        for weights in (None, heights[i])
-    )
-    falls = np.zeros(len(centres))
-    for k, inner in enumerate(distances <= 0.25 * radius):
-        means = [total / count for total, count in zip(sums[k], counts[k], strict=True) if count]
-        if sum(counts[k]) >= FEWEST_AROUND and len(means) >= FEWEST_SECTORS and inner.any():
-            mean = sum(means) / len(means)
-            spread = math.sqrt(sum((z - mean) ** 2 for z in means) / len(means))
-            fall = float(heights[inner].mean()) - mean
-            is_round = fall >= LEAST_FALL_M and spread <= alike * fall
-            falls[k] = fall if is_round else 0.0
-    return falls
+    n_inner, inner = 0, 0.0
+    counts, means = np.zeros(TURN_SECTORS), np.zeros(TURN_SECTORS)
+    for x, y, z in points:
+        x, y = x - centre[0], y - centre[1]
+        distance = math.hypot(x, y)
+        if distance <= 0.25 * radius:
+            n_inner, inner = n_inner + 1, inner + z
+        elif 0.5 * radius < distance <= radius:
+            turn = math.atan2(y, x) / (2.0 * math.pi) % 1.0
+            sector = min(int(turn * TURN_SECTORS), TURN_SECTORS - 1)
+            counts[sector], means[sector] = counts[sector] + 1.0, means[sector] + z
+    if counts.sum() < FEWEST_AROUND or n_inner == 0 or np.count_nonzero(counts) < FEWEST_SECTORS:
+        return 0.0
+    means = means[counts > 0] / counts[counts > 0]
+    fall = inner / n_inner - means.mean()
+    return fall if fall >= LEAST_FALL_M and means.std() <= alike * fall else 0.0
 
 
 def fit_radially(points: np.ndarray, centre: np.ndarray, cap_m: float) -> tuple[np.ndarray, float]:
