@@ -69,8 +69,8 @@ def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
     x = (x - middle) / wide
     under = 1.0 - np.minimum(x * x, 1.0)
     design = np.column_stack([np.ones_like(x), x, under, np.sqrt(under)])
-    used = np.ones(len(z), bool)
+    is_near = np.ones(len(z), bool)
     for _ in range(CURVE_ROUNDS):
-        distances = np.abs(z - design @ np.linalg.lstsq(design[used], z[used], rcond=None)[0])
-        used = distances <= max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
+        distances = np.abs(z - design @ np.linalg.lstsq(design[is_near], z[is_near], rcond=None)[0])
+        is_near = distances <= max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
     return float(np.minimum(distances, MOST_DISTANCE_M).mean())

@@ -90,7 +90,7 @@ def open_group(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | 
 def draw_in_groups(
     volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
 ) -> tuple[list[list[Side]], Agreement]:
-    """Return the volumes' sides, and their planes, equal where they agree with neighbours.
+    """Return the volumes' sides, and planes that agree with their neighbours'.
 
     Planes in the `cache` are not fitted again if all volumes are drawn at once. Otherwise there are
     no common unknowns: the agreement has no members.

@@ -37,9 +37,7 @@ MOST_ADDITIONS = 20  # Most additions tried for one building: a limit on time.
 BASE_QUANTILE = 0.02
 # Most slopes tried for new ends and ties. They cover those of the candidates.
 MOST_TYPICAL_SLOPES = 5
-STARTING_ROUNDS = 2  # Rounds of all moves before a place is grown anew.
-STUCK_ROUNDS = 2  # Rounds of all moves when no candidate helps.
-FINAL_ROUNDS = 3  # Rounds of all moves at the end.
+IMPROVING_ROUNDS = 2  # Most rounds of all moves where no volume is added.
 
 
 def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
@@ -82,7 +80,7 @@ def regrow_volumes(
     while k > 0 and len(volumes) > 2:
         trial = remove_volume(volumes, k)
         trial, trial_value = improve(
-            trial, scene, compute_objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS
+            trial, scene, compute_objective(trial, scene, np.inf), ground.slopes, IMPROVING_ROUNDS
         )
         trial, trial_value = grow_volumes(
             trial, trial_value, ground, candidates, effort, (len(volumes), value)
@@ -116,7 +114,7 @@ def grow_volumes(
             return volumes, value
         if end == NOTHING_LEFT or (is_new and remaining == n_before - 1):
             break
-        volumes, value = improve(volumes, scene, value, ground.slopes, STUCK_ROUNDS)
+        volumes, value = improve(volumes, scene, value, ground.slopes, IMPROVING_ROUNDS)
         unexplained_points = find_unexplained(volumes, scene)
         if len(unexplained_points) < FEWEST_UNEXPLAINED:
             break
@@ -124,7 +122,7 @@ def grow_volumes(
             list_candidates(scene, unexplained_points, MOST_NEW_PLANES, effort),
             True,
         )
-    return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)
+    return improve(volumes, scene, value, ground.slopes, IMPROVING_ROUNDS)
 
 
 def select_typical_slopes(candidates: np.ndarray) -> np.ndarray:

@@ -330,7 +330,7 @@ def measure_shared_area(polygon: shapely.Polygon, other: shapely.Polygon) -> flo
 def find_neighbour(
     wide_gap: shapely.Polygon, polygons: list[list[shapely.Polygon]], site: PlanSite | None = None
 ) -> tuple[int, int]:
-    """Return the two indices of the one of `polygons` that shares most area with `wide_gap`.
+    """Return the two indices of the polygon that shares most area with a gap.
 
     Without any, these are zeros. The `site` keeps the areas.
     """

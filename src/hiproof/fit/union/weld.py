@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -55,9 +56,9 @@ from .volumes import DIRECTION, U0, V0, V1
 
 WINDOW_M2 = 400.0  # A roof of so many square metres is one window.
 MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
-# Repairs that are drawn for each side: of 78 after the second, 4 paid, of 229 first ones 84 did.
-# Drawing one costs as much as composing its window.
-TRIALS_A_SIDE = 2
+# Repairs that are drawn for each line of sides: of 78 after the second, 4 paid, of 229 first
+# ones 84 did. Drawing one costs as much as composing its window.
+TRIALS_A_LINE = 2
 MOST_ROUNDS = 20  # Most rounds of repairs.
 MOST_JUDGES = 1500  # Most points of a window that judge. Of more, every k-th does.
 LEFT_OVER = 1e-9  # An equation of which the others leave less (m) holds because of them.
@@ -246,8 +247,8 @@ def run_round(
 ) -> tuple[RoofState, Drawing | None]:
     """Return the roof with every repair that pays, one in each window.
 
-    `trials` say how often each repair, and each side, was drawn. The roof's drawing comes with it
-    if it is known.
+    `trials` say how often each repair, and each side's line, was drawn. The roof's drawing comes
+    with it if it is known.
     """
     plan = drawing.plans[0]
     if plan is None:
@@ -260,7 +261,7 @@ def run_round(
     for repair in find_repairs(plan, problem.volumes, state.sides, problem.plan, problem.scene):
         # Planes are as they were until another equation holds, and so is what one more costs.
         key = repair.key, state.basis.shape[1] if repair.equations else 0
-        if trials[key] or any(trials[side] >= TRIALS_A_SIDE for side in repair.sides):
+        if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in repair.sides):
             continue
         box = frame_repair(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
@@ -272,12 +273,8 @@ def run_round(
         if repaired_state is None:
             trials[key] += 1
             continue
-        moved = [
-            pair
-            for side in repair.sides
-            for pair in list_sides_on_line(state.sides, *side, problem)
-        ]
-        trials.update((key, *moved))
+        on_lines = (list_sides_on_line(state.sides, *side, problem) for side in repair.sides)
+        trials.update((key, *chain.from_iterable(on_lines)))
         trial = present.draw_if_cheaper(repaired_state)
         if trial is not None:
             state, after_drawing = repaired_state, trial if present.window is whole else None
@@ -292,9 +289,9 @@ def assign_faces(
 
     The state has regions. Who takes a face gets its sides drawn out.
     """
-    first_state, tried = state, set[tuple]()
+    first_state, tried_keys = state, set[tuple]()
     while True:
-        next_state = run_face_round(state, drawing, whole, tried, problem)
+        next_state = run_face_round(state, drawing, whole, tried_keys, problem)
         if next_state is state:
             break
         state, drawing = next_state, draw_window(next_state, whole, problem)
@@ -306,7 +303,7 @@ def assign_faces(
 
 
 def run_face_round(
-    state: RoofState, drawing: Drawing, whole: Window, tried: set[tuple], problem: WeldProblem
+    state: RoofState, drawing: Drawing, whole: Window, tried_keys: set[tuple], problem: WeldProblem
 ) -> RoofState:
     """Return the roof with faces handed over, at most one in each window."""
     plan, is_large = drawing.plans[0], problem.outline.area > WINDOW_M2
@@ -316,9 +313,9 @@ def run_face_round(
     present = RepairTrial(state, whole, plan, problem)
     for face in list_faces(plan):
         box = shapely.box(*shapely.buffer(face.polygon, MARGIN_M).bounds) if is_large else whole.box
-        if face.key in tried or any(shapely.intersects(box, other) for other in changed):
+        if face.key in tried_keys or any(shapely.intersects(box, other) for other in changed):
             continue
-        tried.add(face.key)
+        tried_keys.add(face.key)
         if is_large:
             places = [shapely.MultiPolygon(polygons) for polygons in state.regions[1:]]
             window = make_window(box, places, problem.base, problem)
@@ -358,9 +355,9 @@ def rank_takers(face: PlanFace, present: RepairTrial) -> list[frozenset[int]]:
         return compute_misfits(window.z[inside], highest, problem.scene)
 
     misfits = {takers: measure_misfits(takers) for takers in face.list_choices()}
-    most = count_unexplained(measure_misfits([face.owner])) + FEWEST_UNEXPLAINED
+    limit = count_unexplained(measure_misfits([face.owner])) + FEWEST_UNEXPLAINED
     ranked = sorted(misfits, key=lambda takers: misfits[takers].sum())
-    return [takers for takers in ranked if count_unexplained(misfits[takers]) < most]
+    return [takers for takers in ranked if count_unexplained(misfits[takers]) < limit]
 
 
 def count_unexplained(misfits: np.ndarray) -> int:
