@@ -122,7 +122,9 @@ def test_a_side_may_take_the_line_of_the_edge_that_carries_it_on():
     x, y = own_places[:, edge // 2], own_places[:, 1 - edge // 2]
     sides = [Side(1e3)] * 4
     sides[edge] = Side(float(x[0]))
-    repairs = find_repairs(drawn, np.zeros((2, COLUMNS)), [[Side(1e3)] * 4, sides], plan, scene)
+    repairs = find_repairs(
+        drawn, np.zeros((2, COLUMNS)), [[Side(1e3)] * 4, sides], plan, scene, [1]
+    )
     lines = [repair.sides[1, edge] for repair in repairs]
     off = [np.abs(line.offset + line.lean * y[2:] - x[2:]).max() for line in lines]
     assert min(off) < 1e-9

@@ -79,6 +79,18 @@ class PlanSite(NamedTuple):
             for remainder in self.recall(subtract_hole, polygon, hole)
         ]
 
+    def cut_out_of_all(
+        self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon
+    ) -> list[list[shapely.Polygon]]:
+        """Return the regions without the `hole`, which touches few of them."""
+        polygons = [polygon for region in regions for polygon in region]
+        is_near = shapely.dwithin(polygons, hole, OVERLAY_GAP_M)
+        near_ids = {id(polygon) for polygon in np.array(polygons, object)[is_near]}
+        return [
+            self.cut_out(region, hole) if any(id(p) in near_ids for p in region) else region
+            for region in regions
+        ]
+
 
 def cut_regions(
     volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: PlanSite, base: bool
@@ -126,7 +138,7 @@ def sketch_regions(
     regions = [[p for quad in lower_quads for p in list_polygons(site.cut_quad(quad))]]
     for volume, quad, is_lower in zip(volumes[1:], quads, lower, strict=True):
         if volume[REPLACES]:
-            regions = [site.cut_out(earlier, quad) for earlier in regions]
+            regions = site.cut_out_of_all(regions, quad)
         elif not is_lower:
             regions[0] = site.cut_out(regions[0], quad)
         regions.append([quad])

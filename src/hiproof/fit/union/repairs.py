@@ -5,7 +5,7 @@ These are sides beside a place, and planes with a low step between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,12 +57,16 @@ def find_repairs(
     sides: list[list[Side]],
     plan: Plan,
     scene: Scene,
+    numbers: Iterable[int],
 ) -> list[Repair]:
-    """Find everything in the drawn plan that might be made to meet, the nearest first."""
+    """Find what might be made to meet in the drawn plan, the nearest first.
+
+    These are low steps, and moves of the sides of the volumes `numbers`.
+    """
     gaps = plan_drawn.gaps
     repairs = list(list_low_steps(plan_drawn, gaps))
     owners = np.where(plan_drawn.beside >= 0, plan_drawn.owner[plan_drawn.beside, 0], -1)
-    for k in range(1, len(volumes)):
+    for k in numbers:
         is_own = (owners == k).any(axis=1)
         free = (
             [edge for edge in range(N_SIDES) if not sides[k][edge].anchored] if is_own.any() else []

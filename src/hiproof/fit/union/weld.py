@@ -152,12 +152,12 @@ def weld(
     state = begin_state(sides, problem)
     whole = make_window(make_whole_box(problem), list_quads(state, problem), base, problem)
     drawing = draw_window(state, whole, problem)
-    trials: Counter[tuple] = Counter()
+    trials, numbers = Counter[tuple](), list(range(1, len(volumes)))
     for _ in range(MOST_ROUNDS):
-        next_state, better_drawing = run_round(state, drawing, whole, trials, problem)
-        if next_state is state:
+        state, known_drawing, numbers = run_round(state, drawing, whole, trials, numbers, problem)
+        if not numbers:
             break
-        state, drawing = next_state, better_drawing or draw_window(next_state, whole, problem)
+        drawing = known_drawing or draw_window(state, whole, problem)
     regions = cut_regions(volumes, state.planes, state.sides, site, base)
     state = assign_faces(state._replace(regions=regions), drawing, whole, problem)
     return state.sides, state.planes, list(state.regions)
@@ -243,28 +243,32 @@ def run_round(
     drawing: Drawing,
     whole: Window,
     trials: Counter[tuple],
+    numbers: list[int],
     problem: WeldProblem,
-) -> tuple[RoofState, Drawing | None]:
+) -> tuple[RoofState, Drawing | None, list[int]]:
     """Return the roof with every repair that pays, one in each window.
 
-    `trials` say how often each repair, and each side's line, was drawn. The roof's drawing comes
-    with it if it is known.
+    Sides of the volumes `numbers` may move. `trials` say how often each repair, and each side's
+    line, was drawn. Also returns the roof's drawing, if it is known, and the volumes whose sides
+    may move next.
     """
     plan = drawing.plans[0]
     if plan is None:
-        return state, drawing
+        return state, drawing, []
     area = problem.outline.area
     changed: list[shapely.Polygon] = []
-    after_drawing = None
+    postponed, after_drawing = set[int](), None
     quads = list_quads(state, problem) if area > WINDOW_M2 else []
     present = RepairTrial(state, whole, plan, problem, drawing)
-    for repair in find_repairs(plan, problem.volumes, state.sides, problem.plan, problem.scene):
+    scene, volumes = problem.scene, problem.volumes
+    for repair in find_repairs(plan, volumes, state.sides, problem.plan, scene, numbers):
         # Planes are as they were until another equation holds, and so is what one more costs.
         key = repair.key, state.basis.shape[1] if repair.equations else 0
         if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in repair.sides):
             continue
         box = frame_repair(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
+            postponed |= {k for k, _ in repair.sides}
             continue
         if present.window.box is not box and not present.window.box.equals(box):
             window = make_window(box, quads, problem.base and shows_base(plan, box), problem)
@@ -279,7 +283,20 @@ def run_round(
         if trial is not None:
             state, after_drawing = repaired_state, trial if present.window is whole else None
             changed.append(box)
-    return state, after_drawing
+    return state, after_drawing, list_unsettled(state, changed, postponed, problem)
+
+
+def list_unsettled(
+    state: RoofState, changed: list[shapely.Polygon], postponed: set[int], problem: WeldProblem
+) -> list[int]:
+    """List the volumes in boxes that `changed`, and those `postponed`, none without a change.
+
+    What else there is was tried before.
+    """
+    if not changed:
+        return []
+    is_near = shapely.intersects(np.array(list_quads(state, problem))[:, None], changed)
+    return sorted(postponed.union((1 + np.flatnonzero(is_near.any(axis=1))).tolist()))
 
 
 def assign_faces(
