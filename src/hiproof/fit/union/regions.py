@@ -79,7 +79,7 @@ class PlanSite(NamedTuple):
             for remainder in self.recall(subtract_hole, polygon, hole)
         ]
 
-    def cut_out_of_all(
+    def cut_all_regions(
         self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon
     ) -> list[list[shapely.Polygon]]:
         """Return the regions without the `hole`, which touches few of them."""
@@ -138,7 +138,7 @@ def sketch_regions(
     regions = [[p for quad in lower_quads for p in list_polygons(site.cut_quad(quad))]]
     for volume, quad, is_lower in zip(volumes[1:], quads, lower, strict=True):
         if volume[REPLACES]:
-            regions = site.cut_out_of_all(regions, quad)
+            regions = site.cut_all_regions(regions, quad)
         elif not is_lower:
             regions[0] = site.cut_out(regions[0], quad)
         regions.append([quad])

@@ -289,9 +289,9 @@ def run_round(
 def list_unsettled(
     state: RoofState, changed: list[shapely.Polygon], postponed: set[int], problem: WeldProblem
 ) -> list[int]:
-    """List the volumes in boxes that `changed`, and those `postponed`, none without a change.
+    """List the volumes in boxes that `changed`, and those `postponed`.
 
-    What else there is was tried before.
+    What else there is was tried before. Without a change, there is none.
     """
     if not changed:
         return []
