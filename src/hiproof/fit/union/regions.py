@@ -83,12 +83,13 @@ class PlanSite(NamedTuple):
         self, regions: list[list[shapely.Polygon]], hole: shapely.Polygon
     ) -> list[list[shapely.Polygon]]:
         """Return the regions without the `hole`, which touches few of them."""
+        places = [k for k, region in enumerate(regions) for _ in region]
         polygons = [polygon for region in regions for polygon in region]
         is_near = shapely.dwithin(polygons, hole, OVERLAY_GAP_M)
-        near_ids = {id(polygon) for polygon in np.array(polygons, object)[is_near]}
+        near_regions = {places[n] for n in np.flatnonzero(is_near).tolist()}
         return [
-            self.cut_out(region, hole) if any(id(p) in near_ids for p in region) else region
-            for region in regions
+            self.cut_out(region, hole) if k in near_regions else region
+            for k, region in enumerate(regions)
         ]
 
 

@@ -334,7 +334,7 @@ def run_face_round(
             continue
         tried_keys.add(face.key)
         if is_large:
-            places = [shapely.MultiPolygon(polygons) for polygons in state.regions[1:]]
+            places = problem.site.recall(join_polygons, state.regions)
             window = make_window(box, places, problem.base, problem)
             present = RepairTrial(state, window, plan, problem)
         new_state = assign_if_cheaper(face, present)
@@ -342,6 +342,11 @@ def run_face_round(
             state = new_state
             changed.append(box)
     return state
+
+
+def join_polygons(regions: Regions) -> list[shapely.MultiPolygon]:
+    """Return the region of each volume but the base as one geometry."""
+    return [shapely.MultiPolygon(polygons) for polygons in regions[1:]]
 
 
 def assign_if_cheaper(face: PlanFace, present: RepairTrial) -> RoofState | None:
