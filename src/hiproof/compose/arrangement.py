@@ -720,6 +720,20 @@ def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
 
 
 @compiled
+def enclose_polygons(soup, soup_start):
+    """Return the lowest and highest x, y (k, 4) of each polygon: low x, low y, high x, high y."""
+    boxes = np.empty((len(soup_start) - 1, 4))
+    boxes[:, :2], boxes[:, 2:] = np.inf, -np.inf
+    for k in range(len(boxes)):
+        for e in range(soup_start[k], soup_start[k + 1]):
+            for axis in range(2):
+                start, end = soup[e, axis], soup[e, 2 + axis]
+                boxes[k, axis] = min(boxes[k, axis], start, end)
+                boxes[k, 2 + axis] = max(boxes[k, 2 + axis], start, end)
+    return boxes
+
+
+@compiled
 def meeting_lines(soup, soup_start, planes, plane_start):
     """Return the segments (m, 4) in plan along which the active plane changes.
 
@@ -727,8 +741,13 @@ def meeting_lines(soup, soup_start, planes, plane_start):
     """
     out, count = np.empty((64, 4), np.int64), 0
     pieces = len(plane_start) - 1
+    boxes = enclose_polygons(soup, soup_start[1:])
     for p in range(pieces):
         for q in range(p, pieces):
+            if boxes[p, 0] > boxes[q, 2] or boxes[q, 0] > boxes[p, 2]:
+                continue
+            if boxes[p, 1] > boxes[q, 3] or boxes[q, 1] > boxes[p, 3]:
+                continue
             for i in range(plane_start[p], plane_start[p + 1]):
                 for j in range(i + 1 if p == q else plane_start[q], plane_start[q + 1]):
                     a, b, c = planes[i] - planes[j]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,6 +64,25 @@ class DrawnPlan:
         apart = np.abs(np.matmul(at, (left - right)[..., None])[..., 0])
         apart[(self.beside < 0).any(axis=1)] = np.inf
         return apart
+
+    def select_around(
+        self, is_centre: np.ndarray, reach_m: float
+    ) -> tuple[DrawnPlan, np.ndarray, np.ndarray]:
+        """Return the plan of the edges that end near central ones, and all numbers in it.
+
+        `is_centre` (e,) are these edges. Near is within `reach_m` of the box around them. The
+        numbers are those of places and of edges.
+        """
+        ends = self.places[self.edges[is_centre]]
+        (low_x, low_y), (high_x, high_y) = ends.min(axis=(0, 1)), ends.max(axis=(0, 1))
+        x, y = self.places.T
+        is_near = (x > low_x - reach_m) & (x < high_x + reach_m)
+        is_near &= (y > low_y - reach_m) & (y < high_y + reach_m)
+        edges = np.flatnonzero(is_near[self.edges[:, 0]] | is_near[self.edges[:, 1]])
+        places, ends = np.unique(self.edges[edges], return_inverse=True)
+        ends, beside = ends.reshape(-1, 2), self.beside[edges]
+        around = replace(self, places=self.places[places], edges=ends, beside=beside)
+        return around, places, edges
 
 
 def make_part(
@@ -146,11 +165,23 @@ def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
     c, s = turns.T
     a, b, z = rows.T
     common = np.column_stack([c * a - s * b, s * a + c * b, z])
-    is_apart = np.abs(common[:, None] - common).max(axis=2) > EQUAL_PLANE
     slopes = np.sort(np.hypot(rows[:, 0], rows[:, 1]))
     slopes = slopes[slopes > EQUAL_PLANE]
-    distinct = sum(is_apart[k, :k].all() for k in range(len(rows)))
-    return int(distinct) + int((np.diff(slopes, prepend=0.0) > EQUAL_PLANE).sum())
+    distinct = len(rows) - int(find_doubles(common).sum())
+    return distinct + int((np.diff(slopes, prepend=0.0) > EQUAL_PLANE).sum())
+
+
+def find_doubles(planes: np.ndarray) -> np.ndarray:
+    """Return which planes (k, 3) equal one before them. Sorted by height, few are compared."""
+    order = np.argsort(planes[:, 2], kind="stable")
+    ordered, is_double = planes[order], np.zeros(len(planes), bool)
+    for step in range(1, len(planes)):
+        differences = np.abs(ordered[step:] - ordered[:-step])
+        if differences[:, 2].min() > EQUAL_PLANE:
+            break
+        equal = np.flatnonzero(differences.max(axis=1) <= EQUAL_PLANE)
+        is_double[np.maximum(order[equal], order[equal + step])] = True
+    return is_double
 
 
 def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:

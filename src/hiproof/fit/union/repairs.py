@@ -63,31 +63,36 @@ def find_repairs(
 
     These are low steps, and moves of the sides of the volumes `numbers`.
     """
-    gaps = plan_drawn.gaps
-    repairs = list(list_low_steps(plan_drawn, gaps))
-    owners = np.where(plan_drawn.beside >= 0, plan_drawn.owner[plan_drawn.beside, 0], -1)
+    repairs = list(list_low_steps(plan_drawn))
+    left, right = np.append(plan_drawn.owner[:, 0], -1)[plan_drawn.beside].T  # -1 of -1, outside
+    turned: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     for k in numbers:
-        is_own = (owners == k).any(axis=1)
-        free = (
-            [edge for edge in range(N_SIDES) if not sides[k][edge].anchored] if is_own.any() else []
-        )
-        if not free:
+        is_own = (left == k) | (right == k)
+        free = [edge for edge in range(N_SIDES) if not sides[k][edge].anchored]
+        if not free or not is_own.any():
             continue
-        c, s = scene.turn[int(volumes[k, DIRECTION])]
-        axes = plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
-        places = (plan_drawn.places - plan.frame.origin[:2]) @ axes
-        slopes, heights = plan_drawn.planes[:, :2], plan_drawn.planes[:, 2]
-        planes = np.column_stack([slopes @ axes, slopes @ plan.frame.origin[:2] + heights])
+        direction = int(volumes[k, DIRECTION])
+        if direction not in turned:
+            turned[direction] = turn_plan(plan_drawn, plan, scene.turn[direction])
+        places, planes = turned[direction]
+        around, near_places, near_edges = plan_drawn.select_around(is_own, REPAIR_REACH_M)
+        places, is_own = places[near_places], is_own[near_edges]
         for edge in free:
-            repairs += list_side_moves(
-                plan_drawn, gaps, places, planes, is_own, (k, edge), sides[k][edge]
-            )
+            repairs += list_side_moves(around, places, planes, is_own, (k, edge), sides[k][edge])
     return sorted(repairs, key=lambda repair: repair.size)
+
+
+def turn_plan(plan_drawn: DrawnPlan, plan: Plan, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the drawn plan's places (m, 2) and planes (p, 3) in the axes of a direction."""
+    c, s = turn
+    axes, origin = plan.frame.rotation.T @ np.array([[c, -s], [s, c]]), plan.frame.origin[:2]
+    slopes, heights = plan_drawn.planes[:, :2], plan_drawn.planes[:, 2]
+    planes = np.column_stack([slopes @ axes, slopes @ origin + heights])
+    return (plan_drawn.places - origin) @ axes, planes
 
 
 def list_side_moves(
     plan_drawn: DrawnPlan,
-    gaps: np.ndarray,
     places: np.ndarray,
     planes: np.ndarray,
     is_own: np.ndarray,
@@ -126,7 +131,7 @@ def list_side_moves(
             moved = Side(float(x[i] - lean * y[i]), lean, False, side.sigma)
             yield Repair(float(size), {key: moved})
     yield from list_line_moves(plan_drawn, x, y, on_side, key, side)
-    for e in np.flatnonzero(on_side & is_low_step(gaps)):
+    for e in np.flatnonzero(on_side & is_low_step(plan_drawn.gaps)):
         left, right = planes[plan_drawn.beside[e]]
         line = find_fold_line(left, right, edge)
         if line is not None:
@@ -179,13 +184,14 @@ def find_fold_line(plane: np.ndarray, other: np.ndarray, edge: int) -> tuple[flo
     return -c / fall, -across / fall
 
 
-def list_low_steps(plan_drawn: DrawnPlan, gaps: np.ndarray) -> Iterator[Repair]:
+def list_low_steps(plan_drawn: DrawnPlan) -> Iterator[Repair]:
     """Yield repairs of low steps: two planes meet along the step, or are one."""
-    highest, lengths = gaps.max(axis=1), plan_drawn.lengths
-    low_edges = np.flatnonzero(is_low_step(gaps))
-    pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
-    for pair in np.unique(pairs, axis=0):
-        edges = low_edges[(pairs == pair).all(axis=1)]
+    highest, lengths = plan_drawn.gaps.max(axis=1), plan_drawn.lengths
+    low_edges = np.flatnonzero(is_low_step(plan_drawn.gaps))
+    sorted_pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
+    pairs, pair_of_edge = np.unique(sorted_pairs, axis=0, return_inverse=True)
+    for n, pair in enumerate(pairs):
+        edges = low_edges[pair_of_edge.ravel() == n]
         places = plan_drawn.places[np.unique(plan_drawn.edges[edges])]
         spread = np.linalg.norm(places[:, None] - places, axis=2)
         i, j = np.unravel_index(spread.argmax(), spread.shape)
