@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from ...compose.arrangement import GRID_M, OUTSIDE
-from ...compose.cells import arrange, plan_problem
+from ...compose.cells import arrange, equal_planes, plan_problem
 from ...compose.levels import split_at_crossings, stack_levels
 from ...errors import CompositionError
 from ...frames import LocalFrame
@@ -167,21 +167,8 @@ def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
     common = np.column_stack([c * a - s * b, s * a + c * b, z])
     slopes = np.sort(np.hypot(rows[:, 0], rows[:, 1]))
     slopes = slopes[slopes > EQUAL_PLANE]
-    distinct = len(rows) - int(find_doubles(common).sum())
+    distinct = int((equal_planes(common, EQUAL_PLANE) == np.arange(len(rows))).sum())
     return distinct + int((np.diff(slopes, prepend=0.0) > EQUAL_PLANE).sum())
-
-
-def find_doubles(planes: np.ndarray) -> np.ndarray:
-    """Return which planes (k, 3) equal one before them. Sorted by height, few are compared."""
-    order = np.argsort(planes[:, 2], kind="stable")
-    ordered, is_double = planes[order], np.zeros(len(planes), bool)
-    for step in range(1, len(planes)):
-        differences = np.abs(ordered[step:] - ordered[:-step])
-        if differences[:, 2].min() > EQUAL_PLANE:
-            break
-        equal = np.flatnonzero(differences.max(axis=1) <= EQUAL_PLANE)
-        is_double[np.maximum(order[equal], order[equal + step])] = True
-    return is_double
 
 
 def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:

@@ -50,6 +50,11 @@ class Repair:
         places = [(*np.round(place, 1).tolist(), *terms) for place, terms in self.equations]
         return tuple(sorted(lines)), tuple(sorted(places))
 
+    @property
+    def owners(self) -> set[int]:
+        """The volumes whose planes change."""
+        return {k for _, terms in self.equations for _, (k, _) in terms}
+
 
 def find_repairs(
     plan_drawn: DrawnPlan,

@@ -49,7 +49,7 @@ from .regions import (
     locate_points,
     sketch_regions,
 )
-from .repairs import Repair, find_repairs, measure_low_steps
+from .repairs import REPAIR_REACH_M, Repair, find_repairs, measure_low_steps
 from .scene import Scene, select_points
 from .sides import Side, cross_lines
 from .volumes import DIRECTION, U0, V0, V1
@@ -63,6 +63,7 @@ MOST_ROUNDS = 20  # Most rounds of repairs.
 MOST_JUDGES = 1500  # Most points of a window that judge. Of more, every k-th does.
 LEFT_OVER = 1e-9  # An equation of which the others leave less (m) holds because of them.
 ONE_LINE_M = 0.02  # Sides of two volumes nearer than this (m) are one line.
+LINE_REACH_M = 5.0  # Distance (m) along a line from which on another side on it stays.
 
 
 class WeldProblem(NamedTuple):
@@ -257,6 +258,7 @@ def run_round(
         return state, drawing, []
     area = problem.outline.area
     changed: list[shapely.Polygon] = []
+    boxes: dict[tuple, shapely.Polygon] = {}
     postponed, after_drawing = set[int](), None
     quads = list_quads(state, problem) if area > WINDOW_M2 else []
     present = RepairTrial(state, whole, plan, problem, drawing)
@@ -266,8 +268,14 @@ def run_round(
         key = repair.key, state.basis.shape[1] if repair.equations else 0
         if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in repair.sides):
             continue
-        box = frame_repair(repair, state, problem) if area > WINDOW_M2 else whole.box
-        if any(shapely.intersects(box, other) for other in changed):
+        if not repair.owners <= problem.agreement.members.keys():
+            continue
+        which = (*repair.sides, *repair.owners)
+        if which not in boxes:
+            is_large = area > WINDOW_M2
+            boxes[which] = frame_repair(repair, state, problem) if is_large else whole.box
+        box = boxes[which]
+        if changed and shapely.intersects(box, changed).any():
             postponed |= {k for k, _ in repair.sides}
             continue
         if present.window.box is not box and not present.window.box.equals(box):
@@ -414,39 +422,31 @@ def frame_repair(repair: Repair, state: RoofState, problem: WeldProblem) -> shap
 
     It lies around the sides that move and the volumes whose planes change.
     """
-    owners = {k for _, terms in repair.equations for _, (k, _) in terms}
-    quads = [problem.site.draw_quad(problem.volumes[k], state.sides[k]) for k in owners if k > 0]
-    places = [shapely.get_coordinates(quad) for quad in quads]
-    places += [
-        list_line_ends(state.sides, k, edge, side, problem)
-        for (k, edge), side in repair.sides.items()
-    ]
-    ends = np.concatenate(places) if places else np.zeros((0, 2))
-    if not len(ends) or 0 in owners:
+    if 0 in repair.owners:
         return make_whole_box(problem)
-    return shapely.box(*(ends.min(axis=0) - MARGIN_M), *(ends.max(axis=0) + MARGIN_M))
+    quads = [problem.site.draw_quad(problem.volumes[k], state.sides[k]) for k in repair.owners]
+    places = [shapely.get_coordinates(quad) for quad in quads]
+    places += [list_line_ends(state.sides, k, edge, problem) for k, edge in repair.sides]
+    ends = np.concatenate(places)
+    margin = MARGIN_M + (REPAIR_REACH_M if repair.sides else 0.0)
+    return shapely.box(*(ends.min(axis=0) - margin), *(ends.max(axis=0) + margin))
 
 
 def list_line_ends(
-    sides: list[list[Side]], k: int, edge: int, line: Side, problem: WeldProblem
+    sides: list[list[Side]], k: int, edge: int, problem: WeldProblem
 ) -> np.ndarray:
     """Return the ends (n, 2) of all sides on the line of side `edge` of volume k.
 
-    These are the ends before and after they move onto another `line`, in local coordinates.
+    They are in local coordinates.
     """
     offsets, leans, _ = problem.site.recall(lay_out_sides, sides)
     numbers, edges = np.array(list_sides_on_line(sides, k, edge, problem), int).reshape(-1, 2).T
     beside = slice(2, 4) if edge < 2 else slice(0, 2)
-    offset_beside, lean_beside = offsets[numbers, beside], leans[numbers, beside]
-    ends = []
-    for offset, lean in (
-        (offsets[numbers, edges, None], leans[numbers, edges, None]),
-        (line.offset, line.lean),
-    ):
-        x, y = cross_lines(offset, lean, offset_beside, lean_beside)
-        ends.append(np.stack([x, y] if edge < 2 else [y, x], axis=-1).reshape(-1, 2))
+    across = offsets[numbers, edges, None], leans[numbers, edges, None]
+    x, y = cross_lines(*across, offsets[numbers, beside], leans[numbers, beside])
+    ends = np.stack([x, y] if edge < 2 else [y, x], axis=-1).reshape(-1, 2)
     c, s = problem.scene.turn[int(problem.volumes[k, DIRECTION])]
-    return problem.plan.frame.xy_local(np.concatenate(ends) @ np.array([[c, s], [-s, c]]))
+    return problem.plan.frame.xy_local(ends @ np.array([[c, s], [-s, c]]))
 
 
 def list_quads(state: RoofState, problem: WeldProblem) -> list[shapely.Polygon]:
@@ -545,8 +545,6 @@ def fit_repair(
     members, start = problem.agreement.members, problem.agreement.start
     rows = []
     for place, terms in repair.equations:
-        if any(k not in members for _, (k, _) in terms):
-            return None
         position = np.append(
             (place - problem.plan.frame.origin[:2]) @ problem.plan.frame.rotation.T, 1.0
         )
@@ -589,7 +587,7 @@ def list_sides_on_line(
 ) -> list[tuple[int, int]]:
     """List the sides, as (volume, edge), on the line of side `edge` of volume k.
 
-    Sides on the outline are left out.
+    Sides on the outline are left out, and those too far along the line.
     """
     offsets, lean, anchored = problem.site.recall(lay_out_sides, sides)
     old_side, directions = sides[k][edge], problem.volumes[:, DIRECTION]
@@ -599,6 +597,9 @@ def list_sides_on_line(
         & ~anchored
     )
     is_near &= (directions == directions[k])[:, None]
+    starts, ends = offsets[:, [2, 3] if edge < 2 else [0, 1]].T
+    is_within = (starts < ends[k] + LINE_REACH_M) & (ends > starts[k] - LINE_REACH_M)
+    is_near &= is_within[:, None]
     is_near[0], is_near[:, (edge ^ 2) & 2], is_near[:, (edge ^ 2) | 1] = False, False, False
     return [(j, e) for j, e in np.argwhere(is_near).tolist()]
 

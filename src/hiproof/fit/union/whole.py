@@ -57,13 +57,16 @@ class Whole:
         self.volumes = (
             make_base(float(self.z.min()) - BELOW_ALL_M) if volumes is None else volumes.copy()
         )
-        self.set_volumes(self.volumes)
+        self.set_volumes(self.volumes, self.find_extents(self.volumes))
 
-    def set_volumes(self, volumes: np.ndarray) -> None:
-        """Set the volumes, each numbered by its row."""
-        self.volumes = volumes
+    def set_volumes(self, volumes: np.ndarray, boxes: np.ndarray) -> None:
+        """Set the volumes, each numbered by its row, and the boxes (k, 4) around them."""
+        self.volumes, self.boxes = volumes, boxes
         self.volumes[:, ROW_NUMBER] = np.arange(len(volumes))
-        self.boxes = np.array([self.find_extent(row) for row in volumes])
+
+    def find_extents(self, rows: np.ndarray) -> np.ndarray:
+        """Return the boxes (k, 4) around what lies inside the outline of volumes."""
+        return np.array([self.find_extent(row) for row in rows]).reshape(-1, 4)
 
     def find_points(self, box: Box) -> np.ndarray:
         """Return the numbers (m,) of the points in a box, among those sorted by u."""
@@ -120,18 +123,17 @@ class Whole:
         if not numbers:
             places = [len(self.volumes) + k for k in range(len(rows))]
         all_rows = np.concatenate([self.volumes[kept_numbers], rows])
+        boxes = np.concatenate([self.boxes[kept_numbers], self.find_extents(rows)])
         order = np.argsort(np.concatenate([kept_numbers, places]), kind="stable")
-        self.set_volumes(all_rows[order])
+        self.set_volumes(all_rows[order], boxes[order])
 
     def find(self, place: bytes) -> int | None:
         """Find the number of the volume at a place, None if it is gone.
 
         A place is the bytes of the columns POSITION.
         """
-        for k in range(1, len(self.volumes)):
-            if self.volumes[k, POSITION].tobytes() == place:
-                return k
-        return None
+        is_there = (self.volumes[1:, POSITION] == np.frombuffer(place)).all(axis=1)
+        return 1 + int(is_there.argmax()) if is_there.any() else None
 
     def compute_heights(self) -> np.ndarray:
         """Return heights (n,) of the roof at all points.
