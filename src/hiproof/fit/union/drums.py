@@ -21,7 +21,7 @@ from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
 from .judged import JudgedRoof, make_flat, measure_gain, replace_parts, trim_parts
 from .own import MOST_DISTANCE_M
 from .planes import solve_masked
-from .regions import exclude_parts, list_polygons, unite_outlines
+from .regions import exclude_parts, list_polygons, select_touching, unite_outlines
 from .round_ends import TURRET_DEG, RoundEnd, cut_to_outline
 
 SAME_LEVEL_M = 0.15  # Points so near to a level (m) belong to it.
@@ -98,13 +98,15 @@ def is_at_level(part: Part, level: float) -> bool:
 
 
 def list_drums(roof: JudgedRoof) -> Iterator[Part]:
-    """Yield drums around level parts, all those at one level together or one alone."""
+    """Yield drums around level parts, those that touch at one level together or one alone."""
     z, top = roof.points[:, 2], roof.highest[1]
     for k, part in enumerate(roof.parts):
         own = top == k
         if part.type == "flat" and np.count_nonzero(own) >= FEWEST_LEVEL_POINTS:
             level = float(np.median(z[own]))
-            is_level = np.array([is_at_level(other, level) for other in roof.parts])
+            group = [other for other in roof.parts if is_at_level(other, level)]
+            group = select_touching(group, unite_outlines([part]))
+            is_level = np.array([any(other is one for one in group) for other in roof.parts])
             starts = (is_level[top], own) if np.count_nonzero(is_level) > 1 else (own,)
             drums = (fit_drum(roof, level, start) for start in starts)
             yield from islice((drum for drum in drums if drum is not None), 1)

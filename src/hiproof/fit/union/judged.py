@@ -71,11 +71,10 @@ def replace_parts(
     cap = scale_cap(measure_slope(shape))
     before, after = roof.measure_distances(cap), np.minimum(np.abs(z - over), cap)
     numbers = []
-    for k in range(len(kept_roof.parts)):
+    for k in np.unique(top[within]).tolist():
         own, inside = top == k, (top == k) & within
         if (
-            inside.any()
-            and inside.sum() >= REPLACED_SHARE * own.sum()
+            inside.sum() >= REPLACED_SHARE * own.sum()
             and after[inside].mean() <= before[inside].mean() + AS_WELL_M
         ):
             numbers.append(k)

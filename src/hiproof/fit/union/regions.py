@@ -318,6 +318,11 @@ def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
     )
 
 
+def select_touching(parts: Iterable[Part], area: shapely.Geometry) -> list[Part]:
+    """Select the parts that touch an area."""
+    return [part for part in parts if shapely.dwithin(area, part.outlines, OVERLAY_GAP_M).any()]
+
+
 def exclude_parts(parts: Iterable[Part], excluded: Iterable[Part]) -> list[Part]:
     """Return the parts that are none of `excluded`."""
     return [part for part in parts if not any(part is item for item in excluded)]

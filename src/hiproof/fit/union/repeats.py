@@ -28,6 +28,7 @@ from .volumes import (
     V0,
     V1,
     compute_roof_heights,
+    list_movable,
 )
 
 LEAST_COPY_M2 = 1.0  # Smallest volume (m2) that may stand in a row.
@@ -41,7 +42,7 @@ def repeat_volumes(volumes: np.ndarray, scene: Scene) -> np.ndarray:
 
     Copies are added where points suggest them.
     """
-    for k in range(1, len(volumes)):
+    for k in list_movable(volumes):
         if is_repeatable(volumes[k]):
             for axis in (0, 1):
                 volumes = repeat_along(volumes, k, axis, scene)

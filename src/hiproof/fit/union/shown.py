@@ -15,7 +15,7 @@ from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...model.heights import find_highest
 from .plan import Plan
-from .regions import find_neighbour, list_polygons, unite_outlines, widen_gap
+from .regions import find_neighbour, list_polygons, select_touching, unite_outlines, widen_gap
 from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
 
 # Distance (m) between corners that are the same but for the grid on which they lie.
@@ -48,7 +48,8 @@ def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Pa
 
     Returns None if that is impossible or too much.
     """
-    covered, hidden_area = unite_outlines(parts), unite_outlines([hidden])
+    hidden_area = unite_outlines([hidden])
+    covered = unite_outlines(select_touching(parts, hidden_area))
     pieces = [list(part.pieces) for part in parts]
     bare = list_polygons(shapely.difference(hidden_area, covered, grid_size=OVERLAY_GRID_M))
     bare = [polygon for polygon in bare if not shapely.buffer(polygon, -GRID_SEAM_M).is_empty]

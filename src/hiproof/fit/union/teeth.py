@@ -18,7 +18,7 @@ from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
-from .regions import exclude_parts, list_polygons, unite_outlines
+from .regions import exclude_parts, list_polygons, select_touching, unite_outlines
 from .shown import absorb_slivers
 
 SLOPE_ALIKE = 0.05  # Difference in slope (rise over run) within which teeth are alike.
@@ -107,7 +107,8 @@ def select_equal_heights(parts: list[Part], tooth: Part) -> Iterator[Part]:
     """Select the parts that are about as high as a `tooth` in its middle."""
     middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
     target = tooth.height_at(middle)[0]
-    return (part for part in parts if abs(part.height_at(middle)[0] - target) <= HEIGHT_ALIKE_M)
+    there = select_touching(parts, shapely.Point(*middle))
+    return (part for part in there if abs(part.height_at(middle)[0] - target) <= HEIGHT_ALIKE_M)
 
 
 def is_visible_as(part: Part, tooth: Part, other_parts: list[Part]) -> bool:
@@ -117,7 +118,8 @@ def is_visible_as(part: Part, tooth: Part, other_parts: list[Part]) -> bool:
     """
     xy = lay_places([part])
     z, target = part.height_at(xy), tooth.height_at(xy)
-    beneath = np.max([other.height_at(xy) for other in other_parts], axis=0)
+    touching = select_touching(other_parts, unite_outlines([part]))
+    beneath = np.max([other.height_at(xy) for other in touching], axis=0, initial=-np.inf)
     shows = z > beneath + 1e-6
     alike = np.abs(z[shows] - target[shows]) < HEIGHT_ALIKE_M
     whole = alike.sum() * GRID_STEP_M**2 > TOOTH_SHARE * tooth.area

@@ -52,7 +52,7 @@ from .regions import (
 from .repairs import REPAIR_REACH_M, Repair, find_repairs, measure_low_steps
 from .scene import Scene, select_points
 from .sides import Side, cross_lines
-from .volumes import DIRECTION, U0, V0, V1
+from .volumes import DIRECTION, U0, U1, V0, V1
 
 WINDOW_M2 = 400.0  # A roof of so many square metres is one window.
 MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
@@ -597,7 +597,7 @@ def list_sides_on_line(
         & ~anchored
     )
     is_near &= (directions == directions[k])[:, None]
-    starts, ends = offsets[:, [2, 3] if edge < 2 else [0, 1]].T
+    starts, ends = problem.volumes[:, [V0, V1] if edge < 2 else [U0, U1]].T
     is_within = (starts < ends[k] + LINE_REACH_M) & (ends > starts[k] - LINE_REACH_M)
     is_near &= is_within[:, None]
     is_near[0], is_near[:, (edge ^ 2) & 2], is_near[:, (edge ^ 2) | 1] = False, False, False
