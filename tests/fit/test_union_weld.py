@@ -1,6 +1,8 @@
 """Check welding: a repair is kept if the roof gets cheaper, and outlines stay."""
 
 import importlib
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.repairs import find_repairs
 from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side
-from hiproof.fit.union.volumes import COLUMNS, LEVEL
+from hiproof.fit.union.volumes import COLUMNS, LEVEL, U0, V1
 from hiproof.simulate import Defects, ScanSettings, random_compound, scan_solids
 from points_of_roofs import sample_heights
 
@@ -87,6 +89,37 @@ def test_a_window_judges_a_moved_side_as_the_whole_roof_does(monkeypatch, kind, 
                 assert in_window == pytest.approx(on_roof, abs=1e-6)
                 compared += 1
     assert compared
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("dormered", 2), ("dormered", 5)])
+def test_repairs_of_a_side_depend_on_the_plan_around_its_volume(monkeypatch, kind, seed):
+    problem, state = capture_problem(monkeypatch, kind, seed)
+    sides = [
+        [side if side.anchored else replace(side, offset=side.offset + 0.1 * k) for side in row]
+        for k, row in enumerate(state.sides)
+    ]
+    state = state._replace(sides=sides)
+    quads = weld.list_quads(state, problem)
+    whole = weld.make_window(weld.make_whole_box(problem), quads, problem.base, problem)
+    (plan,) = weld.draw_window(state, whole, problem).plans
+    numbers = range(1, len(problem.volumes))
+    arguments = plan, problem.volumes, sides, problem.plan, problem.scene, numbers
+    repairs = find_repairs(*arguments)
+    everything = plan, np.arange(len(plan.places)), np.arange(len(plan.edges))
+    monkeypatch.setattr(DrawnPlan, "select_around", lambda *_: everything)
+    assert repairs
+    assert [repair.key for repair in repairs] == [one.key for one in find_repairs(*arguments)]
+
+
+def test_a_side_far_away_on_the_same_line_stays():
+    volumes = np.zeros((4, COLUMNS))
+    volumes[1:, U0 : V1 + 1] = [(0, 9, 0, 8), (0, 9, 12, 20), (0, 9, 50, 60)]
+    sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
+    site = SimpleNamespace(recall=lambda find, *arguments: find(*arguments))
+    problem = SimpleNamespace(volumes=volumes, site=site)
+    assert weld.list_sides_on_line(sides, 1, 1, problem) == [(1, 1), (2, 1)]
+    moved = weld.move_line(sides, 1, 1, Side(9.5), problem)
+    assert [volume_sides[1].offset for volume_sides in moved[1:]] == [9.5, 9.5, 9.0]
 
 
 def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):

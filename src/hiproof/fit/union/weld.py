@@ -432,9 +432,7 @@ def frame_repair(repair: Repair, state: RoofState, problem: WeldProblem) -> shap
     return shapely.box(*(ends.min(axis=0) - margin), *(ends.max(axis=0) + margin))
 
 
-def list_line_ends(
-    sides: list[list[Side]], k: int, edge: int, problem: WeldProblem
-) -> np.ndarray:
+def list_line_ends(sides: list[list[Side]], k: int, edge: int, problem: WeldProblem) -> np.ndarray:
     """Return the ends (n, 2) of all sides on the line of side `edge` of volume k.
 
     They are in local coordinates.

@@ -57,11 +57,11 @@ class Whole:
         self.volumes = (
             make_base(float(self.z.min()) - BELOW_ALL_M) if volumes is None else volumes.copy()
         )
-        self.set_volumes(self.volumes, self.find_extents(self.volumes))
+        self.set_volumes(self.volumes)
 
-    def set_volumes(self, volumes: np.ndarray, boxes: np.ndarray) -> None:
-        """Set the volumes, each numbered by its row, and the boxes (k, 4) around them."""
-        self.volumes, self.boxes = volumes, boxes
+    def set_volumes(self, volumes: np.ndarray, boxes: np.ndarray | None = None) -> None:
+        """Set the volumes, each numbered by its row, and the boxes (k, 4) around them if known."""
+        self.volumes, self.boxes = volumes, self.find_extents(volumes) if boxes is None else boxes
         self.volumes[:, ROW_NUMBER] = np.arange(len(volumes))
 
     def find_extents(self, rows: np.ndarray) -> np.ndarray:
