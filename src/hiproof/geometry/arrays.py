@@ -46,9 +46,26 @@ def sort_values(values):
 
 @compiled
 def compute_median(values):
-    """Return the median of `values` (n,), float64, of which there is one at least."""
-    ordered = sort_values(values)
-    return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+    """Return the median of `values` (n,), float64, of which there is one at least.
+
+    They are sorted no further than it takes (Hoare's selection).
+    """
+    x, half, low, high = values.copy(), len(values) // 2, 0, len(values) - 1
+    while low < high:
+        pivot, i, j = x[half], low, high
+        while i <= j:
+            while x[i] < pivot:
+                i += 1
+            while pivot < x[j]:
+                j -= 1
+            if i <= j:
+                x[i], x[j] = x[j], x[i]
+                i, j = i + 1, j - 1
+        if j < half:
+            low = i
+        if half < i:
+            high = j
+    return x[half] if len(x) % 2 == 1 else 0.5 * (x[:half].max() + x[half])
 
 
 @compiled

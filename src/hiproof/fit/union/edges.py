@@ -71,11 +71,13 @@ def move_edges(volumes, scene, k, value, reach, context):
     walls, is_charged = gather_walls(scene), False
     neighbours = np.zeros((0, 0), np.int64)
     beside = make_room(0)
+    sums, places = np.empty((3, len(gain))), np.empty(count_most_places(scene, len(volumes)))
     for edge in range(4):
-        places, m = list_edge_places(volumes, scene, k, edge)
+        m = list_edge_places(volumes, scene, k, edge, places)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
         sign = -1.0 if edge % 2 == 0 else 1.0
-        distance, gains, covered = sum_outward(volumes, scene, k, edge, gain, bare)
+        count = sum_outward(volumes, scene, k, edge, gain, bare, sums)
+        distance, gains, covered = sums[0, :count], sums[1, :count], sums[2, :count]
         places[m] = (
             find_place_between(distance, gains, sign, start) if reach < SMALL_REACH_M else start
         )
@@ -115,12 +117,12 @@ def move_edges(volumes, scene, k, value, reach, context):
     return value
 
 
-@compiled
-def sum_outward(volumes, scene, k, edge, gain, bare):
+@compiled(allocates=False)
+def sum_outward(volumes, scene, k, edge, gain, bare, sums):
     """Sum up what an edge of volume k gains on its way out from the opposite one.
 
-    Returns the distances of the points and unobserved cells that it passes, ascending, and the sums
-    of `gain` and of `bare` up to each.
+    Fills the rows of `sums` with the distances of the points and unobserved cells that it passes,
+    ascending, and with the sums of `gain` and of `bare` up to each. Returns how many it passes.
     """
     direction = int(volumes[k, DIRECTION])
     u, v, order = scene.U[direction], scene.V[direction], scene.order[direction, edge // 2]
@@ -133,7 +135,7 @@ def sum_outward(volumes, scene, k, edge, gain, bare):
         volumes[k, U0 + (edge ^ 1)],
         len(order),
     )
-    distance, gains, covered = np.empty(count), np.empty(count), np.empty(count)
+    distance, gains, covered = sums[0], sums[1], sums[2]
     first, last = 0, count  # of the order, where the way begins: found by halving
     while first < last:
         q = (first + last) // 2
@@ -150,7 +152,7 @@ def sum_outward(volumes, scene, k, edge, gain, bare):
             bared += bare[i]
             distance[m], gains[m], covered[m] = sign * x[i], gained, bared
             m += 1
-    return distance[:m], gains[:m], covered[:m]
+    return m
 
 
 @compiled
@@ -170,16 +172,20 @@ def find_place_between(distance, gains, sign, start):
 
 
 @compiled
-def list_edge_places(volumes, scene, k, edge):
-    """List the places for an edge, and count them.
+def count_most_places(scene, count):
+    """Return the most places that an edge of one of `count` volumes may have, and one more."""
+    return scene.lines.shape[2] + scene.vertices.shape[2] + 2 * SMALL_STEPS + 3 * count + 2
+
+
+@compiled(allocates=False)
+def list_edge_places(volumes, scene, k, edge, places):
+    """Fill `places` with the places for an edge, and count them.
 
     They are corners of the outline, grid lines, small steps, other volumes' edges and ridges, and a
     place outside.
     """
     direction, axis, start = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     lines, vertices = scene.lines[direction, axis], scene.vertices[direction, axis]
-    # One place is for the caller.
-    places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2)
     m, last = 0, lines[0]
     for x in vertices:
         if abs(x - start) < VERTEX_REACH_M:
@@ -204,10 +210,10 @@ def list_edge_places(volumes, scene, k, edge):
                 )
                 m += 1
     places[m] = lines[0] - BEYOND_OUTLINE_M if edge % 2 == 0 else last + BEYOND_OUTLINE_M
-    return places, m + 1
+    return m + 1
 
 
-@compiled
+@compiled(allocates=False)
 def is_repeated(places, q):
     """Return whether the q-th place is one of those before it."""
     for p in range(q):

@@ -320,15 +320,9 @@ def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath
             offset = z[seeds[g]] - slope * x[seeds[g]]
             gain = unchanged
             for first in range(0, m, POINTS_AT_ONCE):
+                last = min(first + POINTS_AT_ONCE, m)
                 gain -= sum_plane_misfit(
-                    slope,
-                    offset,
-                    z[first:m],
-                    x[first:m],
-                    own_heights[first:m],
-                    floors[first:m],
-                    dead,
-                    width,
+                    slope, offset, z, x, own_heights, floors, first, last, dead, width
                 )
                 if gain < best:
                     break
@@ -337,14 +331,14 @@ def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath
     return best, best_slope, best_offset
 
 
-@compiled(fastmath={"reassoc", "nsz"})
-def sum_plane_misfit(slope, offset, z, x, own_heights, floors, dead, width):
-    """Sum up the cost of the first POINTS_AT_ONCE points z with a further plane.
+@compiled(fastmath={"reassoc", "nsz"}, allocates=False)
+def sum_plane_misfit(slope, offset, z, x, own_heights, floors, first, last, dead, width):
+    """Sum up the cost of the points z from `first` to `last` with a further plane.
 
     The volume is `own_heights` high without it, and the roof nowhere below `floors`.
     """
     total = 0.0
-    for p in range(min(POINTS_AT_ONCE, len(z))):
+    for p in range(np.uint64(first), np.uint64(last)):  # unsigned: no place is negative
         h = max(min(own_heights[p], offset + slope * x[p]), floors[p])
         total += compute_point_cost(z[p], h, dead, width)
     return total

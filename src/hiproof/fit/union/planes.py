@@ -480,7 +480,8 @@ def find_best_candidate(cloud, candidates, counts, bounds, current, tau, least_g
             )
     best, number, rectangle = least_gain, -1, (0, 0, 0, 0)
     reach, column = np.empty(len(gain) + 1), np.empty(gain.shape[1])
-    for m in sort_order(-bounds):
+    promising = np.nonzero(bounds > least_gain)[0]
+    for m in promising[sort_order(-bounds[promising])]:
         if bounds[m] <= best:
             break
         bounds[m] = fill_point_gains(cloud, candidates[m], counts[m], current, tau, gain_of_point)
