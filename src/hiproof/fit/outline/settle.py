@@ -177,7 +177,7 @@ def log_likelihoods(depth, a_metre, table):
     for m, walls in enumerate(WALLS_M):
         for q in range(len(OFFSETS_M)):
             logs[m :: len(WALLS_M), q] = -a_metre * (DEEP_M + OFFSETS_M[q] + walls)
-    counted = 0
+    counted, count = 0, len(OFFSETS_M)
     for d in depth:
         if d >= SHALLOW_M - OFFSETS_M[0]:  # inside wherever the side lies
             continue
@@ -187,11 +187,11 @@ def log_likelihoods(depth, a_metre, table):
         p = int((place - k) * OFFSET_STEPS)
         excess = (place - k) * OFFSET_STEPS - p
         then, remainder = (k, p + 1) if p + 1 < OFFSET_STEPS else (k + 1, 0)
-        for row in range(len(logs)):
-            for q in range(len(OFFSETS_M)):
-                logs[row, q] += (1.0 - excess) * table[row, p, k + q] + excess * table[
-                    row, remainder, then + q
-                ]
+        for row in range(len(logs)):  # along arrays of their own: several offsets at once
+            sums, near = logs[row], table[row, p, k : k + count]
+            far = table[row, remainder, then : then + count]
+            for q in range(count):
+                sums[q] += (1.0 - excess) * near[q] + excess * far[q]
     return logs + counted * math.log(a_metre)
 
 

@@ -46,7 +46,8 @@ def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
     Also returns their objective.
     """
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
-    base = make_base(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
+    place = int(quantile * (scene.n - 1))
+    base = make_base(float(np.partition(scene.z[: scene.n], place)[place]))
     candidates = list_candidates(scene, np.arange(scene.n), MOST_PLANES, effort)
     ground = prepare_growth(scene, candidates)
     volumes, value = grow_volumes(

@@ -68,9 +68,12 @@ def list_round_shapes(
         cap = scale_cap(fall / radius)
         disc = np.hypot(*(xy - centre).T) <= radius
         centre, left = fit_radially(roof.points[disc], centre, cap)
-        most_left = BENT if len(np.unique(roof.highest[1][disc])) == 1 else AS_NEAR
-        if left > most_left * roof.measure_distances(cap)[disc].mean() and not list_cants(
-            part.parameters
+        share = BENT if len(np.unique(roof.highest[1][disc])) == 1 else AS_NEAR
+        most_left = share * roof.measure_distances(cap)[disc].mean()
+        if (
+            left > most_left
+            and not list_cants(part.parameters)
+            and measure_spires(roof.points[disc], centre, cap) > most_left
         ):
             continue
         near = roof.points[np.hypot(*(xy - centre).T) <= BEYOND * radius]
@@ -136,8 +139,7 @@ def fit_radially(points: np.ndarray, centre: np.ndarray, cap_m: float) -> tuple[
         slopes = solution[1] + 2.0 * solution[2] * r
         if columns == 5:
             centre = centre + np.clip(solution[3:], -cap_m, cap_m)
-    left = np.minimum(distances, cap_m).mean()
-    return centre, min(float(left), measure_spires(points, centre, cap_m))
+    return centre, float(np.minimum(distances, cap_m).mean())
 
 
 def select_followers(roof: JudgedRoof, part: Part) -> np.ndarray | None:
