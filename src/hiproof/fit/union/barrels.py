@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
+from ...geometry.arrays import compute_median
 from ...model import Part
 from ...settings import Settings
 from .judged import COMPARED_M, JudgedRoof
@@ -72,5 +73,5 @@ def measure_arc_misfit(x: np.ndarray, z: np.ndarray) -> float:
     is_near = np.ones(len(z), bool)
     for _ in range(CURVE_ROUNDS):
         distances = np.abs(z - design @ np.linalg.lstsq(design[is_near], z[is_near], rcond=None)[0])
-        is_near = distances <= max(MOST_DISTANCE_M, 2.0 * float(np.median(distances)))
+        is_near = distances <= max(MOST_DISTANCE_M, 2.0 * compute_median(distances))
     return float(np.minimum(distances, MOST_DISTANCE_M).mean())

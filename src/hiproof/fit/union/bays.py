@@ -207,8 +207,8 @@ def list_small_pieces(outline: shapely.Polygon) -> list[np.ndarray]:
     )
     edges, places = find_first_crossings(ring, corners, ways)
     firsts, lasts, places = (
-        np.r_[corners, edges + 1],
-        np.r_[edges, corners],
+        np.concatenate([corners, edges + 1]),
+        np.concatenate([edges, corners]),
         np.tile(places, (2, 1)),
     )
     areas, most_area = (
@@ -245,7 +245,7 @@ def measure_areas(
     each area.
     """
     twice = np.vstack([ring, ring])
-    sums = np.r_[0.0, np.cumsum(cross_vectors(twice[:-1], twice[1:]))]
+    sums = np.append(0.0, np.cumsum(cross_vectors(twice[:-1], twice[1:])))
     firsts = firsts % len(ring)
     lasts = firsts + (lasts - firsts) % len(ring)
     return 0.5 * (

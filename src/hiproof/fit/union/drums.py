@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
+from ...geometry.arrays import compute_median
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
@@ -103,7 +104,7 @@ def list_drums(roof: JudgedRoof) -> Iterator[Part]:
     for k, part in enumerate(roof.parts):
         own = top == k
         if part.type == "flat" and np.count_nonzero(own) >= FEWEST_LEVEL_POINTS:
-            level = float(np.median(z[own]))
+            level = compute_median(z[own])
             group = [other for other in roof.parts if is_at_level(other, level)]
             group = select_touching(group, unite_outlines([part]))
             is_level = np.array([any(other is one for one in group) for other in roof.parts])

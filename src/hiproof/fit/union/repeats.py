@@ -110,10 +110,11 @@ def find_copy(
     back = np.arange(lower - upper, x[0] - lower, -COPY_STEP_M)
     steps = np.concatenate([back, np.arange(upper - lower, x[-1] - upper, COPY_STEP_M)])
     first, last = np.searchsorted(x, lower + steps), np.searchsorted(x, upper + steps, "right")
+    with_copy = np.concatenate([volumes, volumes[k : k + 1]])
     for n in np.flatnonzero(total[last] - total[first] > most_saved):
         part = select_points(strip, np.sort(order[first[n] : last[n]]))
-        copy = move_volume(volumes[k], axis, steps[n])
-        cost_after = compute_strip_costs(np.vstack([volumes, copy]), part).sum()
+        with_copy[-1] = copy = move_volume(volumes[k], axis, steps[n])
+        cost_after = compute_strip_costs(with_copy, part).sum()
         saved = total[last[n]] - total[first[n]] - cost_after
         if saved > most_saved:
             best, most_saved = copy, saved

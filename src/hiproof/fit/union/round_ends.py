@@ -83,8 +83,10 @@ class RoundEnd:
 def find_round_ends(outline: shapely.Polygon) -> list[RoundEnd]:
     """Find the arcs of an outline that are long enough for a roof of their own."""
     ring = counterclockwise(outline.exterior)
-    angles = np.arctan2(*np.diff(ring, axis=0).T[::-1])
-    turns = np.degrees((np.diff(angles, prepend=angles[-1]) + math.pi) % (2.0 * math.pi) - math.pi)
+    x, y = (ring[1:] - ring[:-1]).T
+    angles = np.arctan2(y, x)
+    before = np.concatenate([angles[-1:], angles[:-1]])
+    turns = np.degrees((angles - before + math.pi) % (2.0 * math.pi) - math.pi)
     is_bend = (turns >= LEAST_TURN_DEG) & (turns <= MOST_TURN_DEG)
     if np.count_nonzero(is_bend) < FEWEST_CORNERS:
         return []

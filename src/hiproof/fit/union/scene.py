@@ -105,7 +105,7 @@ def make_scene(
     A point further than `tolerance_m` from the roof counts as unexplained.
     """
     cloud, unobserved = plan.cloud, plan.unobserved
-    u, v = np.r_[cloud.u, unobserved.u], np.r_[cloud.v, unobserved.v]
+    u, v = np.concatenate([cloud.u, unobserved.u]), np.concatenate([cloud.v, unobserved.v])
     turn = np.array([[math.cos(a), math.sin(a)] for a in angles])
     depth, corner, pitch = make_depth_raster(plan, outline)
     ring = (
@@ -118,9 +118,9 @@ def make_scene(
         U,
         V,
         sort_along(U, V),
-        np.r_[cloud.z, np.zeros(len(unobserved.u))],
-        np.r_[np.ones(len(cloud.u)), unobserved.weight],
-        np.r_[np.zeros(len(cloud.u)), unobserved.shade],
+        np.concatenate([cloud.z, np.zeros(len(unobserved.u))]),
+        np.concatenate([np.ones(len(cloud.u)), unobserved.weight]),
+        np.concatenate([np.zeros(len(cloud.u)), unobserved.shade]),
         len(cloud.u),
         float(unobserved.low),
         float(unobserved.high),
@@ -148,7 +148,7 @@ def thin_scene(scene: Scene, numbers: np.ndarray, evidence: float) -> Scene:
     """
     if len(numbers) == scene.n:
         return scene._replace(evidence=evidence)
-    thinned = select_points(scene, np.r_[numbers, scene.n : len(scene.z)])
+    thinned = select_points(scene, np.append(numbers, np.arange(scene.n, len(scene.z))))
     thinned.weight[thinned.n :] *= thinned.n / scene.n
     return thinned._replace(
         order=sort_along(thinned.U, thinned.V),
@@ -194,10 +194,10 @@ def make_depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray,
     ) @ plan.frame.rotation.T
     lower, upper = ring.min(axis=0), ring.max(axis=0)
     pitch = max(DEPTH_CELL_M, float((upper - lower).max()) / MOST_DEPTH_CELLS)
-    axes = [np.arange(a, b + pitch, pitch) for a, b in zip(lower, upper, strict=True)]
-    nodes = plan.frame.xy_local(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
+    u, v = (np.arange(a, b + pitch, pitch) for a, b in zip(lower, upper, strict=True))
+    nodes = plan.frame.xy_local(np.array([np.repeat(u, len(v)), np.tile(v, len(u))]).T)
     depth = measure_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(outline))
-    return depth.reshape(len(axes[0]), len(axes[1])), lower, pitch
+    return depth.reshape(len(u), len(v)), lower, pitch
 
 
 def list_nodes(scene: Scene, least_depth: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

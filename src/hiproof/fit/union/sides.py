@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
+from ...geometry.rings import is_convex
 from .around import compute_roof_everywhere, measure_context
 from .objective import compute_cell_cost, compute_point_cost
 from .plan import Plan
@@ -96,9 +97,9 @@ def list_lines(
     lines_by_direction = []
     for c, s in turns:
         axes = np.array([[c, -s], [s, c]])
-        x, y = np.moveaxis(ends @ axes, 2, 0)
+        x, y = (ends @ axes).transpose(2, 0, 1)
         x_all, y_all = (
-            np.array([ends.min(), ends.max()]) for ends in np.moveaxis(outline @ axes, 2, 0)
+            np.array([along.min(), along.max()]) for along in (outline @ axes).transpose(2, 0, 1)
         )
         long = np.hypot(x[1] - x[0], y[1] - y[0]) > SHORTEST_LINE_M
         across_u = select_lines(x, y, long, edges.shape[1], x_all, y_all)
@@ -151,11 +152,14 @@ def list_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     corners = np.array(sorted(set(map(tuple, shapely.get_coordinates(outline).tolist()))))
     if len(corners) > MOST_CHORD_CORNERS:
         return np.zeros((2, 0, 2))
-    number, wider = np.arange(len(corners)), shapely.buffer(outline, ALONG_M)
+    number = np.arange(len(corners))
     ends = corners[np.array(np.nonzero(number[:, None] < number))]
-    shapely.prepare(wider)
-    is_within = shapely.contains_properly(wider, shapely.linestrings(ends.swapaxes(0, 1)))
-    return (ends[:, is_within] - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    if not is_convex(outline):
+        wider = shapely.buffer(outline, ALONG_M)
+        shapely.prepare(wider)
+        lines = shapely.linestrings(ends.swapaxes(0, 1))
+        ends = ends[:, shapely.contains_properly(wider, lines)]
+    return (ends - plan.frame.origin[:2]) @ plan.frame.rotation.T
 
 
 def select_lines(

@@ -96,7 +96,7 @@ def is_fixed(volumes, k):
 
 def list_movable(volumes: np.ndarray) -> np.ndarray:
     """Return the numbers of the volumes but the base that moves may change."""
-    return 1 + np.flatnonzero(volumes[1:, SETTLED] < np.inf)
+    return 1 + np.nonzero(volumes[1:, SETTLED] < np.inf)[0]
 
 
 @compiled(inline="always")
