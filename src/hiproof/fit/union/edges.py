@@ -173,7 +173,10 @@ def find_place_between(distance, gains, sign, start):
 
 @compiled
 def count_most_places(scene, count):
-    """Return the most places that an edge of one of `count` volumes may have, and one more."""
+    """Count the places of an edge of one of `count` volumes at most.
+
+    One more is for the caller.
+    """
     return scene.lines.shape[2] + scene.vertices.shape[2] + 2 * SMALL_STEPS + 3 * count + 2
 
 
