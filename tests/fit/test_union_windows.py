@@ -94,6 +94,14 @@ def test_a_large_roof_is_a_valid_solid():
     assert not check_solid(model.built.solid)
 
 
+def test_edges_of_a_long_roof_stay_where_its_steps_are():
+    outline = shapely.box(0, 0, 200, 12)
+    points = sample_heights(
+        lambda x, y: 6.0 + 1.5 * (7 * (x // 10.0) % 4) + 0.0 * y, outline, 4.0, 0.02
+    )
+    assert fit_building(points, outline).unexplained < 0.001
+
+
 def test_a_cut_falls_on_a_step_and_blocks_are_small():
     outline = shapely.box(-30, 0, 30, 15)
     whole = make_whole(lambda x, y: np.where(x < 8.0, 6.0, 9.0), outline)

@@ -11,6 +11,8 @@ from ..geometry.point_in_polygon import flips
 from ..geometry.rings import ring_edges
 from .roof import Part
 
+MANY_PLACES = 10_000  # Of more places, each piece looks only at those in its strip.
+
 
 def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the height (n,) of the roof of `parts` at `xy` (n, 2), and the part.
@@ -19,17 +21,25 @@ def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.
     several. This is `Part.height_at` for many points. On a border that two pieces share, one piece
     that holds the point counts.
     """
-    z, top, (x, y) = (
-        np.full(len(xy), -np.inf),
-        np.zeros(len(xy), np.int64),
-        np.ascontiguousarray(xy.T),
-    )
+    z, top = np.full(len(xy), -np.inf), np.zeros(len(xy), np.int64)
+    is_sorted = len(xy) > MANY_PLACES
+    order = np.argsort(xy[:, 0]) if is_sorted else slice(None)
+    x, y = np.ascontiguousarray(xy[order].T)
     for k, part in enumerate(parts):
         for piece in part.pieces:
-            raise_over(
-                z, top, k, x, y, *ring_edges(piece.outline), np.ascontiguousarray(piece.planes)
-            )
+            starts, ends = ring_edges(piece.outline)
+            strip = find_strip(x, starts[:, 0]) if is_sorted else slice(None)
+            planes = np.ascontiguousarray(piece.planes)
+            raise_over(z[strip], top[strip], k, x[strip], y[strip], starts, ends, planes)
+    if is_sorted:
+        z[order], top[order] = z.copy(), top.copy()
     return z, top
+
+
+def find_strip(x: np.ndarray, ends: np.ndarray) -> slice:
+    """Return the places between the lowest and the highest of `ends`, of sorted x (n,)."""
+    first, last = np.searchsorted(x, (ends.min(), np.nextafter(ends.max(), np.inf)))
+    return slice(int(first), int(last))
 
 
 @compiled

@@ -28,7 +28,9 @@ LEAST_SUPPORT_SHARE = 0.06  # Least share of the outline's edges for a further d
 # early reveals what lies below.
 VISIBLE_DEPTH_M = 0.1
 DEPTH_CELL_M = 0.2  # Size (m) of a cell of the outline's depth.
-MOST_DEPTH_CELLS = 400  # Most cells a side of the raster of depth.
+# Most cells a side of the raster of depth: 500 m. Of longer roofs, what is narrower than a cell is
+# taken for hidden.
+MOST_DEPTH_CELLS = 2500
 MOST_WALL_LEAN = 0.6  # Largest lean of walls that planes may face besides those along the axes.
 LEANS_APART = 0.035  # Least difference of two such leans.
 MOST_LEANS = 3  # Most such leans.

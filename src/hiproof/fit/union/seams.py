@@ -38,7 +38,6 @@ SEAM_STRIP_M = 0.8
 SEAM_MARGIN_M = 1.0  # Distance (m) around volumes that a window shows.
 LARGE_VOLUME_MARGIN_M = 5.0  # Distance (m) around a volume whose neighbours reach too far.
 MOST_WINDOW_M2 = 1200.0  # Largest window (m2) over a volume and all its neighbours.
-MOST_TIMES = 1.5  # Largest window over a volume and its neighbours, in its own boxes.
 WINDOW_POINTS = 1200  # Most points of a window of seams.
 NEIGHBOUR_GAP_M = 0.6  # Distance (m) between volumes that may be one.
 SAME_ROOF_M = 0.6  # Height (m) between planes that may be one.
@@ -144,7 +143,7 @@ def find_row(rows: np.ndarray, number: int) -> int:
 def improve_volume(whole: Whole, place: bytes) -> None:
     """Improve the volume at a place, or leave it out.
 
-    The window shows the points around it and its neighbours.
+    The window shows the points around it and its neighbours. A volume too large for a window stays.
     """
     k = whole.find(place)
     if k is None:
@@ -152,6 +151,8 @@ def improve_volume(whole: Whole, place: bytes) -> None:
     extent = Box(*whole.boxes[k])
     if not extent.u0 <= extent.u1:  # nothing of it lies inside the outline any more
         whole.replace([k], whole.volumes[:0])
+        return
+    if extent.area > MOST_WINDOW_M2:
         return
 
     def improve_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
@@ -209,11 +210,11 @@ def list_volume_slopes(rows: np.ndarray) -> np.ndarray:
 def frame_neighbours(whole: Whole, k: int) -> Box:
     """Return the window over a volume and all that touch it.
 
-    It is smaller if that would be more than a few blocks.
+    It is smaller if that would be more than two blocks.
     """
     extent = Box(*whole.boxes[k])
     neighbours = whole.list_volumes(extent.widen(NEXT_TO_M))
     window = enclose_boxes([extent, *(Box(*whole.boxes[j]) for j in neighbours)])
-    if window.area > max(MOST_WINDOW_M2, MOST_TIMES * extent.area):
+    if window.area > MOST_WINDOW_M2:
         window = extent.widen(LARGE_VOLUME_MARGIN_M)
     return window.widen(SEAM_MARGIN_M)
