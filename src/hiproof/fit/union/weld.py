@@ -335,7 +335,7 @@ def run_face_round(
     if plan is None:
         return state
     changed: list[shapely.Polygon] = []
-    present = RepairTrial(state, whole, plan, problem)
+    present = RepairTrial(state, whole, plan, problem, drawing)
     for face in list_faces(plan):
         box = shapely.box(*shapely.buffer(face.polygon, MARGIN_M).bounds) if is_large else whole.box
         if face.key in tried_keys or any(shapely.intersects(box, other) for other in changed):
