@@ -87,6 +87,7 @@ class Surroundings:
         self.roof, self.noise, self.model, self.plan = points["roof"], points["noise"], model, plan
         self.points, self.grid = points, PointGrid(self.roof)
         self.shifts: dict[int, Shift] = {}
+        self.latest: tuple[shapely.Polygon, np.ndarray] = shapely.Polygon(), np.zeros(0, np.int64)
 
     @functools.cached_property
     def noise_grid(self) -> PointGrid:
@@ -116,9 +117,7 @@ class Surroundings:
         if label not in self.shifts:
             outline = row_outline(row)
             origin = np.floor(outline.bounds[:2])
-            nearby = distinct(
-                self.roof.take(self.grid.find_within(outline, self.plan.around_m), axis=0)
-            )
+            nearby = distinct(self.take_near(outline))
             self.shifts[label] = find_shift(
                 nearby[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin)
             )
@@ -151,15 +150,22 @@ class Surroundings:
         """
         read = self.plan.settings.read
         if read.by_class or job.area.is_empty:
-            return FoundRoof(
-                self.roof.take(self.grid.find_within(job.area, self.plan.around_m), axis=0)
-            )
+            return FoundRoof(self.take_near(job.area))
         nearby = self.select_points(job, 0.0)
         if read.roofs == "alone":
             return self.add_outer_points(job, find_lone_roof(nearby, job.area))
         height = nearby[:, 2] - self.ground_to_leave_out(job).height_at(nearby)
         found = found_roof(nearby, job.area, height, job.footprint is not None)
         return self.add_outer_points(job, found)
+
+    def take_near(self, area: shapely.Polygon) -> np.ndarray:
+        """Take the roof points (n, 3) in an area and around it.
+
+        Of a house alone, the second call for the same area finds the points of the first.
+        """
+        if self.latest[0] is not area:
+            self.latest = area, self.grid.find_within(area, self.plan.around_m)
+        return self.roof.take(self.latest[1], axis=0)
 
     def add_outer_points(self, job: Job, found: FoundRoof) -> FoundRoof:
         """Return the roof with the points beyond a footprint that may show overhangs."""
