@@ -30,6 +30,7 @@ from hiproof.fit.union.objective import (
 )
 from hiproof.fit.union.prices import (
     BASE_COST,
+    EDGE_PRICES,
     LEANING_COST,
     PARAMETER_COST,
     PART_COST,
@@ -265,10 +266,9 @@ def price_edge_slowly(volumes, scene, k, edge, spacing):
         volumes, scene, k, edge, lower + (np.arange(count) + 0.5) * step
     )
     gap = np.abs(inside - outside)[deep >= STEP_DEPTH_M]
-    prices = scene.edge_prices
     shown, low_steps = (
         step * (gap > VISIBLE_STEP_M).sum(),
-        step * ((gap > VISIBLE_STEP_M) & (gap < prices.low_step)).sum(),
+        step * ((gap > VISIBLE_STEP_M) & (gap < EDGE_PRICES.low_step)).sum(),
     )
     if shown == 0.0:
         return 0.0
@@ -277,18 +277,18 @@ def price_edge_slowly(volumes, scene, k, edge, spacing):
         < 1e-6
     )
     by_length, whole = (
-        prices.a_metre * shown + prices.low_a_metre * low_steps,
+        EDGE_PRICES.a_metre * shown + EDGE_PRICES.low_a_metre * low_steps,
         min(shown / FULL_PRICE_M, 1.0),
     )
     if not corner:
-        return (prices.any_step + prices.loose) * whole + by_length
+        return (EDGE_PRICES.any_step + EDGE_PRICES.loose) * whole + by_length
     is_within = (lower + (np.arange(count) + 0.5) * step)[deep >= STEP_DEPTH_M]
     axis, vertices = edge // 2, scene.corners[int(volumes[k, DIRECTION])]
     neighbours = vertices[
         np.abs(vertices[:, axis] - volumes[k, U0 + edge]) < CORNER_LINE_M, 1 - axis
     ]
     ends = sum((np.abs(neighbours - end) < END_AT_CORNER_M).any() for end in is_within[[0, -1]])
-    return (prices.any_step - prices.at_corner * ends) * whole + by_length
+    return (EDGE_PRICES.any_step - EDGE_PRICES.at_corner * ends) * whole + by_length
 
 
 def price_one_edge(volumes, scene, k, edge):
@@ -358,7 +358,7 @@ def test_an_edge_costs_nearly_what_dense_samples_of_it_say():
             for edge in range(4):
                 dense = price_edge_slowly(volumes, scene, k, edge, 0.01)
                 differences.append(abs(price_one_edge(volumes, scene, k, edge) - dense))
-    a_sample = 0.5 * (scene.edge_prices.a_metre + scene.edge_prices.low_a_metre)
+    a_sample = 0.5 * (EDGE_PRICES.a_metre + EDGE_PRICES.low_a_metre)
     assert np.median(differences) < a_sample
     assert np.mean(np.array(differences) < 3 * a_sample) > 0.95
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...compiled import compiled
 from ...geometry.arrays import sort_order
 from .around import measure_context
-from .candidates import find_best_rectangles
+from .candidates import SAME_SLOPE, find_best_rectangles
 from .edges import EVERYWHERE, MIN_SIDE_M, NO_GAIN, move_edges
 from .improve import improve
 from .objective import compute_costs, compute_objective_with
@@ -36,20 +36,19 @@ from .volumes import (
     is_fixed,
 )
 
-MOST_VOLUMES = 24  # Most volumes of one building: a limit on time.
+MOST_VOLUMES = 24  # Most volumes that are searched or changed all at once: a limit on time.
 TRIED_EACH_WAY = 2  # Number of candidates, those of the largest gain, that are fitted.
 UNEXPLAINED = 0.98  # Share of the highest misfit from which on a point counts as unexplained.
 FEWEST_UNEXPLAINED = 4  # Fewest unexplained points that are worth a further volume.
 # Share of the highest misfit from which on points count in a roof that leaves none unexplained but
 # costs much: the base half way up a skirt lies within a quarter of a metre of all of it.
 POORLY = 0.3
-ALONG_WALL = 1e-6  # Largest difference between two leans that are numerically equal.
 CUT_LEAST_M = 0.3  # Least length (m) by which a neighbour is cut back for a new volume.
 CUT_MOST_SHARE = 0.6  # Largest share of a neighbour that is cut back for a new volume.
 
-NONE_HELPS = 0  # How adding ends: no candidate helps.
-NOTHING_LEFT = 1  # How adding ends: nothing is left to explain, or the most additions were tried.
-ROOF_IS_KNOWN = 2  # How adding ends: a known roof has come back.
+# How adding ends: no candidate helps, nothing is left to explain (or the most additions were
+# tried), or a known roof has come back.
+NONE_HELPS, NOTHING_LEFT, ROOF_IS_KNOWN = range(3)
 
 # The data of growth: the scene, the cells (directions, n + g) between its lines along u and along v
 # in which points and unobserved cells lie, and the slopes (m,) to try for a further plane.
@@ -154,7 +153,7 @@ def has_free_plane(volume, scene):
         lean = abs(volume[LEAN0 + plane])
         if lean > 0.0:
             walls = scene.leans[int(volume[DIRECTION]), plane // 2]
-            if np.abs(np.abs(walls) - lean).min() > ALONG_WALL:
+            if np.abs(np.abs(walls) - lean).min() > SAME_SLOPE:
                 return True
     return False
 

@@ -28,17 +28,15 @@ from .steps import (
 )
 from .volumes import DIRECTION, U0, U1, V0, V1, is_within
 
-SAMPLE_COUNT = 0  # Column of an edge: how many of its samples lie inside the outline.
-PITCH = 1  # Column of an edge: the metres from one sample to the next.
-WHOLE_PRICE = 2  # Column of an edge: the fixed sum of its price.
-# First column of an edge's bounds in the axes of the moving volume: u low, u high, v low, v high,
-# empty where it is never visible.
-BOX0 = 3
-EDGE_COLUMNS = 7  # Number of columns of an edge.
-# Rows of an edge's samples: where they lie in the axes of the moving volume, and what step is there
-# without that volume, and with it.
-PLACE_U, PLACE_V, STEP_BARE, STEP_COVERED = 0, 1, 2, 3
+# Columns of an edge: how many of its samples lie inside the outline, the metres from one to the
+# next, the fixed sum of its price, and the first of its bounds in the axes of the moving volume: u
+# low, u high, v low, v high, empty where it is never visible.
+SAMPLE_COUNT, PITCH, WHOLE_PRICE, BOX0 = range(4)
+EDGE_COLUMNS = BOX0 + 4  # Number of columns of an edge.
 SAMPLE_ROWS = 4  # Number of rows of an edge's samples.
+# These are where they lie in the axes of the moving volume, and what step is there without that
+# volume, and with it.
+PLACE_U, PLACE_V, STEP_BARE, STEP_COVERED = range(SAMPLE_ROWS)
 
 Beside = namedtuple("Beside", "edges samples inside outside")
 """The edges of all volumes but a moving one.
@@ -106,8 +104,8 @@ def gather_edge(volumes, walls, neighbours, k, j, edge, beside):
             walls.inside[q] - walls.outside[q],
             beside.inside[q] - beside.outside[q],
         )
-        samples[j, edge, STEP_BARE, q] = classify_step(gap, walls.prices)
-        samples[j, edge, STEP_COVERED, q] = classify_step(covered_gap, walls.prices)
+        samples[j, edge, STEP_BARE, q] = classify_step(gap)
+        samples[j, edge, STEP_COVERED, q] = classify_step(covered_gap)
     for q in range(m, pad_count(m)):
         samples[j, edge, PLACE_U, q] = samples[j, edge, PLACE_V, q] = 0.0
         samples[j, edge, STEP_BARE, q] = samples[j, edge, STEP_COVERED, q] = NO_STEP
@@ -116,8 +114,7 @@ def gather_edge(volumes, walls, neighbours, k, j, edge, beside):
 @compiled(inline="always")
 def fill_heights_twice(volumes, walls, neighbours, k, j, edge, m, beside):
     """Fill the heights beside an edge of volume j without volume k, and under it."""
-    n, is_raised = pad_count(m), False
-    first, last = walls.places[0], walls.places[m - 1]
+    n, is_raised, places = pad_count(m), False, walls.places
     for q in range(n):
         walls.inside[q] = walls.outside[q] = -np.inf
     for p in range(1, neighbours[j, 0] + 1):
@@ -129,20 +126,20 @@ def fill_heights_twice(volumes, walls, neighbours, k, j, edge, m, beside):
                 beside.inside[q], beside.outside[q] = walls.inside[q], walls.outside[q]
             everywhere = (-np.inf, np.inf, -np.inf, np.inf)
             raise_heights(
-                volumes, i, line, everywhere, False, walls, beside.inside, beside.outside, n
+                volumes, i, line, everywhere, False, places, beside.inside, beside.outside, n
             )
             continue
         ends = widen_rectangle(volumes, i)
-        if i == j or meets_line(line, ends, first, last):
-            raise_heights(volumes, i, line, ends, i == j, walls, walls.inside, walls.outside, n)
+        if i == j or meets_line(line, ends, places[0], places[m - 1]):
+            raise_heights(volumes, i, line, ends, i == j, places, walls.inside, walls.outside, n)
             if is_raised:
                 raise_heights(
-                    volumes, i, line, ends, i == j, walls, beside.inside, beside.outside, n
+                    volumes, i, line, ends, i == j, places, beside.inside, beside.outside, n
                 )
 
 
 @compiled(allocates=False)
-def price_neighbour_edge(beside, prices, j, edge, ends):
+def price_neighbour_edge(beside, j, edge, ends):
     """Compute the units of an edge of volume j where the moving volume covers `ends`."""
     edges, samples = beside.edges, beside.samples
     shown_count = low_count = 0
@@ -154,4 +151,4 @@ def price_neighbour_edge(beside, prices, j, edge, ends):
     if shown_count == 0:
         return 0.0
     step = edges[j, edge, PITCH]
-    return price_length(prices, edges[j, edge, WHOLE_PRICE], step * shown_count, step * low_count)
+    return price_length(edges[j, edge, WHOLE_PRICE], step * shown_count, step * low_count)

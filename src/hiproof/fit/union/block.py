@@ -6,9 +6,10 @@ import numpy as np
 
 from .box import Box
 from .candidates import Effort
+from .edges import SETTLE_REACH_M
 from .grow import grow
 from .moves import move_all_edges, refit_volumes
-from .objective import compute_objective
+from .objective import BASE_SHARE, compute_objective
 from .scene import Scene
 from .volumes import U0, V1, compute_roof_heights
 from .whole import Whole
@@ -19,11 +20,9 @@ from .window import end_at_border, forget_digests, open_window
 BLOCK_POINTS = 1600
 # Points of a block that settle its structure: 5 per square metre of the largest block.
 SETTLE_POINTS = 3000
-SETTLE_REACH_M = 0.7  # Distance (m) that edges may move when more points settle them.
 # Growing more than one volume anew gains nothing in blocks and costs a quarter of the time
 # (Vienna's even places at 5 points/m2).
 BLOCK = Effort(pool_points=1200, seeds=200, regrown=1)
-BARE_BLOCK_SHARE = 0.01  # Share of a block above which a visible base becomes a level volume.
 
 
 def search_block(whole: Whole, box: Box) -> None:
@@ -59,7 +58,7 @@ def settle_volumes(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float
 
 
 def is_base_bare(volumes: np.ndarray, scene: Scene) -> bool:
-    """Return whether more than a sliver of the base is visible."""
+    """Return whether so much of the base is visible that it becomes a level volume."""
     _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     cells = scene.weight[scene.n :][top[scene.n :] == 0].sum()
-    return bool(max(cells, 0.5 * (top[: scene.n] == 0).sum()) > BARE_BLOCK_SHARE * scene.n)
+    return bool(max(cells, 0.5 * (top[: scene.n] == 0).sum()) > BASE_SHARE * scene.n)

@@ -14,6 +14,7 @@ from ...geometry.arrays import copy_row, copy_rows, sort_values
 from .objective import compute_cell_cost, compute_point_cost
 from .plan import find_cells
 from .planes import (
+    RIDGE_STEP_M,
     Cloud,
     Grid,
     bound_rows,
@@ -45,12 +46,10 @@ from .volumes import (
 )
 
 ALONG_AXIS = 0.12  # A plane that leans less off an axis or a wall is turned along it.
-RIDGE_INSIDE_M = 0.4  # Least distance (m) of a ridge from the edges of its rectangle.
 MOST_TOPS = 2  # Most level tops that make hips and mansards, strongest first.
 MOST_PAIRS = 3  # Most pairs of slopes that make hips and mansards, strongest first.
-SAME_SLOPE = 1e-6  # Slopes (rise over run) that differ less are numerically equal.
+SAME_SLOPE = 1e-6  # Slopes (rise over run) and leans that differ less are numerically equal.
 WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
-LEAST_ABOVE_M = 1e-9  # Height (m) by which a volume must be above the roof: numerically none.
 # Most planes that are found, of all points and of those that a roof leaves unexplained. Structure
 # that explains less stays unseen.
 MOST_PLANES, MOST_NEW_PLANES = 16, 10
@@ -256,7 +255,7 @@ def has_ridge(plane, other, u, v):
     ridge = (falling[2] - rising[2] + (falling[1 - axis] - rising[1 - axis]) * y) / (
         rising[axis] - falling[axis]
     )
-    return lines[0] + RIDGE_INSIDE_M < ridge < lines[-1] - RIDGE_INSIDE_M
+    return lines[0] + RIDGE_STEP_M < ridge < lines[-1] - RIDGE_STEP_M
 
 
 @compiled
@@ -323,7 +322,7 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
     """
     gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
     floor, gain = (
-        np.full(len(z_now), -np.inf) if replacing else z_now + LEAST_ABOVE_M,
+        np.full(len(z_now), -np.inf) if replacing else z_now,
         np.empty(len(z_now)),
     )
     threshold, most_gain = 0.0, cost_now.sum()

@@ -24,7 +24,6 @@ from .finish import (
     FLATTEST,
     OutlineWall,
     Planes,
-    find_lowest_row,
     find_visible_points,
     fit_volume_planes,
     is_proper,
@@ -34,6 +33,7 @@ from .finish import (
 from .members import is_inside_sides
 from .objective import compute_misfits, compute_point_cost
 from .plan import Plan
+from .planes import find_lowest_row
 from .prices import PARAMETER_COST
 from .scene import Scene
 from .sides import Side

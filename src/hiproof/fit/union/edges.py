@@ -13,7 +13,7 @@ from .around import compute_roof_everywhere
 from .beside import BOX0, gather_neighbour_edges, make_room, price_neighbour_edge
 from .objective import BASE_SHARE, compute_costs
 from .prices import BASE_COST
-from .steps import gather_walls, list_near, price_edge, widen_rectangle
+from .steps import COVER_TOUCH_M, gather_walls, list_near, price_edge, widen_rectangle
 from .volumes import (
     DIRECTION,
     LEVEL,
@@ -27,14 +27,14 @@ from .volumes import (
 )
 
 MIN_SIDE_M = 0.8  # A narrower volume (m) is no part of a roof but a gutter or a parapet.
-BETWEEN_M = 0.4  # Distance (m) that an edge may move to a place midway between points.
-# It does so only within this reach (m): in the search, an edge should stay on a line.
-SMALL_REACH_M = 1.0
+SETTLE_REACH_M = 0.7  # Distance (m) that edges may move when more points settle them.
+# Distance (m) that an edge may move to a place midway between points when it is settled. In the
+# search, an edge should stay on a line.
+BETWEEN_M = 0.4
 BEYOND_OUTLINE_M = 0.6  # An edge so far (m) outside the outline is not visible.
 VERTEX_REACH_M = 1.5  # Corners of the outline within this distance (m) are places for an edge.
 SMALL_STEPS = 4  # Steps tried to either side of an edge.
 SMALL_STEP_M = 0.1  # Length of such a step (m).
-MOVE_TOUCH_M = 0.04  # Distance (m) within which two volumes touch.
 # Places nearer than this (m) are one. Of a corner of the outline and a grid line at it, the corner
 # comes first.
 EQUAL_PLACE_M = 1e-3
@@ -79,7 +79,7 @@ def move_edges(volumes, scene, k, value, reach, context):
         count = sum_outward(volumes, scene, k, edge, gain, bare, sums)
         distance, gains, covered = sums[0, :count], sums[1, :count], sums[2, :count]
         places[m] = (
-            find_place_between(distance, gains, sign, start) if reach < SMALL_REACH_M else start
+            find_place_between(distance, gains, sign, start) if reach <= SETTLE_REACH_M else start
         )
         best, best_place = value - NO_GAIN, start
         # The bounds are the cost of the roof at each place before its edges are charged.
@@ -234,7 +234,7 @@ def charge_edges(volumes, walls, neighbours, k, beside, charge):
             if j == k:
                 charge[j, e] = price_edge(volumes, walls, j, e, neighbours)
             else:
-                charge[j, e] = price_neighbour_edge(beside, walls.prices, j, e, ends)
+                charge[j, e] = price_neighbour_edge(beside, j, e, ends)
 
 
 @compiled(allocates=False)
@@ -245,7 +245,8 @@ def charge_move(volumes, walls, neighbours, k, edge, t, trial, best, charge, bes
     move touches.
     """
     start = volumes[k, U0 + edge]
-    move_low, move_high = min(start, t) - MOVE_TOUCH_M, max(start, t) + MOVE_TOUCH_M
+    touch = 2.0 * COVER_TOUCH_M
+    move_low, move_high = min(start, t) - touch, max(start, t) + touch
     cross_low, cross_high = (
         (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     )
@@ -258,8 +259,8 @@ def charge_move(volumes, walls, neighbours, k, edge, t, trial, best, charge, bes
             else:
                 meets = edges[j, e, along] <= move_high and edges[j, e, along + 1] >= move_low
                 is_beside = (
-                    edges[j, e, cross] <= cross_high + MOVE_TOUCH_M
-                    and edges[j, e, cross + 1] >= cross_low - MOVE_TOUCH_M
+                    edges[j, e, cross] <= cross_high + touch
+                    and edges[j, e, cross + 1] >= cross_low - touch
                 )
                 is_touched = meets and is_beside
             touched[j, e] = is_touched
@@ -273,6 +274,6 @@ def charge_move(volumes, walls, neighbours, k, edge, t, trial, best, charge, bes
     for j in range(1, len(volumes)):
         for e in range(4):
             if trial < best and j != k and touched[j, e]:
-                trial += walls.evidence * price_neighbour_edge(beside, walls.prices, j, e, ends)
+                trial += walls.evidence * price_neighbour_edge(beside, j, e, ends)
     volumes[k, U0 + edge] = start
     return trial

@@ -17,6 +17,7 @@ import numpy as np
 from ...compiled import compiled
 from ...geometry.arrays import copy_row
 from .objective import compute_point_cost
+from .planes import find_lowest_row
 from .prices import PARAMETER_COST
 from .scene import Scene
 from .sides import Side
@@ -333,20 +334,6 @@ def multiply(matrix, vector):
         for j in range(len(vector)):
             product[i] += matrix[i, j] * vector[j]
     return product
-
-
-@compiled
-def find_lowest_row(rows, u, v):
-    """Return the height at u, v of the lowest of planes (5, 3), and its index.
-
-    Planes that are absent are NaN.
-    """
-    best, plane = np.inf, 0
-    for k in range(len(rows)):
-        h = rows[k, 0] * u + rows[k, 1] * v + rows[k, 2]
-        if h < best:
-            best, plane = h, k
-    return best, plane
 
 
 @compiled

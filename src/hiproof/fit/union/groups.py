@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .add import MOST_VOLUMES
 from .agree import Agreement, agree_planes
 from .box import Box, enclose_boxes
 from .cants import Cache
@@ -23,7 +24,6 @@ from .volumes import SETTLED, U0, V1
 from .whole import POSITION, Whole
 from .window import forget_digests, open_window, restore_volumes
 
-MOST_AT_ONCE = 24  # Most volumes that are changed all at once, as those of a house.
 GROUP = 8  # Most volumes of a group.
 GROUP_MARGIN_M = 2.0  # Distance (m) around a group that its window shows.
 GROUP_POINTS = 6000  # Most points of a group's window.
@@ -34,7 +34,7 @@ Pass = Callable[[np.ndarray, Scene], np.ndarray]
 
 def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarray:
     """Let a pass change the volumes: all at once if they are few, else group by group."""
-    if len(volumes) <= MOST_AT_ONCE:
+    if len(volumes) <= MOST_VOLUMES:
         return change(volumes, site.scene)
     whole = Whole(site.scene, site.plan, site.outline, volumes)
     for places in [
@@ -95,7 +95,7 @@ def draw_in_groups(
     Planes in the `cache` are not fitted again if all volumes are drawn at once. Otherwise there are
     no common unknowns: the agreement has no members.
     """
-    if len(volumes) <= MOST_AT_ONCE:
+    if len(volumes) <= MOST_VOLUMES:
         roof = draw_roof(volumes, ends, site.scene, cache)
         return roof.sides, agree_planes(volumes, roof.sides, roof.planes, site.scene)
     whole = Whole(site.scene, site.plan, site.outline, volumes)

@@ -25,7 +25,7 @@ from .candidates import (
     make_grids,
 )
 from .improve import improve
-from .moves import remove_volume
+from .moves import MOST_TYPICAL_SLOPES, remove_volume
 from .objective import compute_objective
 from .plan import MIN_STRUCTURE_POINTS, find_cells
 from .prices import REGROWN_UNITS
@@ -35,8 +35,6 @@ from .volumes import N_SIDES, OFFSET0, SLOPE0, make_base
 MOST_ADDITIONS = 20  # Most additions tried for one building: a limit on time.
 # Quantile of the heights at which the base lies: below all roofs but not below a stray point.
 BASE_QUANTILE = 0.02
-# Most slopes tried for new ends and ties. They cover those of the candidates.
-MOST_TYPICAL_SLOPES = 5
 IMPROVING_ROUNDS = 2  # Most rounds of all moves where no volume is added.
 
 

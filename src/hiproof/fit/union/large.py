@@ -11,10 +11,10 @@ import numpy as np
 import shapely
 
 from .around import measure_context
-from .block import SETTLE_POINTS, SETTLE_REACH_M, find_in_block, search_block
+from .block import SETTLE_POINTS, find_in_block, search_block
 from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .box import Box, clip_to_box
-from .edges import move_edges
+from .edges import SETTLE_REACH_M, move_edges
 from .moves import refit_volume
 from .places import grow_at_places
 from .plan import Plan

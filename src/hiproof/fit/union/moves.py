@@ -48,7 +48,10 @@ from .volumes import (
     read_rectangle,
 )
 
-MOST_TRIED_SLOPES = 9  # Most slopes at which a plane is tried.
+# Most slopes tried for new ends and ties besides the volume's own. They cover those of the
+# candidates.
+MOST_TYPICAL_SLOPES = 5
+MOST_TRIED_SLOPES = N_SIDES + MOST_TYPICAL_SLOPES  # Most slopes at which a plane is tried.
 SLOPES_APART = 0.02  # Least difference (rise over run) between two of them.
 END_SEEDS = 16  # Points through which a new plane is tried.
 POINTS_AT_ONCE = 64  # Points between two checks whether a new plane can still be the best.

@@ -13,7 +13,7 @@ from .grow import grow_volumes, prepare_growth
 from .improve import improve
 from .prices import PLACE_UNITS
 from .scene import Scene
-from .seams import list_volume_slopes
+from .seams import WINDOW_POINTS, list_volume_slopes
 from .whole import Whole
 from .window import change_in_window
 
@@ -21,7 +21,6 @@ COUNT_SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are cou
 SQUARES_AROUND = 2  # Squares around one that count, too.
 PLACES_A_BLOCK = 3.0  # Most places tried for each block's area: a limit on time.
 WINDOW_M = 20.0  # Size (m) of a place's window.
-WINDOW_POINTS = 1200  # Most points of a place's window.
 
 
 def grow_at_places(whole: Whole) -> None:

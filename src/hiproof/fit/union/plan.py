@@ -20,7 +20,8 @@ from ..direction import main_direction
 from ..walls import on_walls
 from .planes import Cloud, Grid, UnobservedCells
 
-MIN_STRUCTURE_POINTS = 4  # With fewer points, a building is one level block at their median.
+# With fewer points, a building is one level block at their median, and a window shows nothing.
+MIN_STRUCTURE_POINTS = 4
 FACADE_BORDER_M = 0.15  # Distance (m) from the border within which returns may be a facade's.
 # Density (points/m2) from which on a cloud loses all points so near the border. Sparser clouds lose
 # those that lie on walls.

@@ -23,7 +23,7 @@ PART_PLANES = 5  # Most planes of one part.
 SLOPE_RIDGE = 2e-4
 NEIGHBOUR_RADIUS_M = 2.5  # Points further away (m) are no neighbours.
 LOCAL_POINTS = (9, 17)  # Numbers of points of a local plane.
-RIDGE_STEP_M = 0.4  # Distance (m) between the ridges tried.
+RIDGE_STEP_M = 0.4  # Distance (m) between the ridges tried, and of any from the plan's border.
 PLANE_BIN = 0.05  # Planes nearer to each other (rise over run, and m at the centre) are one.
 PAIRS_A_SEED = 2  # Pairs of a seed and a point near it whose planes are tried.
 MOST_GABLES = 6  # Most gables of a pool: a limit on time.
@@ -48,14 +48,17 @@ def truncate_cost(residual, tau):
 
 
 @compiled
-def find_lower_envelope(planes, count, u, v):
-    """Return the height of the lowest of the first `count` planes, and its index."""
-    best, active = np.inf, 0
-    for k in range(count):
-        z = planes[k, 0] * u + planes[k, 1] * v + planes[k, 2]
-        if z < best:
-            best, active = z, k
-    return best, active
+def find_lowest_row(rows, u, v):
+    """Return the height at u, v of the lowest of planes (k, 3), and its index.
+
+    Planes that are absent are NaN.
+    """
+    best, plane = np.inf, 0
+    for k in range(len(rows)):
+        h = rows[k, 0] * u + rows[k, 1] * v + rows[k, 2]
+        if h < best:
+            best, plane = h, k
+    return best, plane
 
 
 @compiled
@@ -183,7 +186,7 @@ def fit_symmetric_gable(cloud, members, planes, tau):
         scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
         matrix, right = np.zeros((3, 3)), np.zeros(3)
         for i in members:
-            z, side = find_lower_envelope(fitted, 2, cloud.u[i], cloud.v[i])
+            z, side = find_lowest_row(fitted, cloud.u[i], cloud.v[i])
             r = (cloud.z[i] - z) / scale
             w = 1.0 - r * r
             if w <= 0.0:
@@ -505,10 +508,10 @@ def select_members(cloud, rectangle):
 
 
 @compiled
-def lower_costs(cloud, members, planes, count, tau, current):
-    """Lower `current` (n,) to the cost under the min of `planes` for `members`."""
+def lower_costs(cloud, members, planes, tau, current):
+    """Lower `current` (n,) to the cost under the min of `planes` (k, 3) for `members`."""
     for i in members:
-        z, _ = find_lower_envelope(planes, count, cloud.u[i], cloud.v[i])
+        z, _ = find_lowest_row(planes, cloud.u[i], cloud.v[i])
         current[i] = min(current[i], truncate_cost(cloud.z[i] - z, tau))
 
 
@@ -533,8 +536,8 @@ def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
         members = select_members(cloud, rectangle)
         plane, _ = fit_plane(cloud, members, candidates[m], tau, evidence)
         copy_row(pool[k], plane)
-        lower_costs(cloud, members, plane.reshape((1, 3)), 1, tau, current)
-        lower_costs(cloud, members, stacked[m], 1, tau, current)
+        lower_costs(cloud, members, plane.reshape((1, 3)), tau, current)
+        lower_costs(cloud, members, stacked[m], tau, current)
     return pool
 
 
@@ -693,5 +696,5 @@ def pool_gables(cloud, grid, pool, tau, evidence):
             fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
             if ok:
                 copy_rows(gables[k], fitted)
-        lower_costs(cloud, members, candidates[m], counts[m], tau, current)
+        lower_costs(cloud, members, candidates[m, : counts[m]], tau, current)
     return gables, gable_counts

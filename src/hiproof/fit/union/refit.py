@@ -29,8 +29,8 @@ from .volumes import (
 )
 
 FIT_ROUNDS = 2  # Rounds of fitting and re-weighting.
-LEAST_WEIGHT = 1.0  # Least weight (points) of a plane that is refitted.
-LEAST_SLOPE_WEIGHT = 2.0  # Least weight (points) of planes whose slope is refitted.
+# Least weight (points) of a plane that is refitted. A slope needs twice as much.
+LEAST_WEIGHT = 1.0
 LEAST_SPREAD_M2 = 0.02  # Least variance (m2) of such points along the slope.
 
 
@@ -89,7 +89,7 @@ def solve_planes(row, sums):
                 spread += sums[3, k] - sums[1, k] ** 2 / sums[0, k]
                 product += sums[4, k] - sums[1, k] * sums[2, k] / sums[0, k]
                 weight += sums[0, k]
-        determined = weight > LEAST_SLOPE_WEIGHT and spread > LEAST_SPREAD_M2 * weight
+        determined = weight > 2.0 * LEAST_WEIGHT and spread > LEAST_SPREAD_M2 * weight
         slope = min(max(product / spread, SLOPE_LOW), SLOPE_HIGH) if determined else -1.0
         for k in range(first, first + step):
             if row[OFFSET0 + k] < np.inf:

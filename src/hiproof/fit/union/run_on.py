@@ -14,8 +14,10 @@ import numpy as np
 
 from ...compiled import compiled
 from .objective import compute_objective
+from .prices import EDGE_PRICES
 from .scene import Scene
 from .steps import STEP_DEPTH_M
+from .trim import COVER_M
 from .volumes import (
     DIRECTION,
     FREE,
@@ -30,15 +32,12 @@ from .volumes import (
     list_movable,
 )
 
-END_SAMPLE_M = 0.1  # Distance (m) between the places at which an end is sampled.
-MOST_END_SAMPLES = 400  # Most such places.
+# Distance (m) between the places at which an end is sampled, and by which it is moved on.
+END_SAMPLE_M = 0.1
 LOWEST_END_M = 0.01  # An end that stands out by less (m) does not.
 HIGHEST_END_M = 0.6  # An end that is higher (m) is intended.
 WIDEST_END_M = 1.2  # An end that is wider (m) along the edge is intended.
-END_STEP_M = 0.1  # Distance (m) by which an end is moved on.
 FARTHEST_END_M = 1.5  # Furthest (m) that it is moved.
-# Distance (m) to either side within which it is hidden then: planes are fitted once more.
-COVER_M = 0.25
 BESIDE_EDGE_M = 0.001  # Distance (m) of samples from the edge, on either side.
 
 
@@ -52,7 +51,7 @@ def extend_ends(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.nda
             places, highest = measure_protrusion(volumes, k, edge, scene)
             if places == 0 or places * END_SAMPLE_M > WIDEST_END_M or highest > HIGHEST_END_M:
                 continue
-            limit = value + scene.edge_prices.any_step * scene.evidence
+            limit = value + EDGE_PRICES.any_step * scene.evidence
             for trial in list_end_moves(volumes, k, edge, scene):
                 trial_value = compute_objective(trial, scene, limit)
                 if trial_value < np.inf:
@@ -66,6 +65,7 @@ def list_end_moves(volumes: np.ndarray, k: int, edge: int, scene: Scene) -> Iter
 
     An end is safely hidden, as a neighbour's, or just hidden.
     """
+    # So far to either side it is hidden then: planes are fitted once more.
     yield from hide_end(volumes, k, edge, scene, COVER_M)
     yield from share_neighbour_plane(volumes, k, edge)
     yield from hide_end(volumes, k, edge, scene, 0.0)
@@ -100,8 +100,8 @@ def hide_end(
     either side. Yields nothing if it never is.
     """
     lower, upper = volumes[k, U0 + (edge & 2)], volumes[k, U0 + (edge | 1)]
-    for step, sign in product(range(1, round(FARTHEST_END_M / END_STEP_M) + 1), (1.0, -1.0)):
-        trial, target = volumes.copy(), volumes[k, U0 + edge] + sign * step * END_STEP_M
+    for step, sign in product(range(1, round(FARTHEST_END_M / END_SAMPLE_M) + 1), (1.0, -1.0)):
+        trial, target = volumes.copy(), volumes[k, U0 + edge] + sign * step * END_SAMPLE_M
         for place in (target - cover_m, target + cover_m, target):
             trial[k, U0 + edge] = place
             if (
@@ -124,7 +124,7 @@ def measure_protrusion(volumes, k, edge, scene):
     axis, across = edge // 2, V0 - 2 * (edge // 2)
     outwards = BESIDE_EDGE_M if edge % 2 else -BESIDE_EDGE_M
     start, length = volumes[k, across], volumes[k, across + 1] - volumes[k, across]
-    count = min(max(round(length / END_SAMPLE_M), 1), MOST_END_SAMPLES) + 1
+    count = max(round(length / END_SAMPLE_M), 1) + 1
     shape = len(scene.turn), 2 * count  # inside, then outside
     U, V = np.empty(shape), np.empty(shape)
     direction = int(volumes[k, DIRECTION])

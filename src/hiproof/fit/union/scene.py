@@ -16,7 +16,6 @@ import shapely
 
 from ..direction import measure_support, quarter_gap
 from .plan import Plan, lay_lines, measure_depth, ring_edges
-from .prices import EDGE_PRICES
 
 # Most directions along walls that volumes of a building may follow, the main one first.
 MOST_WALL_DIRECTIONS = 2
@@ -39,7 +38,7 @@ WALL_M = 2.0  # Shortest length (m) of such a wall.
 Scene = namedtuple(
     "Scene",
     "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners "
-    "leans evidence dead width edge_prices allowed",
+    "leans evidence dead width allowed",
 )
 """A building as the search sees it.
 
@@ -58,7 +57,6 @@ Scene = namedtuple(
 - leans (directions, 2, m): of walls not quite along an axis, x = offset + lean y, padded.
 - evidence: the points that a unit of structure must explain.
 - dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
-- edge_prices: see `prices.EdgePrices`.
 - allowed (2, 3, 3, 2): the shapes that a volume may have, see `volumes.is_allowed`.
 """
 
@@ -138,7 +136,6 @@ def make_scene(
         evidence,
         DEAD_M,
         max(tolerance_m - DEAD_M, LEAST_RAMP_M),
-        EDGE_PRICES,
         allowed,
     )
 

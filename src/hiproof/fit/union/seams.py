@@ -38,12 +38,11 @@ SEAM_STRIP_M = 0.8
 SEAM_MARGIN_M = 1.0  # Distance (m) around volumes that a window shows.
 LARGE_VOLUME_MARGIN_M = 5.0  # Distance (m) around a volume whose neighbours reach too far.
 MOST_WINDOW_M2 = 1200.0  # Largest window (m2) over a volume and all its neighbours.
-WINDOW_POINTS = 1200  # Most points of a window of seams.
-NEIGHBOUR_GAP_M = 0.6  # Distance (m) between volumes that may be one.
+WINDOW_POINTS = 1200  # Most points of a window.
+NEIGHBOUR_GAP_M = 0.6  # Distance (m) between volumes that touch, or may be one.
 SAME_ROOF_M = 0.6  # Height (m) between planes that may be one.
 SAME_ROOF_SHARE = 0.4  # Share of a volume over which they must be so near.
 SAMPLES = 4  # Samples a side of a volume at which its planes are compared with another's.
-TOUCH_GAP_M = 0.6  # Distance (m) between volumes that touch.
 NEXT_TO_M = 0.5  # Distance (m) beyond a volume within which others are its neighbours.
 LEFT_OUT_ROUNDS = 2  # Rounds in which neighbours take the place of a volume that is left out.
 
@@ -189,7 +188,7 @@ def leave_out(
     neighbours = [
         q
         for q in neighbours
-        if whole.find_extent(trial[q]).widen(TOUCH_GAP_M).find_inside(u, v).any()
+        if whole.find_extent(trial[q]).widen(NEIGHBOUR_GAP_M).find_inside(u, v).any()
     ]
     for _ in range(LEFT_OUT_ROUNDS):
         for q in neighbours:

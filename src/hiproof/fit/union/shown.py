@@ -15,11 +15,15 @@ from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...model.heights import find_highest
 from .plan import Plan
-from .regions import find_neighbour, list_polygons, select_touching, unite_outlines, widen_gap
+from .regions import (
+    OVERLAY_GAP_M,
+    find_neighbour,
+    list_polygons,
+    select_touching,
+    unite_outlines,
+    widen_gap,
+)
 from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
-
-# Distance (m) between corners that are the same but for the grid on which they lie.
-GRID_SEAM_M = 1e-5
 
 
 def keep_visible(
@@ -52,7 +56,7 @@ def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Pa
     covered = unite_outlines(select_touching(parts, hidden_area))
     pieces = [list(part.pieces) for part in parts]
     bare = list_polygons(shapely.difference(hidden_area, covered, grid_size=OVERLAY_GRID_M))
-    bare = [polygon for polygon in bare if not shapely.buffer(polygon, -GRID_SEAM_M).is_empty]
+    bare = [polygon for polygon in bare if not shapely.buffer(polygon, -OVERLAY_GAP_M).is_empty]
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
     for sliver in bare:
@@ -66,7 +70,7 @@ def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Pa
         seam = list_polygons(
             shapely.intersection(wide_sliver, hidden_area, grid_size=OVERLAY_GRID_M)
         )
-        snapped = shapely.snap(sliver, outline, GRID_SEAM_M)
+        snapped = shapely.snap(sliver, outline, OVERLAY_GAP_M)
         merged = list_polygons(
             shapely.union_all([outline, *seam, snapped], grid_size=OVERLAY_GRID_M)
         )

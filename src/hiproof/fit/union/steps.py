@@ -13,6 +13,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from .prices import EDGE_PRICES
 from .volumes import DIRECTION, REPLACES, U0, U1, V0, V1, find_lowest, is_within, read_coefficients
 
 VISIBLE_STEP_M = 0.05  # Lowest gap (m) that is a step.
@@ -29,7 +30,7 @@ MOST_EDGE_SAMPLES = 40  # Most samples of an edge.
 SAMPLES_AT_ONCE = 8
 FEW_VOLUMES = 8  # Of no more volumes, all count as near: looking is as dear as pricing.
 COVER_TOUCH_M = 0.03  # A volume that reaches so near (m) covers the place.
-NO_STEP, SHOWN_STEP, LOW_STEP = 0, 1, 2  # What the heights beside a sample of an edge make.
+NO_STEP, SHOWN_STEP, LOW_STEP = range(3)  # What the heights beside a sample of an edge make.
 
 
 # What the price of edges depends on, of a scene, and room (MOST_EDGE_SAMPLES,) to work in: the
@@ -37,16 +38,16 @@ NO_STEP, SHOWN_STEP, LOW_STEP = 0, 1, 2  # What the heights beside a sample of a
 # count, a million times.
 Walls = namedtuple(
     "Walls",
-    "turn depth corner_u corner_v pitch vertices corners places inside outside prices evidence",
+    "turn depth corner_u corner_v pitch vertices corners places inside outside evidence",
 )
 
 
 @compiled
 def gather_walls(scene):
     raster = scene.corner_u, scene.corner_v, scene.pitch
-    corners, prices = (scene.vertices, scene.corners), scene.edge_prices
     room = np.zeros(MOST_EDGE_SAMPLES), np.empty(MOST_EDGE_SAMPLES), np.empty(MOST_EDGE_SAMPLES)
-    return Walls(scene.turn, scene.depth, *raster, *corners, *room, prices, scene.evidence)
+    corners = scene.vertices, scene.corners
+    return Walls(scene.turn, scene.depth, *raster, *corners, *room, scene.evidence)
 
 
 @compiled
@@ -72,7 +73,7 @@ def list_near(volumes, turn, moving):
     return neighbours
 
 
-@compiled(inline="always")
+@compiled(allocates=False)
 def enclose_volume(volumes, j, turn, direction):
     """Return the bounds of volume j, a little widened, in the axes of a direction."""
     other = int(volumes[j, DIRECTION])
@@ -105,43 +106,45 @@ def price_edge(volumes, walls, k, edge, neighbours):
     fill_heights(volumes, walls, k, edge, neighbours, m)
     shown_count = low_count = 0
     for q in range(m):
-        kind = classify_step(walls.inside[q] - walls.outside[q], walls.prices)
+        kind = classify_step(walls.inside[q] - walls.outside[q])
         shown_count += kind != NO_STEP
         low_count += kind == LOW_STEP
     if shown_count == 0:
         return 0.0
     whole_price = price_whole_edge(walls, direction, axis, place, in_line, m)
-    return price_length(walls.prices, whole_price, step * shown_count, step * low_count)
+    return price_length(whole_price, step * shown_count, step * low_count)
 
 
 @compiled(inline="always")
-def classify_step(gap, prices):
+def classify_step(gap):
     """Return which kind of step a gap (m) between the heights beside an edge is."""
     gap = abs(gap)
-    return NO_STEP if gap <= VISIBLE_STEP_M else LOW_STEP if gap < prices[3] else SHOWN_STEP
-
-
-@compiled(inline="always")
-def price_whole_edge(walls, direction, axis, place, in_line, m):
-    """Compute the fixed sum of an edge with `m` samples. Short ones cost less."""
-    any_step, _, _, _, loose, at_corner = walls.prices
-    if not in_line:
-        return any_step + loose
-    first, last = walls.places[0], walls.places[m - 1]
-    return any_step - at_corner * count_corner_ends(walls, direction, axis, place, first, last)
-
-
-@compiled(inline="always")
-def price_length(prices, whole_price, shown_length, low_length):
-    """Compute the units of an edge that is a step, or a low one, on these lengths (m)."""
     return (
-        whole_price * min(shown_length / FULL_PRICE_M, 1.0)
-        + prices[1] * shown_length
-        + prices[2] * low_length
+        NO_STEP if gap <= VISIBLE_STEP_M else LOW_STEP if gap < EDGE_PRICES.low_step else SHOWN_STEP
     )
 
 
+@compiled(allocates=False)
+def price_whole_edge(walls, direction, axis, place, in_line, m):
+    """Compute the fixed sum of an edge with `m` samples. Short ones cost less."""
+    if not in_line:
+        return EDGE_PRICES.any_step + EDGE_PRICES.loose
+    first, last = walls.places[0], walls.places[m - 1]
+    n_ends = count_corner_ends(walls, direction, axis, place, first, last)
+    return EDGE_PRICES.any_step - EDGE_PRICES.at_corner * n_ends
+
+
 @compiled(inline="always")
+def price_length(whole_price, shown_length, low_length):
+    """Compute the units of an edge that is a step, or a low one, on these lengths (m)."""
+    return (
+        whole_price * min(shown_length / FULL_PRICE_M, 1.0)
+        + EDGE_PRICES.a_metre * shown_length
+        + EDGE_PRICES.low_a_metre * low_length
+    )
+
+
+@compiled(allocates=False)
 def locate_line(walls, direction, axis, place):
     """Return whether a line of one axis lies deep enough inside for a visible step.
 
@@ -159,7 +162,7 @@ def locate_line(walls, direction, axis, place):
     return min(place - lowest, highest - place) + off_a_node >= STEP_DEPTH_M, in_line
 
 
-@compiled(inline="always")
+@compiled(allocates=False)
 def place_samples(volumes, walls, k, edge):
     """Fill walls.places with an edge's samples inside the outline.
 
@@ -214,7 +217,7 @@ def fill_heights(volumes, walls, k, edge, neighbours, m):
         ends = widen_rectangle(volumes, j)
         if j == k or meets_line(line, ends, walls.places[0], walls.places[m - 1]):
             raise_heights(
-                volumes, j, line, ends, j == k, walls, walls.inside, walls.outside, n_padded
+                volumes, j, line, ends, j == k, walls.places, walls.inside, walls.outside, n_padded
             )
 
 
@@ -262,14 +265,14 @@ def meets_line(line, ends, first, last):
     )
 
 
-@compiled(inline="always")
-def raise_heights(volumes, j, line, ends, is_own, walls, inside, outside, n):
+@compiled(allocates=False)
+def raise_heights(volumes, j, line, ends, is_own, places, inside, outside, n):
     """Raise the heights beside an edge at the first `n` samples to those of volume j.
 
     Of its own edge (`is_own`), a volume lies inside, all along.
     """
     a0, a, b0, b = line
-    places, c, replaces = walls.places, read_coefficients(volumes, j), volumes[j, REPLACES] > 0.0
+    c, replaces = read_coefficients(volumes, j), volumes[j, REPLACES] > 0.0
     if is_own:
         for q in range(n):
             h = find_lowest(c, a0 + a * places[q], b0 + b * places[q])

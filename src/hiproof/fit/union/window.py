@@ -24,7 +24,6 @@ from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0
 from .whole import Whole
 
 MOST_WINDOW_CELLS = 40  # Most cells a side of a window. Of a larger one they are wider.
-FEWEST_POINTS = 4  # A window of fewer points shows nothing.
 
 Operation = Callable[[np.ndarray, Scene, float], tuple[np.ndarray, float]]
 
@@ -36,7 +35,7 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
     """
     part = shapely.MultiPolygon(list_polygons(clip_to_box(whole.outline, box)))
     numbers = whole.find_points(box)
-    if part.is_empty or len(numbers) < FEWEST_POINTS:
+    if part.is_empty or len(numbers) < plans.MIN_STRUCTURE_POINTS:
         return None
     n = min(len(numbers), most_points)
     selected = numbers[
