@@ -142,16 +142,16 @@ def find_circle(
     x, y = points[start, 0].mean(), points[start, 1].mean()
     squares = (points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2
     radius = math.sqrt(2.0 * squares[start].mean())
-    near = points[squares <= (BEYOND_DRUM * radius) ** 2]
-    is_level = np.abs(near[:, 2] - level) <= SAME_LEVEL_M
-    right_share = measure_right_share(near, is_level, x, y, radius)
+    disc = points[squares <= (BEYOND_DRUM * radius) ** 2]
+    is_level = np.abs(disc[:, 2] - level) <= SAME_LEVEL_M
+    right_share = measure_right_share(disc, is_level, x, y, radius)
     for softness in EDGE_SOFTNESS_M:
         if right_share < HOPELESS_SHARE:
             return x, y, radius, 0.0
         for _ in range(CIRCLE_ROUNDS):
-            move = move_circle(near, is_level, x, y, radius, softness)
+            move = move_circle(disc, is_level, x, y, radius, softness)
             x, y, radius = x + move[0], y + move[1], radius + move[2]
-        right_share = measure_right_share(near, is_level, x, y, radius)
+        right_share = measure_right_share(disc, is_level, x, y, radius)
     return x, y, radius, right_share
 
 
@@ -160,8 +160,11 @@ def measure_right_share(
     points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float
 ) -> float:
     """Return which share of points (n, 3) is on the right side of a circle."""
-    is_inside = (points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2 <= radius * radius
-    return np.mean(is_inside == is_level)
+    n_right = 0
+    for i in range(len(points)):
+        is_inside = (points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2 <= radius * radius
+        n_right += is_inside == is_level[i]
+    return n_right / len(points)
 
 
 @compiled
@@ -173,7 +176,9 @@ def move_circle(
     It is a step of a logistic fit. Points nearer to the circle count more, the more so the smaller
     its `softness` (m).
     """
-    hessian, right, change = np.eye(3), np.zeros(3), np.ones(3)
+    hessian, right, change = np.zeros((3, 3)), np.zeros(3), np.ones(3)
+    for j in range(3):
+        hessian[j, j] = 1.0
     for i in range(len(points)):
         way_x, way_y = points[i, 0] - x, points[i, 1] - y
         r = max(math.hypot(way_x, way_y), softness)
@@ -186,7 +191,9 @@ def move_circle(
             for k in range(3):
                 hessian[j, k] += weight * change[j] * change[k]
     move, _ = solve_masked(hessian, right, np.ones(3, np.bool_))
-    return np.minimum(np.maximum(move, -softness), softness)
+    for j in range(3):
+        move[j] = min(max(move[j], -softness), softness)
+    return move
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:

@@ -76,8 +76,8 @@ def list_round_shapes(
             and measure_spires(roof.points[disc], centre, cap) > most_left
         ):
             continue
-        near = roof.points[np.hypot(*(xy - centre).T) <= BEYOND * radius]
-        shape = fit_round(roof, near, names, settings)
+        points_around = roof.points[np.hypot(*(xy - centre).T) <= BEYOND * radius]
+        shape = fit_round(roof, points_around, names, settings)
         if shape is not None:
             yield shape
 
@@ -87,13 +87,20 @@ def find_centre(points: np.ndarray, start: np.ndarray, radius: float) -> np.ndar
     """Return the middle (2,) of what rises above the rest of a disc of points (n, 3)."""
     centre = start.copy()
     for _ in range(CENTRE_ROUNDS):
-        ways = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
-        near = points[ways <= radius]
-        if len(near) == 0:
+        u, v = centre[0], centre[1]
+        n_near = total = weight = centre_u = centre_v = 0.0
+        for i in range(len(points)):
+            if math.hypot(points[i, 0] - u, points[i, 1] - v) <= radius:
+                n_near, total = n_near + 1.0, total + points[i, 2]
+        if n_near == 0.0:
             break
-        above = np.maximum(near[:, 2] - near[:, 2].mean(), COMPARED_M)
-        centre[0] = (above * near[:, 0]).sum() / above.sum()
-        centre[1] = (above * near[:, 1]).sum() / above.sum()
+        for i in range(len(points)):
+            if math.hypot(points[i, 0] - u, points[i, 1] - v) <= radius:
+                above = max(points[i, 2] - total / n_near, COMPARED_M)
+                weight += above
+                centre_u += above * points[i, 0]
+                centre_v += above * points[i, 1]
+        centre[0], centre[1] = centre_u / weight, centre_v / weight
     return centre
 
 
@@ -104,7 +111,7 @@ def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: f
     It is 0 where the points (n, 3) hardly fall, or not `alike` in all directions.
     """
     n_inner, inner = 0, 0.0
-    counts, means = np.zeros(TURN_SECTORS), np.zeros(TURN_SECTORS)
+    counts, sums = np.zeros(TURN_SECTORS), np.zeros(TURN_SECTORS)
     for x, y, z in points:
         x, y = x - centre[0], y - centre[1]
         distance = math.hypot(x, y)
@@ -113,12 +120,18 @@ def measure_fall(points: np.ndarray, centre: np.ndarray, radius: float, alike: f
         elif 0.5 * radius < distance <= radius:
             turn = math.atan2(y, x) / (2.0 * math.pi) % 1.0
             sector = min(int(turn * TURN_SECTORS), TURN_SECTORS - 1)
-            counts[sector], means[sector] = counts[sector] + 1.0, means[sector] + z
-    if counts.sum() < FEWEST_AROUND or n_inner == 0 or np.count_nonzero(counts) < FEWEST_SECTORS:
+            counts[sector], sums[sector] = counts[sector] + 1.0, sums[sector] + z
+    n_outer = n_sectors = total = squares = 0.0
+    for sector in range(TURN_SECTORS):
+        if counts[sector] > 0.0:
+            mean = sums[sector] / counts[sector]
+            n_outer, n_sectors = n_outer + counts[sector], n_sectors + 1.0
+            total, squares = total + mean, squares + mean * mean
+    if n_outer < FEWEST_AROUND or n_inner == 0 or n_sectors < FEWEST_SECTORS:
         return 0.0
-    means = means[counts > 0] / counts[counts > 0]
-    fall = inner / n_inner - means.mean()
-    return fall if fall >= LEAST_FALL_M and means.std() <= alike * fall else 0.0
+    fall = inner / n_inner - total / n_sectors
+    spread = math.sqrt(max(squares / n_sectors - (total / n_sectors) ** 2, 0.0))
+    return fall if fall >= LEAST_FALL_M and spread <= alike * fall else 0.0
 
 
 def fit_radially(points: np.ndarray, centre: np.ndarray, cap_m: float) -> tuple[np.ndarray, float]:
