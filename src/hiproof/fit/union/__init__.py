@@ -20,7 +20,6 @@ edges       compiled: moves of a volume's edges
 refit       compiled: least squares for a volume's planes
 moves       compiled: moves that change one volume
 facings     compiled: moves that turn its planes
-joins       compiled: moves that change several volumes
 improve     compiled: all moves in turn
 add, grow   volumes added one by one to a level base, and the first of them grown anew
 trim        hidden edges drawn in
@@ -151,7 +150,7 @@ def fit_building(
     unit = compute_unit_points(plan.density, COMMON_HOUSE_M2, settings.compound)
     volumes = add_bays(volumes, outline, plan, scene, unit)
     sides, agreement = draw_in_groups(volumes, ends, site, cache)
-    base = bool(is_base_visible(volumes, scene))
+    base = is_base_visible(volumes, scene)
     sides, planes, regions = weld(volumes, sides, agreement, site, base)
     parts = [
         name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, types)

@@ -8,7 +8,7 @@ from .box import Box
 from .candidates import Effort
 from .edges import SETTLE_REACH_M
 from .grow import grow
-from .moves import move_all_edges, refit_volumes
+from .moves import refit_volumes, settle_volume
 from .objective import BASE_SHARE, compute_objective
 from .scene import Scene
 from .volumes import U0, V1, compute_roof_heights
@@ -53,8 +53,9 @@ def find_in_block(whole: Whole, box: Box) -> tuple[np.ndarray, Scene | None]:
 def settle_volumes(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float]:
     """Refit the volumes and move their edges a little on every point of `scene`."""
     volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene, np.inf))
-    value = move_all_edges(volumes, scene, value, SETTLE_REACH_M)
-    return refit_volumes(volumes, scene, value)
+    for k in range(1, len(volumes)):
+        volumes, value = settle_volume(volumes, scene, value, k, SETTLE_REACH_M)
+    return volumes, value
 
 
 def is_base_bare(volumes: np.ndarray, scene: Scene) -> bool:

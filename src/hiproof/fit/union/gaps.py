@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .around import compute_roof_with, measure_context
-from .edges import MIN_SIDE_M, move_edges
-from .moves import refit_volume
+from .edges import MIN_SIDE_M
+from .moves import settle_volume
 from .objective import compute_costs, compute_objective
 from .prices import COPY_UNITS
 from .repeats import COPY_REACH_M, is_repeatable, sum_costs
@@ -113,8 +113,5 @@ def settle_pieces(volumes: np.ndarray, k: int, scene: Scene) -> tuple[np.ndarray
     """Refit volumes k and k + 1, and move their edges. Also returns the objective."""
     value = compute_objective(volumes, scene, np.inf)
     for piece in (k, k + 1):
-        volumes, value = refit_volume(volumes, scene, value, piece)
-        volumes = volumes.copy()
-        context = measure_context(volumes, scene.U, scene.V, scene.order, piece)
-        value = move_edges(volumes, scene, piece, value, COPY_REACH_M, context)
+        volumes, value = settle_volume(volumes, scene, value, piece, COPY_REACH_M)
     return volumes, value

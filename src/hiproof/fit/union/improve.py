@@ -10,7 +10,6 @@ from ...compiled import compiled
 from .around import measure_context
 from .edges import EVERYWHERE, NO_GAIN, move_edges
 from .facings import face_walls
-from .joins import join_neighbours, merge_volumes
 from .moves import (
     add_planes,
     change_ties,
@@ -45,31 +44,23 @@ def improve(volumes, scene, value, slopes, rounds):
         value_before = value
         for k in range(len(volumes)):
             if is_unsettled(volumes, scene.turn, k) or (k == 0 and not is_fixed(volumes, k)):
-                volumes, value = refit_volume(volumes, scene, value, k)
+                context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+                volumes, value = refit_volume(volumes, scene, value, k, context)
         for k in range(1, len(volumes)):
             if is_unsettled(volumes, scene.turn, k):
                 context = measure_context(volumes, scene.U, scene.V, scene.order, k)
                 value = move_edges(volumes, scene, k, value, EVERYWHERE, context)
         volumes, value = drop_volumes(volumes, scene, value)
-        k = 1
-        while k < len(volumes):
-            count, start = len(volumes), value
+        for k in range(1, len(volumes)):
             if is_unsettled(volumes, scene.turn, k):
-                volumes, value = change_structure(volumes, scene, value, k, slopes)
+                start = value
+                volumes, value = change_planes(volumes, scene, value, k, slopes)
                 if value == start:
                     volumes[k, SETTLED] = digest_surroundings(volumes, scene.turn, k)
-            k = k + 1 if len(volumes) == count else 1
         volumes, value = drop_base(volumes, scene, value)
         if value > value_before - 0.05 * scene.evidence:
             break
     return volumes, value
-
-
-@compiled
-def change_structure(volumes, scene, value, k, slopes):
-    """Make all moves that change the planes of volume k or join it to its neighbours."""
-    volumes, value = change_planes(volumes, scene, value, k, slopes)
-    return join_neighbours(volumes, scene, value, k)
 
 
 @compiled
@@ -131,7 +122,7 @@ def digest_surroundings(volumes, turn, k):
 
 @compiled
 def simplify(volumes, scene, value, steepest):
-    """Drop or merge volumes and planes that do not pay under `scene`.
+    """Drop volumes and planes that do not pay under `scene`.
 
     The scene is a more tolerant one. Planes steeper than `steepest` stay.
     """
@@ -153,7 +144,6 @@ def simplify(volumes, scene, value, steepest):
             context = measure_context(volumes, scene.U, scene.V, scene.order, k)
             volumes, value = drop_planes(volumes, scene, value, k, steepest, context)
             k += 1
-        volumes, value = merge_volumes(volumes, scene, value, steepest)
         if value > value_before - NO_GAIN:
             break
     return volumes, value

@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .around import measure_context
 from .block import SETTLE_POINTS, find_in_block, search_block
 from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .box import Box, clip_to_box
-from .edges import SETTLE_REACH_M, move_edges
-from .moves import refit_volume
+from .edges import SETTLE_REACH_M
+from .moves import settle_volume
 from .places import grow_at_places
 from .plan import Plan
 from .scene import Scene
@@ -61,20 +60,16 @@ def settle_in_windows(whole: Whole) -> None:
     for place in [row[POSITION].tobytes() for row in whole.volumes[1:]]:
         k = whole.find(place)
         if k is not None:
-            settle_volume(whole, k)
+            settle_in_window(whole, k)
 
 
-def settle_volume(whole: Whole, k: int) -> None:
+def settle_in_window(whole: Whole, k: int) -> None:
     """Refit volume k, and move its edges a little, on the points around it."""
     extent = Box(*whole.boxes[k])
     if not extent.u0 <= extent.u1:
         return
 
     def settle_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-        row = find_row(rows, k)
-        rows, value = refit_volume(rows, scene, value, row)
-        context = measure_context(rows, scene.U, scene.V, scene.order, row)
-        value = move_edges(rows, scene, row, value, SETTLE_REACH_M, context)
-        return refit_volume(rows, scene, value, row)
+        return settle_volume(rows, scene, value, find_row(rows, k), SETTLE_REACH_M)
 
     change_in_window(whole, extent.widen(SEAM_MARGIN_M), SETTLE_POINTS, settle_row, {k})

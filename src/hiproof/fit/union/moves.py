@@ -9,8 +9,7 @@
 
 All functions take volumes (k, COLUMNS) and the objective's value, and return the better of these
 and of what they find. Those of volume k alone take its `context`, which does not change. Moves that
-turn planes are in facings.py, moves of several volumes in joins.py, and all moves in turn in
-improve.py.
+turn planes are in facings.py, and all moves in turn in improve.py.
 """
 
 from __future__ import annotations
@@ -70,11 +69,7 @@ def settle_move(trial, scene, k, value, reach, context):
     if trial_value == np.inf:
         return trial, trial_value
     trial_value = move_edges(trial, scene, k, trial_value, reach, context)
-    refit_trial = trial.copy()
-    refit(refit_trial, scene, k, context)
-    refit_value = compute_objective_with(refit_trial, scene, k, context, trial_value)
-    if refit_value < trial_value:
-        trial, trial_value = refit_trial, refit_value
+    trial, trial_value = refit_volume(trial, scene, trial_value, k, context)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (trial, np.inf)
 
 
@@ -90,17 +85,27 @@ def refit_volumes(volumes, scene, value):
     for k in range(len(volumes)):
         if is_fixed(volumes, k):
             continue
-        volumes, value = refit_volume(volumes, scene, value, k)
+        context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+        volumes, value = refit_volume(volumes, scene, value, k, context)
     return volumes, value
 
 
 @compiled
-def refit_volume(volumes, scene, value, k):
+def refit_volume(volumes, scene, value, k, context):
     """Refit volume k, if that helps."""
-    trial, context = volumes.copy(), measure_context(volumes, scene.U, scene.V, scene.order, k)
+    trial = volumes.copy()
     refit(trial, scene, k, context)
     trial_value = compute_objective_with(trial, scene, k, context, value)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (volumes, value)
+
+
+@compiled
+def settle_volume(volumes, scene, value, k, reach):
+    """Refit volume k and move its edges within `reach` (m), where that helps."""
+    context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+    volumes, value = refit_volume(volumes.copy(), scene, value, k, context)
+    value = move_edges(volumes, scene, k, value, reach, context)
+    return refit_volume(volumes, scene, value, k, context)
 
 
 @compiled

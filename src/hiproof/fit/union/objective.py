@@ -113,8 +113,7 @@ def price_edges(volumes, scene, limit):
     return total
 
 
-@compiled
-def is_base_visible(volumes, scene):
+def is_base_visible(volumes: np.ndarray, scene) -> bool:
     """Return whether the base roofs a noticeable share of the outline."""
     _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
-    return scene.weight[scene.n :][top[scene.n :] == 0].sum() > BASE_SHARE * scene.n
+    return bool(scene.weight[scene.n :][top[scene.n :] == 0].sum() > BASE_SHARE * scene.n)

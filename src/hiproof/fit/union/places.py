@@ -10,10 +10,9 @@ from .blocks import BLOCK_M2
 from .box import Box
 from .candidates import MOST_NEW_PLANES, list_candidates
 from .grow import grow_volumes, prepare_growth
-from .improve import improve
 from .prices import PLACE_UNITS
 from .scene import Scene
-from .seams import WINDOW_POINTS, list_volume_slopes
+from .seams import WINDOW_POINTS
 from .whole import Whole
 from .window import change_in_window
 
@@ -55,8 +54,7 @@ def sum_squares(counts: np.ndarray) -> np.ndarray:
 
 
 def grow_in_window(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
-    """Improve the volumes of a window, and grow more where points are unexplained."""
-    volumes, value = improve(volumes, scene, value, list_volume_slopes(volumes), 1)
+    """Grow more volumes in a window where points are unexplained."""
     unexplained_points = find_unexplained(volumes, scene)
     if len(unexplained_points) < FEWEST_UNEXPLAINED:
         return volumes, value

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .around import measure_context
-from .edges import move_edges
-from .moves import refit_volume
+from .moves import settle_volume
 from .objective import compute_costs, compute_objective
 from .prices import COPY_UNITS
 from .scene import Scene, select_points
@@ -73,10 +71,7 @@ def add_copy(volumes: np.ndarray, copy: np.ndarray, strip: Scene, scene: Scene) 
     with_copy = np.vstack([volumes, copy])
     last = len(volumes)
     value = compute_objective(with_copy, scene, np.inf)
-    settled, value = refit_volume(with_copy, scene, value, last)
-    settled = settled.copy()
-    context = measure_context(settled, scene.U, scene.V, scene.order, last)
-    move_edges(settled, scene, last, value, COPY_REACH_M, context)
+    settled, _ = settle_volume(with_copy, scene, value, last, COPY_REACH_M)
     saved = sum_costs(volumes, strip) - sum_costs(settled, strip)
     return settled if saved > COPY_UNITS * scene.evidence else with_copy
 

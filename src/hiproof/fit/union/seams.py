@@ -8,13 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .around import measure_context
 from .box import Box, enclose_boxes
-from .edges import EVERYWHERE, NO_GAIN, move_edges
-from .grow import select_typical_slopes
-from .improve import change_planes
-from .joins import settle_trial
-from .moves import refit_volume, remove_volume
+from .edges import EVERYWHERE, NO_GAIN
+from .moves import remove_volume, settle_volume
 from .objective import compute_objective
 from .prices import LEFT_OUT_SHARE, LEFT_OUT_UNITS
 from .scene import Scene
@@ -126,7 +122,9 @@ def merge_pair(whole: Whole, j: int, k: int) -> bool:
         trial[at_k, lower] = np.minimum(rows[at_j, lower], rows[at_k, lower])
         trial[at_k, upper] = np.maximum(rows[at_j, upper], rows[at_k, upper])
         trial = remove_volume(trial, at_j)
-        trial, trial_value = settle_trial(trial, scene, at_k - (at_j < at_k), value)
+        trial_value = compute_objective(trial, scene, np.inf)
+        at_k -= at_j < at_k
+        trial, trial_value = settle_volume(trial, scene, trial_value, at_k, EVERYWHERE)
         return (trial, trial_value) if trial_value < value else (rows, value)
 
     box = enclose_boxes([Box(*whole.boxes[j]), Box(*whole.boxes[k])]).widen(SEAM_MARGIN_M)
@@ -156,16 +154,8 @@ def improve_volume(whole: Whole, place: bytes) -> None:
 
     def improve_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
         row = find_row(rows, k)
-        rows, value = refit_volume(rows, scene, value, row)
-        context = measure_context(rows, scene.U, scene.V, scene.order, row)
-        value = move_edges(rows, scene, row, value, EVERYWHERE, context)
-        rows, value = leave_out(whole, rows, scene, value, row)
-        row = find_row(rows, k)
-        return (
-            change_planes(rows, scene, value, row, list_volume_slopes(rows))
-            if row
-            else (rows, value)
-        )
+        rows, value = settle_volume(rows, scene, value, row, EVERYWHERE)
+        return leave_out(whole, rows, scene, value, row)
 
     change_in_window(whole, frame_neighbours(whole, k), WINDOW_POINTS, improve_row)
 
@@ -192,18 +182,10 @@ def leave_out(
     ]
     for _ in range(LEFT_OUT_ROUNDS):
         for q in neighbours:
-            context = measure_context(trial, scene.U, scene.V, scene.order, q)
-            trial_value = move_edges(trial, scene, q, trial_value, EVERYWHERE, context)
-        for q in neighbours:
-            trial, trial_value = refit_volume(trial, scene, trial_value, q)
+            trial, trial_value = settle_volume(trial, scene, trial_value, q, EVERYWHERE)
         if trial_value < value - NO_GAIN:
             return trial, trial_value
     return rows, value
-
-
-def list_volume_slopes(rows: np.ndarray) -> np.ndarray:
-    """Select typical slopes of the volumes but the base."""
-    return select_typical_slopes(rows[1:]) if len(rows) > 1 else np.zeros(0)
 
 
 def frame_neighbours(whole: Whole, k: int) -> Box:

@@ -15,6 +15,7 @@ from .groups import run_in_groups
 from .grow import grow
 from .improve import simplify
 from .large import find_in_windows
+from .moves import ALMOST_LEVEL
 from .objective import compute_objective
 from .plan import Plan
 from .prices import COMMON_HOUSE_M2, LARGE_ROOF_M2, compute_unit_points
@@ -27,7 +28,6 @@ SEARCH_POINTS = 600  # Points in which structure is searched. All of them settle
 LENIENT_DEAD_M = 0.1  # Difference (m) that a person would leave out of low-pitched roofs.
 LENIENT_MORE_M = 0.04  # Difference (m) that a person would leave out of large roofs besides.
 LENIENT_SOFT_M = 0.18  # Distance (m) over which larger differences grow to the cost of a point.
-LENIENT_SLOPE = 0.15  # Steepest slope (rise over run) of a low-pitched roof.
 
 
 def find_volumes(
@@ -58,7 +58,7 @@ def find_volumes(
     volumes, value = settle_volumes(volumes, full_scene)
     lenient = soften_scene(scene, outline.area)
     volumes, _ = simplify(
-        volumes, lenient, compute_objective(volumes, lenient, np.inf), LENIENT_SLOPE
+        volumes, lenient, compute_objective(volumes, lenient, np.inf), ALMOST_LEVEL
     )
     volumes, value = settle_volumes(volumes, full_scene)
     volumes, value = trim(volumes, full_scene, value)

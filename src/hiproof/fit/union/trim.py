@@ -111,8 +111,8 @@ def list_around(volumes: np.ndarray, k: int, scene: Scene) -> np.ndarray:
     wide = volumes.copy()
     wide[k, [U0, V0]] -= NEAR_VERTEX_M
     wide[k, [U1, V1]] += NEAR_VERTEX_M
-    near = list_near(wide, scene.turn, -1)[k]
-    return np.intersect1d(near[1 : 1 + near[0]], list_movable(volumes))
+    neighbours = list_near(wide, scene.turn, -1)[k]
+    return np.intersect1d(neighbours[1 : 1 + neighbours[0]], list_movable(volumes))
 
 
 def draw_in(
@@ -159,8 +159,8 @@ def changes_heights(
     first, last = sorted((volumes[k, edge], trial[k, edge]))
     is_between = (first <= x) & (x <= last)
     U, V = (np.ascontiguousarray(axis[:, is_between]) for axis in (U, V))
-    before, after = (compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (volumes, trial))
-    return not np.array_equal(before, after)
+    heights = [compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (volumes, trial)]
+    return not np.array_equal(*heights)
 
 
 def cut_short(

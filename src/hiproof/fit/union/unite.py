@@ -170,7 +170,7 @@ def cover_cut_corners(roof: DrawnRoof, ends: OutlineEnds, scene: Scene, cache: C
 
 def is_base_bared(trial: np.ndarray, volumes: np.ndarray, scene: Scene) -> bool:
     """Return whether a trial bares the base, and the volumes that it replaces do not."""
-    return bool(is_base_visible(trial, scene)) and not is_base_visible(volumes, scene)
+    return is_base_visible(trial, scene) and not is_base_visible(volumes, scene)
 
 
 def bound_cost(volumes: np.ndarray, scene: Scene) -> float:

@@ -223,11 +223,11 @@ def is_lower_beyond(
     scene = open_window(whole, box, 2 * most_points)
     if scene is None:
         return False
-    before = whole.volumes, whole.boxes
+    saved = whole.volumes, whole.boxes
     value_before = compute_objective(whole.select_rows(box), scene, np.inf)
     whole.replace(numbers, rows)
     lower = compute_objective(whole.select_rows(box), scene, value_before - NO_GAIN) < np.inf
-    whole.set_volumes(*before)
+    whole.set_volumes(*saved)
     return lower
 
 
