@@ -32,9 +32,9 @@ def list_barrels(roof: JudgedRoof, part: Part, settings: Settings) -> Iterator[P
     for group in list_groups(roof.parts, part):
         is_member = [any(p is member for member in group) for p in roof.parts]
         which = np.array(is_member)[roof.highest[1]]
-        before = roof.measure_distances(MOST_DISTANCE_M)[which].mean()
+        old_misfit = roof.measure_distances(MOST_DISTANCE_M)[which].mean()
         most_left = BENT if len(group) == 1 else AS_NEAR
-        if measure_arc_misfit(x[which], roof.points[which, 2]) > most_left * before:
+        if measure_arc_misfit(x[which], roof.points[which, 2]) > most_left * old_misfit:
             continue
         covered = list_polygons(unite_outlines(group))
         if len(covered) == 1:

@@ -69,13 +69,13 @@ def replace_parts(
     over, _ = find_highest([shape], roof.points[:, :2])
     within = np.isfinite(over)
     cap = scale_cap(measure_slope(shape))
-    before, after = roof.measure_distances(cap), np.minimum(np.abs(z - over), cap)
+    old_gaps, new_gaps = roof.measure_distances(cap), np.minimum(np.abs(z - over), cap)
     numbers = []
     for k in np.unique(top[within]).tolist():
         own, inside = top == k, (top == k) & within
         if (
             inside.sum() >= REPLACED_SHARE * own.sum()
-            and after[inside].mean() <= before[inside].mean() + AS_WELL_M
+            and new_gaps[inside].mean() <= old_gaps[inside].mean() + AS_WELL_M
         ):
             numbers.append(k)
     replaced = [kept_roof.parts[k] for k in numbers]
@@ -94,8 +94,10 @@ def measure_gain(roof: JudgedRoof, new: JudgedRoof, judged: np.ndarray, cap_m: f
 
     Their distances count up to `cap_m`. Fewer parts are worth something, too.
     """
-    before, after = (one.measure_distances(cap_m)[judged].mean() for one in (roof, new))
-    nats = np.count_nonzero(judged) * math.log((before + COMPARED_M) / (after + COMPARED_M))
+    old_misfit, new_misfit = (one.measure_distances(cap_m)[judged].mean() for one in (roof, new))
+    nats = np.count_nonzero(judged) * math.log(
+        (old_misfit + COMPARED_M) / (new_misfit + COMPARED_M)
+    )
     return nats + PART_NATS * (count_shapes(roof.parts) - count_shapes(new.parts))
 
 
