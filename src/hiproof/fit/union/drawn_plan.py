@@ -48,6 +48,17 @@ class DrawnPlan:
         return np.unique(self.beside[self.beside >= 0])
 
     @cached_property
+    def first_equal(self) -> np.ndarray:
+        """The number of the first plane (p,) that equals each."""
+        return equal_planes(self.planes, EQUAL_PLANE)
+
+    def find_edges_of(self, k: int) -> np.ndarray:
+        """Return which edges (e,) lie beside a plane of volume k, or beside one equal to it."""
+        first = np.append(self.first_equal, -1)  # -1 of -1, outside
+        own = first[:-1][self.owner[:, 0] == k]
+        return np.isin(first[self.beside], own).any(axis=1)
+
+    @cached_property
     def lengths(self) -> np.ndarray:
         """The length (m) of each edge (e,)."""
         return np.linalg.norm(np.diff(self.places[self.edges], axis=1)[:, 0], axis=1)

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from .drawn_plan import DrawnPlan
+from .members import is_inside_sides
 from .plan import Plan
 from .scene import Scene
 from .sides import Side
@@ -69,21 +71,29 @@ def find_repairs(
     These are low steps, and moves of the sides of the volumes `numbers`.
     """
     repairs = list(list_low_steps(plan_drawn))
-    left, right = np.append(plan_drawn.owner[:, 0], -1)[plan_drawn.beside].T  # -1 of -1, outside
     turned: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    visible: dict[tuple[int, int], list[VisibleSide]] = {}
     for k in numbers:
-        is_own = (left == k) | (right == k)
         free = [edge for edge in range(N_SIDES) if not sides[k][edge].anchored]
+        is_own = plan_drawn.find_edges_of(k)
+        direction = int(volumes[k, DIRECTION])
+        if free and is_own.any() and direction not in turned:
+            turned[direction] = turn_plan(plan_drawn, plan, scene.turn[direction])
+        if free and is_own.any():
+            places, planes = turned[direction]
+            is_inside = is_inside_sides(places, sides[k], ON_M)
+            is_own &= is_inside[plan_drawn.edges].all(axis=1)
         if not free or not is_own.any():
             continue
-        direction = int(volumes[k, DIRECTION])
-        if direction not in turned:
-            turned[direction] = turn_plan(plan_drawn, plan, scene.turn[direction])
-        places, planes = turned[direction]
         around, near_places, near_edges = plan_drawn.select_around(is_own, REPAIR_REACH_M)
         places, is_own = places[near_places], is_own[near_edges]
         for edge in free:
-            repairs += list_side_moves(around, places, planes, is_own, (k, edge), sides[k][edge])
+            side = find_visible_side(around, places, is_own, (k, edge), sides[k][edge])
+            if side is not None:
+                repairs += list_side_moves(around, planes, side)
+                visible.setdefault((direction, edge // 2), []).append(side)
+    for on_axis in visible.values():
+        repairs += list_leaning_lines(on_axis)
     return sorted(repairs, key=lambda repair: repair.size)
 
 
@@ -96,28 +106,55 @@ def turn_plan(plan_drawn: DrawnPlan, plan: Plan, turn: np.ndarray) -> tuple[np.n
     return (plan_drawn.places - origin) @ axes, planes
 
 
-def list_side_moves(
-    plan_drawn: DrawnPlan,
-    places: np.ndarray,
-    planes: np.ndarray,
-    is_own: np.ndarray,
-    key: tuple[int, int],
-    side: Side,
-) -> Iterator[Repair]:
-    """Yield moves of one side where it is visible on edges of its own.
+class VisibleSide(NamedTuple):
+    """A side where it is visible on edges of its own.
 
-    `key` is (volume, edge), and `is_own` (e,) are the volume's edges. The plan's `places` (m, 2)
-    and `planes` (p, 3) are in its axes. The side may move parallel to a place nearby, to one at
+    `key` is (volume, edge), and x and y (m,) are the plan's places across and along it. `offsets`
+    (m,) are how far they lie off its line, `on_side` (e,) which edges lie on it, and `ends` their
+    places, the first and the last along it at the ends.
+    """
+
+    key: tuple[int, int]
+    line: Side
+    x: np.ndarray
+    y: np.ndarray
+    offsets: np.ndarray
+    on_side: np.ndarray
+    ends: np.ndarray
+
+    @property
+    def reach(self) -> np.ndarray:
+        """The two ends (2, 2), across and along."""
+        return np.column_stack([self.x, self.y])[self.ends[[0, -1]]]
+
+
+def find_visible_side(
+    plan_drawn: DrawnPlan, places: np.ndarray, is_own: np.ndarray, key: tuple[int, int], line: Side
+) -> VisibleSide | None:
+    """Find where a side of a volume is visible, None if nowhere.
+
+    The plan's `places` (m, 2) are in the volume's axes, and `is_own` (e,) are its edges.
+    """
+    axis = key[1] // 2
+    x, y = places[:, axis], places[:, 1 - axis]
+    offsets = x - line.offset - line.lean * y
+    on_side = (np.abs(offsets) < ON_M)[plan_drawn.edges].all(axis=1) & is_own
+    if not on_side.any():
+        return None
+    ends = np.unique(plan_drawn.edges[on_side])
+    return VisibleSide(key, line, x, y, offsets, on_side, ends[np.argsort(y[ends])])
+
+
+def list_side_moves(
+    plan_drawn: DrawnPlan, planes: np.ndarray, visible: VisibleSide
+) -> Iterator[Repair]:
+    """Yield moves of one side.
+
+    The plan's `planes` (p, 3) are in its axes. It may move parallel to a place nearby, to one at
     each end, to the line of a side that carries it on, or to the line where its planes meet.
     """
-    edge = key[1]
-    x, y = places[:, edge // 2], places[:, 1 - edge // 2]
-    offsets = x - side.offset - side.lean * y
-    along = np.abs(offsets) < ON_M
-    on_side = along[plan_drawn.edges].all(axis=1) & is_own
-    if not on_side.any():
-        return
-    ends = np.unique(plan_drawn.edges[on_side])
+    key, side, x, y, offsets, on_side, ends = visible
+    along, edge = np.abs(offsets) < ON_M, key[1]
     near_places = np.flatnonzero((np.abs(offsets) < REPAIR_REACH_M) & ~along)
     distances = np.hypot(x[near_places, None] - x[ends], y[near_places, None] - y[ends])
     for j, size in zip(near_places, distances.min(axis=1), strict=True):
@@ -125,9 +162,8 @@ def list_side_moves(
             moved = Side(float(side.offset + offsets[j]), side.lean, False, side.sigma)
             yield Repair(float(size), {key: moved})
     if len(near_places):
-        first, last = ends[[y[ends].argmin(), y[ends].argmax()]]
         end_distances = [
-            np.hypot(x[near_places] - x[end], y[near_places] - y[end]) for end in (first, last)
+            np.hypot(x[near_places] - x[end], y[near_places] - y[end]) for end in ends[[0, -1]]
         ]
         i, j = (near_places[distance.argmin()] for distance in end_distances)
         size = max(distance.min() for distance in end_distances)
@@ -135,7 +171,7 @@ def list_side_moves(
             lean = float((x[j] - x[i]) / (y[j] - y[i]))
             moved = Side(float(x[i] - lean * y[i]), lean, False, side.sigma)
             yield Repair(float(size), {key: moved})
-    yield from list_line_moves(plan_drawn, x, y, on_side, key, side)
+    yield from list_line_moves(plan_drawn, visible)
     for e in np.flatnonzero(on_side & is_low_step(plan_drawn.gaps)):
         left, right = planes[plan_drawn.beside[e]]
         line = find_fold_line(left, right, edge)
@@ -148,21 +184,13 @@ def list_side_moves(
                 yield Repair(float(shift), {key: moved})
 
 
-def list_line_moves(
-    plan_drawn: DrawnPlan,
-    x: np.ndarray,
-    y: np.ndarray,
-    on_side: np.ndarray,
-    key: tuple[int, int],
-    side: Side,
-) -> Iterator[Repair]:
+def list_line_moves(plan_drawn: DrawnPlan, visible: VisibleSide) -> Iterator[Repair]:
     """Yield moves of a side onto the lines of edges that carry it on.
 
-    One wall has one line. Such an edge begins beside an end of the side. x and y (m,) are the
-    plan's places across and along the side, and `on_side` (e,) are its edges.
+    One wall has one line. Such an edge begins beside an end of the side.
     """
-    ends = np.unique(plan_drawn.edges[on_side])
-    side_ends = ends[[y[ends].argmin(), y[ends].argmax()]]
+    key, side, x, y, _, on_side, ends = visible
+    side_ends = ends[[0, -1]]
     x_edges, y_edges = x[plan_drawn.edges], y[plan_drawn.edges]
     across, along = np.diff(x_edges)[:, 0], np.diff(y_edges)[:, 0]
     carries_on = ~on_side & (np.hypot(across, along) > REPAIR_REACH_M)
@@ -174,6 +202,28 @@ def list_line_moves(
         shift = np.abs(line.offset + lean * y[side_ends] - x[side_ends]).max()
         if ON_M < shift < REPAIR_REACH_M:
             yield Repair(float(shift), {key: line})
+
+
+def list_leaning_lines(sides: list[VisibleSide]) -> Iterator[Repair]:
+    """Yield moves of two sides on one axis, of which one carries the other on, onto one line.
+
+    Where a step leans, the search draws it as stairs. The line runs through the middles of both.
+    """
+    if len(sides) < 2:
+        return
+    ends = np.array([side.reach for side in sides])
+    apart = np.linalg.norm(ends[:, None, :, None] - ends[None, :, None], axis=-1).min(axis=(2, 3))
+    for i, j in np.argwhere(np.triu(apart < REPAIR_REACH_M, 1)).tolist():
+        middle, other_middle = ends[[i, j]].mean(axis=1)
+        across, along = (other_middle - middle).tolist()
+        if not abs(across) < MOST_REPAIR_LEAN * abs(along):
+            continue
+        lean = across / along
+        line = Side(float(middle[0] - lean * middle[1]), lean)
+        x, y = ends[[i, j]].reshape(-1, 2).T
+        shift = float(np.abs(x - line.offset - lean * y).max())
+        if ON_M < shift < REPAIR_REACH_M:
+            yield Repair(shift, {sides[i].key: line, sides[j].key: line})
 
 
 def find_fold_line(plane: np.ndarray, other: np.ndarray, edge: int) -> tuple[float, float] | None:

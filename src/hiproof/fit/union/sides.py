@@ -35,6 +35,9 @@ MOST_CHORD_CORNERS = 40  # Most corners of an outline with such lines.
 SHARED_M = 0.3  # A side takes its neighbour's line within this distance (m).
 SHOWN_M = 0.5  # Distance (m) next to a side in which points need its volume, unless it is hidden.
 MOVED_M = 1.0  # Furthest (m) that a side is moved to see how well points determine its place.
+LEANING_STEPS_M = (0.2, 0.04)  # Steps (m) in which the ends of a leaning side are sought.
+LEANING_PLACES = 5  # Places each way of each end.
+LEANING_SIDE_UNITS = 1.0
 MOVES = 50  # Steps in which it is moved each way.
 # Reach (m) beyond a volume's edges, where its sides do not lean.
 SIDE_REACH_M = max(MOST_OFFSET_M, MOVED_M)
@@ -212,6 +215,9 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
         m = find_cheapest_line(volumes[k], edge, lines, uv, gain, scene.evidence)
         if m >= 0:
             offsets[edge], lean[edge], anchored[edge] = lines.start[m], lines.lean[m], True
+        else:
+            price = scene.evidence * LEANING_SIDE_UNITS
+            offsets[edge], lean[edge] = find_leaning_line(volumes[k], edge, lines, uv, gain, price)
         sigma[edge] = estimate_side_sigma(volumes[k], edge, lines, uv, gain, m >= 0)
     return offsets, lean, anchored, sigma
 
@@ -301,6 +307,50 @@ def find_cheapest_line(volume, edge, lines, uv, gain, evidence):
         if price < cheapest:
             best, cheapest = m, price
     return best
+
+
+@compiled
+def find_leaning_line(volume, edge, lines, uv, gain, price):
+    """Find the line that a side takes where points show that it leans: its offset and lean.
+
+    That is the side itself if no line gains more than its `price` (points).
+    """
+    axis, place = edge // 2, volume[U0 + edge]
+    y_low = max(volume[V0 - 2 * axis], lines.y_extent[0])
+    y_high = min(volume[V1 - 2 * axis], lines.y_extent[1])
+    sign = -1.0 if edge % 2 == 0 else 1.0
+    x, y = uv[axis] - place, uv[1 - axis]
+    near = np.nonzero(
+        (y >= y_low)
+        & (y <= y_high)
+        & (np.abs(x) < MOST_OFFSET_M)
+        & (sign * (uv[axis] - volume[U0 + (edge ^ 1)]) >= 0.0)
+        & (gain != 0.0)
+    )[0]
+    x, gain = sign * x[near], gain[near]
+    share = (y[near] - y_low) / max(y_high - y_low, 1e-6)
+    # what a line could gain at most
+    if np.where(x <= 0.0, gain, -gain).clip(0.0, np.inf).sum() <= price:
+        return place, 0.0
+    present = gain[x <= 0.0].sum()
+    best, first, last = present - price, 0.0, 0.0
+    for step in LEANING_STEPS_M:
+        begin, end = first, last
+        for i in range(-LEANING_PLACES, LEANING_PLACES + 1):
+            for j in range(-LEANING_PLACES, LEANING_PLACES + 1):
+                at, to = begin + i * step, end + j * step
+                if max(abs(at), abs(to)) > MOST_OFFSET_M or at == to:
+                    continue
+                cost = 0.0
+                for n in range(len(x)):
+                    if x[n] <= at + share[n] * (to - at):
+                        cost += gain[n]
+                if cost < best:
+                    best, first, last = cost, at, to
+    lean = sign * (last - first) / max(y_high - y_low, 1e-6)
+    if abs(lean) > MOST_SIDE_LEAN:
+        return place, 0.0
+    return place + sign * first - lean * y_low, lean
 
 
 @compiled
@@ -408,7 +458,7 @@ def take_shared_line(side: Side, lines: list[Side], middle: float) -> Side:
 
     It is near at the side's `middle`.
     """
-    if side.anchored or not lines:
+    if side.anchored or side.lean or not lines:
         return side
     gaps = [abs(line.offset + line.lean * middle - side.offset) for line in lines]
     nearest = lines[gaps.index(min(gaps))]

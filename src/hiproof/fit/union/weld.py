@@ -518,15 +518,13 @@ def apply_repair(
     most_units = REPAIR_UNITS + LOW_STEP_COST_A_METRE * repair.length
     most_cost = most_units * problem.scene.evidence
     sides, planes, basis, _ = state
+    extra_cost, volumes = 0.0, problem.volumes[window.numbers]
     for (k, edge), side in repair.sides.items():
-        position = int(np.flatnonzero(window.numbers == k)[0])
-        volumes = problem.volumes[window.numbers]
-        if (
-            measure_extra_cost(volumes, position, edge, sides[k][edge], side, window.scene)
-            > most_cost
-        ):
-            return None
+        position, old_side = int(np.flatnonzero(window.numbers == k)[0]), state.sides[k][edge]
+        extra_cost += measure_extra_cost(volumes, position, edge, old_side, side, window.scene)
         sides = move_line(sides, k, edge, side, problem)
+    if extra_cost > most_cost:
+        return None
     if not repair.equations:
         return RoofState(sides, planes, basis)
     fit = fit_repair(repair, state, most_cost, problem)
