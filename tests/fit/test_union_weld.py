@@ -153,7 +153,7 @@ def test_a_side_may_take_the_line_of_the_edge_that_carries_it_on():
     own_places = (places - plan.frame.origin[:2]) @ plan.frame.rotation.T
     edge = int(2 * np.argmin(np.ptp(own_places[:2], axis=0)))  # across which axis the side lies
     x, y = own_places[:, edge // 2], own_places[:, 1 - edge // 2]
-    sides = [Side(1e3)] * 4
+    sides = [Side(-1e3), Side(1e3), Side(-1e3), Side(1e3)]
     sides[edge] = Side(float(x[0]))
     repairs = find_repairs(
         drawn, np.zeros((2, COLUMNS)), [[Side(1e3)] * 4, sides], plan, scene, [1]

@@ -721,7 +721,7 @@ def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
 
 @compiled
 def enclose_polygons(soup, soup_start):
-    """Return the lowest and highest x, y (k, 4) of each polygon: low x, low y, high x, high y."""
+    """Return the boxes (k, 4) around polygons: low x, low y, high x, high y."""
     boxes = np.empty((len(soup_start) - 1, 4))
     boxes[:, :2], boxes[:, 2:] = np.inf, -np.inf
     for k in range(len(boxes)):

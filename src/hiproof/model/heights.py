@@ -37,7 +37,7 @@ def find_highest(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def find_strip(x: np.ndarray, ends: np.ndarray) -> slice:
-    """Return the places between the lowest and the highest of `ends`, of sorted x (n,)."""
+    """Return which of sorted x (n,) lie between the lowest and the highest end."""
     first, last = np.searchsorted(x, (ends.min(), np.nextafter(ends.max(), np.inf)))
     return slice(int(first), int(last))
 

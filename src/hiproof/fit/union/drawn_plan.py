@@ -53,10 +53,14 @@ class DrawnPlan:
         return equal_planes(self.planes, EQUAL_PLANE)
 
     def find_edges_of(self, k: int) -> np.ndarray:
-        """Return which edges (e,) lie beside a plane of volume k, or beside one equal to it."""
+        """Return which edges (e,) lie beside a plane of volume k.
+
+        One beside a plane equal to such a plane is among them.
+        """
         first = np.append(self.first_equal, -1)  # -1 of -1, outside
         own = first[:-1][self.owner[:, 0] == k]
-        return np.isin(first[self.beside], own).any(axis=1)
+        is_own: np.ndarray = np.isin(first[self.beside], own)
+        return np.asarray(is_own.any(axis=1))
 
     @cached_property
     def lengths(self) -> np.ndarray:

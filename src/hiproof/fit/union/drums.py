@@ -99,7 +99,10 @@ def is_at_level(part: Part, level: float) -> bool:
 
 
 def list_drums(roof: JudgedRoof) -> Iterator[Part]:
-    """Yield drums around level parts, those that touch at one level together or one alone."""
+    """Yield drums around level parts.
+
+    They lie around those that touch at one level together, or around one alone.
+    """
     z, top = roof.points[:, 2], roof.highest[1]
     for k, part in enumerate(roof.parts):
         own = top == k

@@ -78,6 +78,7 @@ KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 
 FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
 REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
+LEANING_SIDE_UNITS = 1.0  # a side that leans as its points say, along no line of the outline
 SHAPE_UNITS = 0.5  # the base in a gap, instead of the volume beside it
 BAY_UNITS = 1.0
 """A level volume over a bay, of a common house's points.

@@ -98,7 +98,7 @@ def find_repairs(
 
 
 def turn_plan(plan_drawn: DrawnPlan, plan: Plan, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the drawn plan's places (m, 2) and planes (p, 3) in the axes of a direction."""
+    """Return a plan's places (m, 2) and planes (p, 3) in a direction's axes."""
     c, s = turn
     axes, origin = plan.frame.rotation.T @ np.array([[c, -s], [s, c]]), plan.frame.origin[:2]
     slopes, heights = plan_drawn.planes[:, :2], plan_drawn.planes[:, 2]
@@ -205,7 +205,7 @@ def list_line_moves(plan_drawn: DrawnPlan, visible: VisibleSide) -> Iterator[Rep
 
 
 def list_leaning_lines(sides: list[VisibleSide]) -> Iterator[Repair]:
-    """Yield moves of two sides on one axis, of which one carries the other on, onto one line.
+    """Yield moves of two sides onto one line, of which one carries on the other.
 
     Where a step leans, the search draws it as stairs. The line runs through the middles of both.
     """

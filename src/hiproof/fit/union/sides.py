@@ -3,7 +3,8 @@
 They lie along the outline, between its corners, or are shared with a neighbour. Walls are seldom
 quite at right angles. Lines near a side of a volume's rectangle compete for it: edges of the
 outline, lines between two of its corners, and the side as the search left it. Each costs what its
-points say and, the less outline lies along it, up to the price of a loose edge.
+points say and, the less outline lies along it, up to the price of a loose edge. A side on no such
+line leans where its points show that.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from ...geometry.rings import is_convex
 from .around import compute_roof_everywhere, measure_context
 from .objective import compute_cell_cost, compute_point_cost
 from .plan import Plan
-from .prices import FAR_COST_A_METRE, LOOSE_COST, UNSUPPORTED_COST
+from .prices import FAR_COST_A_METRE, LEANING_SIDE_UNITS, LOOSE_COST, UNSUPPORTED_COST
 from .scene import Scene
 from .volumes import DIRECTION, U0, V0, V1
 
@@ -36,8 +37,7 @@ SHARED_M = 0.3  # A side takes its neighbour's line within this distance (m).
 SHOWN_M = 0.5  # Distance (m) next to a side in which points need its volume, unless it is hidden.
 MOVED_M = 1.0  # Furthest (m) that a side is moved to see how well points determine its place.
 LEANING_STEPS_M = (0.2, 0.04)  # Steps (m) in which the ends of a leaning side are sought.
-LEANING_PLACES = 5  # Places each way of each end.
-LEANING_SIDE_UNITS = 1.0
+LEANING_PLACES = 5  # Places each way in which each end is tried.
 MOVES = 50  # Steps in which it is moved each way.
 # Reach (m) beyond a volume's edges, where its sides do not lean.
 SIDE_REACH_M = max(MOST_OFFSET_M, MOVED_M)
@@ -218,7 +218,8 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
         else:
             price = scene.evidence * LEANING_SIDE_UNITS
             offsets[edge], lean[edge] = find_leaning_line(volumes[k], edge, lines, uv, gain, price)
-        sigma[edge] = estimate_side_sigma(volumes[k], edge, lines, uv, gain, m >= 0)
+        line = (offsets[edge], lean[edge])
+        sigma[edge] = estimate_side_sigma(volumes[k], edge, lines, uv, gain, line, m >= 0)
     return offsets, lean, anchored, sigma
 
 
@@ -311,54 +312,64 @@ def find_cheapest_line(volume, edge, lines, uv, gain, evidence):
 
 @compiled
 def find_leaning_line(volume, edge, lines, uv, gain, price):
-    """Find the line that a side takes where points show that it leans: its offset and lean.
+    """Find the offset and the lean of the line that points show for a side.
 
-    That is the side itself if no line gains more than its `price` (points).
+    They are those of the side itself if no line gains more than its `price` (points).
     """
     axis, place = edge // 2, volume[U0 + edge]
     y_low = max(volume[V0 - 2 * axis], lines.y_extent[0])
     y_high = min(volume[V1 - 2 * axis], lines.y_extent[1])
     sign = -1.0 if edge % 2 == 0 else 1.0
-    x, y = uv[axis] - place, uv[1 - axis]
-    near = np.nonzero(
-        (y >= y_low)
-        & (y <= y_high)
-        & (np.abs(x) < MOST_OFFSET_M)
-        & (sign * (uv[axis] - volume[U0 + (edge ^ 1)]) >= 0.0)
-        & (gain != 0.0)
-    )[0]
-    x, gain = sign * x[near], gain[near]
-    share = (y[near] - y_low) / max(y_high - y_low, 1e-6)
-    # what a line could gain at most
-    if np.where(x <= 0.0, gain, -gain).clip(0.0, np.inf).sum() <= price:
-        return place, 0.0
-    present = gain[x <= 0.0].sum()
-    best, first, last = present - price, 0.0, 0.0
-    for step in LEANING_STEPS_M:
-        begin, end = first, last
-        for i in range(-LEANING_PLACES, LEANING_PLACES + 1):
-            for j in range(-LEANING_PLACES, LEANING_PLACES + 1):
-                at, to = begin + i * step, end + j * step
-                if max(abs(at), abs(to)) > MOST_OFFSET_M or at == to:
-                    continue
-                cost = 0.0
-                for n in range(len(x)):
-                    if x[n] <= at + share[n] * (to - at):
-                        cost += gain[n]
-                if cost < best:
-                    best, first, last = cost, at, to
-    lean = sign * (last - first) / max(y_high - y_low, 1e-6)
+    x, y = uv[axis], uv[1 - axis]
+    is_beside = (y >= y_low) & (y <= y_high) & (np.abs(x - place) < MOST_OFFSET_M)
+    is_beside &= sign * (x - volume[U0 + (edge ^ 1)]) >= 0.0
+    strip = np.nonzero(is_beside & (gain != 0.0))[0]
+    length = max(y_high - y_low, 1e-6)
+    begin, end = move_ends(
+        sign * (x[strip] - place), (y[strip] - y_low) / length, gain[strip], price
+    )
+    lean = sign * (end - begin) / length
     if abs(lean) > MOST_SIDE_LEAN:
         return place, 0.0
-    return place + sign * first - lean * y_low, lean
+    return place + sign * begin - lean * y_low, lean
 
 
 @compiled
-def estimate_side_sigma(volume, edge, lines, uv, gain, anchored):
-    """Estimate the `sigma` of a side, which is 0 if it is `anchored`."""
+def move_ends(x, share, gain, price):
+    """Return how far (m) the two ends of a side move out, 0 if that gains no `price`.
+
+    Places (m,) lie x beyond the side, at a `share` of its length. Their `gain` counts if they lie
+    within it.
+    """
+    present = most = 0.0
+    for i in range(len(x)):
+        present += gain[i] if x[i] <= 0.0 else 0.0
+        most += max(gain[i] if x[i] <= 0.0 else -gain[i], 0.0)
+    cheapest, best_begin, best_end = present - price, 0.0, 0.0
+    if most <= price:
+        return best_begin, best_end
+    for step in LEANING_STEPS_M:
+        middle_begin, middle_end = best_begin, best_end
+        for k in range((2 * LEANING_PLACES + 1) ** 2):
+            row, column = divmod(k, 2 * LEANING_PLACES + 1)
+            begin = middle_begin + (row - LEANING_PLACES) * step
+            end = middle_end + (column - LEANING_PLACES) * step
+            if begin == end or max(abs(begin), abs(end)) > MOST_OFFSET_M:
+                continue
+            cost = 0.0
+            for i in range(len(x)):
+                cost += gain[i] if x[i] <= begin + share[i] * (end - begin) else 0.0
+            if cost < cheapest:
+                cheapest, best_begin, best_end = cost, begin, end
+    return best_begin, best_end
+
+
+@compiled
+def estimate_side_sigma(volume, edge, lines, uv, gain, line, anchored):
+    """Estimate the `sigma` of a side on a `line`, which is 0 if it is `anchored`."""
     if not is_needed_at(volume, edge, lines, uv, gain):
         return np.inf
-    return 0.0 if anchored else estimate_place_sigma(volume, edge, uv, gain)
+    return 0.0 if anchored else estimate_place_sigma(volume, edge, uv, gain, line)
 
 
 @compiled
@@ -381,22 +392,23 @@ def is_needed_at(volume, edge, lines, uv, gain):
 
 
 @compiled
-def estimate_place_sigma(volume, edge, uv, gain):
-    """Estimate the standard deviation (m) of the place of a volume's edge.
+def estimate_place_sigma(volume, edge, uv, gain, line):
+    """Estimate the standard deviation (m) of the place of a volume's edge on a `line`.
 
-    It follows from what the edge's points would cost with the edge elsewhere within MOVED_M. It is
+    It follows from what the edge's points would cost with the line elsewhere within MOVED_M. It is
     infinite if they do not determine the place, or if another place is better.
     """
-    axis, place = edge // 2, volume[U0 + edge]
+    axis = edge // 2
     sign = -1.0 if edge % 2 == 0 else 1.0
-    x, y = uv[axis], uv[1 - axis]
+    y = uv[1 - axis]
+    x = uv[axis] - line[0] - line[1] * y
     moved = (np.arange(2 * MOVES + 1) - MOVES) * MOVED_M / MOVES
     cost = np.zeros(len(moved))
     for i in range(len(x)):
         is_beside = volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis]
-        if gain[i] != 0.0 and is_beside and abs(x[i] - place) < MOVED_M:
+        if gain[i] != 0.0 and is_beside and abs(x[i]) < MOVED_M:
             for m in range(len(cost)):
-                cost[m] += gain[i] if sign * (x[i] - place) <= moved[m] else 0.0
+                cost[m] += gain[i] if sign * x[i] <= moved[m] else 0.0
     weight = np.exp(-NATS_A_POINT * (cost - cost.min()))
     if max(weight[0], weight[-1]) > LEAST_KNOWN * weight.max():
         return np.inf

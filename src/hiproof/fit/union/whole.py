@@ -60,7 +60,10 @@ class Whole:
         self.set_volumes(self.volumes)
 
     def set_volumes(self, volumes: np.ndarray, boxes: np.ndarray | None = None) -> None:
-        """Set the volumes, each numbered by its row, and the boxes (k, 4) around them if known."""
+        """Set the volumes, and the boxes (k, 4) around them if known.
+
+        Each is numbered by its row.
+        """
         self.volumes, self.boxes = volumes, self.find_extents(volumes) if boxes is None else boxes
         self.volumes[:, ROW_NUMBER] = np.arange(len(volumes))
 
