@@ -18,6 +18,7 @@ from hiproof.fit.union.repairs import find_repairs
 from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side
 from hiproof.fit.union.volumes import COLUMNS, LEVEL, U0, V1
+from hiproof.model.heights import find_highest
 from hiproof.simulate import Defects, ScanSettings, random_compound, scan_solids
 from points_of_roofs import sample_heights
 
@@ -171,3 +172,16 @@ def test_long_steps_of_a_hand_on_a_large_level_roof_go(seed):
     fit = fit_building(np.column_stack([x, y, z]), shapely.box(0, 0, 24, 14))
     rows = np.concatenate([piece.planes for part in fit.roof_parts for piece in part.pieces])
     assert np.ptp(rows, axis=0) == pytest.approx(np.zeros(3), abs=1e-6)
+
+
+@pytest.mark.parametrize(("lean", "is_lower"), [(0.08, False), (0.15, True), (-0.2, False)])
+def test_a_long_step_that_leans_is_one_line(lean, is_lower):
+    rng = np.random.default_rng(0)
+    xy = rng.random((8 * 30 * 14, 2)) * [30.0, 14.0]
+    beyond = xy[:, 0] - 13.0 - lean * (xy[:, 1] - 7.0)
+    z = np.where(beyond > 0.0, 3.0 if is_lower else 9.0, 6.0)
+    points = np.column_stack([xy, z + rng.normal(0.0, 0.02, len(xy))])
+    fit = fit_building(points, shapely.box(0, 0, 30, 14))
+    away = np.abs(beyond) > 0.25
+    height, _ = find_highest(fit.roof_parts, xy[away])
+    assert np.abs(height - z[away]).max() < 0.1
