@@ -43,12 +43,12 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
     volumes, value = draw_out(volumes, scene, value, list_movable(volumes))
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V, UNSORTED)
-    visible_by_volume = [top == k for k in range(len(volumes))]
     k = 1
-    for visible in visible_by_volume[1:]:
+    for number in range(1, len(volumes)):
         if is_fixed(volumes, k):
             k += 1
             continue
+        visible = top == number
         if not visible.any():
             trial = remove_volume(volumes, k)
             trial_value = compute_objective(trial, scene, value + 1e-9)
