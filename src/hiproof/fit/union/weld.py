@@ -56,8 +56,8 @@ from .volumes import DIRECTION, U0, U1, V0, V1
 
 WINDOW_M2 = 400.0  # A roof of so many square metres is one window.
 MARGIN_M = 2.0  # Distance (m) that a window reaches beyond a repair.
-# Repairs that are drawn for each line of sides: of 78 after the second, 4 paid, of 229 first
-# ones 84 did. Drawing one costs as much as composing its window.
+# Repairs of one side that are drawn for each line of sides: of 78 after the second, 4 paid, of 229
+# first ones 84 did. Drawing one costs as much as composing its window.
 TRIALS_A_LINE = 2
 MOST_ROUNDS = 20  # Most rounds of repairs.
 MOST_JUDGES = 1500  # Most points of a window that judge. Of more, every k-th does.
@@ -266,7 +266,8 @@ def run_round(
     for repair in find_repairs(plan, volumes, state.sides, problem.plan, scene, numbers):
         # Planes are as they were until another equation holds, and so is what one more costs.
         key = repair.key, state.basis.shape[1] if repair.equations else 0
-        if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in repair.sides):
+        lines = repair.sides if len(repair.sides) == 1 else {}  # stairs are few
+        if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in lines):
             continue
         if not repair.owners <= problem.agreement.members.keys():
             continue
@@ -285,7 +286,7 @@ def run_round(
         if repaired_state is None:
             trials[key] += 1
             continue
-        on_lines = (list_sides_on_line(state.sides, *side, problem) for side in repair.sides)
+        on_lines = (list_sides_on_line(state.sides, *side, problem) for side in lines)
         trials.update((key, *chain.from_iterable(on_lines)))
         trial = present.draw_if_cheaper(repaired_state)
         if trial is not None:
