@@ -203,6 +203,7 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
     direction = int(volumes[k, DIRECTION])
     numbers = find_near_places(volumes[k], across_u, scene.U[direction], scene.V[direction])
     gain = measure_gain(volumes, k, numbers, scene)
+    points_gain = np.where(numbers < scene.n, gain, 0.0)
     uv = scene.U[direction][numbers], scene.V[direction][numbers]
     offsets, lean, anchored, sigma = (
         volumes[k, U0 : V1 + 1].copy(),
@@ -217,7 +218,9 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
             offsets[edge], lean[edge], anchored[edge] = lines.start[m], lines.lean[m], True
         else:
             price = scene.evidence * LEANING_SIDE_UNITS
-            offsets[edge], lean[edge] = find_leaning_line(volumes[k], edge, lines, uv, gain, price)
+            offsets[edge], lean[edge] = find_leaning_line(
+                volumes[k], edge, lines, uv, points_gain, price
+            )
         line = (offsets[edge], lean[edge])
         sigma[edge] = estimate_side_sigma(volumes[k], edge, lines, uv, gain, line, m >= 0)
     return offsets, lean, anchored, sigma
