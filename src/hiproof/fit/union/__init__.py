@@ -173,9 +173,8 @@ def tidy_volumes(
 ) -> np.ndarray:
     """Drop specks and slivers, split volumes, unite, and repeat.
 
-    Those visible in several places are split.
-    Over cut corners, only volumes of houses are united: in large roofs it gains nothing and takes
-    a fifth of the time.
+    Volumes visible in several places are split. Over cut corners, only volumes of houses are
+    united: in large roofs it gains nothing and takes a fifth of the time.
     """
     is_house = site.outline.area <= LARGE_ROOF_M2
 

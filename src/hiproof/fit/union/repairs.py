@@ -15,7 +15,7 @@ from .drawn_plan import DrawnPlan
 from .members import is_inside_sides
 from .plan import Plan
 from .scene import Scene
-from .sides import Side
+from .sides import MOST_SIDE_LEAN, Side
 from .volumes import DIRECTION, N_SIDES
 
 # Distance (m) that a side may move to end in a corner, or to lie where its planes meet.
@@ -24,7 +24,6 @@ LOW_STEP_M = 0.4  # A step so low (m) may be a fold line.
 NO_STEP_M = 2e-3  # A lower step (m) is none.
 # Planes whose gradients (rise over run) differ less have no fold line, but may be one.
 LEAST_BREAK = 0.1
-MOST_REPAIR_LEAN = 0.5  # Largest lean of a line that a side may take.
 ON_M = 0.004  # A place so near a line (m) lies on it: crossings are set aside by a millimetre.
 
 
@@ -76,14 +75,14 @@ def find_repairs(
     for k in numbers:
         free = [edge for edge in range(N_SIDES) if not sides[k][edge].anchored]
         is_own = plan_drawn.find_edges_of(k)
-        direction = int(volumes[k, DIRECTION])
-        if free and is_own.any() and direction not in turned:
-            turned[direction] = turn_plan(plan_drawn, plan, scene.turn[direction])
-        if free and is_own.any():
-            places, planes = turned[direction]
-            is_inside = is_inside_sides(places, sides[k], ON_M)
-            is_own &= is_inside[plan_drawn.edges].all(axis=1)
         if not free or not is_own.any():
+            continue
+        direction = int(volumes[k, DIRECTION])
+        if direction not in turned:
+            turned[direction] = turn_plan(plan_drawn, plan, scene.turn[direction])
+        places, planes = turned[direction]
+        is_own &= is_inside_sides(places, sides[k], ON_M)[plan_drawn.edges].all(axis=1)
+        if not is_own.any():
             continue
         around, near_places, near_edges = plan_drawn.select_around(is_own, REPAIR_REACH_M)
         places, is_own = places[near_places], is_own[near_edges]
@@ -167,7 +166,7 @@ def list_side_moves(
         ]
         i, j = (near_places[distance.argmin()] for distance in end_distances)
         size = max(distance.min() for distance in end_distances)
-        if size < REPAIR_REACH_M and abs(x[j] - x[i]) < MOST_REPAIR_LEAN * abs(y[j] - y[i]):
+        if size < REPAIR_REACH_M and abs(x[j] - x[i]) < MOST_SIDE_LEAN * abs(y[j] - y[i]):
             lean = float((x[j] - x[i]) / (y[j] - y[i]))
             moved = Side(float(x[i] - lean * y[i]), lean, False, side.sigma)
             yield Repair(float(size), {key: moved})
@@ -194,7 +193,7 @@ def list_line_moves(plan_drawn: DrawnPlan, visible: VisibleSide) -> Iterator[Rep
     x_edges, y_edges = x[plan_drawn.edges], y[plan_drawn.edges]
     across, along = np.diff(x_edges)[:, 0], np.diff(y_edges)[:, 0]
     carries_on = ~on_side & (np.hypot(across, along) > REPAIR_REACH_M)
-    carries_on &= np.abs(across) < MOST_REPAIR_LEAN * np.abs(along)
+    carries_on &= np.abs(across) < MOST_SIDE_LEAN * np.abs(along)
     distances = np.hypot(x_edges[..., None] - x[side_ends], y_edges[..., None] - y[side_ends])
     for e in np.flatnonzero(carries_on & (distances.min(axis=(1, 2)) < REPAIR_REACH_M)):
         lean = across[e] / along[e]
@@ -216,7 +215,7 @@ def list_leaning_lines(sides: list[VisibleSide]) -> Iterator[Repair]:
     for i, j in np.argwhere(np.triu(apart < REPAIR_REACH_M, 1)).tolist():
         middle, other_middle = ends[[i, j]].mean(axis=1)
         across, along = (other_middle - middle).tolist()
-        if not abs(across) < MOST_REPAIR_LEAN * abs(along):
+        if not abs(across) < MOST_SIDE_LEAN * abs(along):
             continue
         lean = across / along
         line = Side(float(middle[0] - lean * middle[1]), lean)
@@ -234,7 +233,7 @@ def find_fold_line(plane: np.ndarray, other: np.ndarray, edge: int) -> tuple[flo
     """
     a, b, c = (plane - other).tolist()
     fall, across = (a, b) if edge < 2 else (b, a)
-    if not abs(fall) > LEAST_BREAK or not abs(across / fall) < MOST_REPAIR_LEAN:
+    if not abs(fall) > LEAST_BREAK or not abs(across / fall) < MOST_SIDE_LEAN:
         return None
     return -c / fall, -across / fall
 
