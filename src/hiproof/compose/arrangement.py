@@ -16,8 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import copy_row, copy_rows, sort_order, sort_values
+from ..geometry.arrays import copy_row, sort_order, sort_values
 from ..geometry.point_in_polygon import flips
+from .buckets import append_row, enter_edge, enter_item, grow_array, lay_buckets, list_near
 from .joined import find_root, join
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
@@ -29,33 +30,15 @@ COLLINEAR_UNITS = 5.0
 
 
 @compiled
-def grow_array(array):
-    """Return a copy of `array` with twice the rows."""
-    larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
-    copy_rows(larger, array)
-    return larger
-
-
-@compiled
-def append_row(rows, count, a, b):
-    """Append (a, b) to `rows` (m, 2), of which `count` are used.
-
-    Returns the rows and the count. Rows are copied where all were used.
-    """
-    if count == len(rows):
-        rows = grow_array(rows)
-    rows[count, 0], rows[count, 1] = a, b
-    return rows, count + 1
-
-
-@compiled
-def vertex_at(xy, count, x, y, reach):
-    """Index of the vertex nearest to (x, y) within `reach`, -1 if there is none."""
+def find_vertex_at(xy, near, x, y, reach):
+    """Return the vertex of `near` nearest to (x, y) within `reach`, -1 if there is none."""
     best, best_d2 = -1, reach * reach
-    for v in range(count):
+    for v in near:
         dx, dy = xy[v, 0] - x, xy[v, 1] - y
-        if abs(dx) < reach and abs(dy) < reach and dx * dx + dy * dy < best_d2:
-            best, best_d2 = v, dx * dx + dy * dy
+        if abs(dx) < reach and abs(dy) < reach:
+            d2 = float(dx * dx + dy * dy)
+            if d2 < best_d2 or (d2 == best_d2 and v < best):
+                best, best_d2 = v, d2
     return best
 
 
@@ -74,23 +57,28 @@ def is_beside(p, a, b, reach):
 
 
 @compiled
-def find_vertex_near_segment(xy, count, a, b, reach):
-    """Return the vertex beside segment ab nearest to a, -1 if there is none.
+def find_vertex_near_segment(xy, near, a, b, reach):
+    """Return the vertex of `near` beside segment ab that is nearest to a, -1 if there is none.
 
-    The segment's ends do not count.
+    The segment's ends do not count. Nor does a vertex that makes a flat triangle with them, in
+    which an end lies beside the edge from the vertex to the other end: no way around would end.
     """
     r = np.int64(reach) + 1
     x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
     y_low, y_high = min(xy[a, 1], xy[b, 1]) - r, max(xy[a, 1], xy[b, 1]) + r
     best, best_along = -1, np.int64(0)
-    for v in range(count):
+    for v in near:
         x, y = xy[v, 0], xy[v, 1]
         if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
-        if is_beside(xy[v], xy[a], xy[b], reach):
-            along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
-            if best < 0 or along < best_along:
-                best, best_along = v, along
+        if not is_beside(xy[v], xy[a], xy[b], reach):
+            continue
+        along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
+        if best >= 0 and (along > best_along or (along == best_along and v >= best)):
+            continue
+        if is_beside(xy[a], xy[v], xy[b], reach) or is_beside(xy[b], xy[a], xy[v], reach):
+            continue
+        best, best_along = v, along
     return best
 
 
@@ -104,13 +92,14 @@ def turn(a, b, c):
 
 
 @compiled
-def find_first_crossing(xy, edges, count, a, b):
-    """Return the first live edge that properly crosses segment ab, else -1."""
+def find_first_crossing(xy, edges, near, a, b):
+    """Return the first live edge of `near` that properly crosses segment ab, else -1."""
     x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
     y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
-    for e in range(count):
+    first = -1
+    for e in near:
         c, d = edges[e, 0], edges[e, 1]
-        if c < 0 or c in (a, b) or d in (a, b):
+        if c < 0 or 0 <= first <= e or c in (a, b) or d in (a, b):
             continue
         if max(xy[c, 0], xy[d, 0]) < x_low or min(xy[c, 0], xy[d, 0]) > x_high:
             continue
@@ -121,8 +110,8 @@ def find_first_crossing(xy, edges, count, a, b):
             continue
         left, right = turn(xy[c], xy[d], xy[a]), turn(xy[c], xy[d], xy[b])
         if (left > 0) != (right > 0) and left != 0 and right != 0:
-            return e
-    return -1
+            first = e
+    return first
 
 
 @compiled
@@ -134,28 +123,32 @@ def crossing_point(a, b, c, d):
 
 
 @compiled
-def numbered_ends(segments, reach):
+def number_ends(segments, reach):
     """Number the end points of the segments as vertices.
 
-    Returns xy with room to grow, their number, and the ends (m, 2).
+    Returns xy with room to grow, their number, the ends (m, 2), and buckets of the vertices.
     """
-    xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    ends = np.empty((len(segments), 2), np.int64)
-    for s in range(len(segments)):
+    size, r = len(segments), np.int64(reach) + 1
+    xy, count = np.empty((2 * size + 16, 2), np.int64), 0
+    ends, near = np.empty((size, 2), np.int64), np.empty(0, np.int64)
+    buckets = lay_buckets(segments.reshape(-1, 2), size)
+    for s in range(size):
         for end in range(2):
             x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
-            v = vertex_at(xy, count, x, y, reach)
+            near, others = list_near(x - r, y - r, x + r, y + r, buckets, near)
+            v = find_vertex_at(xy, near[:others], x, y, reach)
             if v < 0:
                 v, xy[count, 0], xy[count, 1] = count, x, y
+                buckets = enter_item(v, x, y, x, y, buckets)
                 count += 1
             ends[s, end] = v
-    return xy, count, ends
+    return xy, count, ends, buckets
 
 
 @compiled
-def has_edge(edges, count, a, b):
-    """Return whether edge ab exists, in either direction."""
-    for e in range(count):
+def has_edge(edges, near, a, b):
+    """Return whether edge ab, in either direction, is one of `near`."""
+    for e in near:
         c, d = edges[e, 0], edges[e, 1]
         if (c == a and d == b) or (c == b and d == a):
             return True
@@ -172,9 +165,10 @@ def node(segments, reach):
     them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
     from hanging a run).
     """
-    xy, count, ends = numbered_ends(segments, reach)
+    xy, count, ends, places = number_ends(segments, reach)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    borders, near, r = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64), np.int64(reach) + 1
     steps = 0
     while top > 0:
         steps += 1
@@ -186,38 +180,45 @@ def node(segments, reach):
             continue
         while top + 1 + edge_count > len(stack):  # what may be taken back, and the segment itself
             stack = grow_array(stack)
-        v = find_vertex_near_segment(xy, count, a, b, reach)
+        x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
+        y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
+        near, others = list_near(x_low - r, y_low - r, x_high + r, y_high + r, places, near)
+        v = find_vertex_near_segment(xy, near[:others], a, b, reach)
         if v >= 0:
             stack, top = append_row(stack, top, v, b)
             stack, top = append_row(stack, top, a, v)
             continue
-        if has_edge(edges, edge_count, a, b):
+        near, others = list_near(x_low, y_low, x_high, y_high, borders, near)
+        if has_edge(edges, near[:others], a, b):
             continue
-        e = find_first_crossing(xy, edges, edge_count, a, b)
+        e = find_first_crossing(xy, edges, near[:others], a, b)
         if e < 0:
             edges, edge_count = append_row(edges, edge_count, a, b)
+            borders = enter_edge(edge_count - 1, xy, edges, borders)
             continue
         x, y = crossing_point(xy[a], xy[b], xy[edges[e, 0]], xy[edges[e, 1]])
         xy, count = append_row(xy, count, x, y)
+        places = enter_item(count - 1, x, y, x, y, places)
         stack, top = append_row(stack, top, a, b)
-        top = taken_back(xy, count - 1, e, edges, edge_count, stack, top, reach)
+        near, others = list_near(x - r, y - r, x + r, y + r, borders, near)
+        top = take_back(xy, count - 1, e, edges, near[:others], stack, top, reach)
     live = edges[:edge_count, 0] >= 0
     return xy[:count].copy(), edges[:edge_count][live]
 
 
 @compiled
-def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
-    """Put every live edge that must go through a new vertex back on the stack.
+def take_back(xy, vertex, crossed, edges, near, stack, top, reach):
+    """Put every live edge of `near` that must go through a new vertex back on the stack.
 
-    These are the `crossed` edge and those beside `vertex`. Returns the stack's new top.
+    These are the `crossed` edge and those beside `vertex`, in their order. Returns the stack's new
+    top.
     """
-    for other in range(edge_count):
-        c = edges[other, 0]
-        if c >= 0 and (
-            other == crossed or is_beside(xy[vertex], xy[c], xy[edges[other, 1]], reach)
-        ):
-            copy_row(stack[top], edges[other])
-            edges[other, 0] = edges[other, 1] = -1
+    for other in sort_values(1.0 * near):
+        e = int(other)
+        c = edges[e, 0]
+        if c >= 0 and (e == crossed or is_beside(xy[vertex], xy[c], xy[edges[e, 1]], reach)):
+            copy_row(stack[top], edges[e])
+            edges[e, 0] = edges[e, 1] = -1
             top += 1
     return top
 
@@ -319,30 +320,44 @@ def trace_faces(xy, edges, follow):
 
 
 @compiled
-def chord(xy, edges, h):
+def chord(xy, edges, h, buckets, near):
     """Return the length and direction of the chord left of half-edge `h`.
 
     It is the ray from the half-edge's middle to the first edge; the direction is a unit vector.
+    Also returns `near`, as `list_near` does.
     """
+    layout = buckets[0]
     a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
     ax, ay = 0.5 * (xy[a, 0] + xy[b, 0]), 0.5 * (xy[a, 1] + xy[b, 1])
     dx, dy = float(xy[b, 0] - xy[a, 0]), float(xy[b, 1] - xy[a, 1])
     length = np.hypot(dx, dy)
     nx, ny = -dy / length, dx / length
-    nearest = np.inf
-    for e in range(len(edges)):
-        if e == h >> 1:
-            continue
-        c, d = edges[e, 0], edges[e, 1]
-        cx, cy, ex, ey = xy[c, 0] - ax, xy[c, 1] - ay, xy[d, 0] - ax, xy[d, 1] - ay
-        side_c, side_d = nx * cy - ny * cx, nx * ey - ny * ex
-        if side_c * side_d > 0 or side_c == side_d:
-            continue
-        s = side_c / (side_c - side_d)
-        along = nx * (cx + s * (ex - cx)) + ny * (cy + s * (ey - cy))
-        if 0 < along < nearest:
-            nearest = along
-    return nearest, nx, ny
+    nearest, looked, farthest = np.inf, float(layout[2]), layout[2] * float(layout[3] + layout[4])
+    while True:
+        x, y = np.int64(ax + looked * nx), np.int64(ay + looked * ny)
+        near, others = list_near(
+            min(np.int64(ax), x) - 1,
+            min(np.int64(ay), y) - 1,
+            max(np.int64(ax), x) + 1,
+            max(np.int64(ay), y) + 1,
+            buckets,
+            near,
+        )
+        for e in near[:others]:
+            if e == h >> 1:
+                continue
+            c, d = edges[e, 0], edges[e, 1]
+            cx, cy, ex, ey = xy[c, 0] - ax, xy[c, 1] - ay, xy[d, 0] - ax, xy[d, 1] - ay
+            side_c, side_d = nx * cy - ny * cx, nx * ey - ny * ex
+            if side_c * side_d > 0 or side_c == side_d:
+                continue
+            s = side_c / (side_c - side_d)
+            along = nx * (cx + s * (ex - cx)) + ny * (cy + s * (ey - cy))
+            if 0 < along < nearest:
+                nearest = along
+        if nearest <= looked or looked > farthest:
+            return nearest, nx, ny, near
+        looked *= 2.0
 
 
 @compiled
@@ -352,7 +367,12 @@ def face_points(xy, edges, face, faces):
     It is the middle of the face's longest chord at right angles to an edge's middle.
     """
     longest, best = np.zeros(faces), np.zeros(faces)
-    points = np.zeros((faces, 2))
+    points, near = np.zeros((faces, 2)), np.empty(0, np.int64)
+    if len(edges) == 0:
+        return points
+    buckets = lay_buckets(xy, len(edges))
+    for e in range(len(edges)):
+        buckets = enter_edge(e, xy, edges, buckets)
     for h in range(2 * len(edges)):
         d = xy[edges[h >> 1, 0]] - xy[edges[h >> 1, 1]]
         longest[face[h]] = max(longest[face[h]], np.hypot(float(d[0]), float(d[1])))
@@ -361,7 +381,7 @@ def face_points(xy, edges, face, faces):
         length = np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1]))
         if f == 0 or length < 0.3 * longest[f]:
             continue
-        reach, nx, ny = chord(xy, edges, h)
+        reach, nx, ny, near = chord(xy, edges, h, buckets, near)
         if np.isfinite(reach) and reach > best[f]:
             best[f] = reach
             points[f, 0] = 0.5 * (xy[a, 0] + xy[b, 0]) + 0.5 * reach * nx

@@ -176,27 +176,32 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
 
 
 @compiled
-def first_saddle(order, start, level, face, label):
-    """Return the first plan vertex that is no clean manifold, -1 if none.
+def is_saddle(around, level, face, label):
+    """Return whether the half-edges `around` a plan vertex make it no clean manifold.
 
     That is where the levels rise and fall more than once, or where one cell has two sectors that do
     not adjoin.
     """
-    for v in range(len(start) - 1):
-        size = start[v + 1] - start[v]
-        turns, last, first = 0, 0, 0
-        for k in range(size):
-            current, following = order[start[v] + k], order[start[v] + (k + 1) % size]
-            sign = np.sign(level[following] - level[current])
-            if sign != 0:
-                turns += last != 0 and sign != last
-                first = sign if first == 0 else first
-                last = sign
-            if label[current] != OUTSIDE and face[current] != face[following]:
-                for m in range(2, size):
-                    if face[order[start[v] + (k + m) % size]] == face[current]:
-                        return v
-        turns += last != first
-        if turns > 2:
-            return v
-    return -1
+    size = len(around)
+    turns, last, first = 0, 0, 0
+    for k in range(size):
+        current, following = around[k], around[(k + 1) % size]
+        sign = np.sign(level[following] - level[current])
+        if sign != 0:
+            turns += last != 0 and sign != last
+            first = sign if first == 0 else first
+            last = sign
+        if label[current] != OUTSIDE and face[current] != face[following]:
+            for m in range(2, size):
+                if face[around[(k + m) % size]] == face[current]:
+                    return True
+    return turns + (last != first) > 2
+
+
+@compiled
+def find_saddles(order, start, level, face, label):
+    """Return which plan vertices (n,) are no clean manifolds."""
+    result = np.empty(len(start) - 1, np.bool_)
+    for v in range(len(result)):
+        result[v] = is_saddle(order[start[v] : start[v + 1]], level, face, label)
+    return result

@@ -17,7 +17,7 @@ from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
 from .cells import PlanCells, PlanProblem
 from .flat_corners import turn_flat_corners_in
-from .levels import first_saddle, split_at_crossings, stack_levels
+from .levels import find_saddles, split_at_crossings, stack_levels
 
 Item = TypeVar("Item")
 
@@ -35,17 +35,17 @@ class Levels(NamedTuple):
     vertices: np.ndarray
 
 
-class Saddle(Exception):
-    """A plan vertex around which the solid is no manifold.
+class Saddles(Exception):
+    """Plan vertices around which the solid is no manifold.
 
-    Levels rise and fall twice around it, or a cell meets itself there.
+    Levels rise and fall twice around each, or a cell meets itself there.
 
-    `patch` (soup, label) is the cure.
+    `patches` (soup, label) are the cures.
     """
 
-    def __init__(self, patch: tuple[np.ndarray, int]):
+    def __init__(self, patches: list[tuple[np.ndarray, int]]):
         super().__init__("the roof's levels form a checkerboard around a vertex")
-        self.patch = patch
+        self.patches = patches
 
 
 def raise_shell(
@@ -56,14 +56,15 @@ def raise_shell(
     reach_m: float,
     merge_walls: bool = True,
     turn_in: bool = False,
+    widening: float = 1.0,
 ) -> Solid:
     """Raise the solid over the plan cells.
 
-    Raises Saddle where the problem needs a patch first, CompositionError when none helps.
+    Raises Saddles where the problem needs a patch first, CompositionError when none helps.
 
     The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
     `merge_walls` makes one wall of consecutive ones along a straight stretch of the outline.
-    `turn_in` moves flat corners into their cells.
+    `turn_in` moves flat corners into their cells. Patches are wider by the factor `widening`.
     """
     planes = problem.planes
     xy, edges, side, ties = split_at_crossings(
@@ -79,11 +80,11 @@ def raise_shell(
     z_low = lowest_roof(xy, edges, side, planes) - clearance_m / GRID_M
     z_base = np.floor(min(z_ground / GRID_M, z_low))
     levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
-    saddle = first_saddle(levels.order, levels.start, levels.level, levels.face, side.ravel())
-    if saddle >= 0:
-        # grows: a cure may need room
-        radius = max(SETBACK_M, 4 * reach_m) / GRID_M * (1 + 0.25 * len(problem.patches))
-        raise Saddle(cure(sectors_at(saddle, xy, edges, side, levels), radius))
+    saddles = find_saddles(levels.order, levels.start, levels.level, levels.face, side.ravel())
+    if saddles.any():
+        radius = max(SETBACK_M, 4 * reach_m) / GRID_M * widening
+        vertices = np.flatnonzero(saddles).tolist()
+        raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in vertices])
     # from here on numbers of a few dozen edges: plain lists are faster than arrays
     label, xyz = side.ravel().tolist(), levels.vertices.tolist()
     follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()

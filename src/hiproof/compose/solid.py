@@ -14,7 +14,7 @@ from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
 from .facets import draw_facets
-from .shell import Saddle, raise_shell
+from .shell import Saddles, raise_shell
 
 # factor on the snap distance, whether straight walls become one and whether flat corners are turned
 # in, tried in turn until the solid is valid
@@ -33,7 +33,7 @@ ATTEMPTS = (
 # val3dity's default planarity: steep planes cannot meet within less where vertices moved a
 # centimetre
 LENIENT_M = 0.01
-MAX_PATCHES = 40  # crosswise corners mended in one building, so that it comes to an end
+MAX_ROUNDS = 40  # in which crosswise corners are mended, so that it comes to an end
 
 
 def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None) -> Solid:
@@ -109,19 +109,28 @@ def compose_at(
 ) -> Solid:
     """Compose once, at the given snap distance.
 
-    Corners where levels meet crosswise are set back one by one.
+    Corners where levels meet crosswise are set back, all of them in each round.
     """
     reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
-    for _ in range(MAX_PATCHES):
+    for round_number in range(MAX_ROUNDS):
         cells = arrange(problem, reach_m, options.min_face_area_m2, options.min_face_width_m)
+        widening = 1 + 0.25 * round_number  # a cure may need room
         try:
             return raise_shell(
-                cells, problem, z_ground, options.ground_clearance_m, reach_m, merge_walls, turn_in
+                cells,
+                problem,
+                z_ground,
+                options.ground_clearance_m,
+                reach_m,
+                merge_walls,
+                turn_in,
+                widening,
             )
-        except Saddle as saddle:
-            problem = replace(problem, patches=[*problem.patches, saddle.patch])
+        except Saddles as saddles:
+            problem = replace(problem, patches=[*problem.patches, *saddles.patches])
     raise CompositionError(
-        "expected at most forty corners where roof levels meet crosswise, got more"
+        "expected corners where roof levels meet crosswise to be mended in forty rounds, "
+        "got some after them"
     )
 
 
