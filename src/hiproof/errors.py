@@ -65,10 +65,12 @@ class CompositionError(HiproofError):
     The caller falls back to a simpler roof.
 
     `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not
-    known.
+    known. `places` are boxes in plan (low x, low y, high x, high y) [m] around what is at fault,
+    likewise.
     """
 
     parts: tuple[int, ...] = ()
+    places: tuple[tuple[float, ...], ...] = ()
 
 
 def is_interrupt(error: BaseException) -> bool:

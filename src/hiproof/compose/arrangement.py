@@ -57,13 +57,25 @@ def is_beside(p, a, b, reach):
 
 
 @compiled
-def find_vertex_near_segment(xy, near, a, b, reach):
+def find_reach(reaches, place):
+    """Return the reach at a place: that of the last zone (k, 5) that holds it."""
+    for k in range(len(reaches) - 1, 0, -1):
+        if (
+            reaches[k, 0] <= place[0] <= reaches[k, 2]
+            and reaches[k, 1] <= place[1] <= reaches[k, 3]
+        ):
+            return reaches[k, 4]
+    return reaches[0, 4]
+
+
+@compiled
+def find_vertex_near_segment(xy, near, a, b, r, reaches):
     """Return the vertex of `near` beside segment ab that is nearest to a, -1 if there is none.
 
-    The segment's ends do not count. Nor does a vertex that makes a flat triangle with them, in
-    which an end lies beside the edge from the vertex to the other end: no way around would end.
+    No reach is over `r`. The segment's ends do not count. Nor does a vertex that makes a small
+    triangle with them, in which an end lies beside the edge from the vertex to the other end: its
+    three edges would replace each other for ever.
     """
-    r = np.int64(reach) + 1
     x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
     y_low, y_high = min(xy[a, 1], xy[b, 1]) - r, max(xy[a, 1], xy[b, 1]) + r
     best, best_along = -1, np.int64(0)
@@ -71,6 +83,7 @@ def find_vertex_near_segment(xy, near, a, b, reach):
         x, y = xy[v, 0], xy[v, 1]
         if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
+        reach = find_reach(reaches, xy[v])
         if not is_beside(xy[v], xy[a], xy[b], reach):
             continue
         along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
@@ -123,12 +136,12 @@ def crossing_point(a, b, c, d):
 
 
 @compiled
-def number_ends(segments, reach):
+def number_ends(segments, reaches):
     """Number the end points of the segments as vertices.
 
     Returns xy with room to grow, their number, the ends (m, 2), and buckets of the vertices.
     """
-    size, r = len(segments), np.int64(reach) + 1
+    size, r = len(segments), np.int64(reaches[:, 4].max()) + 1
     xy, count = np.empty((2 * size + 16, 2), np.int64), 0
     ends, near = np.empty((size, 2), np.int64), np.empty(0, np.int64)
     buckets = lay_buckets(segments.reshape(-1, 2), size)
@@ -136,7 +149,7 @@ def number_ends(segments, reach):
         for end in range(2):
             x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
             near, others = list_near(x - r, y - r, x + r, y + r, buckets, near)
-            v = find_vertex_at(xy, near[:others], x, y, reach)
+            v = find_vertex_at(xy, near[:others], x, y, find_reach(reaches, (x, y)))
             if v < 0:
                 v, xy[count, 0], xy[count, 1] = count, x, y
                 buckets = enter_item(v, x, y, x, y, buckets)
@@ -156,19 +169,21 @@ def has_edge(edges, near, a, b):
 
 
 @compiled
-def node(segments, reach):
+def node(segments, reaches):
     """Return the vertices (n, 2) and edges (e, 2) of an arrangement.
 
-    It is that of `segments` (m, 4), well separated by `reach` grid units.
+    It is that of `segments` (m, 4), well separated by the reach (grid units) of
+    the last of the zones `reaches` (k, 5) that holds a vertex, the first of which is everywhere.
 
     Earlier segments have the right of way: their end points stay, later ones within reach move onto
     them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
     from hanging a run).
     """
-    xy, count, ends, places = number_ends(segments, reach)
+    xy, count, ends, places = number_ends(segments, reaches)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    borders, near, r = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64), np.int64(reach) + 1
+    borders, near = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64)
+    r = np.int64(reaches[:, 4].max()) + 1
     steps = 0
     while top > 0:
         steps += 1
@@ -183,7 +198,7 @@ def node(segments, reach):
         x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
         y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
         near, others = list_near(x_low - r, y_low - r, x_high + r, y_high + r, places, near)
-        v = find_vertex_near_segment(xy, near[:others], a, b, reach)
+        v = find_vertex_near_segment(xy, near[:others], a, b, r, reaches)
         if v >= 0:
             stack, top = append_row(stack, top, v, b)
             stack, top = append_row(stack, top, a, v)
@@ -201,6 +216,7 @@ def node(segments, reach):
         places = enter_item(count - 1, x, y, x, y, places)
         stack, top = append_row(stack, top, a, b)
         near, others = list_near(x - r, y - r, x + r, y + r, borders, near)
+        reach = find_reach(reaches, (x, y))
         top = take_back(xy, count - 1, e, edges, near[:others], stack, top, reach)
     live = edges[:edge_count, 0] >= 0
     return xy[:count].copy(), edges[:edge_count][live]
@@ -664,7 +680,7 @@ def dissolve(xy, edges, side):
 @compiled
 def plan_cells(
     segments,
-    reach,
+    reaches,
     soup,
     soup_start,
     planes,
@@ -683,7 +699,7 @@ def plan_cells(
     `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones;
     what remains UNCOVERED is for the caller to see in `side`.
     """
-    xy, edges = node(segments, reach)
+    xy, edges = node(segments, reaches)
     order, start = half_edge_order(xy, edges)
     face, area = trace_faces(xy, edges, next_half_edges(edges, order, start))
     points = face_points(xy, edges, face, len(area))

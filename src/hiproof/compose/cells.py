@@ -145,9 +145,9 @@ def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def arrange(
-    problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_m: float
+    problem: PlanProblem, reaches: np.ndarray, min_area_m2: float, min_width_m: float
 ) -> PlanCells:
-    """Return the plan cells of a roof, well separated by `reach_m`.
+    """Return the plan cells of a roof, well separated by the `reaches` of zones.
 
     Where no piece covers the outline, the piece beside it is extended.
     """
@@ -159,7 +159,7 @@ def arrange(
         segments = np.concatenate((soup.astype(np.int64), patches.astype(np.int64), lines))
         xy, edges, side = plan_cells(
             segments,
-            reach_m / GRID_M,
+            reaches,
             soup,
             soup_start,
             problem.planes,
@@ -172,9 +172,7 @@ def arrange(
             min_width_m / GRID_M,
         )
         if not (side == UNCOVERED).any():
-            return PlanCells(
-                *without_short_edges(xy, edges, side, problem.planes, reach_m / GRID_M)
-            )
+            return PlanCells(*without_short_edges(xy, edges, side, problem.planes, reaches))
         problem = extend_over_gaps(problem, PlanCells(xy, edges, side))
     raise CompositionError(
         "expected the roof's pieces to reach all of its outline, got gaps that no piece borders"

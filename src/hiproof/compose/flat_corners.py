@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from .arrangement import OUTSIDE, half_edge_order, next_half_edges, turn
+from .arrangement import OUTSIDE, find_reach, half_edge_order, next_half_edges, turn
 
 # units of the grid, 0.3 mm: heights rounded to 0.1 mm can turn a thinner triangle by over 20
 # degrees
@@ -56,13 +56,13 @@ def is_free(xy, edges, v, x, y, reach):
 
 
 @compiled
-def turn_flat_corners_in(xy, edges, side, ties, reach):
+def turn_flat_corners_in(xy, edges, side, ties, reaches, may_turn):
     """Move every flat corner to the inner side of its neighbours' line.
 
     Returns plan vertices (n, 2). The inner side is the cell's.
 
-    `edges` (e, 2), `side` (e, 2) and `ties` (k, 3) as `split_at_crossings` returns them. Corners of
-    the outline stay, and so do those with a tie and those without room.
+    `edges` (e, 2), `side` (e, 2) and `ties` (k, 3) as `split_at_crossings` returns them. Corners
+    that `may_turn` (n,) leaves out stay, those of the outline, with a tie, and without room.
     """
     xy = xy.copy()
     follow = next_half_edges(edges, *half_edge_order(xy, edges))
@@ -74,7 +74,9 @@ def turn_flat_corners_in(xy, edges, side, ties, reach):
             edges[following >> 1, following & 1],
             edges[following >> 1, 1 - (following & 1)],
         )
-        if label[h] == OUTSIDE or a == b or borders_outside(edges, side, v):
+        if label[h] == OUTSIDE or a == b or not may_turn[v]:
+            continue
+        if borders_outside(edges, side, v):
             continue
         if (ties[:, 0] == v).any():
             continue
@@ -86,6 +88,6 @@ def turn_flat_corners_in(xy, edges, side, ties, reach):
             continue
         x = np.rint(xy[a, 0] + along * dx / length - INWARD_UNITS * dy / length)
         y = np.rint(xy[a, 1] + along * dy / length + INWARD_UNITS * dx / length)
-        if is_free(xy, edges, v, x, y, reach):
+        if is_free(xy, edges, v, x, y, find_reach(reaches, xy[v])):
             xy[v, 0], xy[v, 1] = np.int64(x), np.int64(y)
     return xy

@@ -6,6 +6,7 @@ It has roof faces over the cells, walls where levels part, and one ground face b
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple, TypeVar
@@ -14,10 +15,11 @@ import numpy as np
 
 from ..errors import CompositionError
 from ..model import GROUND, ROOF, WALL, Face, Solid
-from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
+from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE, find_reach
 from .cells import PlanCells, PlanProblem
 from .flat_corners import turn_flat_corners_in
 from .levels import find_saddles, split_at_crossings, stack_levels
+from .zones import Zone, list_reaches, select_turned_in
 
 Item = TypeVar("Item")
 
@@ -40,12 +42,14 @@ class Saddles(Exception):
 
     Levels rise and fall twice around each, or a cell meets itself there.
 
-    `patches` (soup, label) are the cures.
+    `patches` (soup, label) are the cures, and `places` boxes around the cells at each vertex [m].
     """
 
-    def __init__(self, patches: list[tuple[np.ndarray, int]]):
+    def __init__(
+        self, patches: list[tuple[np.ndarray, int]], places: tuple[tuple[float, ...], ...]
+    ):
         super().__init__("the roof's levels form a checkerboard around a vertex")
-        self.patches = patches
+        self.patches, self.places = patches, places
 
 
 def raise_shell(
@@ -53,25 +57,24 @@ def raise_shell(
     problem: PlanProblem,
     z_ground: float,
     clearance_m: float,
-    reach_m: float,
-    merge_walls: bool = True,
-    turn_in: bool = False,
-    widening: float = 1.0,
+    zones: Sequence[Zone],
+    snap_m: float,
+    widening: float,
 ) -> Solid:
     """Raise the solid over the plan cells.
 
-    Raises Saddles where the problem needs a patch first, CompositionError when none helps.
+    Raises Saddles where the problem needs a patch first, CompositionError with the places where
+    none helps.
 
     The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
-    `merge_walls` makes one wall of consecutive ones along a straight stretch of the outline.
-    `turn_in` moves flat corners into their cells. Patches are wider by the factor `widening`.
+    Consecutive walls along a straight stretch of the outline become one where all `zones` want it.
+    Flat corners are turned in where zones do. Patches are wider by the factor `widening`.
     """
-    planes = problem.planes
-    xy, edges, side, ties = split_at_crossings(
-        cells.xy, cells.edges, cells.side, planes, reach_m / GRID_M
-    )
-    if turn_in:
-        xy = turn_flat_corners_in(xy, edges, side, ties, reach_m / GRID_M)
+    planes, reaches = problem.planes, list_reaches(zones, snap_m)
+    xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reaches)
+    may_turn = select_turned_in(zones, xy)
+    if may_turn.any():
+        xy = turn_flat_corners_in(xy, edges, side, ties, reaches, may_turn)
     if len(edges) == 0:
         raise CompositionError(
             "expected an outline with an area, got one thinner than a millimetre; repair or remove "
@@ -82,15 +85,16 @@ def raise_shell(
     levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
     saddles = find_saddles(levels.order, levels.start, levels.level, levels.face, side.ravel())
     if saddles.any():
-        radius = max(SETBACK_M, 4 * reach_m) / GRID_M * widening
-        vertices = np.flatnonzero(saddles).tolist()
-        raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in vertices])
+        places = [sectors_at(v, xy, edges, side, levels) for v in np.flatnonzero(saddles)]
+        boxes = [frame_sectors(place, xy, edges, levels) for place in places]
+        raise Saddles(cure_all(places, boxes, reaches, widening), tuple(boxes))
     # from here on numbers of a few dozen edges: plain lists are faster than arrays
     label, xyz = side.ravel().tolist(), levels.vertices.tolist()
     follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
     faces = roof_faces(follow, face, level, label, xyz, problem.part)
     rises = wall_rises(follow, level)
-    runs = wall_runs(rises, follow, label, xyz) if merge_walls else [[h] for h in rises]
+    is_merged = all(zone.attempt.merges_walls for zone in zones)
+    runs = wall_runs(rises, follow, label, xyz) if is_merged else [[h] for h in rises]
     skip = {rises[h][0] for run in runs for h in run[1:]}
     faces += [
         Face((tuple([v for v in make_wall_ring(run, rises) if v not in skip]),), WALL)
@@ -342,8 +346,45 @@ def sectors_at(
     )
 
 
-def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
-    """Return a patch (soup, label) for a vertex that is no manifold.
+def frame_sectors(
+    sectors: Sectors, xy: np.ndarray, edges: np.ndarray, levels: Levels
+) -> tuple[float, ...]:
+    """Return the box in plan [m] around the cells that meet at a plan vertex."""
+    roofed = [f for f, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE]
+    half_edges = np.flatnonzero(np.isin(levels.face, roofed))
+    ends = xy[edges[half_edges >> 1]].reshape(-1, 2) * GRID_M
+    return (*ends.min(axis=0).tolist(), *ends.max(axis=0).tolist())
+
+
+def cure_all(
+    places: list[Sectors],
+    boxes: list[tuple[float, ...]],
+    reaches: np.ndarray,
+    widening: float,
+) -> list[tuple[np.ndarray, int]]:
+    """Return a patch for each vertex that is no manifold.
+
+    Raises CompositionError with the boxes of those that no patch mends.
+    """
+    patches, failures = [], []
+    for sectors, box in zip(places, boxes, strict=True):
+        reach = find_reach(reaches, sectors.corner)
+        patch = cure(sectors, max(SETBACK_M / GRID_M, 4 * reach) * widening)
+        if patch is None:
+            failures.append(box)
+        else:
+            patches.append(patch)
+    if failures:
+        failure = CompositionError(
+            "expected levels that can be told apart around every corner, got a corner that has none"
+        )
+        failure.places = tuple(failures)
+        raise failure
+    return patches
+
+
+def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int] | None:
+    """Return a patch (soup, label) for a vertex that is no manifold, None if none mends it.
 
     It gives the tip of the narrowest peak to the higher neighbour.
 
@@ -360,9 +401,7 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
     if len(peaks) < 2:
         peaks = pinches(sectors)
     if not peaks:
-        raise CompositionError(
-            "expected levels that can be told apart around every corner, got a corner that has none"
-        )
+        return None
     _, run, label = min(peaks)
     return sectors.tip(run, radius), label
 

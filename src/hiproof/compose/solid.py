@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,25 +15,13 @@ from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
 from .facets import draw_facets
 from .shell import Saddles, raise_shell
+from .zones import EVERYWHERE, Zone, add_zones, list_reaches
 
-# factor on the snap distance, whether straight walls become one and whether flat corners are turned
-# in, tried in turn until the solid is valid
-ATTEMPTS = (
-    (1.0, True, False),
-    (1.0, False, False),
-    (3.0, False, False),
-    (10.0, False, False),
-    (20.0, False, False),
-    (30.0, False, False),
-    (1.0, False, True),
-    (3.0, False, True),
-    (10.0, False, True),
-    (30.0, False, True),
-)
 # val3dity's default planarity: steep planes cannot meet within less where vertices moved a
 # centimetre
 LENIENT_M = 0.01
-MAX_ROUNDS = 40  # in which crosswise corners are mended, so that it comes to an end
+MAX_ROUNDS = 10  # in which crosswise corners are mended in one attempt
+MAX_ATTEMPTS = 40  # of one roof, with coarser snapping in ever more places
 
 
 def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None) -> Solid:
@@ -69,20 +57,23 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     bent: list[Solid] = []
     failure = ""
     parts: tuple[int, ...] = ()
-    for factor, merge_walls, turn_in in ATTEMPTS:
+    zones: tuple[Zone, ...] = (Zone(EVERYWHERE, 0),)
+    for _ in range(MAX_ATTEMPTS):
         try:
-            solid = compose_at(
-                problem, z_ground_local, options, factor * options.snap_m, merge_walls, turn_in
-            )
+            solid = compose_at(problem, z_ground_local, options, zones)
         except CompositionError as error:
-            failure = str(error)
-            continue
-        findings = check_solid(solid, planarity_m=options.planarity_m)
-        if not findings:
-            return solid
-        failure = "; ".join(finding.message for finding in findings[:3])
-        parts = parts or parts_at_fault(solid, findings)
-        bent += [solid] if any(finding.code == 203 for finding in findings) else []
+            failure, places = str(error), error.places
+        else:
+            findings = check_solid(solid, planarity_m=options.planarity_m)
+            if not findings:
+                return solid
+            failure = "; ".join(finding.message for finding in findings[:3])
+            places = list_places(solid, findings)
+            parts = parts or parts_at_fault(solid, findings)
+            bent += [solid] if any(finding.code == 203 for finding in findings) else []
+        zones = add_zones(zones, places or (EVERYWHERE,))
+        if not zones:
+            break
     for solid in bent:
         if not check_solid(solid, planarity_m=max(LENIENT_M, options.planarity_m)):
             return solid
@@ -99,39 +90,44 @@ def parts_at_fault(solid: Solid, findings: tuple[Finding, ...]) -> tuple[int, ..
     return tuple(sorted(parts - {-1}))
 
 
+def list_places(solid: Solid, findings: tuple[Finding, ...]) -> tuple[tuple[float, ...], ...]:
+    """Return the boxes [m] in plan around the faces with a finding.
+
+    They are low x, low y, high x and high y. There is none where a finding has no face.
+    """
+    faces = sorted({finding.face for finding in findings})
+    if faces[0] < 0:
+        return ()
+    rings = [solid.vertices[list(solid.faces[face].rings[0]), :2] for face in faces]
+    return tuple((*ring.min(axis=0).tolist(), *ring.max(axis=0).tolist()) for ring in rings)
+
+
 def compose_at(
-    problem: PlanProblem,
-    z_ground: float,
-    options: ComposeSettings,
-    snap_m: float,
-    merge_walls: bool,
-    turn_in: bool = False,
+    problem: PlanProblem, z_ground: float, options: ComposeSettings, zones: Sequence[Zone]
 ) -> Solid:
-    """Compose once, at the given snap distance.
+    """Compose once, with the attempts that `zones` want.
 
     Corners where levels meet crosswise are set back, all of them in each round.
     """
-    reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
-    for round_number in range(MAX_ROUNDS):
-        cells = arrange(problem, reach_m, options.min_face_area_m2, options.min_face_width_m)
-        widening = 1 + 0.25 * round_number  # a cure may need room
+    reaches = list_reaches(zones, options.snap_m)
+    places: tuple[tuple[float, ...], ...] = ()
+    for number in range(MAX_ROUNDS):
+        cells = arrange(problem, reaches, options.min_face_area_m2, options.min_face_width_m)
+        widening = 1 + 0.25 * number  # a cure may need room
+        clearance_m = options.ground_clearance_m
         try:
             return raise_shell(
-                cells,
-                problem,
-                z_ground,
-                options.ground_clearance_m,
-                reach_m,
-                merge_walls,
-                turn_in,
-                widening,
+                cells, problem, z_ground, clearance_m, zones, options.snap_m, widening
             )
         except Saddles as saddles:
             problem = replace(problem, patches=[*problem.patches, *saddles.patches])
-    raise CompositionError(
-        "expected corners where roof levels meet crosswise to be mended in forty rounds, "
+            places = saddles.places
+    failure = CompositionError(
+        "expected corners where roof levels meet crosswise to be mended in ten rounds, "
         "got some after them"
     )
+    failure.places = places
+    raise failure
 
 
 def terrain_intersection(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from .arrangement import OUTSIDE, is_beside, renumber_vertices, turn
+from .arrangement import OUTSIDE, find_reach, is_beside, renumber_vertices, turn
 from .levels import evaluate_plane
 
 # units of the grid, 3 mm: beside a shorter edge no face can be flat to val3dity's 20 degrees
@@ -61,7 +61,7 @@ def is_clear(xy, edges, missing, stays, distant, reach):
 
 
 @compiled
-def without_short_edges(xy, edges, side, planes, reach):
+def without_short_edges(xy, edges, side, planes, reaches):
     """Drop an end of every edge between two cells that is shorter than 3 mm.
 
     Returns (xy, edges, side), compacted.
@@ -86,7 +86,9 @@ def without_short_edges(xy, edges, side, planes, reach):
             if (
                 count != 2
                 or distant == stays
-                or not is_clear(xy, edges, missing, stays, distant, reach)
+                or not is_clear(
+                    xy, edges, missing, stays, distant, find_reach(reaches, xy[missing])
+                )
             ):
                 continue
             edges[other, end] = stays

@@ -11,6 +11,7 @@ import shapely
 from ...compose.arrangement import GRID_M, OUTSIDE
 from ...compose.cells import arrange, equal_planes, plan_problem
 from ...compose.levels import split_at_crossings, stack_levels
+from ...compose.zones import EVERYWHERE, Zone, list_reaches
 from ...errors import CompositionError
 from ...frames import LocalFrame
 from ...model import Part, Piece, Roof
@@ -21,7 +22,7 @@ from .scene import Scene
 from .volumes import DIRECTION
 
 STRAIGHT_CORNER_M = 0.02  # A corner nearer (m) to the line between its two neighbours is none.
-PLAN_REACH_M = 0.0012  # Reach (m) as in the first attempt to arrange a solid's plan.
+PLAN_REACHES = list_reaches([Zone(EVERYWHERE, 0)], 0.001)  # As in a solid's first attempt.
 EQUAL_PLANE = 1e-5  # Planes and slopes nearer to each other (m, rise over run) are one.
 
 
@@ -130,7 +131,7 @@ def draw_plan(
     options = ComposeSettings()
     try:
         problem = plan_problem(roof)
-        cells = arrange(problem, PLAN_REACH_M, options.min_face_area_m2, options.min_face_width_m)
+        cells = arrange(problem, PLAN_REACHES, options.min_face_area_m2, options.min_face_width_m)
     except CompositionError:
         return None
     return make_drawn_plan(cells, problem.planes, np.array(owner))
@@ -138,9 +139,7 @@ def draw_plan(
 
 def make_drawn_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan | None:
     """Make the plan of `cells`, in metres, None if no volume owns one of its planes."""
-    split = split_at_crossings(
-        cells.xy, cells.edges, cells.side, grid_planes, PLAN_REACH_M / GRID_M
-    )
+    split = split_at_crossings(cells.xy, cells.edges, cells.side, grid_planes, PLAN_REACHES)
     xy, edges, side, ties = split
     if not len(edges) or side.max() >= len(owner):
         return None
