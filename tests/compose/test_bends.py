@@ -9,6 +9,7 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
 from hiproof.compose.bends import bent_faces
+from hiproof.compose.zones import ATTEMPTS, EVERYWHERE, Zone
 from hiproof.model import Face, Solid
 from hiproof.settings import Settings
 from roof_zoo import KINDS, generate_roof
@@ -83,7 +84,7 @@ def test_few_roofs_need_coarser_snapping():
     first = 0
     for seed in range(100):
         problem = composing.plan_problem(generate_roof("unions", seed))
-        solid = composing.compose_at(problem, 0.0, options, options.snap_m, merge_walls=True)
+        solid = composing.compose_at(problem, 0.0, options, [Zone(EVERYWHERE, 0)])
         first += check_solid(solid, planarity_m=options.planarity_m) == ()
     assert first >= 97
 
@@ -94,13 +95,12 @@ def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
     height to speak of.
     """
     options = Settings().compose
+    separate, turned_in = map(ATTEMPTS.index, ((1.0, False, False), (1.0, False, True)))
     for seed in range(4):
         problem = composing.plan_problem(generate_roof(kind, seed))
         plain, turned = (
-            composing.compose_at(
-                problem, -2.0, options, options.snap_m, merge_walls=False, turn_in=turn
-            )
-            for turn in (False, True)
+            composing.compose_at(problem, -2.0, options, [Zone(EVERYWHERE, number)])
+            for number in (separate, turned_in)
         )
         assert [face.kind for face in plain.faces] == [face.kind for face in turned.faces]
         if not check_solid(plain):

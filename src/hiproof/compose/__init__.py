@@ -8,7 +8,9 @@ readable          whether a file of parameters can hold a roof
 facets            facets of curved parts, by the tolerance of chords
 solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
+zones             places where a solid failed, and what is attempted there
 arrangement       the planar arrangement under them, on an integer grid
+buckets           what lies near a place, for it
 joined            sets that are joined, for it and for the check
 tidy              cells without steps a millimetre long
 levels            which heights meet over every vertex of the plan

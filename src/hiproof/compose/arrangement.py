@@ -406,17 +406,33 @@ def face_points(xy, edges, face, faces):
 
 
 @compiled
-def covers(soup, lower, upper, x, y):
-    """Return whether the polygon of soup[lower:upper] holds (x, y), by parity."""
+def enclose_polygons(soup, soup_start):
+    """Return the boxes (k, 4) around polygons: low x, low y, high x, high y."""
+    boxes = np.empty((len(soup_start) - 1, 4))
+    boxes[:, :2], boxes[:, 2:] = np.inf, -np.inf
+    for k in range(len(boxes)):
+        for e in range(soup_start[k], soup_start[k + 1]):
+            for axis in range(2):
+                start, end = soup[e, axis], soup[e, 2 + axis]
+                boxes[k, axis] = min(boxes[k, axis], start, end)
+                boxes[k, 2 + axis] = max(boxes[k, 2 + axis], start, end)
+    return boxes
+
+
+@compiled
+def covers(soup, soup_start, boxes, k, x, y):
+    """Return whether polygon k of the soup, in its box (k, 4), holds (x, y), by parity."""
     inside = False
-    for e in range(lower, upper):
+    if x < boxes[k, 0] or x > boxes[k, 2] or y < boxes[k, 1] or y > boxes[k, 3]:
+        return inside
+    for e in range(soup_start[k], soup_start[k + 1]):
         if flips(soup[e, 0], soup[e, 1], soup[e, 2], soup[e, 3], x, y):
             inside = not inside
     return inside
 
 
 @compiled
-def active_plane(x, y, soup, soup_start, planes, plane_start):
+def active_plane(x, y, soup, soup_start, boxes, planes, plane_start):
     """Return the plane that is active at (x, y).
 
     It is the highest of the covering pieces' lowest planes.
@@ -425,11 +441,11 @@ def active_plane(x, y, soup, soup_start, planes, plane_start):
 
     Polygon 0 of the soup is the outline, polygon k + 1 the outline of piece k.
     """
-    if not covers(soup, soup_start[0], soup_start[1], x, y):
+    if not covers(soup, soup_start, boxes, 0, x, y):
         return OUTSIDE
     best, best_z = UNCOVERED, -np.inf
     for k in range(len(plane_start) - 1):
-        if not covers(soup, soup_start[k + 1], soup_start[k + 2], x, y):
+        if not covers(soup, soup_start, boxes, k + 1, x, y):
             continue
         lower, low_z = -1, np.inf
         for j in range(plane_start[k], plane_start[k + 1]):
@@ -451,11 +467,13 @@ def label_faces(
     it.
     """
     label, patched = np.full(len(points), OUTSIDE, np.int64), np.zeros(len(points), np.bool_)
+    boxes, patch_boxes = enclose_polygons(soup, soup_start), enclose_polygons(patches, patch_start)
     for f in range(1, len(points)):
-        plane = active_plane(points[f, 0], points[f, 1], soup, soup_start, planes, plane_start)
+        x, y = points[f, 0], points[f, 1]
+        plane = active_plane(x, y, soup, soup_start, boxes, planes, plane_start)
         label[f] = group[plane] if plane >= 0 else plane
         for p in range(len(patch_label)):
-            if covers(patches, patch_start[p], patch_start[p + 1], points[f, 0], points[f, 1]):
+            if covers(patches, patch_start, patch_boxes, p, x, y):
                 label[f], patched[f] = patch_label[p], True
     return label, patched
 
@@ -753,20 +771,6 @@ def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
         else:
             t_high = min(t_high, -base / rise)
     return t_low, t_high
-
-
-@compiled
-def enclose_polygons(soup, soup_start):
-    """Return the boxes (k, 4) around polygons: low x, low y, high x, high y."""
-    boxes = np.empty((len(soup_start) - 1, 4))
-    boxes[:, :2], boxes[:, 2:] = np.inf, -np.inf
-    for k in range(len(boxes)):
-        for e in range(soup_start[k], soup_start[k + 1]):
-            for axis in range(2):
-                start, end = soup[e, axis], soup[e, 2 + axis]
-                boxes[k, axis] = min(boxes[k, axis], start, end)
-                boxes[k, 2 + axis] = max(boxes[k, 2 + axis], start, end)
-    return boxes
 
 
 @compiled

@@ -85,7 +85,8 @@ def raise_shell(
     levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
     saddles = find_saddles(levels.order, levels.start, levels.level, levels.face, side.ravel())
     if saddles.any():
-        places = [sectors_at(v, xy, edges, side, levels) for v in np.flatnonzero(saddles)]
+        vertices = np.flatnonzero(saddles).tolist()
+        places = [sectors_at(v, xy, edges, side, levels) for v in vertices]
         boxes = [frame_sectors(place, xy, edges, levels) for place in places]
         raise Saddles(cure_all(places, boxes, reaches, widening), tuple(boxes))
     # from here on numbers of a few dozen edges: plain lists are faster than arrays

@@ -1,0 +1,105 @@
+"""Large plans: noding looks nearby only and comes to rest, and faults stay local."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.compose import check_solid, compose
+from hiproof.compose.arrangement import is_beside, node
+from hiproof.compose.buckets import enter_edge, lay_buckets, list_near
+from hiproof.compose.zones import ATTEMPTS, EVERYWHERE, Zone, add_zones, list_reaches
+from hiproof.frames import LocalFrame
+from hiproof.model import Part, Piece, Roof
+
+REACHES = np.array([[-np.inf, -np.inf, np.inf, np.inf, 12.0]])
+
+
+def test_two_vertices_as_far_apart_as_the_reach_come_to_rest():
+    """Each lay beside the edge from the other to a third one, and was put into it in turn."""
+    segments = [
+        [299967, 700000, 299967, 700051],
+        [408500, 799900, 299966, 799900],
+        [299978, 799900, 299978, 700051],
+    ]
+    xy, edges = node(np.array(segments), REACHES)
+    pairs = {frozenset(map(tuple, xy[edge].tolist())) for edge in edges}
+    assert frozenset([(299978, 799900), (299967, 700051)]) in pairs
+    assert len(edges) == 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noded_vertices_keep_the_reach_of_their_zone(seed):
+    rng = np.random.default_rng(seed)
+    starts = rng.integers(0, 100_000, (60, 2))
+    segments = np.hstack([starts, starts + rng.integers(-20_000, 20_000, (60, 2))])
+    zone = [0.0, 0.0, 50_000.0, 100_000.0, 300.0]
+    xy, edges = node(segments, np.vstack([REACHES, [zone]]))
+    assert len(edges) > 60
+    small_triangles = 0
+    for v, place in enumerate(xy):
+        reach = 300.0 if zone[0] <= place[0] <= zone[2] and 0 <= place[1] <= zone[3] else 12.0
+        for a, b in edges[(edges != v).all(axis=1)]:
+            if is_beside(place, xy[a], xy[b], reach):
+                ends = np.linalg.norm(xy[[a, b]] - place, axis=1)
+                small_triangles += ends.min() < 2 * reach
+                assert ends.min() < 2 * reach
+    assert small_triangles <= 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_buckets_list_every_edge_that_reaches_into_a_box(seed):
+    rng = np.random.default_rng(seed)
+    xy = rng.integers(-5_000, 5_000, (200, 2))
+    edges = rng.integers(0, 200, (150, 2))
+    buckets = lay_buckets(xy, len(edges))
+    for e in range(len(edges)):
+        buckets = enter_edge(e, xy, edges, buckets)
+    low, high = xy[edges].min(axis=1), xy[edges].max(axis=1)
+    listed = []
+    for _ in range(50):
+        corner, size = rng.integers(-7_000, 5_000, 2), rng.integers(0, 1_000, 2)
+        near, count = list_near(*corner, *(corner + size), buckets, np.empty(0, np.int64))
+        is_met = ((low <= corner + size) & (high >= corner)).all(axis=1)
+        assert set(np.flatnonzero(is_met)) <= set(near[:count].tolist())
+        listed.append(len(set(near[:count].tolist())))
+    assert np.mean(listed) < 0.5 * len(edges)
+
+
+def make_checkerboard(squares):
+    """A roof of squares of 2 m, low and high in turn."""
+    parts = []
+    for i in range(squares):
+        for j in range(squares):
+            box = shapely.box(2.0 * i, 2.0 * j, 2.0 * i + 2.0, 2.0 * j + 2.0)
+            plane = np.array([[0.0, 0.0, 4.0 + 3.0 * ((i + j) % 2)]])
+            parts.append(Part("flat", (Piece(box, plane),)))
+    outline = shapely.box(0.0, 0.0, 2.0 * squares, 2.0 * squares)
+    return Roof(tuple(parts), outline, LocalFrame(np.zeros(3)))
+
+
+def test_any_number_of_crosswise_corners_is_mended():
+    solid = compose(make_checkerboard(9), 0.0)
+    assert not check_solid(solid)
+    assert math.isclose(solid.volume, 4.0 * (41 * 4.0 + 40 * 7.0), rel_tol=1e-3)
+
+
+def test_each_zone_goes_on_from_the_attempts_made_there():
+    zones = (Zone(EVERYWHERE, 0),)
+    for number in (1, 2):
+        zones = add_zones(zones, [(0.0, 0.0, 1.0, 1.0)])
+        assert zones[-1].number == number
+    zones = add_zones(zones, [(10.0, 0.0, 11.0, 1.0), (1.2, 0.0, 1.3, 1.0)])
+    assert [zone.number for zone in zones] == [0, 1, 2, 1, 3]
+    reaches = list_reaches(zones, 0.001)
+    assert reaches[:, 4].tolist() == [12.0, 12.0, 32.0, 12.0, 102.0]
+    assert np.isinf(reaches[0, :4]).all() and reaches[1, 0] == -5000.0
+
+
+def test_no_zone_is_left_after_the_last_attempt():
+    zones = (Zone(EVERYWHERE, 0),)
+    for _ in ATTEMPTS[1:]:
+        zones = add_zones(zones, [EVERYWHERE])
+    assert len(zones) == len(ATTEMPTS)
+    assert add_zones(zones, [(0.0, 0.0, 1.0, 1.0)]) == ()
