@@ -15,6 +15,7 @@ from hiproof.fit.union.planes import (
     find_median,
     find_neighbours,
     select_distinct,
+    solve_three,
     truncate_cost,
 )
 from union_scenes import search_all_rectangles
@@ -24,6 +25,17 @@ def find_rectangle(gain, least_sum):
     reach = np.empty(len(gain) + 1)
     bound_rows(gain, reach)
     return find_best_rectangle(gain, least_sum, reach, np.empty(gain.shape[1]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_three_unknowns_solve_their_system(seed):
+    rows = np.random.default_rng(seed).normal(size=(5, 3))
+    matrix, right = rows.T @ rows, rows[0] - rows[1]
+    *unknowns, is_regular = solve_three(*matrix[np.triu_indices(3)], *right)
+    assert is_regular
+    assert np.allclose(matrix @ unknowns, right)
+    matrix[:, seed % 3] = matrix[seed % 3] = 0.0
+    assert not solve_three(*matrix[np.triu_indices(3)], *right)[3]
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -19,7 +19,14 @@ from hiproof.fit.union.candidates import (
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.grow import prepare_growth
 from hiproof.fit.union.improve import digest_surroundings, improve, simplify
-from hiproof.fit.union.moves import find_best_plane, refit_volumes, settle_volume
+from hiproof.fit.union.moves import (
+    FEWEST_SEEDS,
+    count_seeds,
+    find_best_plane,
+    place_outside,
+    refit_volumes,
+    settle_volume,
+)
 from hiproof.fit.union.objective import (
     BASE_SHARE,
     compute_costs,
@@ -756,6 +763,31 @@ def test_a_further_plane_gains_what_the_points_then_cost_less(seed):
                 - compute_costs(z_then, scene)[: scene.n].sum()
             )
             assert gain == pytest.approx(saving, abs=1e-9)
+
+
+def test_planes_with_too_few_seeds_gain_nothing_wherever_their_edge_lies():
+    few = many = 0
+    for seed in SEEDS:
+        rng, _, scene = draw_case(seed)
+        volumes = draw_volumes(rng)
+        z_now, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+        for k in range(1, len(volumes)):
+            roofs = compute_both_roofs(volumes, scene, k)
+            seeds = count_seeds(volumes, scene, k, z_now, *roofs)
+            for plane in range(N_PLANES):
+                wide = volumes.copy()
+                if plane < LEVEL:
+                    wide[k, U0 + plane] = place_outside(scene, int(volumes[k, DIRECTION]), plane)
+                slopes = SLOPES if plane < LEVEL else np.zeros(1)
+                gains = [
+                    find_best_plane(rows, scene, k, plane, slopes, z_now, *roofs, 0.0)[0]
+                    for rows in (volumes, wide)
+                ]
+                few += seeds[plane] < FEWEST_SEEDS
+                many += max(gains) > 0.0
+                assert seeds[plane] >= FEWEST_SEEDS or max(gains) == 0.0
+    assert few
+    assert many
 
 
 @pytest.mark.parametrize("other_direction", [0.0, 1.0])

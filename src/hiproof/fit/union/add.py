@@ -7,7 +7,6 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ...geometry.arrays import sort_order
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
 from .edges import EVERYWHERE, MIN_SIDE_M, NO_GAIN, move_edges
@@ -123,7 +122,8 @@ def find_best_addition(volumes, value, ground, candidates):
         gains, cells = find_best_rectangles(
             scene, candidates, ground.cell_u, ground.cell_v, cost_now, z_now, replacing
         )
-        for m in sort_order(-gains)[:TRIED_EACH_WAY]:
+        for _ in range(TRIED_EACH_WAY):
+            m = np.argmax(gains)
             if not gains[m] > 0.0:
                 break
             extended = np.concatenate((volumes, candidates[m : m + 1]))
@@ -143,6 +143,7 @@ def find_best_addition(volumes, value, ground, candidates):
                 best, lowest = cut_back_neighbours(
                     volumes, extended, scene, best, lowest, value, surcharge
                 )
+            gains[m] = -np.inf
     return best, lowest
 
 

@@ -34,6 +34,8 @@ def draw_over_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> I
     The walls are (m, 2, 2). The volume reaches as far as a corner of the outline on one side, or
     stays as wide. Volumes over these walls that then lie within it are dropped.
     """
+    if len(volumes) < 3:  # there is none to drop
+        return
     places, aslant = place_inside_walls(walls, scene)
     if not 0 < aslant[0].sum() <= MOST_ASLANT:
         return

@@ -21,7 +21,7 @@ from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
 from .judged import JudgedRoof, make_flat, measure_gain, replace_parts, trim_parts
 from .own import MOST_DISTANCE_M
-from .planes import solve_masked
+from .planes import solve_three
 from .regions import exclude_parts, list_polygons, select_touching, unite_outlines
 from .round_ends import TURRET_DEG, RoundEnd, cut_to_outline
 
@@ -179,24 +179,26 @@ def move_circle(
     It is a step of a logistic fit. Points nearer to the circle count more, the more so the smaller
     its `softness` (m).
     """
-    hessian, right, change = np.zeros((3, 3)), np.zeros(3), np.ones(3)
-    for j in range(3):
-        hessian[j, j] = 1.0
+    xx = yy = rr = 1.0
+    xy = xr = yr = right_x = right_y = right_r = 0.0
     for i in range(len(points)):
         way_x, way_y = points[i, 0] - x, points[i, 1] - y
         r = max(math.hypot(way_x, way_y), softness)
         sign = 1.0 if is_level[i] else -1.0
         wrong = 0.5 + 0.5 * math.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
-        change[0], change[1] = way_x / r, way_y / r
+        way_x, way_y = way_x / r, way_y / r
         weight = wrong * (1.0 - wrong) / softness**2
-        for j in range(3):
-            right[j] += change[j] * sign * wrong / softness
-            for k in range(3):
-                hessian[j, k] += weight * change[j] * change[k]
-    move, _ = solve_masked(hessian, right, np.ones(3, np.bool_))
-    for j in range(3):
-        move[j] = min(max(move[j], -softness), softness)
-    return move
+        xx += weight * way_x * way_x
+        xy += weight * way_x * way_y
+        xr += weight * way_x
+        yy += weight * way_y * way_y
+        yr += weight * way_y
+        rr += weight
+        right_x += way_x * sign * wrong / softness
+        right_y += way_y * sign * wrong / softness
+        right_r += sign * wrong / softness
+    move_x, move_y, wider, _ = solve_three(xx, xy, xr, yy, yr, rr, right_x, right_y, right_r)
+    return np.array([min(max(x, -softness), softness) for x in (move_x, move_y, wider)])
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:

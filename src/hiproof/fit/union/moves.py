@@ -53,6 +53,7 @@ MOST_TYPICAL_SLOPES = 5
 MOST_TRIED_SLOPES = N_SIDES + MOST_TYPICAL_SLOPES  # Most slopes at which a plane is tried.
 SLOPES_APART = 0.02  # Least difference (rise over run) between two of them.
 END_SEEDS = 16  # Points through which a new plane is tried.
+FEWEST_SEEDS = 3  # Fewest points through which a new plane may pass for any to be tried.
 POINTS_AT_ONCE = 64  # Points between two checks whether a new plane can still be the best.
 ALMOST_LEVEL = 0.15  # A flatter plane (rise over run) may as well be level.
 
@@ -210,8 +211,9 @@ def add_planes(volumes, scene, value, k, slopes, context):
     """
     z_now = compute_roof_with(volumes, scene.U, scene.V, k, context)
     everywhere = compute_roof_everywhere(volumes, scene.U, scene.V, k, context)
+    seeds = count_seeds(volumes, scene, k, z_now, everywhere, context.roof_without)
     for plane in range(N_PLANES):
-        if volumes[k, OFFSET0 + plane] < np.inf:
+        if volumes[k, OFFSET0 + plane] < np.inf or seeds[plane] < FEWEST_SEEDS:
             continue
         trial_slopes = list_trial_slopes(volumes[k], plane, slopes)
         least_gain = 0.6 * scene.evidence * PARAMETER_COST
@@ -250,8 +252,42 @@ def add_planes(volumes, scene, value, k, slopes, context):
                 volumes, value = trial, trial_value
                 z_now = compute_roof_with(volumes, scene.U, scene.V, k, context)
                 everywhere = compute_roof_everywhere(volumes, scene.U, scene.V, k, context)
+                seeds = count_seeds(volumes, scene, k, z_now, everywhere, context.roof_without)
                 break
     return volumes, value
+
+
+@compiled
+def count_seeds(volumes, scene, k, z_now, everywhere, beneath):
+    """Count, for each plane (N_PLANES,), the points through which it may pass at most.
+
+    They are those well below volume k, also where its edge at the plane is drawn out.
+    """
+    direction, seeds = int(volumes[k, DIRECTION]), np.zeros(N_PLANES, np.int64)
+    u, v = scene.U[direction], scene.V[direction]
+    c, ends, replaces = (
+        read_coefficients(volumes, k),
+        read_rectangle(volumes, k),
+        volumes[k, REPLACES] > 0.0,
+    )
+    for i in range(scene.n):
+        h, z = find_lowest(c, u[i], v[i]), scene.z[i]
+        if everywhere[i] == h and is_seed(
+            h, z, z_now[i], -np.inf if replaces else beneath[i], scene.dead, scene.width
+        ):
+            out = u[i] < ends[0], u[i] > ends[1], v[i] < ends[2], v[i] > ends[3]
+            n_out = out[0] + out[1] + out[2] + out[3]
+            for plane in range(N_SIDES):
+                seeds[plane] += n_out == 0 or (n_out == 1 and out[plane])
+            seeds[LEVEL] += n_out == 0
+    return seeds
+
+
+@compiled(inline="always")
+def is_seed(height, z, z_now, floor, dead, width):
+    """Return whether a new plane may pass through the point `z`, well below a volume."""
+    r = min(max(abs(z_now - z) - dead, 0.0) / width, 1.0)
+    return height - z > 0.5 * (dead + width) and (r > 0.5 or z > floor - dead - width)
 
 
 @compiled
@@ -316,12 +352,12 @@ def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath
         floors[m] = -np.inf if replaces else beneath[i]
         r = min(max(abs(z_now[i] - z[m]) - dead, 0.0) / width, 1.0)
         unchanged += r * r
-        if h - z[m] > 0.5 * (dead + width) and (r > 0.5 or z[m] > floors[m] - dead - width):
+        if is_seed(h, z[m], z_now[i], floors[m], dead, width):
             seeds[count] = m
             count += 1
         m += 1
     best, best_slope, best_offset = least_gain, 0.0, 0.0
-    if count < 3:
+    if count < FEWEST_SEEDS:
         return best, best_slope, best_offset
     for slope in slopes:
         for g in range(0, count, max(1, count // END_SEEDS)):

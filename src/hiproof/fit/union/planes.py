@@ -61,33 +61,27 @@ def find_lowest_row(rows, u, v):
     return best, plane
 
 
-@compiled
-def solve_masked(matrix, right, mask):
-    """Solve the symmetric 3 x 3 system for the unknowns in `mask`, the others zero.
+@compiled(inline="always")
+def solve_three(xx, xy, x1, yy, y1, n, xz, yz, z1):
+    """Solve a symmetric 3 x 3 system, whose upper rows are (xx, xy, x1), (yy, y1), and (n,).
 
-    Also returns False if it is singular.
+    The right side is xz, yz, z1. Returns the three unknowns, and False if it is singular.
     """
-    a, b, x = matrix.copy(), right.copy(), np.zeros(3)
-    for i in range(3):
-        if not mask[i]:
-            a[i, :] = 0.0
-            a[:, i] = 0.0
-            a[i, i] = 1.0
-            b[i] = 0.0
-    for i in range(3):
-        if abs(a[i, i]) < 1e-12:
-            return x, False
-        for k in range(i + 1, 3):
-            f = a[k, i] / a[i, i]
-            for j in range(i, 3):
-                a[k, j] -= f * a[i, j]
-            b[k] -= f * b[i]
-    for i in range(2, -1, -1):
-        s = b[i]
-        for j in range(i + 1, 3):
-            s -= a[i, j] * x[j]
-        x[i] = s / a[i, i]
-    return x, True
+    if abs(xx) < 1e-12:
+        return 0.0, 0.0, 0.0, False
+    f = xy / xx
+    yy, upper, yz = yy - f * xy, y1 - f * x1, yz - f * xz
+    f = x1 / xx
+    lower, n, z1 = y1 - f * xy, n - f * x1, z1 - f * xz
+    if abs(yy) < 1e-12:
+        return 0.0, 0.0, 0.0, False
+    f = lower / yy
+    n, z1 = n - f * upper, z1 - f * yz
+    if abs(n) < 1e-12:
+        return 0.0, 0.0, 0.0, False
+    c = z1 / n
+    b = (yz - upper * c) / yy
+    return (xz - xy * b - x1 * c) / xx, b, c, True
 
 
 @compiled
@@ -106,7 +100,7 @@ def step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v):
 
     Also returns False if too little weight is left.
     """
-    matrix, right = np.zeros((3, 3)), np.zeros(3)
+    xx = xy = x1 = yy = y1 = weight = xz = yz = z1 = 0.0
     for i in members:
         r = (cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2]) / scale
         w = 1.0 - r * r
@@ -114,24 +108,25 @@ def step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v):
             continue
         w *= w
         x, y, z = cloud.u[i] - centre_u, cloud.v[i] - centre_v, cloud.z[i]
-        matrix[0, 0] += w * x * x
-        matrix[0, 1] += w * x * y
-        matrix[0, 2] += w * x
-        matrix[1, 1] += w * y * y
-        matrix[1, 2] += w * y
-        matrix[2, 2] += w
-        right[0] += w * x * z
-        right[1] += w * y * z
-        right[2] += w * z
-    weight = matrix[2, 2]
+        xx += w * x * x
+        xy += w * x * y
+        x1 += w * x
+        yy += w * y * y
+        y1 += w * y
+        weight += w
+        xz += w * x * z
+        yz += w * y * z
+        z1 += w * z
     if weight < 0.5 * (1 + mask[0] + mask[1]) + 1.0:
         return plane, False
-    matrix[1, 0], matrix[2, 0], matrix[2, 1] = matrix[0, 1], matrix[0, 2], matrix[1, 2]
-    matrix[0, 0] += SLOPE_RIDGE * weight
-    matrix[1, 1] += SLOPE_RIDGE * weight
-    x, ok = solve_masked(matrix, right, mask)
-    x[2] -= x[0] * centre_u + x[1] * centre_v
-    return x, ok
+    xx += SLOPE_RIDGE * weight
+    yy += SLOPE_RIDGE * weight
+    if not mask[0]:
+        xx, xy, x1, xz = 1.0, 0.0, 0.0, 0.0
+    if not mask[1]:
+        xy, yy, y1, yz = 0.0, 1.0, 0.0, 0.0
+    a, b, c, ok = solve_three(xx, xy, x1, yy, y1, weight, xz, yz, z1)
+    return np.array([a, b, c - (a * centre_u + b * centre_v)]), ok
 
 
 @compiled
@@ -184,7 +179,8 @@ def fit_symmetric_gable(cloud, members, planes, tau):
     x = cloud.u if k == 0 else cloud.v
     for step in range(4):
         scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
-        matrix, right = np.zeros((3, 3)), np.zeros(3)
+        weights, moments, heights = np.zeros(2), np.zeros(2), np.zeros(2)
+        spread = product = 0.0
         for i in members:
             z, side = find_lowest_row(fitted, cloud.u[i], cloud.v[i])
             r = (cloud.z[i] - z) / scale
@@ -193,25 +189,32 @@ def fit_symmetric_gable(cloud, members, planes, tau):
                 continue
             w *= w
             s = (sign if side == 0 else -sign) * x[i]
-            matrix[side, side] += w
-            matrix[side, 2] += w * s
-            matrix[2, 2] += w * s * s
-            right[side] += w * cloud.z[i]
-            right[2] += w * s * cloud.z[i]
-        if matrix[0, 0] < 1.0 or matrix[1, 1] < 1.0:
+            weights[side] += w
+            moments[side] += w * s
+            spread += w * s * s
+            heights[side] += w * cloud.z[i]
+            product += w * s * cloud.z[i]
+        if weights.min() < 1.0:
             return fitted, False
-        matrix[2, 0], matrix[2, 1] = matrix[0, 2], matrix[1, 2]
-        for q in range(3):
-            matrix[q, q] += 1e-6
-        p, ok = solve_masked(matrix, right, np.ones(3, np.bool_))
-        if not ok or not MIN_AXIS_SLOPE < p[2] < MAX_SLOPE:
+        height, other_height, slope, ok = solve_three(
+            weights[0] + 1e-6,
+            0.0,
+            moments[0],
+            weights[1] + 1e-6,
+            moments[1],
+            spread + 1e-6,
+            heights[0],
+            heights[1],
+            product,
+        )
+        if not ok or not MIN_AXIS_SLOPE < slope < MAX_SLOPE:
             return fitted, False
         fitted[:] = 0.0
         fitted[0, k], fitted[0, 2], fitted[1, k], fitted[1, 2] = (
-            sign * p[2],
-            p[0],
-            -sign * p[2],
-            p[1],
+            sign * slope,
+            height,
+            -sign * slope,
+            other_height,
         )
     return fitted, True
 
@@ -222,43 +225,37 @@ def fit_local_plane(cloud, nearest, count):
 
     Points are trimmed once, at twice the median residual.
     """
-    plane, limit, ok = np.zeros(3), np.inf, True
-    mask = np.ones(3, np.bool_)
+    a = b = c = 0.0
+    limit, ok = np.inf, True
     u0, v0 = cloud.u[nearest[0]], cloud.v[nearest[0]]
     residuals = np.empty(count)
     for _ in range(2):
-        matrix, right, n_kept = np.zeros((3, 3)), np.zeros(3), 0
+        xx = xy = x1 = yy = y1 = n_kept = xz = yz = z1 = 0.0
         for q in range(count):
             i = nearest[q]
             x, y, z = cloud.u[i] - u0, cloud.v[i] - v0, cloud.z[i]
-            if abs(z - plane[0] * x - plane[1] * y - plane[2]) > limit:
+            if abs(z - a * x - b * y - c) > limit:
                 continue
-            n_kept += 1
-            matrix[0, 0] += x * x
-            matrix[0, 1] += x * y
-            matrix[0, 2] += x
-            matrix[1, 1] += y * y
-            matrix[1, 2] += y
-            matrix[2, 2] += 1.0
-            right[0] += x * z
-            right[1] += y * z
-            right[2] += z
-        if n_kept < 4:
+            xx += x * x
+            xy += x * y
+            x1 += x
+            yy += y * y
+            y1 += y
+            n_kept += 1.0
+            xz += x * z
+            yz += y * z
+            z1 += z
+        if n_kept < 4.0:
             break
-        matrix[1, 0], matrix[2, 0], matrix[2, 1] = matrix[0, 1], matrix[0, 2], matrix[1, 2]
-        matrix[0, 0] += 1e-6
-        matrix[1, 1] += 1e-6
-        plane, ok = solve_masked(matrix, right, mask)
+        a, b, c, ok = solve_three(xx + 1e-6, xy, x1, yy + 1e-6, y1, n_kept, xz, yz, z1)
         if not ok:
             break
         for q in range(count):
             i = nearest[q]
-            residuals[q] = abs(
-                cloud.z[i] - plane[0] * (cloud.u[i] - u0) - plane[1] * (cloud.v[i] - v0) - plane[2]
-            )
+            residuals[q] = abs(cloud.z[i] - a * (cloud.u[i] - u0) - b * (cloud.v[i] - v0) - c)
         limit = 2.0 * find_median(residuals) + 1e-3
-    plane[2] -= plane[0] * u0 + plane[1] * v0
-    return plane, ok and plane[0] ** 2 + plane[1] ** 2 < MAX_SLOPE**2
+    c -= a * u0 + b * v0
+    return np.array([a, b, c]), ok and a**2 + b**2 < MAX_SLOPE**2
 
 
 @compiled
@@ -594,20 +591,21 @@ def fit_template(z, drop, slope, tau):
 
     It begins with a start slope. The slope is 0 if it fails.
     """
-    height = compute_median(z + slope * drop)
+    height, weights = compute_median(z + slope * drop), np.empty(len(drop))
     for step in range(5):
         scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
         n = sx = sy = sxx = sxy = 0.0
-        for i in range(len(drop)):
+        for i in range(len(drop)):  # no branches: a processor does several points at once
             r = (z[i] - height + slope * drop[i]) / scale
             w = 1.0 - r * r
-            if w > 0.0:
-                w *= w
-                n += w
-                sx += w * drop[i]
-                sy += w * z[i]
-                sxx += w * drop[i] * drop[i]
-                sxy += w * drop[i] * z[i]
+            weights[i] = w * w if w > 0.0 else 0.0
+        for i in range(len(drop)):
+            w = weights[i]
+            n += w
+            sx += w * drop[i]
+            sy += w * z[i]
+            sxx += w * drop[i] * drop[i]
+            sxy += w * drop[i] * z[i]
         determinant = n * sxx - sx * sx
         if n < 2.0 or determinant < 1e-6:
             return height, 0.0
