@@ -44,9 +44,12 @@ cut_corners one volume over such walls instead of several
 unite       volumes merged that only skewed walls or cut corners keep apart
 repeats     copies of small volumes along their axes, such as dormers in a row
 bays        level volumes over small pieces that walls cut off the outline
-members     the volumes whose planes the points determine, by the unknowns of all
-agree       planes, slopes, ridges and eaves that volumes have in common
+risen       compiled: volumes whose fitted planes rise above others, put back
+members     the volumes whose planes the points determine
+clusters    members tied by equations, and the normal equations of their unknowns
+conditions  planes, slopes, ridges and eaves of members that are nearly equal
 corners     hips and valleys that end beside a corner of the outline, moved into it
+agree       the conditions of both that hold
 drawn_plan  the plan of the drawn roof: its corners, and the planes beside its edges
 repairs     what nearly meets in it and might be made to meet
 faces       the faces of the drawn plan, and who may take them
@@ -83,6 +86,7 @@ from ...model import Part, Piece, as_xyz
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
+from .agree import agree_planes
 from .apart import split_volumes
 from .bays import add_bays
 from .cants import Cache
@@ -90,7 +94,7 @@ from .clamp import clamp_parts
 from .curved import fit_curved_shapes
 from .fit import BuildingFit
 from .gaps import split_at_gaps
-from .groups import draw_in_groups, run_in_groups
+from .groups import run_in_groups
 from .larger import combine_parts
 from .names import name_part
 from .objective import is_base_visible
@@ -104,7 +108,7 @@ from .scene import Scene
 from .search import find_volumes
 from .shown import find_highest, keep_visible
 from .slivers import drop_slivers, drop_specks
-from .unite import OutlineEnds, gather_ends, select_ends, unite_volumes
+from .unite import OutlineEnds, draw_roof, gather_ends, select_ends, unite_volumes
 from .weld import weld
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -149,9 +153,10 @@ def fit_building(
     volumes = tidy_volumes(volumes, ends, site, cache)
     unit = compute_unit_points(plan.density, COMMON_HOUSE_M2, settings.compound)
     volumes = add_bays(volumes, outline, plan, scene, unit)
-    sides, agreement = draw_in_groups(volumes, ends, site, cache)
+    roof = draw_roof(volumes, ends, scene, cache)
+    agreement = agree_planes(volumes, roof.sides, roof.planes, scene)
     base = is_base_visible(volumes, scene)
-    sides, planes, regions = weld(volumes, sides, agreement, site, base)
+    sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
     parts = [
         name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, types)
         for k, polygons in list_part_polygons(regions, outline, plan)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .clusters import Equation, collect_terms
 from .members import LinearVolume, compute_heights_at, evaluate_rows
 from .sides import CORNER_SIDES, find_corners
 from .volumes import LEVEL
@@ -43,25 +44,31 @@ class CornerPlane(NamedTuple):
 
 
 def list_corner_equations(
-    members: list[LinearVolume], start: np.ndarray, ring: np.ndarray
-) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
-    """Yield equations (1, p) between planes that meet beside a corner.
+    members: dict[int, LinearVolume], ring: np.ndarray
+) -> Iterator[tuple[float, Equation]]:
+    """Yield equations (1, q) between planes that meet beside a corner.
 
     Corners are those of the outline's `ring` (c, 2), and places where a step ends at it. Each comes
-    with how far apart in height (m) the planes are there at the unknowns `start` (p,), and with the
-    two members.
+    with how far apart in height (m) the planes are there.
     """
-    rows = evaluate_rows(members, start)
-    corners = np.vstack([ring, *(list_own_corners(member, ring) for member in members)])
-    for corner, planes in zip(corners, list_planes_at(members, rows, corners), strict=True):
+    numbers, member_list = list(members), list(members.values())
+    if not members:
+        return
+    rows = evaluate_rows(member_list)
+    corners = np.vstack([ring, *(list_own_corners(member, ring) for member in member_list)])
+    for corner, planes in zip(corners, list_planes_at(member_list, rows, corners), strict=True):
         position = np.array([*corner, 1.0])
         for plane, other in combinations(planes, 2):
-            if is_near_miss(plane, other) and is_fold_line(plane, other, corner, members, rows):
-                equation = position @ (
-                    members[plane.member].common_design[plane.number]
-                    - members[other.member].common_design[other.number]
-                )
-                yield abs(plane.height - other.height), (plane.member, other.member), equation[None]
+            if is_near_miss(plane, other) and is_fold_line(plane, other, corner, member_list, rows):
+                terms = [
+                    (
+                        numbers[one.member],
+                        sign * position @ member_list[one.member].common_design[one.number],
+                    )
+                    for sign, one in ((1.0, plane), (-1.0, other))
+                ]
+                equation = collect_terms((k, factors[None]) for k, factors in terms)
+                yield abs(plane.height - other.height), equation
 
 
 def list_own_corners(member: LinearVolume, ring: np.ndarray) -> np.ndarray:

@@ -7,20 +7,14 @@ them it costs as much as on a house. What does not belong to the group returns a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from .add import MOST_VOLUMES
-from .agree import Agreement, agree_planes
 from .box import Box, enclose_boxes
-from .cants import Cache
-from .finish import Planes, read_volume_planes
 from .regions import PlanSite
 from .scene import Scene
-from .sides import Side
-from .unite import OutlineEnds, draw_roof, select_ends
-from .volumes import SETTLED, U0, V1
+from .volumes import SETTLED
 from .whole import POSITION, Whole
 from .window import forget_digests, open_window, restore_volumes
 
@@ -85,42 +79,3 @@ def open_group(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | 
     box = frame_group(whole, group)
     scene = open_window(whole, box, GROUP_POINTS)
     return None if scene is None else (scene, [0, *whole.list_volumes(box)])
-
-
-def draw_in_groups(
-    volumes: np.ndarray, ends: OutlineEnds, site: PlanSite, cache: Cache
-) -> tuple[list[list[Side]], Agreement]:
-    """Return the volumes' sides, and planes that agree with their neighbours'.
-
-    Planes in the `cache` are not fitted again if all volumes are drawn at once. Otherwise there are
-    no common unknowns: the agreement has no members.
-    """
-    if len(volumes) <= MOST_VOLUMES:
-        roof = draw_roof(volumes, ends, site.scene, cache)
-        return roof.sides, agree_planes(volumes, roof.sides, roof.planes, site.scene)
-    whole = Whole(site.scene, site.plan, site.outline, volumes)
-    sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
-    planes = [read_volume_planes(row, whole.scene) for row in volumes]
-    for group in group_volumes(whole):
-        view = open_group(whole, group)
-        if view is None:
-            continue
-        scene, numbers = view
-        rows = whole.volumes[numbers]
-        roof = draw_roof(rows, select_ends(ends, scene), scene, {})
-        group_planes = [
-            volume_planes if k in group else fix_planes(volume_planes)
-            for k, volume_planes in zip(numbers, roof.planes, strict=True)
-        ]
-        together = agree_planes(rows, roof.sides, group_planes, scene).planes
-        for k in group:
-            position = numbers.index(k)
-            sides[k], planes[k] = roof.sides[position], together[position]
-    return sides, Agreement(planes, {}, np.zeros((0, 0)), np.zeros(0))
-
-
-def fix_planes(planes: Planes) -> Planes:
-    """Return the planes without unknowns, so that others do not change them."""
-    return replace(
-        planes, design=np.zeros((*planes.design.shape[:2], 0)), covariance=np.zeros((0, 0))
-    )

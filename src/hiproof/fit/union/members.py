@@ -16,17 +16,15 @@ from .volumes import DIRECTION
 class LinearVolume:
     """A volume as one of several.
 
-    `rows` (k, 3) are its planes in its own axes: `design` (k, 3, q) times its own unknowns, which
-    are those from number `first` on of all p. `full_design` (k, 3, p) gives them by all unknowns,
-    `common_design` (k, 3, p) does in the first direction's axes. `points` (3, n) are its points in
-    its own axes, and `places` (3, n) their u, v, 1 in the first direction's. `visible` are the
-    numbers of its planes on which any points lie, with the numbers of those.
+    `rows` (k, 3) are its planes in its own axes: `design` (k, 3, q) times its `unknowns` (q,).
+    `common_design` (k, 3, q) gives them in the first direction's axes. `points` (3, n) are its
+    points in its own axes, and `places` (3, n) their u, v, 1 in the first direction's. `visible`
+    are the numbers of its planes on which any points lie, with the numbers of those.
     """
 
     rows: np.ndarray
     design: np.ndarray
-    first: int
-    full_design: np.ndarray
+    unknowns: np.ndarray
     common_design: np.ndarray
     points: np.ndarray
     places: np.ndarray
@@ -41,35 +39,25 @@ def list_members(
 ) -> dict[int, LinearVolume]:
     """Return the volumes whose planes points determine, by their number."""
     visible = find_visible_points(volumes, scene)
-    free = [
-        k
-        for k, full_design in enumerate(planes)
-        if full_design.design.shape[2] and len(visible[k]) >= FEWEST_FITTED_POINTS
-    ]
-    size, start, members = sum(planes[k].design.shape[2] for k in free), 0, {}
-    for k in free:
-        rows, design, direction = planes[k].rows, planes[k].design, int(volumes[k, DIRECTION])
-        full_design = np.zeros((*design.shape[:2], size))
-        full_design[:, :, start : start + design.shape[2]] = design
-        c, s = scene.turn[direction]
-        common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ full_design
-        ones = np.ones(len(visible[k]))
-        points = take_points(volumes[k], visible[k], scene)
-        places = np.array([scene.U[0][visible[k]], scene.V[0][visible[k]], ones])
+    members = {}
+    for k, one in enumerate(planes):
+        if not one.design.shape[2] or len(visible[k]) < FEWEST_FITTED_POINTS:
+            continue
+        turn = scene.turn[int(volumes[k, DIRECTION])]
+        c, s = turn
+        points, is_present = take_points(volumes[k], visible[k], scene), np.isfinite(one.rows)
         members[k] = LinearVolume(
-            rows,
-            design,
-            start,
-            full_design,
-            common,
+            one.rows,
+            one.design,
+            np.linalg.lstsq(one.design[is_present], one.rows[is_present], rcond=None)[0],
+            np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ one.design,
             points,
-            places,
-            find_lowest_planes(rows, points),
+            np.array([scene.U[0][visible[k]], scene.V[0][visible[k]], np.ones(len(visible[k]))]),
+            find_lowest_planes(one.rows, points),
             sides[k],
-            planes[k].walls,
-            scene.turn[direction],
+            one.walls,
+            turn,
         )
-        start += design.shape[2]
     return members
 
 
@@ -85,27 +73,15 @@ def find_lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.nda
     return {number: numbers for number, numbers in points_by_plane.items() if len(numbers)}
 
 
-def solve_unknowns(members: list[LinearVolume]) -> np.ndarray:
-    """Return the unknowns (p,) that give the members' rows."""
-    present = [np.isfinite(member.rows) for member in members]
-    design = np.concatenate(
-        [member.full_design[is_known] for member, is_known in zip(members, present, strict=True)]
-    )
-    rows = np.concatenate(
-        [member.rows[is_known] for member, is_known in zip(members, present, strict=True)]
-    )
-    return np.linalg.lstsq(design, rows, rcond=None)[0]
+def evaluate_rows(members: list[LinearVolume]) -> np.ndarray:
+    """Return the members' planes (m, k, 3) in the first direction's axes.
 
-
-def evaluate_rows(members: list[LinearVolume], unknowns: np.ndarray) -> np.ndarray:
-    """Return the members' planes (m, k, 3) under the unknowns (p,).
-
-    They are in the first direction's axes, NaN where a plane is absent.
+    They are NaN where a plane is absent.
     """
     rows = np.full((len(members), max(len(member.rows) for member in members), 3), np.nan)
     for member_rows, member in zip(rows, members, strict=True):
         member_rows[: len(member.rows)] = np.where(
-            np.isfinite(member.rows), member.common_design @ unknowns, np.nan
+            np.isfinite(member.rows), member.common_design @ member.unknowns, np.nan
         )
     return rows
 

@@ -24,17 +24,21 @@ import shapely
 from ...model import Part
 from ...model.heights import find_highest
 from .add import FEWEST_UNEXPLAINED, UNEXPLAINED
-from .agree import (
-    Agreement,
-    NormalSums,
+from .agree import Agreement
+from .around import compute_roof_everywhere, measure_context
+from .clusters import (
+    Basis,
+    collect_terms,
     constrain,
+    count_free,
+    evaluate_equation,
+    join_bases,
     place_planes,
     price_rows,
     solve_normal,
-    sum_at_start,
+    sum_first_round,
     sum_row_costs,
 )
-from .around import compute_roof_everywhere, measure_context
 from .drawn_plan import DrawnPlan, count_parameters, draw_plan, make_part
 from .faces import PlanFace, Regions, assign_face, draw_out_sides, list_faces
 from .finish import Planes
@@ -95,13 +99,13 @@ class WeldProblem(NamedTuple):
 class RoofState(NamedTuple):
     """A roof: its sides and planes.
 
-    `basis` (p, q) spans the unknowns that its equations leave free. `regions` are what each volume
-    may roof, empty as long as that follows from the sides.
+    `bases` are those of the members' clusters, by volume. `regions` are what each volume may roof,
+    empty as long as that follows from the sides.
     """
 
     sides: list[list[Side]]
     planes: list[Planes]
-    basis: np.ndarray
+    bases: dict[int, Basis]
     regions: Regions = ()
 
 
@@ -175,17 +179,7 @@ def make_problem(
 def begin_state(sides: list[list[Side]], problem: WeldProblem) -> RoofState:
     """Return the roof as volumes agree on it."""
     agreement = problem.agreement
-    return RoofState(sides, list(agreement.planes), agreement.basis)
-
-
-def sum_at_planes(
-    planes: list[Planes], agreement: Agreement, scene: Scene
-) -> tuple[NormalSums, float]:
-    """Return the normal equations of members at these planes, and their points' cost."""
-    members = [replace(member, rows=planes[k].rows) for k, member in agreement.members.items()]
-    return sum_at_start(members, scene), sum_row_costs(
-        members, [member.rows for member in members], scene
-    )
+    return RoofState(sides, list(agreement.planes), agreement.bases)
 
 
 def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawing:
@@ -265,11 +259,11 @@ def run_round(
     scene, volumes = problem.scene, problem.volumes
     for repair in find_repairs(plan, volumes, state.sides, problem.plan, scene, numbers):
         # Planes are as they were until another equation holds, and so is what one more costs.
-        key = repair.key, state.basis.shape[1] if repair.equations else 0
+        if not repair.owners <= state.bases.keys():
+            continue
+        key = repair.key, *(count_free(state.bases[k]) for k in sorted(repair.owners))
         lines = repair.sides if len(repair.sides) == 1 else {}  # stairs are few
         if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in lines):
-            continue
-        if not repair.owners <= problem.agreement.members.keys():
             continue
         which = (*repair.sides, *repair.owners)
         if which not in boxes:
@@ -518,7 +512,7 @@ def apply_repair(
     """Return the roof after a repair, None if its points cost too much more."""
     most_units = REPAIR_UNITS + LOW_STEP_COST_A_METRE * repair.length
     most_cost = most_units * problem.scene.evidence
-    sides, planes, basis, _ = state
+    sides = state.sides
     extra_cost, volumes = 0.0, problem.volumes[window.numbers]
     for (k, edge), side in repair.sides.items():
         position, old_side = int(np.flatnonzero(window.numbers == k)[0]), state.sides[k][edge]
@@ -527,45 +521,47 @@ def apply_repair(
     if extra_cost > most_cost:
         return None
     if not repair.equations:
-        return RoofState(sides, planes, basis)
+        return state._replace(sides=sides)
     fit = fit_repair(repair, state, most_cost, problem)
-    return None if fit is None else RoofState(sides, *fit)
+    return None if fit is None else state._replace(sides=sides, planes=fit[0], bases=fit[1])
 
 
 def fit_repair(
     repair: Repair, state: RoofState, most_cost: float, problem: WeldProblem
-) -> tuple[list[Planes], np.ndarray] | None:
+) -> tuple[list[Planes], dict[int, Basis]] | None:
     """Fit planes under a repair's equations, too.
 
-    Returns them and the unknowns left free, None if points cost over `most_cost` more.
+    Returns them and the members' bases, None if points cost over `most_cost` more.
     """
-    members, start = problem.agreement.members, problem.agreement.start
-    rows = []
+    members, scene, frame = problem.agreement.members, problem.scene, problem.plan.frame
+    equations = []
     for place, terms in repair.equations:
-        position = np.append(
-            (place - problem.plan.frame.origin[:2]) @ problem.plan.frame.rotation.T, 1.0
+        position = np.append((place - frame.origin[:2]) @ frame.rotation.T, 1.0)
+        equations.append(
+            collect_terms(
+                (k, weight * position @ members[k].common_design[p]) for weight, (k, p) in terms
+            )
         )
-        rows.append(
-            sum(weight * (position @ members[k].common_design[p]) for weight, (k, p) in terms)
-        )
-    equation = np.array(rows)
-    if not np.abs(equation @ state.basis).max() > LEFT_OVER:
+    equation = {k: np.array([one[k] for one in equations]) for k in equations[0]}
+    basis = join_bases([state.bases[k] for k in sorted(repair.owners)])
+    if not np.abs(evaluate_equation(equation, basis)).max() > LEFT_OVER:
         return None
-    free = constrain(state.basis, equation)
-    if not free.shape[1]:
+    free = constrain(basis, equation)
+    if not count_free(free):
         return None
-    sums, cost_before = problem.site.recall(
-        sum_at_planes, state.planes, problem.agreement, problem.scene
-    )
-    member_list = list(members.values())
-    member_rows = place_planes(member_list, solve_normal(sums, free, start).unknowns)
-    if price_rows(member_list, member_rows, problem.scene) > cost_before + most_cost:
+    sums = {
+        k: problem.site.recall(sum_first_round, members[k], state.planes[k].rows, scene)
+        for k in basis
+    }
+    rows = place_planes(members, solve_normal(sums, free, members).unknowns)
+    cost_before = sum_row_costs(members, {k: state.planes[k].rows for k in basis}, scene)
+    if price_rows(members, rows, scene) > cost_before + most_cost:
         return None
-    planes = list(state.planes)
-    for k, plane_rows in zip(members, member_rows, strict=True):
-        # The covariance stays: that planes meet somewhere does not make their place more precise.
-        planes[k] = replace(planes[k], rows=plane_rows)
-    return planes, free
+    # The covariance stays: that planes meet somewhere does not make their place more precise.
+    planes = [
+        replace(one, rows=rows[k]) if k in rows else one for k, one in enumerate(state.planes)
+    ]
+    return planes, state.bases | dict.fromkeys(free, free)
 
 
 def move_line(
