@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .aligned import align_planes
 from .clusters import (
     NO_REMAINDER,
     Basis,
@@ -33,11 +34,11 @@ from .clusters import (
     sum_member,
     sum_row_costs,
 )
-from .conditions import Condition, find_likely_conditions
+from .conditions import Condition, compute_allowance, find_likely_conditions
 from .corners import list_corner_equations
-from .finish import LEVEL_SLACK, ROUNDS, Planes
+from .finish import ROUNDS, Planes
 from .members import LinearVolume, list_members
-from .prices import FOLD_UNITS, PARAMETER_COST
+from .prices import FOLD_UNITS
 from .risen import measure_misfits, restore_risen_planes
 from .scene import Scene
 from .sides import Side
@@ -93,7 +94,7 @@ def agree_planes(
     the outline are moved into it.
     """
     planes, misfits = restore_risen_planes(volumes, planes, scene)
-    members = list_members(volumes, sides, planes, scene)
+    members = align_planes(list_members(volumes, sides, planes, scene), scene)
     at_corners = (
         Condition(*condition, np.inf, FOLD_UNITS)
         for condition in list_corner_equations(members, scene.corners[0])
@@ -198,17 +199,6 @@ def join_clusters(
     return Cluster((*conditions, condition), solution, cost)
 
 
-def compute_allowance(
-    condition: Condition, n_saved: int, members: dict[int, LinearVolume], scene: Scene
-) -> float:
-    """Return the points that an accepted condition may leave unexplained.
-
-    It saves `n_saved` parameters.
-    """
-    slack = LEVEL_SLACK * sum(members[k].points.shape[1] for k in condition.equation)
-    return float(scene.evidence * (PARAMETER_COST * n_saved + condition.spared) + slack)
-
-
 def may_hold(
     condition: Condition,
     members: dict[int, LinearVolume],
@@ -256,7 +246,10 @@ def fit_cluster(
         for equation in by_points:
             free = constrain(free, equation)
         _, covariances, _ = solve_rounds(free, members, scene)
-    new_planes = {k: replace(planes[k], rows=rows[k], covariance=covariances[k]) for k in basis}
+    new_planes = {
+        k: replace(planes[k], rows=rows[k], design=members[k].design, covariance=covariances[k])
+        for k in basis
+    }
     own_rows = {k: members[k].rows for k in basis}
     return CommonFit(new_planes, basis, cost - sum_row_costs(members, own_rows, scene))
 

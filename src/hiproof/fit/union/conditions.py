@@ -15,8 +15,10 @@ import numpy as np
 
 from .add import MOST_VOLUMES
 from .clusters import Equation
-from .finish import RISE_SIGN
+from .finish import LEVEL_SLACK, RISE_SIGN
 from .members import LinearVolume
+from .prices import PARAMETER_COST
+from .scene import Scene
 from .volumes import N_SIDES
 
 NEAR_M = 0.2  # Heights further apart (m) are not tried as one.
@@ -37,6 +39,17 @@ class Condition(NamedTuple):
     spared: float = 0.0
 
 
+def compute_allowance(
+    condition: Condition, n_saved: int, members: dict[int, LinearVolume], scene: Scene
+) -> float:
+    """Return the points that an accepted condition may leave unexplained.
+
+    It saves `n_saved` parameters.
+    """
+    slack = LEVEL_SLACK * sum(members[k].points.shape[1] for k in condition.equation)
+    return float(scene.evidence * (PARAMETER_COST * n_saved + condition.spared) + slack)
+
+
 class VisiblePlane(NamedTuple):
     """A plane of a member on which points lie.
 
@@ -44,6 +57,7 @@ class VisiblePlane(NamedTuple):
     by the member's unknowns. `places` (3, n) are u, v, 1 of its points.
     """
 
+    number: int
     coefficients: np.ndarray
     equation: np.ndarray
     places: np.ndarray
@@ -99,7 +113,7 @@ def list_neighbours(members: dict[int, LinearVolume]) -> list[tuple[int, int]]:
 def list_visible_planes(member: LinearVolume) -> list[VisiblePlane]:
     common, places = member.common_design @ member.unknowns, member.places
     return [
-        VisiblePlane(common[p], member.common_design[p], places[:, numbers])
+        VisiblePlane(p, common[p], member.common_design[p], places[:, numbers])
         for p, numbers in member.visible.items()
     ]
 

@@ -44,13 +44,12 @@ def list_members(
         if not one.design.shape[2] or len(visible[k]) < FEWEST_FITTED_POINTS:
             continue
         turn = scene.turn[int(volumes[k, DIRECTION])]
-        c, s = turn
         points, is_present = take_points(volumes[k], visible[k], scene), np.isfinite(one.rows)
         members[k] = LinearVolume(
             one.rows,
             one.design,
             np.linalg.lstsq(one.design[is_present], one.rows[is_present], rcond=None)[0],
-            np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ one.design,
+            turn_design(one.design, turn),
             points,
             np.array([scene.U[0][visible[k]], scene.V[0][visible[k]], np.ones(len(visible[k]))]),
             find_lowest_planes(one.rows, points),
@@ -59,6 +58,12 @@ def list_members(
             turn,
         )
     return members
+
+
+def turn_design(design: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Return a `design` (k, 3, q) in the first direction's axes, from those at `turn`."""
+    c, s = turn
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ design
 
 
 def find_lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.ndarray]:

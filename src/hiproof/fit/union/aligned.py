@@ -1,0 +1,114 @@
+"""Face planes of two volumes one way where they may be one plane.
+
+A volume's planes face along its axes, or square to its sides, and those of another a degree off.
+Two that are one in truth then cross at a flat angle. The smaller one is turned to face as the
+larger one does, if the points allow that both are one plane.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from .clusters import (
+    constrain,
+    count_free,
+    free_member,
+    join_bases,
+    place_planes,
+    price_rows,
+    solve_normal,
+    sum_first_round,
+)
+from .conditions import (
+    NEAR_M,
+    Condition,
+    VisiblePlane,
+    compute_allowance,
+    equate_planes,
+    list_visible_planes,
+    measure_plane_gap,
+)
+from .members import LinearVolume, turn_design
+from .scene import NEAR_RAD, Scene
+from .volumes import N_SIDES
+
+APART_M = 1.0  # Planes whose points lie further apart (m) are two faces.
+ONE_WAY_RAD = 1e-6  # Planes within this angle (rad) face one way.
+
+
+def align_planes(members: dict[int, LinearVolume], scene: Scene) -> dict[int, LinearVolume]:
+    """Return the members with planes turned that may be one with a larger one's beside them."""
+    planes = [
+        (k, plane)
+        for k, member in members.items()
+        for plane in list_visible_planes(member)
+        if plane.number < N_SIDES
+    ]
+    planes.sort(key=lambda item: -item[1].places.shape[1])
+    if len(planes) < 2:
+        return members
+    low = np.array([plane.places[:2].min(axis=1) for _, plane in planes])
+    high = np.array([plane.places[:2].max(axis=1) for _, plane in planes])
+    facing = np.array([math.atan2(*plane.coefficients[1::-1]) for _, plane in planes])
+    for i in range(1, len(planes)):
+        k, plane = planes[i]
+        turns = np.remainder(facing[:i] - facing[i] + math.pi, 2.0 * math.pi) - math.pi
+        gaps = np.maximum(low[:i] - high[i], low[i] - high[:i]).max(axis=1)
+        is_near = (np.abs(turns) < NEAR_RAD) & (np.abs(turns) > ONE_WAY_RAD) & (gaps < APART_M)
+        for j in np.flatnonzero(is_near).tolist():
+            pair = k, planes[j][0]
+            if pair[0] == pair[1]:
+                continue
+            other = find_visible_plane(members[pair[1]], planes[j][1].number)
+            if measure_plane_gap(plane, other) >= NEAR_M:
+                continue
+            turned = members | {k: turn_plane(members[k], plane.number, float(turns[j]))}
+            new_plane = find_visible_plane(turned[k], plane.number)
+            if may_be_one(new_plane, other, pair, members, turned, scene):
+                members, facing[i] = turned, facing[j]
+                break
+    return members
+
+
+def find_visible_plane(member: LinearVolume, p: int) -> VisiblePlane:
+    return next(plane for plane in list_visible_planes(member) if plane.number == p)
+
+
+def turn_plane(member: LinearVolume, p: int, angle: float) -> LinearVolume:
+    """Return the member with its plane p turned by an angle (rad) about the middle of its points.
+
+    It keeps its slope.
+    """
+    c, s = math.cos(angle) - 1.0, math.sin(angle)
+    middle = member.points[:2, member.visible[p]].mean(axis=1)
+    design, change = member.design.copy(), np.array([[c, -s], [s, c]]) @ member.design[p, :2]
+    design[p] += np.array([*change, -middle @ change])
+    rows = np.where(np.isfinite(member.rows), design @ member.unknowns, np.nan)
+    return replace(member, rows=rows, design=design, common_design=turn_design(design, member.turn))
+
+
+def may_be_one(
+    plane: VisiblePlane,
+    other: VisiblePlane,
+    pair: tuple[int, int],
+    before: dict[int, LinearVolume],
+    after: dict[int, LinearVolume],
+    scene: Scene,
+) -> bool:
+    """Return whether two planes of a `pair` of members may be one `after` one is turned."""
+    left, right = equate_planes(plane, other)
+    condition = Condition(0.0, dict(zip(pair, (left, right), strict=True)))
+    costs = []
+    for members in (before, after):
+        sums = {k: sum_first_round(members[k], members[k].rows, scene) for k in pair}
+        basis = join_bases(free_member(k, members[k]) for k in pair)
+        n_free = count_free(basis)
+        if members is after:
+            basis = constrain(basis, condition.equation)
+        rows = place_planes(members, solve_normal(sums, basis, members).unknowns)
+        costs.append(price_rows(members, rows, scene))
+    allowance = compute_allowance(condition, n_free - count_free(basis), before, scene)
+    return costs[1] <= costs[0] + allowance
