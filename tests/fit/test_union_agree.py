@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union import agree, fit_building
-from hiproof.fit.union.agree import measure_misfits, restore_risen_planes
+from hiproof.fit.union import clusters, fit_building
+from hiproof.fit.union.agree import agree_planes
 from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.finish import read_volume_planes
+from hiproof.fit.union.finish import (
+    find_visible_points,
+    fit_design,
+    read_volume_planes,
+    take_points,
+)
 from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.risen import measure_misfits, restore_risen_planes
 from hiproof.fit.union.scene import make_scene
-from hiproof.fit.union.volumes import LEVEL, OFFSET0, make_base
+from hiproof.fit.union.sides import Side
+from hiproof.fit.union.volumes import LEVEL, N_PLANES, OFFSET0, SLOPE0, U0, V1, make_base
 from hiproof.model import Roof
 from points_of_roofs import sample_heights
 
@@ -69,7 +76,7 @@ def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
     fit = fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
     lower, upper = list_ridge_heights(fit)
     assert upper - lower < 1e-4
-    monkeypatch.setattr(agree, "is_proper", lambda *_: False)
+    monkeypatch.setattr(clusters, "is_proper", lambda *_: False)
     lower, upper = list_ridge_heights(
         fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
     )
@@ -138,8 +145,31 @@ def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
     risen = replace(result[1], rows=result[1].rows + [0.0, 0.0, 0.4])
     with_risen = [result[0], risen, result[2]]
     assert measure_misfits(volumes, with_risen, scene)[0].sum() > 0.5 * scene.n
-    _, misfit = restore_risen_planes(volumes, with_risen, scene)
-    assert misfit == measure_misfits(volumes, result, scene)[0].sum()
+    _, misfits = restore_risen_planes(volumes, with_risen, scene)
+    assert np.array_equal(misfits, measure_misfits(volumes, result, scene)[0])
     shifted = replace(result[2], rows=result[2].rows + [0.0, 0.0, 0.02])
     planes, _ = restore_risen_planes(volumes, [*result[:2], shifted], scene)
     assert planes[2] is shifted
+
+
+@pytest.mark.parametrize(("bend", "n_planes"), [(0.0, 1), (0.25, 2)])
+def test_planes_that_face_a_degree_apart_are_one_where_the_points_are(bend, n_planes):
+    outline = shapely.box(0.0, 0.0, 20.0, 8.0)
+    points = sample_heights(
+        lambda x, y: 5.0 + 0.6 * y + bend * (x > 12.0) * (x - 12.0), outline, 5.0, 0.02
+    )
+    plan = lay_out_plan(points, outline)
+    scene = make_scene(plan, outline, [0.0], 3.0, 0.2, list_allowed_shapes(()))
+    volumes = np.repeat(make_base(-9.0), 3, axis=0)
+    volumes[1:, OFFSET0 : OFFSET0 + N_PLANES] = np.inf
+    volumes[1:, U0 : V1 + 1] = (-4, 4, -2, 10), (-4, 4, -10, -2)  # u is y - 4, and v is 10 - x
+    volumes[1:, OFFSET0], volumes[1:, SLOPE0] = 7.4 - plan.frame.origin[2], 0.6
+    planes = [read_volume_planes(volume, scene) for volume in volumes]
+    for k, lean in ((1, 0.0), (2, 0.02)):  # the planes rise from the left
+        design = np.zeros((5, 3, 2))
+        design[0] = [[0.0, 1.0], [0.0, lean], [1.0, 0.0]]
+        own = take_points(volumes[k], find_visible_points(volumes, scene)[k], scene)
+        planes[k] = fit_design(planes[k], design, own, scene)
+    sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
+    first, second = (one.rows[0] for one in agree_planes(volumes, sides, planes, scene).planes[1:])
+    assert len({tuple(np.round(rows, 9)) for rows in (first, second)}) == n_planes

@@ -48,6 +48,7 @@ risen       compiled: volumes whose fitted planes rise above others, put back
 members     the volumes whose planes the points determine
 clusters    members tied by equations, and the normal equations of their unknowns
 conditions  planes, slopes, ridges and eaves of members that are nearly equal
+aligned     planes of two volumes that may be one, faced one way
 corners     hips and valleys that end beside a corner of the outline, moved into it
 agree       the conditions of both that hold
 drawn_plan  the plan of the drawn roof: its corners, and the planes beside its edges

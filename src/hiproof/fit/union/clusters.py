@@ -51,10 +51,12 @@ def free_member(k: int, member: LinearVolume) -> Basis:
 def join_bases(bases: Iterable[Basis]) -> Basis:
     """Return the basis of several clusters together. One cluster may come several times."""
     bases = list({id(basis): basis for basis in bases}.values())
-    sizes, joint = [count_free(basis) for basis in bases], Basis()
-    for n, basis in enumerate(bases):
-        before, after = sum(sizes[:n]), sum(sizes[n + 1 :])
-        joint |= {k: np.pad(own, ((0, 0), (before, after))) for k, own in basis.items()}
+    sizes, joint, first = [count_free(basis) for basis in bases], Basis(), 0
+    for size, basis in zip(sizes, bases, strict=True):
+        for k, own in basis.items():
+            joint[k] = np.zeros((len(own), sum(sizes)))
+            joint[k][:, first : first + size] = own
+        first += size
     return joint
 
 

@@ -30,13 +30,15 @@ class Condition(NamedTuple):
     """An `equation` that nearly holds between two members.
 
     `gap` is the height (m) by which it fails, `allowed` the one that is accepted whatever the
-    points' deviations. `spared` are units that it saves besides its parameters.
+    points' deviations. `spared` are units that it saves besides its parameters. It ties at most
+    `most_tied` members: any number may have one plane, but equal slopes would tie all of a block.
     """
 
     gap: float
     equation: Equation
     allowed: float = LEVELLED_M
     spared: float = 0.0
+    most_tied: float = np.inf
 
 
 def compute_allowance(
@@ -93,7 +95,8 @@ def find_likely_conditions(members: dict[int, LinearVolume]) -> Iterator[Conditi
                 for y in other_dimensions:
                     gap = max(x.reach, y.reach) * abs(x.value - y.value)
                     if gap < NEAR_M:
-                        yield Condition(gap, {j: x.equation[None], k: -y.equation[None]})
+                        equation = {j: x.equation[None], k: -y.equation[None]}
+                        yield Condition(gap, equation, most_tied=MOST_VOLUMES)
 
 
 def list_neighbours(members: dict[int, LinearVolume]) -> list[tuple[int, int]]:

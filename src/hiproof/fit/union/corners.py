@@ -52,8 +52,6 @@ def list_corner_equations(
     with how far apart in height (m) the planes are there.
     """
     numbers, member_list = list(members), list(members.values())
-    if not members:
-        return
     rows = evaluate_rows(member_list)
     corners = np.vstack([ring, *(list_own_corners(member, ring) for member in member_list)])
     for corner, planes in zip(corners, list_planes_at(member_list, rows, corners), strict=True):
