@@ -109,7 +109,8 @@ def list_drums(roof: JudgedRoof) -> Iterator[Part]:
         if part.type == "flat" and np.count_nonzero(own) >= FEWEST_LEVEL_POINTS:
             level = compute_median(z[own])
             group = [other for other in roof.parts if is_at_level(other, level)]
-            group = select_touching(group, unite_outlines([part]))
+            if len(group) > 1:
+                group = select_touching(group, unite_outlines([part]))
             is_level = np.array([any(other is one for one in group) for other in roof.parts])
             starts = (is_level[top], own) if np.count_nonzero(is_level) > 1 else (own,)
             drums = (fit_drum(roof, level, start) for start in starts)
