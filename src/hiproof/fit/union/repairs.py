@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from .drawn_plan import DrawnPlan
 from .members import is_inside_sides
@@ -211,8 +212,12 @@ def list_leaning_lines(sides: list[VisibleSide]) -> Iterator[Repair]:
     if len(sides) < 2:
         return
     ends = np.array([side.reach for side in sides])
-    apart = np.linalg.norm(ends[:, None, :, None] - ends[None, :, None], axis=-1).min(axis=(2, 3))
-    for i, j in np.argwhere(np.triu(apart < REPAIR_REACH_M, 1)).tolist():
+    points = shapely.points(ends.reshape(-1, 2))
+    near = shapely.STRtree(points).query(points, "dwithin", 2.0 * REPAIR_REACH_M) // 2
+    pairs = np.array(sorted({(i, j) for i, j in near.T.tolist() if i < j}), int).reshape(-1, 2)
+    apart = ends[pairs[:, 0], :, None] - ends[pairs[:, 1], None]
+    is_near = np.linalg.norm(apart, axis=-1).min(axis=(1, 2)) < REPAIR_REACH_M
+    for i, j in pairs[is_near].tolist():
         middle, other_middle = ends[[i, j]].mean(axis=1)
         across, along = (other_middle - middle).tolist()
         if not abs(across) < MOST_SIDE_LEAN * abs(along):

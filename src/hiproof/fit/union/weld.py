@@ -432,11 +432,14 @@ def list_line_ends(sides: list[list[Side]], k: int, edge: int, problem: WeldProb
 
     They are in local coordinates.
     """
-    offsets, leans, _ = problem.site.recall(lay_out_sides, sides)
-    numbers, edges = np.array(list_sides_on_line(sides, k, edge, problem), int).reshape(-1, 2).T
+    on_line = list_sides_on_line(sides, k, edge, problem)
     beside = slice(2, 4) if edge < 2 else slice(0, 2)
-    across = offsets[numbers, edges, None], leans[numbers, edges, None]
-    x, y = cross_lines(*across, offsets[numbers, beside], leans[numbers, beside])
+    lines = [(sides[j][other], *sides[j][beside]) for j, other in on_line]
+    offsets, leans = (
+        np.array([[getattr(side, name) for side in line] for line in lines]).reshape(-1, 3)
+        for name in ("offset", "lean")
+    )
+    x, y = cross_lines(offsets[:, :1], leans[:, :1], offsets[:, 1:], leans[:, 1:])
     ends = np.stack([x, y] if edge < 2 else [y, x], axis=-1).reshape(-1, 2)
     c, s = problem.scene.turn[int(problem.volumes[k, DIRECTION])]
     return problem.plan.frame.xy_local(ends @ np.array([[c, s], [-s, c]]))
@@ -582,35 +585,19 @@ def list_sides_on_line(
 
     Sides on the outline are left out, and those too far along the line.
     """
-    offsets, lean, anchored = problem.site.recall(lay_out_sides, sides)
-    old_side, directions = sides[k][edge], problem.volumes[:, DIRECTION]
-    is_near = (
-        (np.abs(offsets - old_side.offset) < ONE_LINE_M)
-        & (np.abs(lean - old_side.lean) < ONE_LINE_M)
-        & ~anchored
-    )
-    is_near &= (directions == directions[k])[:, None]
-    starts, ends = problem.volumes[:, [V0, V1] if edge < 2 else [U0, U1]].T
+    volumes, old_side = problem.volumes, sides[k][edge]
+    starts, ends = volumes[:, [V0, V1] if edge < 2 else [U0, U1]].T
     is_within = (starts < ends[k] + LINE_REACH_M) & (ends > starts[k] - LINE_REACH_M)
-    is_near &= is_within[:, None]
-    is_near[0], is_near[:, (edge ^ 2) & 2], is_near[:, (edge ^ 2) | 1] = False, False, False
-    return [(j, e) for j, e in np.argwhere(is_near).tolist()]
-
-
-def lay_out_sides(sides: list[list[Side]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return where all sides lie, their leans, and whether they are anchored.
-
-    These are three arrays (k, 4).
-    """
-    offsets, lean = (
-        np.array([[getattr(side, name) for side in volume_sides] for volume_sides in sides])
-        for name in ("offset", "lean")
-    )
-    return (
-        offsets,
-        lean,
-        np.array([[side.anchored for side in volume_sides] for volume_sides in sides]),
-    )
+    is_within &= volumes[:, DIRECTION] == volumes[k, DIRECTION]
+    is_within[0] = False
+    return [
+        (j, e)
+        for j in np.flatnonzero(is_within).tolist()
+        for e in ((0, 1) if edge < 2 else (2, 3))
+        if abs(sides[j][e].offset - old_side.offset) < ONE_LINE_M
+        and abs(sides[j][e].lean - old_side.lean) < ONE_LINE_M
+        and not sides[j][e].anchored
+    ]
 
 
 def measure_extra_cost(
