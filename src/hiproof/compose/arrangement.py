@@ -57,13 +57,10 @@ def is_beside(p, a, b, reach):
 
 
 @compiled
-def find_reach(reaches, place):
-    """Return the reach at a place: that of the last zone (k, 5) that holds it."""
+def find_reach(reaches, x, y):
+    """Return the reach at (x, y): that of the last zone (k, 5) that holds it."""
     for k in range(len(reaches) - 1, 0, -1):
-        if (
-            reaches[k, 0] <= place[0] <= reaches[k, 2]
-            and reaches[k, 1] <= place[1] <= reaches[k, 3]
-        ):
+        if reaches[k, 0] <= x <= reaches[k, 2] and reaches[k, 1] <= y <= reaches[k, 3]:
             return reaches[k, 4]
     return reaches[0, 4]
 
@@ -83,7 +80,7 @@ def find_vertex_near_segment(xy, near, a, b, r, reaches):
         x, y = xy[v, 0], xy[v, 1]
         if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
-        reach = find_reach(reaches, xy[v])
+        reach = find_reach(reaches, x, y)
         if not is_beside(xy[v], xy[a], xy[b], reach):
             continue
         along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
@@ -136,12 +133,12 @@ def crossing_point(a, b, c, d):
 
 
 @compiled
-def number_ends(segments, reaches):
-    """Number the end points of the segments as vertices.
+def number_ends(segments, reaches, r):
+    """Number the end points of the segments as vertices. No reach is over `r`.
 
     Returns xy with room to grow, their number, the ends (m, 2), and buckets of the vertices.
     """
-    size, r = len(segments), np.int64(reaches[:, 4].max()) + 1
+    size = len(segments)
     xy, count = np.empty((2 * size + 16, 2), np.int64), 0
     ends, near = np.empty((size, 2), np.int64), np.empty(0, np.int64)
     buckets = lay_buckets(segments.reshape(-1, 2), size)
@@ -149,7 +146,7 @@ def number_ends(segments, reaches):
         for end in range(2):
             x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
             near, others = list_near(x - r, y - r, x + r, y + r, buckets, near)
-            v = find_vertex_at(xy, near[:others], x, y, find_reach(reaches, (x, y)))
+            v = find_vertex_at(xy, near[:others], x, y, find_reach(reaches, x, y))
             if v < 0:
                 v, xy[count, 0], xy[count, 1] = count, x, y
                 buckets = enter_item(v, x, y, x, y, buckets)
@@ -179,11 +176,13 @@ def node(segments, reaches):
     them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
     from hanging a run).
     """
-    xy, count, ends, places = number_ends(segments, reaches)
+    r = np.int64(0)
+    for k in range(len(reaches)):
+        r = max(r, np.int64(reaches[k, 4]) + 1)
+    xy, count, ends, places = number_ends(segments, reaches, r)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
     borders, near = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64)
-    r = np.int64(reaches[:, 4].max()) + 1
     steps = 0
     while top > 0:
         steps += 1
@@ -216,10 +215,14 @@ def node(segments, reaches):
         places = enter_item(count - 1, x, y, x, y, places)
         stack, top = append_row(stack, top, a, b)
         near, others = list_near(x - r, y - r, x + r, y + r, borders, near)
-        reach = find_reach(reaches, (x, y))
+        reach = find_reach(reaches, x, y)
         top = take_back(xy, count - 1, e, edges, near[:others], stack, top, reach)
-    live = edges[:edge_count, 0] >= 0
-    return xy[:count].copy(), edges[:edge_count][live]
+    live = 0
+    for e in range(edge_count):
+        if edges[e, 0] >= 0:
+            copy_row(edges[live], edges[e])
+            live += 1
+    return xy[:count].copy(), edges[:live].copy()
 
 
 @compiled
@@ -229,8 +232,11 @@ def take_back(xy, vertex, crossed, edges, near, stack, top, reach):
     These are the `crossed` edge and those beside `vertex`, in their order. Returns the stack's new
     top.
     """
-    for other in sort_values(1.0 * near):
-        e = int(other)
+    for i in range(len(near)):
+        for j in range(i, 0, -1):  # in order, for there are few
+            if near[j - 1] > near[j]:
+                near[j - 1], near[j] = near[j], near[j - 1]
+    for e in near:
         c = edges[e, 0]
         if c >= 0 and (e == crossed or is_beside(xy[vertex], xy[c], xy[edges[e, 1]], reach)):
             copy_row(stack[top], edges[e])
@@ -582,11 +588,13 @@ def choose_heir(xy, edges, face, label, region, length, planes, sliver, anyone):
                     for end in range(2):
                         z = evaluate_height(planes[label[r]], xy[edges[e, end]])
                         fits[r] = fits[r] and lower - BEYOND_UNITS < z < upper + BEYOND_UNITS
-    if label[sliver] < 0 or (anyone and not (fits & (shared > 0.0)).any()):
-        fits[:] = True
+    none_fits = True
+    for r in range(len(label)):
+        none_fits = none_fits and not (fits[r] and shared[r] > 0.0)
+    anyone = label[sliver] < 0 or (anyone and none_fits)
     heir, longest = OUTSIDE, 0.0
     for r in range(len(label)):
-        if fits[r] and shared[r] > longest:
+        if (fits[r] or anyone) and shared[r] > longest:
             heir, longest = label[r], shared[r]
     return heir
 

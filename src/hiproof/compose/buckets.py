@@ -48,7 +48,9 @@ def lay_buckets(xy, segments):
     width, height = x - lowest_x, y - lowest_y
     most = max(1, segments // SEGMENTS_A_BUCKET)
     size = 1 + np.int64(max((width + height) / most, np.sqrt(float(width) * float(height) / most)))
-    layout = np.array([lowest_x, lowest_y, size, width // size + 1, height // size + 1, 0])
+    layout = np.zeros(6, np.int64)
+    layout[0], layout[1], layout[2] = lowest_x, lowest_y, size
+    layout[3], layout[4] = width // size + 1, height // size + 1
     first = np.full(layout[3] * layout[4], -1, np.int64)
     return layout, first, np.empty((2 * segments + 16, 2), np.int64)
 

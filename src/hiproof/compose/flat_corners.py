@@ -88,6 +88,6 @@ def turn_flat_corners_in(xy, edges, side, ties, reaches, may_turn):
             continue
         x = np.rint(xy[a, 0] + along * dx / length - INWARD_UNITS * dy / length)
         y = np.rint(xy[a, 1] + along * dy / length + INWARD_UNITS * dx / length)
-        if is_free(xy, edges, v, x, y, find_reach(reaches, xy[v])):
+        if is_free(xy, edges, v, x, y, find_reach(reaches, xy[v, 0], xy[v, 1])):
             xy[v, 0], xy[v, 1] = np.int64(x), np.int64(y)
     return xy

@@ -102,7 +102,7 @@ def split_at_crossings(xy, edges, side, planes, reaches):
             continue
         t = at_a / (at_a - at_b)
         length = np.hypot(float(b[0] - a[0]), float(b[1] - a[1]))
-        reach = find_reach(reaches, a)
+        reach = find_reach(reaches, a[0], a[1])
         if t * length < reach or (1 - t) * length < reach:
             v = edges[e, 0] if t < 0.5 else edges[e, 1]
             z0 = evaluate_plane(planes, left, xy[v, 0], xy[v, 1])

@@ -369,7 +369,7 @@ def cure_all(
     """
     patches, failures = [], []
     for sectors, box in zip(places, boxes, strict=True):
-        reach = find_reach(reaches, sectors.corner)
+        reach = find_reach(reaches, *map(int, sectors.corner))
         patch = cure(sectors, max(SETBACK_M / GRID_M, 4 * reach) * widening)
         if patch is None:
             failures.append(box)

@@ -87,7 +87,12 @@ def without_short_edges(xy, edges, side, planes, reaches):
                 count != 2
                 or distant == stays
                 or not is_clear(
-                    xy, edges, missing, stays, distant, find_reach(reaches, xy[missing])
+                    xy,
+                    edges,
+                    missing,
+                    stays,
+                    distant,
+                    find_reach(reaches, xy[missing, 0], xy[missing, 1]),
                 )
             ):
                 continue
