@@ -94,7 +94,7 @@ Vienna's even places: 82.0, 81.9, 81.8 % at 1, 2 and 3 units, 81.7 without copie
 
 # What a change may cost that a draughtsman would make, in units.
 
-SLIVER_UNITS = 3.0  # dropping a plane of which a narrow strip is visible
+SLIVER_UNITS = 3.0  # dropping a plane or a volume of which hardly anything is visible
 FOLD_UNITS = 2.0  # a fold line that ends in a corner: nobody draws the short edge
 SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
 

@@ -1,7 +1,7 @@
 """Drop what is visible as a speck or a sliver.
 
 Such are a volume of a point or two, and a plane that is a strip at its volume's edge. They are
-dropped however well they explain what a scanner saw of the wall there.
+dropped even if they explain a little of what a scanner saw of the wall there.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from .volumes import (
     SLOPE0,
     UNSORTED,
     compute_roof_heights,
+    is_fixed,
     list_movable,
     measure_runs,
 )
@@ -34,18 +35,20 @@ SAME_STEEPNESS = 0.05  # Planes of a hip differ less in slope (rise over run).
 
 
 def drop_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """Drop volumes that are visible at hardly any point, those with the fewest first.
+    """Drop volumes that are visible at hardly any point.
 
-    A single volume stays: it is all there is of its roof.
+    They stay if dropping them costs more than a part would. A single volume stays, too: it is all
+    there is of its roof.
     """
-    while len(volumes) > 2:
+    value, k = compute_objective(volumes, scene, np.inf), len(volumes)
+    while (k := k - 1) > 0 and len(volumes) > 2:
         _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
-        movable = list_movable(volumes)
-        n_seen = np.bincount(top[: scene.n], minlength=len(volumes))[movable]
-        if n_seen.min(initial=FEWEST_SEEN) >= FEWEST_SEEN:
-            break
-        trial = remove_volume(volumes, int(movable[np.argmin(n_seen)]))
-        volumes, _ = refit_volumes(trial, scene, compute_objective(trial, scene, np.inf))
+        if is_fixed(volumes, k) or np.count_nonzero(top[: scene.n] == k) >= FEWEST_SEEN:
+            continue
+        trial = remove_volume(volumes, k)
+        trial, trial_value = refit_volumes(trial, scene, compute_objective(trial, scene, np.inf))
+        if trial_value < value + SLIVER_UNITS * scene.evidence:
+            volumes, value = trial, min(value, trial_value)
     return volumes
 
 
