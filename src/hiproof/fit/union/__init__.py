@@ -57,6 +57,7 @@ faces       the faces of the drawn plan, and who may take them
 weld        the repairs that pay: sides that end in corners, low steps that become fold lines,
             faces handed to the volumes beside them
 regions     where each volume roofs the outline
+levels      equal levels that touch, as one
 names       from volumes to named parts of the family of roof shapes
 teeth       rows of equal monopitches as saw-teeth
 larger      gambrels combined from their parts
@@ -97,6 +98,7 @@ from .fit import BuildingFit
 from .gaps import split_at_gaps
 from .groups import run_in_groups
 from .larger import combine_parts
+from .levels import join_levels
 from .names import name_part
 from .objective import is_base_visible
 from .outline import draw_outline
@@ -158,6 +160,7 @@ def fit_building(
     agreement = agree_planes(volumes, roof.sides, roof.planes, scene)
     base = is_base_visible(volumes, scene)
     sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
+    sides, regions = join_levels(volumes, sides, planes, regions, site)
     parts = [
         name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, types)
         for k, polygons in list_part_polygons(regions, outline, plan)

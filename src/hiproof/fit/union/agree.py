@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .add import MOST_VOLUMES
 from .aligned import align_planes
 from .clusters import (
     NO_REMAINDER,
@@ -50,10 +49,6 @@ REACHED_M = 0.003
 # The quadratic form of the normal equations overestimates what a condition costs. Of 532 accepted
 # in Delft, none had 2.7 times its allowance. Others are not tried on the points.
 MOST_ESTIMATED = 4.0
-# Share of the points, of a large roof of as many as MOST_VOLUMES volumes have, that a cluster may
-# leave unexplained besides. Steep planes that agree below their neighbours may rise above these.
-# Only the misfit of the roof shows that: a volume's own points lie where it alone is visible.
-MOST_WORSE_SHARE = 0.02
 
 
 class Agreement(NamedTuple):
@@ -70,19 +65,24 @@ class Agreement(NamedTuple):
 class Cluster(NamedTuple):
     """Members that the accepted `conditions` tie, in the first round of their fit.
 
-    `cost` is that of their points.
+    `cost` is that of their points, and may be higher by `allowance` for what the conditions save.
     """
 
     conditions: tuple[Condition, ...]
     solution: Solution
     cost: float
+    allowance: float
 
 
 class CommonFit(NamedTuple):
-    """The fit of a cluster: its members' `planes`, and the `basis` of their unknowns."""
+    """The fit of a cluster: its members' `planes`, and the `basis` of their unknowns.
+
+    All points may cost more by its `allowance`.
+    """
 
     planes: dict[int, Planes]
     basis: Basis
+    allowance: float
 
 
 def agree_planes(
@@ -120,9 +120,11 @@ def drop_risen_fits(
     misfits: np.ndarray,
     scene: Scene,
 ) -> list[CommonFit]:
-    """Return the fits without those that rise above other volumes.
+    """Return the fits without those that cost more points than their conditions save.
 
-    `misfits` (n,) is what each point costs under the `planes` before.
+    A volume's own points lie where it alone is visible. Steep planes that agree below their
+    neighbours may rise above these. `misfits` (n,) is what each point costs under the `planes`
+    before.
     """
     if not fits:
         return fits
@@ -132,8 +134,7 @@ def drop_risen_fits(
             number[k], trial[k] = n, one
     new_misfits, top = measure_misfits(volumes, trial, scene)
     excess = np.bincount(number[top], new_misfits - misfits, len(fits) + 1)
-    most_worse = MOST_WORSE_SHARE * scene.n * min(1.0, MOST_VOLUMES / len(volumes))
-    return [fit for fit, extra in zip(fits, excess[:-1], strict=True) if extra <= most_worse]
+    return [fit for fit, extra in zip(fits, excess[:-1], strict=True) if extra <= fit.allowance]
 
 
 def choose_conditions(
@@ -169,7 +170,7 @@ def begin_cluster(
 ) -> Cluster:
     solution = solve_normal(sums, free_member(k, members[k]), members)
     rows = place_planes(members, solution.unknowns)
-    return Cluster((), solution, sum_row_costs(members, rows, scene))
+    return Cluster((), solution, sum_row_costs(members, rows, scene), 0.0)
 
 
 def join_clusters(
@@ -201,13 +202,15 @@ def join_clusters(
     if not cost <= sum(cluster.cost for cluster in clusters) + allowance:
         return None
     conditions = [one for cluster in clusters for one in cluster.conditions]
-    return Cluster((*conditions, condition), solution, cost)
+    allowance += sum(cluster.allowance for cluster in clusters)
+    return Cluster((*conditions, condition), solution, cost, allowance)
 
 
 def estimate_extra_squares(equation: Equation, clusters: list[Cluster]) -> float:
     """Return by how much (m2) an equation lets the weighted squared residuals grow."""
     gap, variance = np.zeros(1), np.zeros((1, 1))
-    for _, solution, _ in clusters:
+    for cluster in clusters:
+        solution = cluster.solution
         own = {k: factors for k, factors in equation.items() if k in solution.basis}
         factors = evaluate_equation(own, solution.basis)
         gap = gap + evaluate_equation(own, solution.unknowns)
@@ -266,7 +269,7 @@ def fit_cluster(
         k: replace(planes[k], rows=rows[k], design=members[k].design, covariance=covariances[k])
         for k in basis
     }
-    return CommonFit(new_planes, basis)
+    return CommonFit(new_planes, basis, cluster.allowance)
 
 
 def solve_rounds(

@@ -21,7 +21,7 @@ from .regions import exclude_parts, list_polygons, unite_outlines
 from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, lay_places, unite_saw_teeth
 
 # Difference (m) in height allowed between a gambrel and the parts that it replaces.
-GAMBREL_GAP_M = 0.3
+GAMBREL_GAP_M = 0.15
 GAMBREL_SHARE = 0.9  # Share of places at which it must hold.
 SKEWED = 1e-6  # Slope (rise over run) along the ridge that is numerically none.
 LEAST_BREAK = 0.1  # Smallest share of a gambrel's width between its breaks.

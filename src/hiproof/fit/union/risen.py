@@ -62,14 +62,18 @@ def restore_risen_planes(
 
     Planes are fitted to the points over which their volume is visible. Where it is hidden, such as
     one of two gables of nearly the same slopes, they may come out above the other and fit less.
-    Also returns what each point costs (n,).
+    They go back where points that others explained cost a unit more, or where all points cost more
+    by RISEN_SHARE. Also returns what each point costs (n,).
     """
     planes, risen = list(planes), np.zeros(len(planes), bool)
-    heights, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    heights, visible = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
     search_misfits = compute_misfits(scene.z[: scene.n], heights[: scene.n], scene)
     while True:
         misfits, top = measure_misfits(volumes, planes, scene)
-        excess = np.bincount(top, misfits - search_misfits - RISEN_SHARE, len(planes))
+        extra = misfits - search_misfits
+        over_others = np.bincount(top, extra * (top != visible[: scene.n]), len(planes))
+        over_all = np.bincount(top, extra - RISEN_SHARE, len(planes))
+        excess = np.maximum(over_others - scene.evidence, over_all)
         excess[risen] = 0.0
         k = int(np.argmax(excess))
         if excess[k] <= 0.0:

@@ -1,0 +1,36 @@
+"""Check that level volumes that touch at one height are one part."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof import fit_building
+from points_of_roofs import sample_heights
+
+# West, south, east, north (m) of the boxes at one level, above a lower one all around.
+STAGGERED = {
+    "L": [(2, 2, 14, 8), (2, 8, 8, 14)],
+    "stairs": [(2, 2, 7, 6), (2, 6, 11, 10), (2, 10, 15, 14)],
+    "T": [(2, 9, 16, 14), (7, 2, 11, 9)],
+}
+
+
+@pytest.mark.parametrize("name", STAGGERED)
+@pytest.mark.parametrize("seed", range(3))
+def test_boxes_that_touch_at_one_level_are_one_part(name, seed):
+    top = shapely.union_all([shapely.box(*ends) for ends in STAGGERED[name]])
+    outline = shapely.box(0, 0, 18, 16)
+
+    def height(x, y):
+        return np.where(shapely.contains_xy(top, x, y), 7.0, 4.0)
+
+    fit = fit_building(sample_heights(height, outline, 6.0, 0.02, seed), outline)
+    flat = [part for part in fit.roof_parts if part.type == "flat"]
+    for part, other in combinations(flat, 2):
+        outlines = [shapely.union_all(one.outlines) for one in (part, other)]
+        shared = shapely.intersection(*[one.boundary for one in outlines]).length
+        same = abs(part.translation[2] - other.translation[2]) < 1e-6
+        assert not (same and shared > 0.1)
+    assert len(flat) == 2
