@@ -9,7 +9,7 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
 from hiproof.compose.bends import bent_faces
-from hiproof.compose.zones import ATTEMPTS, EVERYWHERE, Zone
+from hiproof.compose.zones import ATTEMPTS, WHOLE_PLAN, Zone
 from hiproof.model import Face, Solid
 from hiproof.settings import Settings
 from roof_zoo import KINDS, generate_roof
@@ -84,7 +84,7 @@ def test_few_roofs_need_coarser_snapping():
     first = 0
     for seed in range(100):
         problem = composing.plan_problem(generate_roof("unions", seed))
-        solid = composing.compose_at(problem, 0.0, options, [Zone(EVERYWHERE, 0)])
+        solid = composing.compose_at(problem, 0.0, options, [Zone(WHOLE_PLAN, 0)])
         first += check_solid(solid, planarity_m=options.planarity_m) == ()
     assert first >= 97
 
@@ -99,7 +99,7 @@ def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
     for seed in range(4):
         problem = composing.plan_problem(generate_roof(kind, seed))
         plain, turned = (
-            composing.compose_at(problem, -2.0, options, [Zone(EVERYWHERE, number)])
+            composing.compose_at(problem, -2.0, options, [Zone(WHOLE_PLAN, number)])
             for number in (separate, turned_in)
         )
         assert [face.kind for face in plain.faces] == [face.kind for face in turned.faces]

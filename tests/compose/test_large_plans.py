@@ -9,7 +9,7 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.compose.arrangement import is_beside, node
 from hiproof.compose.buckets import enter_edge, lay_buckets, list_near
-from hiproof.compose.zones import ATTEMPTS, EVERYWHERE, Zone, add_zones, list_reaches
+from hiproof.compose.zones import ATTEMPTS, WHOLE_PLAN, Zone, add_zones, list_reaches
 from hiproof.frames import LocalFrame
 from hiproof.model import Part, Piece, Roof
 
@@ -86,7 +86,7 @@ def test_any_number_of_crosswise_corners_is_mended():
 
 
 def test_each_zone_goes_on_from_the_attempts_made_there():
-    zones = (Zone(EVERYWHERE, 0),)
+    zones = (Zone(WHOLE_PLAN, 0),)
     for number in (1, 2):
         zones = add_zones(zones, [(0.0, 0.0, 1.0, 1.0)])
         assert zones[-1].number == number
@@ -98,8 +98,8 @@ def test_each_zone_goes_on_from_the_attempts_made_there():
 
 
 def test_no_zone_is_left_after_the_last_attempt():
-    zones = (Zone(EVERYWHERE, 0),)
+    zones = (Zone(WHOLE_PLAN, 0),)
     for _ in ATTEMPTS[1:]:
-        zones = add_zones(zones, [EVERYWHERE])
+        zones = add_zones(zones, [WHOLE_PLAN])
     assert len(zones) == len(ATTEMPTS)
     assert add_zones(zones, [(0.0, 0.0, 1.0, 1.0)]) == ()

@@ -30,10 +30,10 @@ COLLINEAR_UNITS = 5.0
 
 
 @compiled
-def find_vertex_at(xy, near, x, y, reach):
-    """Return the vertex of `near` nearest to (x, y) within `reach`, -1 if there is none."""
+def find_vertex_at(xy, items, x, y, reach):
+    """Return the vertex of `items` nearest to (x, y) within `reach`, else -1."""
     best, best_d2 = -1, reach * reach
-    for v in near:
+    for v in items:
         dx, dy = xy[v, 0] - x, xy[v, 1] - y
         if abs(dx) < reach and abs(dy) < reach:
             d2 = float(dx * dx + dy * dy)
@@ -66,8 +66,8 @@ def find_reach(reaches, x, y):
 
 
 @compiled
-def find_vertex_near_segment(xy, near, a, b, r, reaches):
-    """Return the vertex of `near` beside segment ab that is nearest to a, -1 if there is none.
+def find_vertex_near_segment(xy, items, a, b, r, reaches):
+    """Return the vertex of `items` beside segment ab nearest to a, else -1.
 
     No reach is over `r`. The segment's ends do not count. Nor does a vertex that makes a small
     triangle with them, in which an end lies beside the edge from the vertex to the other end: its
@@ -76,7 +76,7 @@ def find_vertex_near_segment(xy, near, a, b, r, reaches):
     x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
     y_low, y_high = min(xy[a, 1], xy[b, 1]) - r, max(xy[a, 1], xy[b, 1]) + r
     best, best_along = -1, np.int64(0)
-    for v in near:
+    for v in items:
         x, y = xy[v, 0], xy[v, 1]
         if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
@@ -102,12 +102,12 @@ def turn(a, b, c):
 
 
 @compiled
-def find_first_crossing(xy, edges, near, a, b):
-    """Return the first live edge of `near` that properly crosses segment ab, else -1."""
+def find_first_crossing(xy, edges, items, a, b):
+    """Return the first live edge of `items` that properly crosses segment ab, else -1."""
     x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
     y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
     first = -1
-    for e in near:
+    for e in items:
         c, d = edges[e, 0], edges[e, 1]
         if c < 0 or 0 <= first <= e or c in (a, b) or d in (a, b):
             continue
@@ -140,13 +140,13 @@ def number_ends(segments, reaches, r):
     """
     size = len(segments)
     xy, count = np.empty((2 * size + 16, 2), np.int64), 0
-    ends, near = np.empty((size, 2), np.int64), np.empty(0, np.int64)
+    ends, items = np.empty((size, 2), np.int64), np.empty(0, np.int64)
     buckets = lay_buckets(segments.reshape(-1, 2), size)
     for s in range(size):
         for end in range(2):
             x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
-            near, others = list_near(x - r, y - r, x + r, y + r, buckets, near)
-            v = find_vertex_at(xy, near[:others], x, y, find_reach(reaches, x, y))
+            items, n_items = list_near(x - r, y - r, x + r, y + r, buckets, items)
+            v = find_vertex_at(xy, items[:n_items], x, y, find_reach(reaches, x, y))
             if v < 0:
                 v, xy[count, 0], xy[count, 1] = count, x, y
                 buckets = enter_item(v, x, y, x, y, buckets)
@@ -156,9 +156,9 @@ def number_ends(segments, reaches, r):
 
 
 @compiled
-def has_edge(edges, near, a, b):
-    """Return whether edge ab, in either direction, is one of `near`."""
-    for e in near:
+def has_edge(edges, items, a, b):
+    """Return whether edge ab, in either direction, is one of `items`."""
+    for e in items:
         c, d = edges[e, 0], edges[e, 1]
         if (c == a and d == b) or (c == b and d == a):
             return True
@@ -182,7 +182,7 @@ def node(segments, reaches):
     xy, count, ends, places = number_ends(segments, reaches, r)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    borders, near = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64)
+    borders, items = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64)
     steps = 0
     while top > 0:
         steps += 1
@@ -196,16 +196,16 @@ def node(segments, reaches):
             stack = grow_array(stack)
         x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
         y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
-        near, others = list_near(x_low - r, y_low - r, x_high + r, y_high + r, places, near)
-        v = find_vertex_near_segment(xy, near[:others], a, b, r, reaches)
+        items, n_items = list_near(x_low - r, y_low - r, x_high + r, y_high + r, places, items)
+        v = find_vertex_near_segment(xy, items[:n_items], a, b, r, reaches)
         if v >= 0:
             stack, top = append_row(stack, top, v, b)
             stack, top = append_row(stack, top, a, v)
             continue
-        near, others = list_near(x_low, y_low, x_high, y_high, borders, near)
-        if has_edge(edges, near[:others], a, b):
+        items, n_items = list_near(x_low, y_low, x_high, y_high, borders, items)
+        if has_edge(edges, items[:n_items], a, b):
             continue
-        e = find_first_crossing(xy, edges, near[:others], a, b)
+        e = find_first_crossing(xy, edges, items[:n_items], a, b)
         if e < 0:
             edges, edge_count = append_row(edges, edge_count, a, b)
             borders = enter_edge(edge_count - 1, xy, edges, borders)
@@ -214,9 +214,9 @@ def node(segments, reaches):
         xy, count = append_row(xy, count, x, y)
         places = enter_item(count - 1, x, y, x, y, places)
         stack, top = append_row(stack, top, a, b)
-        near, others = list_near(x - r, y - r, x + r, y + r, borders, near)
+        items, n_items = list_near(x - r, y - r, x + r, y + r, borders, items)
         reach = find_reach(reaches, x, y)
-        top = take_back(xy, count - 1, e, edges, near[:others], stack, top, reach)
+        top = take_back(xy, count - 1, e, edges, items[:n_items], stack, top, reach)
     live = 0
     for e in range(edge_count):
         if edges[e, 0] >= 0:
@@ -226,17 +226,17 @@ def node(segments, reaches):
 
 
 @compiled
-def take_back(xy, vertex, crossed, edges, near, stack, top, reach):
-    """Put every live edge of `near` that must go through a new vertex back on the stack.
+def take_back(xy, vertex, crossed, edges, items, stack, top, reach):
+    """Put edges of `items` back on the stack that must go through a new vertex.
 
     These are the `crossed` edge and those beside `vertex`, in their order. Returns the stack's new
     top.
     """
-    for i in range(len(near)):
+    for i in range(len(items)):
         for j in range(i, 0, -1):  # in order, for there are few
-            if near[j - 1] > near[j]:
-                near[j - 1], near[j] = near[j], near[j - 1]
-    for e in near:
+            if items[j - 1] > items[j]:
+                items[j - 1], items[j] = items[j], items[j - 1]
+    for e in items:
         c = edges[e, 0]
         if c >= 0 and (e == crossed or is_beside(xy[vertex], xy[c], xy[edges[e, 1]], reach)):
             copy_row(stack[top], edges[e])
@@ -342,11 +342,11 @@ def trace_faces(xy, edges, follow):
 
 
 @compiled
-def chord(xy, edges, h, buckets, near):
+def chord(xy, edges, h, buckets, items):
     """Return the length and direction of the chord left of half-edge `h`.
 
     It is the ray from the half-edge's middle to the first edge; the direction is a unit vector.
-    Also returns `near`, as `list_near` does.
+    Also returns `items`, as `list_near` does.
     """
     layout = buckets[0]
     a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
@@ -357,15 +357,15 @@ def chord(xy, edges, h, buckets, near):
     nearest, looked, farthest = np.inf, float(layout[2]), layout[2] * float(layout[3] + layout[4])
     while True:
         x, y = np.int64(ax + looked * nx), np.int64(ay + looked * ny)
-        near, others = list_near(
+        items, n_items = list_near(
             min(np.int64(ax), x) - 1,
             min(np.int64(ay), y) - 1,
             max(np.int64(ax), x) + 1,
             max(np.int64(ay), y) + 1,
             buckets,
-            near,
+            items,
         )
-        for e in near[:others]:
+        for e in items[:n_items]:
             if e == h >> 1:
                 continue
             c, d = edges[e, 0], edges[e, 1]
@@ -378,7 +378,7 @@ def chord(xy, edges, h, buckets, near):
             if 0 < along < nearest:
                 nearest = along
         if nearest <= looked or looked > farthest:
-            return nearest, nx, ny, near
+            return nearest, nx, ny, items
         looked *= 2.0
 
 
@@ -389,7 +389,7 @@ def face_points(xy, edges, face, faces):
     It is the middle of the face's longest chord at right angles to an edge's middle.
     """
     longest, best = np.zeros(faces), np.zeros(faces)
-    points, near = np.zeros((faces, 2)), np.empty(0, np.int64)
+    points, items = np.zeros((faces, 2)), np.empty(0, np.int64)
     if len(edges) == 0:
         return points
     buckets = lay_buckets(xy, len(edges))
@@ -403,7 +403,7 @@ def face_points(xy, edges, face, faces):
         length = np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1]))
         if f == 0 or length < 0.3 * longest[f]:
             continue
-        reach, nx, ny, near = chord(xy, edges, h, buckets, near)
+        reach, nx, ny, items = chord(xy, edges, h, buckets, items)
         if np.isfinite(reach) and reach > best[f]:
             best[f] = reach
             points[f, 0] = 0.5 * (xy[a, 0] + xy[b, 0]) + 0.5 * reach * nx
@@ -427,7 +427,7 @@ def enclose_polygons(soup, soup_start):
 
 @compiled
 def covers(soup, soup_start, boxes, k, x, y):
-    """Return whether polygon k of the soup, in its box (k, 4), holds (x, y), by parity."""
+    """Return whether polygon k of the soup, in its box (k, 4), holds (x, y)."""
     inside = False
     if x < boxes[k, 0] or x > boxes[k, 2] or y < boxes[k, 1] or y > boxes[k, 3]:
         return inside

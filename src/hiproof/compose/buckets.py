@@ -1,4 +1,4 @@
-"""Square buckets of a plan, in which what lies near a place is looked up. Compiled.
+"""Look up what lies near a place of a plan, in square buckets. Compiled.
 
 Items are the numbers of vertices or edges. Each is in every bucket that its box reaches into. So
 the cost of noding is in proportion to the number of edges, however large the plan is.
@@ -57,7 +57,7 @@ def lay_buckets(xy, segments):
 
 @compiled
 def find_buckets(layout, x_low, y_low, x_high, y_high):
-    """Return the first and last column, and the first and last row, that a box reaches into."""
+    """Return the columns and rows that a box reaches into: first, last, first, last."""
     return (
         max(0, (x_low - layout[0]) // layout[2]),
         min(layout[3] - 1, (x_high - layout[0]) // layout[2]),
@@ -88,21 +88,21 @@ def enter_edge(e, xy, edges, buckets):
 
 
 @compiled
-def list_near(x_low, y_low, x_high, y_high, buckets, near):
+def list_near(x_low, y_low, x_high, y_high, buckets, items):
     """List the items whose buckets a box reaches into, an item perhaps several times.
 
-    Returns `near`, or a longer array, with the items, and their number.
+    Returns `items`, or a longer array, with the items, and their number.
     """
     layout, first, links = buckets
-    if len(near) < layout[5]:
-        near = np.empty(len(links), np.int64)
+    if len(items) < layout[5]:
+        items = np.empty(len(links), np.int64)
     count = 0
     left, right, low, high = find_buckets(layout, x_low, y_low, x_high, y_high)
     for column in range(left, right + 1):
         for k in range(column * layout[4] + low, column * layout[4] + high + 1):
             link = first[k]
             while link >= 0:
-                near[count] = links[link, 0]
+                items[count] = links[link, 0]
                 count += 1
                 link = links[link, 1]
-    return near, count
+    return items, count

@@ -88,7 +88,7 @@ def raise_shell(
         vertices = np.flatnonzero(saddles).tolist()
         places = [sectors_at(v, xy, edges, side, levels) for v in vertices]
         boxes = [frame_sectors(place, xy, edges, levels) for place in places]
-        raise Saddles(cure_all(places, boxes, reaches, widening), tuple(boxes))
+        raise Saddles(mend_corners(places, boxes, reaches, widening), tuple(boxes))
     # from here on numbers of a few dozen edges: plain lists are faster than arrays
     label, xyz = side.ravel().tolist(), levels.vertices.tolist()
     follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
@@ -357,7 +357,7 @@ def frame_sectors(
     return (*ends.min(axis=0).tolist(), *ends.max(axis=0).tolist())
 
 
-def cure_all(
+def mend_corners(
     places: list[Sectors],
     boxes: list[tuple[float, ...]],
     reaches: np.ndarray,
@@ -385,9 +385,9 @@ def cure_all(
 
 
 def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int] | None:
-    """Return a patch (soup, label) for a vertex that is no manifold, None if none mends it.
+    """Return a patch (soup, label) for a vertex that is no manifold.
 
-    It gives the tip of the narrowest peak to the higher neighbour.
+    Returns None if none mends it. It gives the tip of the narrowest peak to the higher neighbour.
 
     Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to
     that cell.

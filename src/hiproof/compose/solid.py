@@ -15,7 +15,7 @@ from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
 from .facets import draw_facets
 from .shell import Saddles, raise_shell
-from .zones import EVERYWHERE, Zone, add_zones, list_reaches
+from .zones import WHOLE_PLAN, Zone, add_zones, list_reaches
 
 # val3dity's default planarity: steep planes cannot meet within less where vertices moved a
 # centimetre
@@ -57,7 +57,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     bent: list[Solid] = []
     failure = ""
     parts: tuple[int, ...] = ()
-    zones: tuple[Zone, ...] = (Zone(EVERYWHERE, 0),)
+    zones: tuple[Zone, ...] = (Zone(WHOLE_PLAN, 0),)
     for _ in range(MAX_ATTEMPTS):
         try:
             solid = compose_at(problem, z_ground_local, options, zones)
@@ -71,7 +71,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
             places = list_places(solid, findings)
             parts = parts or parts_at_fault(solid, findings)
             bent += [solid] if any(finding.code == 203 for finding in findings) else []
-        zones = add_zones(zones, places or (EVERYWHERE,))
+        zones = add_zones(zones, places or (WHOLE_PLAN,))
         if not zones:
             break
     for solid in bent:

@@ -13,12 +13,16 @@ import numpy as np
 
 from .arrangement import GRID_M
 
-ROUNDING_M = 2e-4  # rounding to the grid moves a crossing by less
-MARGIN_M = 0.5  # around faces at fault, more than the coarsest snapping
+CROSSING_MOVE_M = 2e-4  # rounding to the grid moves a crossing by less
+ZONE_MARGIN_M = 0.5  # around faces at fault, more than the coarsest snapping
 
 
 class Attempt(NamedTuple):
-    """A factor on the snap distance, whether walls in line are one, and flat corners turn in."""
+    """What is tried in a zone.
+
+    It is a factor on the snap distance, whether walls in line are one, and whether flat corners
+    turn in.
+    """
 
     coarseness: float
     merges_walls: bool
@@ -41,9 +45,9 @@ ATTEMPTS = (
 
 
 class Zone(NamedTuple):
-    """A box of the plan (low x, low y, high x, high y) [m], and the number of its attempt.
+    """A box of the plan, and the number of its attempt.
 
-    Of zones that overlap, the last one holds.
+    The box is (low x, low y, high x, high y) [m]. Of zones that overlap, the last one holds.
     """
 
     box: tuple[float, ...]
@@ -54,7 +58,7 @@ class Zone(NamedTuple):
         return ATTEMPTS[self.number]
 
 
-EVERYWHERE = (-math.inf, -math.inf, math.inf, math.inf)
+WHOLE_PLAN = (-math.inf, -math.inf, math.inf, math.inf)
 
 
 def add_zones(zones: Sequence[Zone], boxes: Iterable[tuple[float, ...]]) -> tuple[Zone, ...]:
@@ -64,7 +68,7 @@ def add_zones(zones: Sequence[Zone], boxes: Iterable[tuple[float, ...]]) -> tupl
     """
     result = list(zones)
     for x0, y0, x1, y1 in boxes:
-        box = x0 - MARGIN_M, y0 - MARGIN_M, x1 + MARGIN_M, y1 + MARGIN_M
+        box = x0 - ZONE_MARGIN_M, y0 - ZONE_MARGIN_M, x1 + ZONE_MARGIN_M, y1 + ZONE_MARGIN_M
         numbers = [zone.number for zone in zones if overlap(zone.box, box)]
         if 1 + max(numbers) == len(ATTEMPTS):
             return ()
@@ -79,7 +83,9 @@ def overlap(box: tuple[float, ...], other: tuple[float, ...]) -> bool:
 def list_reaches(zones: Iterable[Zone], snap_m: float) -> np.ndarray:
     """Return the box and the reach (k, 5) of every zone, in grid units."""
     return (
-        np.array([(*zone.box, zone.attempt.coarseness * snap_m + ROUNDING_M) for zone in zones])
+        np.array(
+            [(*zone.box, zone.attempt.coarseness * snap_m + CROSSING_MOVE_M) for zone in zones]
+        )
         / GRID_M
     )
 

@@ -62,7 +62,7 @@ class Agreement(NamedTuple):
     bases: dict[int, Basis]
 
 
-class Cluster(NamedTuple):
+class TiedMembers(NamedTuple):
     """Members that the accepted `conditions` tie, in the first round of their fit.
 
     `cost` is that of their points, and may be higher by `allowance` for what the conditions save.
@@ -108,7 +108,7 @@ def agree_planes(
     fits = [fit for cluster in clusters if (fit := fit_cluster(cluster, planes, members, scene))]
     bases = {k: free_member(k, member) for k, member in members.items()}
     for fit in drop_risen_fits(fits, volumes, planes, misfits, scene):
-        planes = [fit.planes.get(k, one) for k, one in enumerate(planes)]
+        planes = [fit.planes.get(k, kept) for k, kept in enumerate(planes)]
         bases |= dict.fromkeys(fit.basis, fit.basis)
     return Agreement(planes, members, bases)
 
@@ -130,8 +130,8 @@ def drop_risen_fits(
         return fits
     number, trial = np.full(len(planes), len(fits)), list(planes)
     for n, fit in enumerate(fits):
-        for k, one in fit.planes.items():
-            number[k], trial[k] = n, one
+        for k, volume_planes in fit.planes.items():
+            number[k], trial[k] = n, volume_planes
     new_misfits, top = measure_misfits(volumes, trial, scene)
     excess = np.bincount(number[top], new_misfits - misfits, len(fits) + 1)
     return [fit for fit, extra in zip(fits, excess[:-1], strict=True) if extra <= fit.allowance]
@@ -139,11 +139,11 @@ def drop_risen_fits(
 
 def choose_conditions(
     members: dict[int, LinearVolume], conditions: list[Condition], scene: Scene
-) -> list[Cluster]:
-    """Choose the conditions that hold, one after another, and return the clusters they tie.
+) -> list[TiedMembers]:
+    """Choose the conditions that hold, one after another.
 
-    The normal equations of all members give the planes under a condition, and the points say what
-    these cost.
+    Returns the clusters that they tie. The normal equations of all members give the planes under a
+    condition, and the points say what these cost.
     """
     sums = {k: sum_first_round(member, member.rows, scene) for k, member in members.items()}
     clusters = {k: begin_cluster(k, members, sums, scene) for k in members}
@@ -167,19 +167,19 @@ def choose_conditions(
 
 def begin_cluster(
     k: int, members: dict[int, LinearVolume], sums: dict[int, NormalSums], scene: Scene
-) -> Cluster:
+) -> TiedMembers:
     solution = solve_normal(sums, free_member(k, members[k]), members)
     rows = place_planes(members, solution.unknowns)
-    return Cluster((), solution, sum_row_costs(members, rows, scene), 0.0)
+    return TiedMembers((), solution, sum_row_costs(members, rows, scene), 0.0)
 
 
 def join_clusters(
-    clusters: list[Cluster],
+    clusters: list[TiedMembers],
     condition: Condition,
     members: dict[int, LinearVolume],
     sums: dict[int, NormalSums],
     scene: Scene,
-) -> Cluster | None:
+) -> TiedMembers | None:
     """Return clusters as one under a condition, too.
 
     Returns None if it holds already, ties too many, or if the points cost too much more.
@@ -201,19 +201,19 @@ def join_clusters(
     allowance = compute_allowance(condition, n_saved, members, scene)
     if not cost <= sum(cluster.cost for cluster in clusters) + allowance:
         return None
-    conditions = [one for cluster in clusters for one in cluster.conditions]
+    conditions = [accepted for cluster in clusters for accepted in cluster.conditions]
     allowance += sum(cluster.allowance for cluster in clusters)
-    return Cluster((*conditions, condition), solution, cost, allowance)
+    return TiedMembers((*conditions, condition), solution, cost, allowance)
 
 
-def estimate_extra_squares(equation: Equation, clusters: list[Cluster]) -> float:
+def estimate_extra_squares(equation: Equation, clusters: list[TiedMembers]) -> float:
     """Return by how much (m2) an equation lets the weighted squared residuals grow."""
     gap, variance = np.zeros(1), np.zeros((1, 1))
     for cluster in clusters:
         solution = cluster.solution
-        own = {k: factors for k, factors in equation.items() if k in solution.basis}
-        factors = evaluate_equation(own, solution.basis)
-        gap = gap + evaluate_equation(own, solution.unknowns)
+        part = {k: factors for k, factors in equation.items() if k in solution.basis}
+        factors = evaluate_equation(part, solution.basis)
+        gap = gap + evaluate_equation(part, solution.unknowns)
         variance = variance + factors @ solution.inverse @ factors.T
     return float(gap @ np.linalg.pinv(variance, hermitian=True) @ gap)
 
@@ -221,10 +221,10 @@ def estimate_extra_squares(equation: Equation, clusters: list[Cluster]) -> float
 def may_hold(
     condition: Condition,
     members: dict[int, LinearVolume],
-    clusters: dict[int, Cluster],
+    clusters: dict[int, TiedMembers],
     covariances: dict[int, np.ndarray],
 ) -> bool:
-    """Return whether a condition fails by little, or by no more than the points leave open."""
+    """Return whether a condition fails by no more than the points leave open."""
     if condition.gap <= condition.allowed:
         return True
     equation = condition.equation
@@ -243,23 +243,25 @@ def measure_remainder(
     equation: Equation, start: dict[int, np.ndarray], unknowns: dict[int, np.ndarray]
 ) -> float:
     """Return the share by which an equation still fails, of how far it did at `start`."""
-    fails, failed = (np.abs(evaluate_equation(equation, one)).max() for one in (unknowns, start))
+    fails, failed = (
+        np.abs(evaluate_equation(equation, values)).max() for values in (unknowns, start)
+    )
     return float(fails / max(failed, NO_REMAINDER))
 
 
 def fit_cluster(
-    cluster: Cluster, planes: list[Planes], members: dict[int, LinearVolume], scene: Scene
+    cluster: TiedMembers, planes: list[Planes], members: dict[int, LinearVolume], scene: Scene
 ) -> CommonFit | None:
-    """Fit the planes of a cluster's members by biweighted least squares, None if improper.
+    """Fit the planes of a cluster's members by biweighted least squares.
 
-    The covariance is what the points determine: a corner of the outline gives the place where
-    planes meet, but not how precise it is.
+    Returns None if they are improper. The covariance is what the points determine: a corner of the
+    outline gives the place where planes meet, but not how precise it is.
     """
     basis = cluster.solution.basis
     rows, covariances, cost = solve_rounds(basis, members, scene)
     if not math.isfinite(cost):
         return None
-    by_points = [one.equation for one in cluster.conditions if not one.spared]
+    by_points = [condition.equation for condition in cluster.conditions if not condition.spared]
     if len(by_points) < len(cluster.conditions):
         free = join_bases([free_member(k, members[k]) for k in basis])
         for equation in by_points:

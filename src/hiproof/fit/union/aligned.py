@@ -40,7 +40,7 @@ ONE_WAY_RAD = 1e-6  # Planes within this angle (rad) face one way.
 
 
 def align_planes(members: dict[int, LinearVolume], scene: Scene) -> dict[int, LinearVolume]:
-    """Return the members with planes turned that may be one with a larger one's beside them."""
+    """Turn planes that may be one with a larger plane beside them."""
     planes = [
         (k, plane)
         for k, member in members.items()
@@ -50,13 +50,13 @@ def align_planes(members: dict[int, LinearVolume], scene: Scene) -> dict[int, Li
     planes.sort(key=lambda item: -item[1].places.shape[1])
     if len(planes) < 2:
         return members
-    low = np.array([plane.places[:2].min(axis=1) for _, plane in planes])
-    high = np.array([plane.places[:2].max(axis=1) for _, plane in planes])
+    lowest = np.array([plane.places[:2].min(axis=1) for _, plane in planes])
+    highest = np.array([plane.places[:2].max(axis=1) for _, plane in planes])
     facing = np.array([math.atan2(*plane.coefficients[1::-1]) for _, plane in planes])
     for i in range(1, len(planes)):
         k, plane = planes[i]
         turns = np.remainder(facing[:i] - facing[i] + math.pi, 2.0 * math.pi) - math.pi
-        gaps = np.maximum(low[:i] - high[i], low[i] - high[:i]).max(axis=1)
+        gaps = np.maximum(lowest[:i] - highest[i], lowest[i] - highest[:i]).max(axis=1)
         is_near = (np.abs(turns) < NEAR_RAD) & (np.abs(turns) > ONE_WAY_RAD) & (gaps < APART_M)
         for j in np.flatnonzero(is_near).tolist():
             pair = k, planes[j][0]
@@ -67,7 +67,7 @@ def align_planes(members: dict[int, LinearVolume], scene: Scene) -> dict[int, Li
                 continue
             turned = members | {k: turn_plane(members[k], plane.number, float(turns[j]))}
             new_plane = find_visible_plane(turned[k], plane.number)
-            if may_be_one(new_plane, other, pair, members, turned, scene):
+            if is_one_plane(new_plane, other, pair, members, turned, scene):
                 members, facing[i] = turned, facing[j]
                 break
     return members
@@ -78,9 +78,9 @@ def find_visible_plane(member: LinearVolume, p: int) -> VisiblePlane:
 
 
 def turn_plane(member: LinearVolume, p: int, angle: float) -> LinearVolume:
-    """Return the member with its plane p turned by an angle (rad) about the middle of its points.
+    """Turn plane p of a member by an angle (rad).
 
-    It keeps its slope.
+    It turns about the middle of its points, and keeps its slope.
     """
     c, s = math.cos(angle) - 1.0, math.sin(angle)
     middle = member.points[:2, member.visible[p]].mean(axis=1)
@@ -90,25 +90,28 @@ def turn_plane(member: LinearVolume, p: int, angle: float) -> LinearVolume:
     return replace(member, rows=rows, design=design, common_design=turn_design(design, member.turn))
 
 
-def may_be_one(
+def is_one_plane(
     plane: VisiblePlane,
     other: VisiblePlane,
     pair: tuple[int, int],
-    before: dict[int, LinearVolume],
-    after: dict[int, LinearVolume],
+    members: dict[int, LinearVolume],
+    turned: dict[int, LinearVolume],
     scene: Scene,
 ) -> bool:
-    """Return whether two planes of a `pair` of members may be one `after` one is turned."""
+    """Return whether two planes may be one.
+
+    They belong to a `pair` of members: `members` before the first is turned, `turned` after it.
+    """
     left, right = equate_planes(plane, other)
     condition = Condition(0.0, dict(zip(pair, (left, right), strict=True)))
     costs = []
-    for members in (before, after):
-        sums = {k: sum_first_round(members[k], members[k].rows, scene) for k in pair}
-        basis = join_bases(free_member(k, members[k]) for k in pair)
+    for those in (members, turned):
+        sums = {k: sum_first_round(those[k], those[k].rows, scene) for k in pair}
+        basis = join_bases(free_member(k, those[k]) for k in pair)
         n_free = count_free(basis)
-        if members is after:
+        if those is turned:
             basis = constrain(basis, condition.equation)
-        rows = place_planes(members, solve_normal(sums, basis, members).unknowns)
-        costs.append(price_rows(members, rows, scene))
-    allowance = compute_allowance(condition, n_free - count_free(basis), before, scene)
+        rows = place_planes(those, solve_normal(sums, basis, those).unknowns)
+        costs.append(price_rows(those, rows, scene))
+    allowance = compute_allowance(condition, n_free - count_free(basis), members, scene)
     return costs[1] <= costs[0] + allowance

@@ -49,13 +49,16 @@ def free_member(k: int, member: LinearVolume) -> Basis:
 
 
 def join_bases(bases: Iterable[Basis]) -> Basis:
-    """Return the basis of several clusters together. One cluster may come several times."""
+    """Return the basis of several clusters together.
+
+    One cluster may come several times.
+    """
     bases = list({id(basis): basis for basis in bases}.values())
     sizes, joint, first = [count_free(basis) for basis in bases], Basis(), 0
     for size, basis in zip(sizes, bases, strict=True):
-        for k, own in basis.items():
-            joint[k] = np.zeros((len(own), sum(sizes)))
-            joint[k][:, first : first + size] = own
+        for k, factors in basis.items():
+            joint[k] = np.zeros((len(factors), sum(sizes)))
+            joint[k][:, first : first + size] = factors
         first += size
     return joint
 
@@ -63,7 +66,7 @@ def join_bases(bases: Iterable[Basis]) -> Basis:
 def constrain(basis: Basis, equation: Equation) -> Basis:
     """Return the basis of what solves an equation, too."""
     free = find_null_space(evaluate_equation(equation, basis))
-    return {k: own @ free for k, own in basis.items()}
+    return {k: factors @ free for k, factors in basis.items()}
 
 
 def count_free(basis: Basis) -> int:
@@ -104,22 +107,28 @@ class Solution(NamedTuple):
     basis: Basis
 
     def covary(self, k: int) -> np.ndarray:
-        """Return the covariance (q, q) of a member's unknowns, for points of unit variance."""
-        own = self.basis[k]
-        return own @ self.inverse @ own.T
+        """Return the covariance (q, q) of a member's unknowns.
+
+        It is that for points of unit variance.
+        """
+        factors = self.basis[k]
+        return factors @ self.inverse @ factors.T
 
 
 def estimate_variance(sums: dict[int, NormalSums]) -> float:
     """Return the variance (m2) of the points about the planes that the sums belong to."""
     misfit, weight = (
-        sum(one.misfit for one in sums.values()),
-        sum(one.weight for one in sums.values()),
+        sum(member_sums.misfit for member_sums in sums.values()),
+        sum(member_sums.weight for member_sums in sums.values()),
     )
     return misfit / max(weight, 1.0)
 
 
 def sum_member(member: LinearVolume, rows: np.ndarray, reach: float) -> NormalSums:
-    """Return the sums over the points within `reach` (m) of a member's planes `rows` (k, 3)."""
+    """Return the sums over points near a member's planes `rows` (k, 3).
+
+    These are the points within `reach` (m).
+    """
     moments, products, weight, misfit = sum_moments(rows, member.points, reach)
     is_present = np.isfinite(rows[:, 2])
     normal, right = form_normal_equations(member.design, moments, products, is_present)
@@ -139,19 +148,19 @@ def solve_normal(
     ridge = RIDGE * max(trace / size, 1e-6)
     n_free = count_free(basis)
     matrix, right = ridge * np.eye(n_free), np.zeros(n_free)
-    for k, own in basis.items():
-        matrix += own.T @ sums[k].normal @ own
-        right += own.T @ (sums[k].right + ridge * members[k].unknowns)
+    for k, factors in basis.items():
+        matrix += factors.T @ sums[k].normal @ factors
+        right += factors.T @ (sums[k].right + ridge * members[k].unknowns)
     inverse = np.linalg.inv(matrix)
     free = inverse @ right
-    return Solution({k: own @ free for k, own in basis.items()}, inverse, basis)
+    return Solution({k: factors @ free for k, factors in basis.items()}, inverse, basis)
 
 
 def place_planes(members: dict[int, LinearVolume], unknowns: dict[int, np.ndarray]) -> Rows:
     """Return the planes of members with these unknowns."""
     return {
-        k: np.where(np.isfinite(members[k].rows), members[k].design @ own, np.nan)
-        for k, own in unknowns.items()
+        k: np.where(np.isfinite(members[k].rows), members[k].design @ values, np.nan)
+        for k, values in unknowns.items()
     }
 
 
@@ -166,5 +175,5 @@ def sum_row_costs(members: dict[int, LinearVolume], rows: Rows, scene: Scene) ->
     """Sum up what the points of members cost under their planes."""
     dead, width = scene.dead, scene.width
     return float(
-        sum(sum_point_costs(one, members[k].points, dead, width) for k, one in rows.items())
+        sum(sum_point_costs(planes, members[k].points, dead, width) for k, planes in rows.items())
     )

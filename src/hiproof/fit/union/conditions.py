@@ -105,9 +105,9 @@ def list_neighbours(members: dict[int, LinearVolume]) -> list[tuple[int, int]]:
     These are each member and the MOST_VOLUMES nearest to it, by the boxes around their points.
     """
     numbers = list(members)
-    low = np.array([member.places[:2].min(axis=1) for member in members.values()])
-    high = np.array([member.places[:2].max(axis=1) for member in members.values()])
-    gaps = np.maximum(low[:, None] - high, low - high[:, None]).max(axis=2)
+    lowest = np.array([member.places[:2].min(axis=1) for member in members.values()])
+    highest = np.array([member.places[:2].max(axis=1) for member in members.values()])
+    gaps = np.maximum(lowest[:, None] - highest, lowest - highest[:, None]).max(axis=2)
     nearest = np.argsort(gaps, axis=1, kind="stable")[:, : MOST_VOLUMES + 1].tolist()
     pairs = {(min(j, k), max(j, k)) for j, row in enumerate(nearest) for k in row if j != k}
     return [(numbers[j], numbers[k]) for j, k in sorted(pairs)]

@@ -60,10 +60,10 @@ def list_corner_equations(
             if is_near_miss(plane, other) and is_fold_line(plane, other, corner, member_list, rows):
                 terms = [
                     (
-                        numbers[one.member],
-                        sign * position @ member_list[one.member].common_design[one.number],
+                        numbers[end.member],
+                        sign * position @ member_list[end.member].common_design[end.number],
                     )
-                    for sign, one in ((1.0, plane), (-1.0, other))
+                    for sign, end in ((1.0, plane), (-1.0, other))
                 ]
                 equation = collect_terms((k, factors[None]) for k, factors in terms)
                 yield abs(plane.height - other.height), equation

@@ -11,7 +11,7 @@ import shapely
 from ...compose.arrangement import GRID_M, OUTSIDE
 from ...compose.cells import arrange, equal_planes, plan_problem
 from ...compose.levels import split_at_crossings, stack_levels
-from ...compose.zones import EVERYWHERE, Zone, list_reaches
+from ...compose.zones import WHOLE_PLAN, Zone, list_reaches
 from ...errors import CompositionError
 from ...frames import LocalFrame
 from ...model import Part, Piece, Roof
@@ -22,7 +22,7 @@ from .scene import Scene
 from .volumes import DIRECTION
 
 STRAIGHT_CORNER_M = 0.02  # A corner nearer (m) to the line between its two neighbours is none.
-PLAN_REACHES = list_reaches([Zone(EVERYWHERE, 0)], 0.001)  # As in a solid's first attempt.
+PLAN_REACHES = list_reaches([Zone(WHOLE_PLAN, 0)], 0.001)  # As in a solid's first attempt.
 EQUAL_PLANE = 1e-5  # Planes and slopes nearer to each other (m, rise over run) are one.
 
 

@@ -42,8 +42,8 @@ def join_levels(
     equal = equal_planes(rows, EQUAL_PLANE)
     for first in sorted(set(equal.tolist())):
         numbers = [k for k, other in zip(level, equal, strict=True) if other == first]
-        for polygon, (owner, *others) in find_touching(numbers, regions):
-            for k in others:
+        for polygon, (owner, *joined) in find_touching(numbers, regions):
+            for k in joined:
                 regions[k] = []
             if owner == 0:
                 regions[0] = [*(p for p in regions[0] if not is_inside(p, polygon)), polygon]
@@ -58,7 +58,7 @@ def join_levels(
 def place_corners(
     volume: np.ndarray, polygons: list[shapely.Polygon], site: PlanSite
 ) -> np.ndarray:
-    """Return u, v, 1 (n, 3) of the polygons' corners, in the axes of the volume's direction."""
+    """Return u, v, 1 (n, 3) of polygons' corners in the axes of a volume."""
     c, s = site.scene.turn[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]]) @ site.plan.frame.rotation
     corners = shapely.get_coordinates(polygons) - site.plan.frame.origin[:2]
@@ -76,7 +76,7 @@ def find_touching(numbers: list[int], regions: Regions) -> list[tuple[shapely.Po
     The base comes first, of which each polygon counts by itself, then the largest.
     """
     areas = {k: shapely.union_all(regions[k], grid_size=OVERLAY_GRID_M) for k in numbers}
-    found = []
+    touching = []
     for polygon in list_polygons(shapely.union_all(list(areas.values()), grid_size=OVERLAY_GRID_M)):
         inside = [
             k
@@ -84,8 +84,8 @@ def find_touching(numbers: list[int], regions: Regions) -> list[tuple[shapely.Po
             if any(is_inside(p, polygon) for p in ([area] if k else list_polygons(area)))
         ]
         if len(inside) > 1:
-            found.append((polygon, sorted(inside, key=lambda k: (k > 0, -areas[k].area))))
-    return found
+            touching.append((polygon, sorted(inside, key=lambda k: (k > 0, -areas[k].area))))
+    return touching
 
 
 def is_inside(area: shapely.Geometry, polygon: shapely.Polygon) -> bool:

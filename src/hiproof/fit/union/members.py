@@ -40,21 +40,26 @@ def list_members(
     """Return the volumes whose planes points determine, by their number."""
     visible = find_visible_points(volumes, scene)
     members = {}
-    for k, one in enumerate(planes):
-        if not one.design.shape[2] or len(visible[k]) < FEWEST_FITTED_POINTS:
+    for k, volume_planes in enumerate(planes):
+        if not volume_planes.design.shape[2] or len(visible[k]) < FEWEST_FITTED_POINTS:
             continue
         turn = scene.turn[int(volumes[k, DIRECTION])]
-        points, is_present = take_points(volumes[k], visible[k], scene), np.isfinite(one.rows)
+        points, is_present = (
+            take_points(volumes[k], visible[k], scene),
+            np.isfinite(volume_planes.rows),
+        )
         members[k] = LinearVolume(
-            one.rows,
-            one.design,
-            np.linalg.lstsq(one.design[is_present], one.rows[is_present], rcond=None)[0],
-            turn_design(one.design, turn),
+            volume_planes.rows,
+            volume_planes.design,
+            np.linalg.lstsq(
+                volume_planes.design[is_present], volume_planes.rows[is_present], rcond=None
+            )[0],
+            turn_design(volume_planes.design, turn),
             points,
             np.array([scene.U[0][visible[k]], scene.V[0][visible[k]], np.ones(len(visible[k]))]),
-            find_lowest_planes(one.rows, points),
+            find_lowest_planes(volume_planes.rows, points),
             sides[k],
-            one.walls,
+            volume_planes.walls,
             turn,
         )
     return members

@@ -63,9 +63,10 @@ def find_lowest_row(rows, u, v):
 
 @compiled(inline="always")
 def solve_three(xx, xy, x1, yy, y1, n, xz, yz, z1):
-    """Solve a symmetric 3 x 3 system, whose upper rows are (xx, xy, x1), (yy, y1), and (n,).
+    """Solve a symmetric 3 x 3 system.
 
-    The right side is xz, yz, z1. Returns the three unknowns, and False if it is singular.
+    Its upper rows are (xx, xy, x1), (yy, y1), and (n,). The right side is xz, yz, z1. Returns the
+    three unknowns, and False if it is singular.
     """
     if abs(xx) < 1e-12:
         return 0.0, 0.0, 0.0, False

@@ -1,4 +1,7 @@
-"""Find volumes that rise above others where these explain the points, and put them back."""
+"""Put planes back that rise above other volumes.
+
+They are those of the search. They return where the others explain the points better.
+"""
 
 from __future__ import annotations
 
@@ -28,16 +31,18 @@ def measure_misfits(
 
     Both are arrays (n,).
     """
-    rows = np.full((len(planes), max(len(one.rows) for one in planes), 3), np.nan)
-    for volume_rows, one in zip(rows, planes, strict=True):
-        volume_rows[: len(one.rows)] = one.rows
+    rows = np.full((len(planes), max(len(fitted.rows) for fitted in planes), 3), np.nan)
+    for volume_rows, fitted in zip(rows, planes, strict=True):
+        volume_rows[: len(fitted.rows)] = fitted.rows
     heights, top = compute_plane_heights(volumes, rows, scene.U, scene.V, scene.order)
     return compute_misfits(scene.z[: scene.n], heights[: scene.n], scene), top[: scene.n]
 
 
 @compiled
 def compute_plane_heights(volumes, rows, U, V, order):
-    """Return the height (n,) of volumes with planes `rows` (k, m, 3), and the visible one (n,).
+    """Return the heights (n,) of volumes with planes `rows` (k, m, 3).
+
+    Also returns which is visible (n,).
 
     Places U, V (directions, n) and `order` are those of a scene.
     """

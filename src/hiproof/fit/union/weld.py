@@ -545,7 +545,7 @@ def fit_repair(
                 (k, weight * position @ members[k].common_design[p]) for weight, (k, p) in terms
             )
         )
-    equation = {k: np.array([one[k] for one in equations]) for k in equations[0]}
+    equation = {k: np.array([equation[k] for equation in equations]) for k in equations[0]}
     basis = join_bases([state.bases[k] for k in sorted(repair.owners)])
     if not np.abs(evaluate_equation(equation, basis)).max() > LEFT_OVER:
         return None
@@ -562,7 +562,8 @@ def fit_repair(
         return None
     # The covariance stays: that planes meet somewhere does not make their place more precise.
     planes = [
-        replace(one, rows=rows[k]) if k in rows else one for k, one in enumerate(state.planes)
+        replace(planes, rows=rows[k]) if k in rows else planes
+        for k, planes in enumerate(state.planes)
     ]
     return planes, state.bases | dict.fromkeys(free, free)
 
