@@ -201,10 +201,15 @@ def make_depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray,
 
 def list_nodes(scene: Scene, least_depth: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the raster's nodes that deep inside the outline: U, V (directions, n)."""
-    i, j = np.nonzero(scene.depth >= least_depth)
-    u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
+    u, v = place_nodes(scene, least_depth)
     c, s = scene.turn[:, :1], scene.turn[:, 1:]
     return c * u + s * v, c * v - s * u
+
+
+def place_nodes(scene: Scene, least_depth: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of `list_nodes` in the plan's axes: u, v (n,)."""
+    i, j = np.nonzero(scene.depth >= least_depth)
+    return scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
 
 
 def make_lines(plan: Plan, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,7 @@ from .regions import (
     unite_outlines,
     widen_gap,
 )
-from .scene import VISIBLE_DEPTH_M, Scene, list_nodes
+from .scene import VISIBLE_DEPTH_M, Scene, place_nodes
 
 
 def keep_visible(
@@ -35,8 +35,7 @@ def keep_visible(
     """
     if len(parts) < 2:
         return parts
-    u, v = list_nodes(scene, VISIBLE_DEPTH_M)
-    xy = plan.frame.xy_local(np.column_stack([u[0], v[0]]))
+    xy = plan.frame.xy_local(np.column_stack(place_nodes(scene, VISIBLE_DEPTH_M)))
     # These are the numbers of places at which each part is the highest.
     places = np.bincount(find_highest(parts, xy)[1], minlength=len(parts)).tolist()
     visible = [part for part, count in zip(parts, places, strict=True) if count]
