@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .add import MOST_VOLUMES
 from .aligned import align_planes
 from .clusters import (
     NO_REMAINDER,
@@ -49,6 +50,10 @@ REACHED_M = 0.003
 # The quadratic form of the normal equations overestimates what a condition costs. Of 532 accepted
 # in Delft, none had 2.7 times its allowance. Others are not tried on the points.
 MOST_ESTIMATED = 4.0
+# Share of the points, of a large roof of as many as MOST_VOLUMES volumes have, that a cluster may
+# leave unexplained besides. Steep planes that agree below their neighbours may rise above these.
+# Only the misfit of the roof shows that: a volume's own points lie where it alone is visible.
+MOST_WORSE_SHARE = 0.02
 
 
 class Agreement(NamedTuple):
@@ -65,24 +70,19 @@ class Agreement(NamedTuple):
 class TiedMembers(NamedTuple):
     """Members that the accepted `conditions` tie, in the first round of their fit.
 
-    `cost` is that of their points, and may be higher by `allowance` for what the conditions save.
+    `cost` is that of their points.
     """
 
     conditions: tuple[Condition, ...]
     solution: Solution
     cost: float
-    allowance: float
 
 
 class CommonFit(NamedTuple):
-    """The fit of a cluster: its members' `planes`, and the `basis` of their unknowns.
-
-    All points may cost more by its `allowance`.
-    """
+    """The fit of a cluster: its members' `planes`, and the `basis` of their unknowns."""
 
     planes: dict[int, Planes]
     basis: Basis
-    allowance: float
 
 
 def agree_planes(
@@ -120,11 +120,9 @@ def drop_risen_fits(
     misfits: np.ndarray,
     scene: Scene,
 ) -> list[CommonFit]:
-    """Return the fits without those that cost more points than their conditions save.
+    """Return the fits without those that rise above other volumes.
 
-    A volume's own points lie where it alone is visible. Steep planes that agree below their
-    neighbours may rise above these. `misfits` (n,) is what each point costs under the `planes`
-    before.
+    `misfits` (n,) is what each point costs under the `planes` before.
     """
     if not fits:
         return fits
@@ -134,7 +132,8 @@ def drop_risen_fits(
             number[k], trial[k] = n, volume_planes
     new_misfits, top = measure_misfits(volumes, trial, scene)
     excess = np.bincount(number[top], new_misfits - misfits, len(fits) + 1)
-    return [fit for fit, extra in zip(fits, excess[:-1], strict=True) if extra <= fit.allowance]
+    most_worse = MOST_WORSE_SHARE * scene.n * min(1.0, MOST_VOLUMES / len(volumes))
+    return [fit for fit, extra in zip(fits, excess[:-1], strict=True) if extra <= most_worse]
 
 
 def choose_conditions(
@@ -170,7 +169,7 @@ def begin_cluster(
 ) -> TiedMembers:
     solution = solve_normal(sums, free_member(k, members[k]), members)
     rows = place_planes(members, solution.unknowns)
-    return TiedMembers((), solution, sum_row_costs(members, rows, scene), 0.0)
+    return TiedMembers((), solution, sum_row_costs(members, rows, scene))
 
 
 def join_clusters(
@@ -202,8 +201,7 @@ def join_clusters(
     if not cost <= sum(cluster.cost for cluster in clusters) + allowance:
         return None
     conditions = [accepted for cluster in clusters for accepted in cluster.conditions]
-    allowance += sum(cluster.allowance for cluster in clusters)
-    return TiedMembers((*conditions, condition), solution, cost, allowance)
+    return TiedMembers((*conditions, condition), solution, cost)
 
 
 def estimate_extra_squares(equation: Equation, clusters: list[TiedMembers]) -> float:
@@ -271,7 +269,7 @@ def fit_cluster(
         k: replace(planes[k], rows=rows[k], design=members[k].design, covariance=covariances[k])
         for k in basis
     }
-    return CommonFit(new_planes, basis, cluster.allowance)
+    return CommonFit(new_planes, basis)
 
 
 def solve_rounds(
