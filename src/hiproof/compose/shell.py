@@ -19,7 +19,7 @@ from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE, find_reach
 from .cells import PlanCells, PlanProblem
 from .flat_corners import turn_flat_corners_in
 from .levels import find_saddles, split_at_crossings, stack_levels
-from .zones import Zone, list_reaches, select_turned_in
+from .zones import Zone, frame_places, select_turned_in
 
 Item = TypeVar("Item")
 
@@ -58,7 +58,7 @@ def raise_shell(
     z_ground: float,
     clearance_m: float,
     zones: Sequence[Zone],
-    snap_m: float,
+    reaches: np.ndarray,
     widening: float,
 ) -> Solid:
     """Raise the solid over the plan cells.
@@ -68,9 +68,10 @@ def raise_shell(
 
     The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
     Consecutive walls along a straight stretch of the outline become one where all `zones` want it.
-    Flat corners are turned in where zones do. Patches are wider by the factor `widening`.
+    Flat corners are turned in where zones do. `reaches` (k, 5) are the zones'. Patches are wider by
+    the factor `widening`.
     """
-    planes, reaches = problem.planes, list_reaches(zones, snap_m)
+    planes = problem.planes
     xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reaches)
     may_turn = select_turned_in(zones, xy)
     if may_turn.any():
@@ -353,8 +354,7 @@ def frame_sectors(
     """Return the box in plan [m] around the cells that meet at a plan vertex."""
     roofed = [f for f, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE]
     half_edges = np.flatnonzero(np.isin(levels.face, roofed))
-    ends = xy[edges[half_edges >> 1]].reshape(-1, 2) * GRID_M
-    return (*ends.min(axis=0).tolist(), *ends.max(axis=0).tolist())
+    return frame_places(xy[edges[half_edges >> 1]].reshape(-1, 2) * GRID_M)
 
 
 def mend_corners(

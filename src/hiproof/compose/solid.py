@@ -15,7 +15,7 @@ from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
 from .facets import draw_facets
 from .shell import Saddles, raise_shell
-from .zones import WHOLE_PLAN, Zone, add_zones, list_reaches
+from .zones import WHOLE_PLAN, Zone, add_zones, frame_places, list_reaches
 
 # val3dity's default planarity: steep planes cannot meet within less where vertices moved a
 # centimetre
@@ -99,7 +99,7 @@ def list_places(solid: Solid, findings: tuple[Finding, ...]) -> tuple[tuple[floa
     if faces[0] < 0:
         return ()
     rings = [solid.vertices[list(solid.faces[face].rings[0]), :2] for face in faces]
-    return tuple((*ring.min(axis=0).tolist(), *ring.max(axis=0).tolist()) for ring in rings)
+    return tuple(frame_places(ring) for ring in rings)
 
 
 def compose_at(
@@ -116,9 +116,7 @@ def compose_at(
         widening = 1 + 0.25 * number  # a cure may need room
         clearance_m = options.ground_clearance_m
         try:
-            return raise_shell(
-                cells, problem, z_ground, clearance_m, zones, options.snap_m, widening
-            )
+            return raise_shell(cells, problem, z_ground, clearance_m, zones, reaches, widening)
         except Saddles as saddles:
             problem = replace(problem, patches=[*problem.patches, *saddles.patches])
             places = saddles.places

@@ -76,6 +76,11 @@ def add_zones(zones: Sequence[Zone], boxes: Iterable[tuple[float, ...]]) -> tupl
     return tuple(result)
 
 
+def frame_places(xy: np.ndarray) -> tuple[float, ...]:
+    """Return the box around places (n, 2): low x, low y, high x, high y."""
+    return (*xy.min(axis=0).tolist(), *xy.max(axis=0).tolist())
+
+
 def overlap(box: tuple[float, ...], other: tuple[float, ...]) -> bool:
     return box[0] <= other[2] and other[0] <= box[2] and box[1] <= other[3] and other[1] <= box[3]
 

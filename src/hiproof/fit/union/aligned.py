@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from .clusters import (
+    Basis,
     constrain,
     count_free,
     free_member,
@@ -27,9 +28,12 @@ from .conditions import (
     Condition,
     VisiblePlane,
     compute_allowance,
+    enclose_places,
     equate_planes,
     list_visible_planes,
+    measure_box_gaps,
     measure_plane_gap,
+    view_plane,
 )
 from .members import LinearVolume, turn_design
 from .scene import NEAR_RAD, Scene
@@ -50,31 +54,26 @@ def align_planes(members: dict[int, LinearVolume], scene: Scene) -> dict[int, Li
     planes.sort(key=lambda item: -item[1].places.shape[1])
     if len(planes) < 2:
         return members
-    lowest = np.array([plane.places[:2].min(axis=1) for _, plane in planes])
-    highest = np.array([plane.places[:2].max(axis=1) for _, plane in planes])
+    boxes = enclose_places(plane for _, plane in planes)
     facing = np.array([math.atan2(*plane.coefficients[1::-1]) for _, plane in planes])
     for i in range(1, len(planes)):
         k, plane = planes[i]
         turns = np.remainder(facing[:i] - facing[i] + math.pi, 2.0 * math.pi) - math.pi
-        gaps = np.maximum(lowest[:i] - highest[i], lowest[i] - highest[:i]).max(axis=1)
-        is_near = (np.abs(turns) < NEAR_RAD) & (np.abs(turns) > ONE_WAY_RAD) & (gaps < APART_M)
+        is_near = measure_box_gaps(boxes[:i], boxes[i]) < APART_M
+        is_near &= (np.abs(turns) < NEAR_RAD) & (np.abs(turns) > ONE_WAY_RAD)
         for j in np.flatnonzero(is_near).tolist():
             pair = k, planes[j][0]
             if pair[0] == pair[1]:
                 continue
-            other = find_visible_plane(members[pair[1]], planes[j][1].number)
+            other = view_plane(members[pair[1]], planes[j][1].number)
             if measure_plane_gap(plane, other) >= NEAR_M:
                 continue
             turned = members | {k: turn_plane(members[k], plane.number, float(turns[j]))}
-            new_plane = find_visible_plane(turned[k], plane.number)
+            new_plane = view_plane(turned[k], plane.number)
             if is_one_plane(new_plane, other, pair, members, turned, scene):
                 members, facing[i] = turned, facing[j]
                 break
     return members
-
-
-def find_visible_plane(member: LinearVolume, p: int) -> VisiblePlane:
-    return next(plane for plane in list_visible_planes(member) if plane.number == p)
 
 
 def turn_plane(member: LinearVolume, p: int, angle: float) -> LinearVolume:
@@ -104,14 +103,17 @@ def is_one_plane(
     """
     left, right = equate_planes(plane, other)
     condition = Condition(0.0, dict(zip(pair, (left, right), strict=True)))
-    costs = []
-    for those in (members, turned):
-        sums = {k: sum_first_round(those[k], those[k].rows, scene) for k in pair}
-        basis = join_bases(free_member(k, those[k]) for k in pair)
-        n_free = count_free(basis)
-        if those is turned:
-            basis = constrain(basis, condition.equation)
-        rows = place_planes(those, solve_normal(sums, basis, those).unknowns)
-        costs.append(price_rows(those, rows, scene))
-    allowance = compute_allowance(condition, n_free - count_free(basis), members, scene)
-    return costs[1] <= costs[0] + allowance
+    basis = join_bases(free_member(k, members[k]) for k in pair)
+    free = constrain(basis, condition.equation)
+    n_saved = count_free(basis) - count_free(free)
+    most_cost = price_basis(basis, members, scene)
+    most_cost += compute_allowance(condition, n_saved, members, scene)
+    return price_basis(free, turned, scene) <= most_cost
+
+
+def price_basis(basis: Basis, members: dict[int, LinearVolume], scene: Scene) -> float:
+    """Return what the points cost after the first round of a fit of a basis' members."""
+    sums = {k: sum_first_round(members[k], members[k].rows, scene) for k in basis}
+    return price_rows(
+        members, place_planes(members, solve_normal(sums, basis, members).unknowns), scene
+    )

@@ -7,7 +7,7 @@ agree is a linear equation between their unknowns.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from statistics import median
 from typing import NamedTuple
 
@@ -105,20 +105,38 @@ def list_neighbours(members: dict[int, LinearVolume]) -> list[tuple[int, int]]:
     These are each member and the MOST_VOLUMES nearest to it, by the boxes around their points.
     """
     numbers = list(members)
-    lowest = np.array([member.places[:2].min(axis=1) for member in members.values()])
-    highest = np.array([member.places[:2].max(axis=1) for member in members.values()])
-    gaps = np.maximum(lowest[:, None] - highest, lowest - highest[:, None]).max(axis=2)
+    boxes = enclose_places(members.values())
+    gaps = measure_box_gaps(boxes[:, None], boxes)
     nearest = np.argsort(gaps, axis=1, kind="stable")[:, : MOST_VOLUMES + 1].tolist()
     pairs = {(min(j, k), max(j, k)) for j, row in enumerate(nearest) for k in row if j != k}
     return [(numbers[j], numbers[k]) for j, k in sorted(pairs)]
 
 
+def enclose_places(items: Iterable[LinearVolume | VisiblePlane]) -> np.ndarray:
+    """Return the boxes (n, 2, 2) around the places of members or planes.
+
+    These are their lowest and highest u, v.
+    """
+    return np.array([[item.places[:2].min(axis=1), item.places[:2].max(axis=1)] for item in items])
+
+
+def measure_box_gaps(boxes: np.ndarray, other_boxes: np.ndarray) -> np.ndarray:
+    """Return how far apart (m) boxes (..., 2, 2) lie along an axis at most.
+
+    It is below 0 where they overlap.
+    """
+    return np.maximum(
+        boxes[..., 0, :] - other_boxes[..., 1, :], other_boxes[..., 0, :] - boxes[..., 1, :]
+    ).max(axis=-1)
+
+
 def list_visible_planes(member: LinearVolume) -> list[VisiblePlane]:
-    common, places = member.common_design @ member.unknowns, member.places
-    return [
-        VisiblePlane(p, common[p], member.common_design[p], places[:, numbers])
-        for p, numbers in member.visible.items()
-    ]
+    return [view_plane(member, p) for p in member.visible]
+
+
+def view_plane(member: LinearVolume, p: int) -> VisiblePlane:
+    design = member.common_design[p]
+    return VisiblePlane(p, design @ member.unknowns, design, member.places[:, member.visible[p]])
 
 
 def measure_plane_gap(plane: VisiblePlane, other: VisiblePlane) -> float:

@@ -22,7 +22,8 @@ from .scene import Scene
 from .volumes import DIRECTION
 
 STRAIGHT_CORNER_M = 0.02  # A corner nearer (m) to the line between its two neighbours is none.
-PLAN_REACHES = list_reaches([Zone(WHOLE_PLAN, 0)], 0.001)  # As in a solid's first attempt.
+# As in a solid's first attempt.
+PLAN_REACHES = list_reaches([Zone(WHOLE_PLAN, 0)], ComposeSettings().snap_m)
 EQUAL_PLANE = 1e-5  # Planes and slopes nearer to each other (m, rise over run) are one.
 
 

@@ -14,9 +14,9 @@ from ...geometry.rings import OVERLAY_GRID_M
 from .drawn_plan import EQUAL_PLANE
 from .finish import Planes
 from .names import find_visible_planes
-from .regions import OVERLAY_GAP_M, PlanSite, list_polygons
+from .regions import OVERLAY_GAP_M, PlanSite, list_polygons, transform_places
 from .sides import Side
-from .volumes import DIRECTION, LEVEL
+from .volumes import LEVEL
 
 Regions = list[list[shapely.Polygon]]
 
@@ -36,7 +36,7 @@ def join_levels(
     level = [
         k
         for k, polygons in enumerate(regions)
-        if polygons and is_level(planes[k], place_corners(volumes[k], polygons, site))
+        if polygons and is_level(planes[k], place_corners(polygons, volumes[k], site))
     ]
     rows = np.array([planes[k].rows[LEVEL] for k in level]).reshape(-1, 3)
     equal = equal_planes(rows, EQUAL_PLANE)
@@ -46,27 +46,26 @@ def join_levels(
             for k in joined:
                 regions[k] = []
             if owner == 0:
-                regions[0] = [*(p for p in regions[0] if not is_inside(p, polygon)), polygon]
+                touched = widen(polygon)
+                regions[0] = [*(p for p in regions[0] if not touched.covers(p)), polygon]
                 continue
             regions[owner] = [polygon]
-            positions = place_corners(volumes[owner], [polygon], site)
-            ends = np.stack([positions.min(axis=0), positions.max(axis=0)], axis=1)[:2]
+            corners = place_corners([polygon], volumes[owner], site)
+            ends = np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
             sides[owner] = [Side(float(end)) for end in ends.ravel()]
     return sides, regions
 
 
 def place_corners(
-    volume: np.ndarray, polygons: list[shapely.Polygon], site: PlanSite
+    polygons: list[shapely.Polygon], volume: np.ndarray, site: PlanSite
 ) -> np.ndarray:
-    """Return u, v, 1 (n, 3) of polygons' corners in the axes of a volume."""
-    c, s = site.scene.turn[int(volume[DIRECTION])]
-    axes = np.array([[c, s], [-s, c]]) @ site.plan.frame.rotation
-    corners = shapely.get_coordinates(polygons) - site.plan.frame.origin[:2]
-    return np.column_stack([corners @ axes.T, np.ones(len(corners))])
+    """Return the polygons' corners (n, 2) in a volume's axes."""
+    return transform_places(shapely.get_coordinates(polygons), volume, site)
 
 
-def is_level(planes: Planes, positions: np.ndarray) -> bool:
-    """Return whether only the level plane is visible over corners (n, 3) at u, v, 1."""
+def is_level(planes: Planes, corners: np.ndarray) -> bool:
+    """Return whether only the level plane is visible over corners (n, 2)."""
+    positions = np.column_stack([corners, np.ones(len(corners))])
     return bool(np.flatnonzero(find_visible_planes(planes.rows, positions)).tolist() == [LEVEL])
 
 
@@ -75,18 +74,22 @@ def find_touching(numbers: list[int], regions: Regions) -> list[tuple[shapely.Po
 
     The base comes first, of which each polygon counts by itself, then the largest.
     """
+    if len(numbers) < 2:
+        return []
     areas = {k: shapely.union_all(regions[k], grid_size=OVERLAY_GRID_M) for k in numbers}
     touching = []
     for polygon in list_polygons(shapely.union_all(list(areas.values()), grid_size=OVERLAY_GRID_M)):
+        touched = widen(polygon)
         inside = [
             k
             for k, area in areas.items()
-            if any(is_inside(p, polygon) for p in ([area] if k else list_polygons(area)))
+            if any(touched.covers(p) for p in ([area] if k else list_polygons(area)))
         ]
         if len(inside) > 1:
             touching.append((polygon, sorted(inside, key=lambda k: (k > 0, -areas[k].area))))
     return touching
 
 
-def is_inside(area: shapely.Geometry, polygon: shapely.Polygon) -> bool:
-    return bool(polygon.buffer(OVERLAY_GAP_M).covers(area))
+def widen(polygon: shapely.Polygon) -> shapely.Polygon:
+    """Return what a polygon touches but for rounding."""
+    return polygon.buffer(OVERLAY_GAP_M)

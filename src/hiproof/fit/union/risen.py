@@ -42,9 +42,7 @@ def measure_misfits(
 def compute_plane_heights(volumes, rows, U, V, order):
     """Return the heights (n,) of volumes with planes `rows` (k, m, 3).
 
-    Also returns which is visible (n,).
-
-    Places U, V (directions, n) and `order` are those of a scene.
+    Also returns which is visible (n,). U, V (directions, n) and `order` are those of a scene.
     """
     n = U.shape[1]
     z, top = np.full(n, -np.inf), np.zeros(n, np.int64)

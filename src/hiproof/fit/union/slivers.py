@@ -23,7 +23,6 @@ from .volumes import (
     SLOPE0,
     UNSORTED,
     compute_roof_heights,
-    is_fixed,
     list_movable,
     measure_runs,
 )
@@ -40,16 +39,23 @@ def drop_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     They stay if dropping them costs more than a part would. A single volume stays, too: it is all
     there is of its roof.
     """
-    value, k = compute_objective(volumes, scene, np.inf), len(volumes)
-    while (k := k - 1) > 0 and len(volumes) > 2:
-        _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
-        if is_fixed(volumes, k) or np.count_nonzero(top[: scene.n] == k) >= FEWEST_SEEN:
-            continue
+    specks = list_specks(volumes, scene)
+    value = compute_objective(volumes, scene, np.inf) if specks else 0.0
+    while specks and len(volumes) > 2:
+        k = specks.pop()
         trial = remove_volume(volumes, k)
         trial, trial_value = refit_volumes(trial, scene, compute_objective(trial, scene, np.inf))
         if trial_value < value + SLIVER_UNITS * scene.evidence:
             volumes, value = trial, min(value, trial_value)
+            specks = [j for j in list_specks(volumes, scene) if j < k]
     return volumes
+
+
+def list_specks(volumes: np.ndarray, scene: Scene) -> list[int]:
+    """List the volumes that are visible at hardly any point."""
+    _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    n_seen = np.bincount(top[: scene.n], minlength=len(volumes))
+    return [k for k in list_movable(volumes).tolist() if n_seen[k] < FEWEST_SEEN]
 
 
 def drop_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
