@@ -234,15 +234,20 @@ def usable(
             return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
     points = finite(points)
     if footprint is not None:
-        points = points.compress(
-            shapely.intersects_xy(footprint, points[:, 0], points[:, 1]), axis=0
-        )
+        points = compress_inside(points, footprint)
     points = distinct(points)
     if len(points) == 0:
         return points, footprint, Status.NO_POINTS
     if footprint is None and (len(points) < FEWEST_POINTS or on_a_line(points[:, :2])):
         return points, None, Status.NO_ROOF
     return points, footprint, Status.MODELLED
+
+
+def compress_inside(points: np.ndarray, area: shapely.Geometry) -> np.ndarray:
+    """Return the points (n, 3) inside an area or on its border."""
+    from .geometry.point_in_polygon import find_inside
+
+    return points.compress(find_inside(area, points[:, 0], points[:, 1]), axis=0)
 
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
@@ -812,7 +817,7 @@ def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
     if unused is None:
         return np.zeros((0, 3))
     local = roof.frame.to_local(finite(as_xyz(unused)))
-    return local.compress(shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1]), axis=0)
+    return compress_inside(local, roof.outline)
 
 
 def grade_building(

@@ -18,7 +18,7 @@ from hiproof.fit.union.finish import (
 )
 from hiproof.fit.union.larger import combine_parts
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.regions import PlanSite, cut_regions
+from hiproof.fit.union.regions import PlanSite, cut_regions, sketch_regions
 from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side, choose_sides, find_corners
 from hiproof.fit.union.unite import gather_ends
@@ -78,7 +78,9 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     plan, scene = lay_out_scene(rng, outline, volumes)
     sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
     planes = fit_planes(volumes, sides, list_walls(outline, plan), scene, {})
-    regions = cut_regions(volumes, planes, sides, PlanSite(outline, plan, scene, {}), base)
+    site = PlanSite(outline, plan, scene, {})
+    sketch = sketch_regions(volumes, planes, sides, site, base)
+    regions = cut_regions(volumes, sketch, sides, site)
     assert len(regions) == len(volumes)
     polygons = [polygon for item in regions for polygon in item]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
@@ -97,7 +99,9 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     plan, scene = lay_out_scene(rng, outline, volumes)
     sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
     planes = fit_planes(volumes, sides, list_walls(outline, plan), scene, {})
-    regions = cut_regions(volumes, planes, sides, PlanSite(outline, plan, scene, {}), True)
+    site = PlanSite(outline, plan, scene, {})
+    sketch = sketch_regions(volumes, planes, sides, site, True)
+    regions = cut_regions(volumes, sketch, sides, site)
     recess = shapely.union_all(regions[-1])
     assert recess.area > 1.0
     assert all(

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from ..geometry.point_in_polygon import find_inside
 from ..read.terrain import Terrain
 from ..status import Doubt
 
@@ -146,7 +147,7 @@ def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
 
 def select_inside(area: shapely.Geometry, points: np.ndarray) -> np.ndarray:
     """Return whether (n,) points (n, 3) lie in `area` in plan."""
-    return shapely.intersects_xy(area, points[:, 0], points[:, 1])
+    return find_inside(area, points[:, 0], points[:, 1])
 
 
 def list_cells(points: np.ndarray) -> np.ndarray:

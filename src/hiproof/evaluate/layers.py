@@ -15,6 +15,7 @@ import math
 import numpy as np
 import shapely
 
+from ..geometry.point_in_polygon import find_inside
 from ..model import Roof
 from ..model.heights import find_highest
 from .metrics import NEAR_M, Inner, well_inside
@@ -86,7 +87,7 @@ def places_in(outline: shapely.Polygon) -> np.ndarray:
     x, y = np.meshgrid(
         np.arange(west + 0.5 * gap, east, gap), np.arange(south + 0.5 * gap, north, gap)
     )
-    inside = shapely.intersects_xy(outline, x.ravel(), y.ravel())
+    inside = find_inside(outline, x.ravel(), y.ravel())
     return np.column_stack([x.ravel()[inside], y.ravel()[inside]])
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import OVERLAY_GRID_M
 from ..model import ROOF, Fit, Quality, Solid
 from ..read.cell_kernel import cell_keys
@@ -56,8 +57,7 @@ class Inner(NamedTuple):
 def well_inside(points: np.ndarray, outline: shapely.Geometry) -> Inner:
     """Return the points of (n, 2 or 3) that lie well inside the outline."""
     area = shapely.buffer(outline, -FACADE_M)
-    shapely.prepare(area)
-    return Inner(shapely.intersects_xy(area, points[:, 0], points[:, 1]), area.area)
+    return Inner(find_inside(area, points[:, 0], points[:, 1]), area.area)
 
 
 def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
@@ -191,10 +191,7 @@ def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
     west, south = math.floor(west), math.floor(south)
     columns, rows = math.ceil(east) - west, math.ceil(north) - south
     row, column = np.divmod(np.arange(rows * columns), columns)
-    shapely.prepare(outline)
-    mask = shapely.intersects_xy(
-        outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M
-    )
+    mask = find_inside(outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M)
     if not mask.any():
         return float("nan")
     column, row = np.floor(xy[:, 0] / CELL_M) - west, np.floor(xy[:, 1] / CELL_M) - south

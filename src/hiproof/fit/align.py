@@ -21,6 +21,7 @@ import shapely
 
 from ..compiled import compiled
 from ..geometry.grid import count_cells
+from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import counterclockwise, ring_edges
 from .outline.cost import cost_at_depth
 from .outline.lines import make_lines
@@ -172,9 +173,8 @@ def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
 
     Such a cut looks like a roof that ends there; mostly a few of the points lie beyond it.
     """
-    shapely.prepare(footprint)
     for subset in (xy[::FEW], xy):
-        outside = ~shapely.contains_xy(footprint, subset[:, 0], subset[:, 1])
+        outside = ~find_inside(footprint, subset[:, 0], subset[:, 1])
         if np.count_nonzero(outside) / len(xy) >= LEAST_OUTSIDE:
             return False
     return True

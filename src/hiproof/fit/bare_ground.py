@@ -19,6 +19,7 @@ import numpy as np
 import shapely
 
 from ..geometry.grid import count_cells
+from ..geometry.point_in_polygon import find_inside
 from .direction import main_direction
 
 NODE_M, MOST_NODES = 0.5, 200
@@ -98,11 +99,7 @@ def find_bare_ground(
     more) points of the ground; all in one frame in metres.
     """
     inner = shapely.buffer(shapely.simplify(outline, NEEDLESS_M), -LEAST_WIDTH_M / 2)
-    mask = (
-        shapely.intersects_xy(inner, ground[:, 0], ground[:, 1])
-        if len(ground)
-        else np.zeros(0, bool)
-    )
+    mask = find_inside(inner, ground[:, 0], ground[:, 1])
     if count_cells(np.floor(ground[mask, :2])) < LEAST_SEEN * LEAST_AREA_M2 / 2 or len(roof) == 0:
         return None
     angle = main_direction(outline)
@@ -167,7 +164,7 @@ class ClassifiedPoints:
         x, y = (np.arange(lower[k] + node / 2, upper[k], node) for k in (0, 1))
         grid_x, grid_y = np.meshgrid(x, y)
         places = np.column_stack([grid_x.ravel(), grid_y.ravel()])
-        inside = shapely.intersects_xy(outline, places[:, 0], places[:, 1])
+        inside = find_inside(outline, places[:, 0], places[:, 1])
         value = np.zeros(len(places))
         spacing = float(np.clip(estimate_spacing(roof), NEAREST_ROOF_M, FARTHEST_ROOF_M))
         is_roof = mark_near(roof, spacing, x, y).ravel()[inside]

@@ -10,6 +10,7 @@ import shapely
 
 from ..errors import FitError
 from ..frames import LocalFrame
+from ..geometry.point_in_polygon import find_inside
 from ..log import count_things
 from ..model import Fit
 from ..primitives import CATALOGUE, get
@@ -109,7 +110,7 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
         if not isinstance(hull, shapely.Polygon):
             break
         hull = shapely.buffer(hull, HULL_SPACINGS * math.sqrt(hull.area / len(on_roof)))
-        inside = cloud[shapely.contains_xy(hull, *cloud[:, :2].T)]
+        inside = cloud[find_inside(hull, *cloud[:, :2].T)]
         theta[:Q0] = outline_rectangle(hull, theta[KAPPA])
         theta, noise = fit_heights(inside, shape, theta)
     return replace(estimate, theta=theta, noise=noise)
@@ -170,7 +171,7 @@ def usable_points(
     cloud = np.column_stack([points[finite, :3], weights[finite]])
     text = "finite points"
     if outline is not None:
-        cloud = cloud[shapely.intersects_xy(outline, cloud[:, 0], cloud[:, 1])]
+        cloud = cloud[find_inside(outline, cloud[:, 0], cloud[:, 1])]
         text = "finite points inside the outline"
     count = np.count_nonzero(cloud[:, 3])
     if count < FEWEST_POINTS:

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from ..frames import LocalFrame
+from ..geometry.point_in_polygon import find_inside
 from ..read.terrain import Terrain, TerrainChain
 from ..settings import Settings
 from ..status import Doubt
@@ -54,7 +55,7 @@ def look_at_ground(
 
     The points `ground` (m, 3) and the terrain around decide, all in the local `frame`.
     """
-    ground = ground.compress(shapely.intersects_xy(outline, ground[:, 0], ground[:, 1]), axis=0)
+    ground = ground.compress(find_inside(outline, ground[:, 0], ground[:, 1]), axis=0)
     plane = None if terrain is None else fit_plane_around(outline, frame, terrain)
     if plane is None:
         return cut_bare_ground(points, outline, ground, settings, points)
@@ -91,7 +92,7 @@ def has_roofed_rest(all_points: np.ndarray, is_low: np.ndarray, outline: shapely
     bare_ground = find_bare_ground(outline, all_points[~is_low], all_points[is_low])
     if bare_ground is None or bare_ground.outline is None:
         return False
-    mask = shapely.intersects_xy(bare_ground.outline, all_points[:, 0], all_points[:, 1])
+    mask = find_inside(bare_ground.outline, all_points[:, 0], all_points[:, 1])
     return bool(mask.any()) and cover(all_points[mask], ~is_low[mask]) >= ROOFED
 
 
@@ -134,7 +135,7 @@ def cut_bare_ground(
     if bare_ground.outline is None or settings.reconstruct.footprint_trust == "full":
         advice = "" if bare_ground.outline is None else "; --footprint-trust points cuts it out"
         return Site(points, outline, f"{area} is roofed over{advice}")
-    inside = shapely.intersects_xy(bare_ground.outline, points[:, 0], points[:, 1])
+    inside = find_inside(bare_ground.outline, points[:, 0], points[:, 1])
     if not inside.any():
         return Site(points, outline, f"{area} is roofed over")
     return Site(points.compress(inside, axis=0), bare_ground.outline, f"{area} was cut out")

@@ -124,7 +124,9 @@ def ground_plane(
     for _ in range(ROUNDS):
         plane = np.linalg.lstsq(places[selection], heights[selection], rcond=None)[0]
         off = np.abs(places @ plane - heights)
-        selection = off < max(BESIDE_PLANE_M, 2.0 * float(np.median(off)))
+        before, selection = selection, off < max(BESIDE_PLANE_M, 2.0 * float(np.median(off)))
+        if (selection == before).all():
+            break
     return plane if np.median(off) < MOST_ROUGH_M else None
 
 

@@ -57,13 +57,15 @@ def is_convex(outline: shapely.Polygon) -> bool:
     return not outline.interiors and bool((turns >= 0.0).all())
 
 
-def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts and ends (m, 2) of all edges of an outline, holes included."""
-    if not outline.interiors:
-        ring = shapely.get_coordinates(outline)
+def ring_edges(area: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
+    """Return starts and ends (m, 2) of all edges of one or several polygons."""
+    if area.geom_type == "Polygon" and not area.interiors:
+        ring = shapely.get_coordinates(area)
         return ring[:-1], ring[1:]
-    rings = [shapely.get_coordinates(ring) for ring in (outline.exterior, *outline.interiors)]
-    return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
+    rings = shapely.get_rings(shapely.get_parts(area))
+    xy, ring_number = shapely.get_coordinates(rings, return_index=True)
+    follows = ring_number[1:] == ring_number[:-1]
+    return xy[:-1][follows], xy[1:][follows]
 
 
 def with_area(geometry: shapely.Geometry) -> shapely.Geometry:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import shapely
 
+from ..geometry.point_in_polygon import find_inside
 from ..model import Footprint
 from .cell_kernel import cell_keys
 from .thin import cell_range
@@ -84,9 +85,8 @@ class PointGrid:
         if polygon.is_empty:
             return np.empty(0, np.int64)
         result = self.candidates(polygon.bounds)
-        shapely.prepare(polygon)
         x, y = self.xy.take(result, axis=0)[:, :2].T
-        return np.sort(result[shapely.intersects_xy(polygon, x, y)])
+        return np.sort(result[find_inside(polygon, x, y)])
 
     def find_within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
         """Return ascending indices of the points at most `distance_m` from `polygon`.

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ...geometry.arrays import compute_median
+from ...geometry.point_in_polygon import find_inside
 from ...model import Part
 from ...settings import Settings
 from .judged import COMPARED_M, JudgedRoof
@@ -38,7 +39,7 @@ def list_barrels(roof: JudgedRoof, part: Part, settings: Settings) -> Iterator[P
             continue
         covered = list_polygons(unite_outlines(group))
         if len(covered) == 1:
-            inside = shapely.contains_xy(covered[0], *roof.points[:, :2].T)
+            inside = find_inside(covered[0], *roof.points[:, :2].T)
             shape = fit_types(roof.points[inside], covered[0], ("barrel",), settings)
             if shape is not None:
                 yield cut_part(shape, covered[0])

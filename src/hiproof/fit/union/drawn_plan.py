@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...compose.arrangement import GRID_M, OUTSIDE
 from ...compose.cells import arrange, equal_planes, plan_problem
 from ...compose.levels import split_at_crossings, stack_levels
@@ -54,15 +55,19 @@ class DrawnPlan:
         """The number of the first plane (p,) that equals each."""
         return equal_planes(self.planes, EQUAL_PLANE)
 
+    @cached_property
+    def first_beside(self) -> np.ndarray:
+        """The numbers of the first planes that equal those beside each edge (e, 2)."""
+        return np.append(self.first_equal, -1)[self.beside]  # -1 of -1, outside
+
     def find_edges_of(self, k: int) -> np.ndarray:
         """Return which edges (e,) lie beside a plane of volume k.
 
         One beside a plane equal to such a plane is among them.
         """
-        first = np.append(self.first_equal, -1)  # -1 of -1, outside
-        own = first[:-1][self.owner[:, 0] == k]
-        is_own: np.ndarray = np.isin(first[self.beside], own)
-        return np.asarray(is_own.any(axis=1))
+        is_own = np.zeros(len(self.first_equal) + 1, bool)  # the last is outside
+        is_own[self.first_equal[self.owner[:, 0] == k]] = True
+        return np.asarray(is_own[self.first_beside].any(axis=1))
 
     @cached_property
     def lengths(self) -> np.ndarray:
@@ -96,10 +101,15 @@ class DrawnPlan:
         is_near = (x > low_x - reach_m) & (x < high_x + reach_m)
         is_near &= (y > low_y - reach_m) & (y < high_y + reach_m)
         edges = np.flatnonzero(is_near[self.edges[:, 0]] | is_near[self.edges[:, 1]])
-        places, ends = np.unique(self.edges[edges], return_inverse=True)
-        ends, beside = ends.reshape(-1, 2), self.beside[edges]
-        around = replace(self, places=self.places[places], edges=ends, beside=beside)
-        return around, places, edges
+        is_end = np.zeros(len(self.places), bool)
+        is_end[self.edges[edges]] = True
+        around = replace(
+            self,
+            places=self.places[is_end],
+            edges=(np.cumsum(is_end) - 1)[self.edges[edges]],
+            beside=self.beside[edges],
+        )
+        return around, np.flatnonzero(is_end), edges
 
 
 def make_part(
@@ -149,27 +159,39 @@ def make_drawn_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnP
     roofed = side.ravel() != OUTSIDE
     ends = np.column_stack([level, level[follow]])[roofed]
     planes = grid_planes * [1.0, 1.0, GRID_M]
-    corners = count_corners(ends, vertices * GRID_M)
+    corners = int(count_corners(ends, vertices * GRID_M))
     return DrawnPlan(xy * GRID_M, edges, side, planes[: len(owner)], owner, corners)
 
 
-def count_corners(ends: np.ndarray, vertices: np.ndarray) -> int:
+@compiled
+def count_corners(ends, vertices):
     """Count the vertices (n, 3) at the `ends` (m, 2) of edges that bend an edge."""
-    starts, other = ends[ends[:, 0] != ends[:, 1]].T
-    size = len(vertices)
-    pairs = np.unique(np.minimum(starts, other) * size + np.maximum(starts, other))
-    starts, other = np.divmod(pairs, size)
-    begins = np.concatenate([starts, other])
-    neighbours = np.concatenate([other, starts])[np.argsort(begins, kind="stable")]
-    count = np.bincount(begins, minlength=size)
-    middle = np.flatnonzero(count == 2)
-    first = (np.cumsum(count) - count)[middle]
-    v, a, b = vertices[middle], vertices[neighbours[first]], vertices[neighbours[first + 1]]
-    way = b - a
-    share = ((v - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12)
-    offsets = np.linalg.norm(v - a - share[:, None] * way, axis=1)
-    straight = (offsets < STRAIGHT_CORNER_M) & (share > 0.0) & (share < 1.0)
-    return int(np.count_nonzero(count)) - int(straight.sum())
+    near, count = np.full((len(vertices), 2), -1), np.zeros(len(vertices), np.int64)
+    for k in range(len(ends)):
+        for side in range(2):
+            v, other = ends[k, side], ends[k, 1 - side]
+            if other != v and other != near[v, 0] and other != near[v, 1]:
+                near[v, min(count[v], 1)] = other
+                count[v] += 1
+    corners = 0
+    for v in range(len(vertices)):
+        is_straight = count[v] == 2 and is_between(vertices, near[v, 0], v, near[v, 1])
+        corners += count[v] > 0 and not is_straight
+    return corners
+
+
+@compiled
+def is_between(vertices, a, v, b):
+    """Return whether vertex v lies on the line from vertex a to b, nearly."""
+    square = along = across = 0.0
+    for i in range(3):
+        square += (vertices[b, i] - vertices[a, i]) ** 2
+        along += (vertices[v, i] - vertices[a, i]) * (vertices[b, i] - vertices[a, i])
+    share = along / max(square, 1e-12)
+    for i in range(3):
+        foot = vertices[a, i] + share * (vertices[b, i] - vertices[a, i])
+        across += (vertices[v, i] - foot) ** 2
+    return across < STRAIGHT_CORNER_M**2 and 0.0 < share < 1.0
 
 
 def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from ...geometry.point_in_polygon import find_inside
 from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ...model import Part
 from .apart import ROW_DEPTH_M
@@ -94,15 +95,18 @@ class PlanSite(NamedTuple):
 
 
 def cut_regions(
-    volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: PlanSite, base: bool
+    volumes: np.ndarray,
+    sketch: list[list[shapely.Polygon]],
+    sides: list[list[Side]],
+    site: PlanSite,
 ) -> list[list[shapely.Polygon]]:
     """Return, for each volume, the polygons of the site's outline that it may roof.
 
-    They are those of a sketch inside the outline. The volume beside a gap has it, too.
+    They are those of a `sketch` inside the outline. The volume beside a gap has it, too.
     """
-    base_region, *sketched = sketch_regions(volumes, planes, sides, site, base)
+    base_region = list(sketch[0])
     regions = [base_region]
-    for quads in sketched:
+    for quads in sketch[1:]:
         regions.append([p for quad in quads for p in list_polygons(site.cut_quad(quad))])
     for gap in find_gaps(volumes, sides, site):
         if any(gap is polygon for polygon in base_region):
@@ -263,7 +267,7 @@ def is_base_above(
 def select_points_in(region: shapely.Geometry, site: PlanSite) -> tuple[np.ndarray, np.ndarray]:
     """Return the points inside a region: local x, y (n, 2) and the plan's z (n,)."""
     xy = site.recall(locate_points, site.scene, site.plan)
-    inside = shapely.contains_xy(region, xy[:, 0], xy[:, 1])
+    inside = find_inside(region, xy[:, 0], xy[:, 1])
     return xy[inside], site.scene.z[: site.scene.n][inside]
 
 

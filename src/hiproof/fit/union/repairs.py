@@ -247,10 +247,9 @@ def list_low_steps(plan_drawn: DrawnPlan) -> Iterator[Repair]:
     """Yield repairs of low steps: two planes meet along the step, or are one."""
     highest, lengths = plan_drawn.gaps.max(axis=1), plan_drawn.lengths
     low_edges = np.flatnonzero(is_low_step(plan_drawn.gaps))
-    sorted_pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
-    pairs, pair_of_edge = np.unique(sorted_pairs, axis=0, return_inverse=True)
-    for n, pair in enumerate(pairs):
-        edges = low_edges[pair_of_edge.ravel() == n]
+    pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
+    for pair in sorted(set(map(tuple, pairs.tolist()))):
+        edges = low_edges[(pairs == pair).all(axis=1)]
         places = plan_drawn.places[np.unique(plan_drawn.edges[edges])]
         spread = np.linalg.norm(places[:, None] - places, axis=2)
         i, j = np.unravel_index(spread.argmax(), spread.shape)

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...geometry.point_in_polygon import find_inside
 from ...model import Part
 from ...model.heights import find_highest
 from .add import FEWEST_UNEXPLAINED, UNEXPLAINED
@@ -128,11 +129,12 @@ class Window(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a window shows of a roof: one part and its plan by site.
+    """What a window shows of a roof, by site.
 
-    A plan is None where its part makes none.
+    These are the regions of its volumes, one part over these, and the plan of the part. A plan is None where its part makes none.
     """
 
+    regions: list[Regions]
     parts: list[Part]
     plans: list[DrawnPlan | None]
 
@@ -152,7 +154,8 @@ def weld(
     """Return the sides, planes and regions of all volumes with every repair that pays."""
     if len(volumes) - 1 + base < 2:  # one volume meets no other
         planes = list(agreement.planes)
-        return sides, planes, cut_regions(volumes, planes, sides, site, base)
+        sketch = sketch_regions(volumes, planes, sides, site, base)
+        return sides, planes, cut_regions(volumes, sketch, sides, site)
     problem = make_problem(volumes, agreement, site, base)
     state = begin_state(sides, problem)
     whole = make_window(make_whole_box(problem), list_quads(state, problem), base, problem)
@@ -163,7 +166,9 @@ def weld(
         if not numbers:
             break
         drawing = known_drawing or draw_window(state, whole, problem)
-    regions = cut_regions(volumes, state.planes, state.sides, site, base)
+    sketch = dict(zip(whole.numbers.tolist(), drawing.regions[0], strict=True))
+    all_regions = [sketch.get(k, []) for k in range(len(volumes))]
+    regions = cut_regions(volumes, all_regions, state.sides, site)
     state = assign_faces(state._replace(regions=regions), drawing, whole, problem)
     return state.sides, state.planes, list(state.regions)
 
@@ -187,13 +192,14 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
     given_regions = [state.regions[k] for k in window.numbers] if state.regions else []
-    parts, plans = [], []
+    all_regions, parts, plans = [], [], []
     for site in window.sites:
         regions = given_regions or sketch_regions(volumes, planes, sides, site, window.base)
+        all_regions.append(regions)
         part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
         parts.append(part)
         plans.append(draw_plan(part, owner, site.outline))
-    return Drawing(parts, plans)
+    return Drawing(all_regions, parts, plans)
 
 
 @dataclass
@@ -369,7 +375,7 @@ def rank_takers(face: PlanFace, present: RepairTrial) -> list[frozenset[int]]:
     Who would leave points unexplained that are worth a volume is left out.
     """
     window, planes, problem = present.window, present.state.planes, present.problem
-    inside = shapely.contains_xy(face.polygon, *window.xy.T)
+    inside = find_inside(face.polygon, *window.xy.T)
     heights = {
         k: compute_volume_heights(problem.volumes[k], planes[k], window.xy[inside], problem.site)
         for k in (face.owner, *face.takers)
