@@ -131,7 +131,8 @@ class Window(NamedTuple):
 class Drawing(NamedTuple):
     """What a window shows of a roof, by site.
 
-    These are the regions of its volumes, one part over these, and the plan of the part. A plan is None where its part makes none.
+    These are the regions of its volumes, one part over these, and the plan of the part. A plan is
+    None where its part makes none.
     """
 
     regions: list[Regions]
