@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -135,7 +135,7 @@ class Drawing(NamedTuple):
     None where its part makes none.
     """
 
-    regions: list[Regions]
+    regions: Sequence[Regions]
     parts: list[Part]
     plans: list[DrawnPlan | None]
 
@@ -167,9 +167,9 @@ def weld(
         if not numbers:
             break
         drawing = known_drawing or draw_window(state, whole, problem)
-    sketch = dict(zip(whole.numbers.tolist(), drawing.regions[0], strict=True))
-    all_regions = [sketch.get(k, []) for k in range(len(volumes))]
-    regions = cut_regions(volumes, all_regions, state.sides, site)
+    drawn = dict(zip(whole.numbers.tolist(), drawing.regions[0], strict=True))
+    sketch = [drawn.get(k, []) for k in range(len(volumes))]
+    regions = cut_regions(volumes, sketch, state.sides, site)
     state = assign_faces(state._replace(regions=regions), drawing, whole, problem)
     return state.sides, state.planes, list(state.regions)
 
