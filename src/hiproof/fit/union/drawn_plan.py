@@ -69,6 +69,10 @@ class DrawnPlan:
         is_own[self.first_equal[self.owner[:, 0] == k]] = True
         return np.asarray(is_own[self.first_beside].any(axis=1))
 
+    def list_ends(self, edges: np.ndarray) -> np.ndarray:
+        """Return the numbers of the places where some `edges` end, each once, ascending."""
+        return np.array(sorted(set(self.edges[edges].ravel().tolist())))
+
     @cached_property
     def lengths(self) -> np.ndarray:
         """The length (m) of each edge (e,)."""

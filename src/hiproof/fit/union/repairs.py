@@ -5,7 +5,7 @@ These are sides beside a place, and planes with a low step between them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -65,12 +65,14 @@ def find_repairs(
     plan: Plan,
     scene: Scene,
     numbers: Iterable[int],
+    settled: Collection[tuple[int, int]] = (),
 ) -> list[Repair]:
     """Find what might be made to meet in the drawn plan, the nearest first.
 
-    These are low steps, and moves of the sides of the volumes `numbers`.
+    These are low steps, and moves of the sides of the volumes `numbers`. Sides (volume, edge) that
+    are `settled` do not move alone.
     """
-    repairs = list(list_low_steps(plan_drawn))
+    repairs, is_low = list(list_low_steps(plan_drawn)), is_low_step(plan_drawn.gaps)
     turned: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     visible: dict[tuple[int, int], list[VisibleSide]] = {}
     for k in numbers:
@@ -89,9 +91,11 @@ def find_repairs(
         places, is_own = places[near_places], is_own[near_edges]
         for edge in free:
             side = find_visible_side(around, places, is_own, (k, edge), sides[k][edge])
-            if side is not None:
-                repairs += list_side_moves(around, planes, side)
-                visible.setdefault((direction, edge // 2), []).append(side)
+            if side is None:
+                continue
+            visible.setdefault((direction, edge // 2), []).append(side)
+            if side.key not in settled:
+                repairs += list_side_moves(around, planes, side, is_low[near_edges])
     for on_axis in visible.values():
         repairs += list_leaning_lines(on_axis)
     return sorted(repairs, key=lambda repair: repair.size)
@@ -125,7 +129,8 @@ class VisibleSide(NamedTuple):
     @property
     def reach(self) -> np.ndarray:
         """The two ends (2, 2), across and along."""
-        return np.column_stack([self.x, self.y])[self.ends[[0, -1]]]
+        ends = self.ends[[0, -1]]
+        return np.column_stack([self.x[ends], self.y[ends]])
 
 
 def find_visible_side(
@@ -141,38 +146,37 @@ def find_visible_side(
     on_side = (np.abs(offsets) < ON_M)[plan_drawn.edges].all(axis=1) & is_own
     if not on_side.any():
         return None
-    ends = np.unique(plan_drawn.edges[on_side])
+    ends = plan_drawn.list_ends(on_side)
     return VisibleSide(key, line, x, y, offsets, on_side, ends[np.argsort(y[ends])])
 
 
 def list_side_moves(
-    plan_drawn: DrawnPlan, planes: np.ndarray, visible: VisibleSide
+    plan_drawn: DrawnPlan, planes: np.ndarray, visible: VisibleSide, is_low: np.ndarray
 ) -> Iterator[Repair]:
     """Yield moves of one side.
 
-    The plan's `planes` (p, 3) are in its axes. It may move parallel to a place nearby, to one at
-    each end, to the line of a side that carries it on, or to the line where its planes meet.
+    The plan's `planes` (p, 3) are in its axes, and the steps at its edges are low where `is_low`
+    (e,). It may move parallel to a place nearby, to one at each end, to the line of a side that
+    carries it on, or to the line where its planes meet.
     """
     key, side, x, y, offsets, on_side, ends = visible
-    along, edge = np.abs(offsets) < ON_M, key[1]
-    near_places = np.flatnonzero((np.abs(offsets) < REPAIR_REACH_M) & ~along)
+    off = np.abs(offsets)
+    near_places, edge = np.flatnonzero((off < REPAIR_REACH_M) & (off >= ON_M)), key[1]
     distances = np.hypot(x[near_places, None] - x[ends], y[near_places, None] - y[ends])
-    for j, size in zip(near_places, distances.min(axis=1), strict=True):
-        if size < REPAIR_REACH_M:
-            moved = Side(float(side.offset + offsets[j]), side.lean, False, side.sigma)
-            yield Repair(float(size), {key: moved})
+    sizes = distances.min(axis=1)
+    for n in np.flatnonzero(sizes < REPAIR_REACH_M).tolist():
+        offset = float(side.offset + offsets[near_places[n]])
+        yield Repair(float(sizes[n]), {key: Side(offset, side.lean, False, side.sigma)})
     if len(near_places):
-        end_distances = [
-            np.hypot(x[near_places] - x[end], y[near_places] - y[end]) for end in ends[[0, -1]]
-        ]
-        i, j = (near_places[distance.argmin()] for distance in end_distances)
-        size = max(distance.min() for distance in end_distances)
+        end_distances = distances[:, [0, -1]]
+        i, j = near_places[end_distances.argmin(axis=0)]
+        size = end_distances.min(axis=0).max()
         if size < REPAIR_REACH_M and abs(x[j] - x[i]) < MOST_SIDE_LEAN * abs(y[j] - y[i]):
             lean = float((x[j] - x[i]) / (y[j] - y[i]))
             moved = Side(float(x[i] - lean * y[i]), lean, False, side.sigma)
             yield Repair(float(size), {key: moved})
     yield from list_line_moves(plan_drawn, visible)
-    for e in np.flatnonzero(on_side & is_low_step(plan_drawn.gaps)):
+    for e in np.flatnonzero(on_side & is_low):
         left, right = planes[plan_drawn.beside[e]]
         line = find_fold_line(left, right, edge)
         if line is not None:
@@ -190,16 +194,16 @@ def list_line_moves(plan_drawn: DrawnPlan, visible: VisibleSide) -> Iterator[Rep
     One wall has one line. Such an edge begins beside an end of the side.
     """
     key, side, x, y, _, on_side, ends = visible
-    side_ends = ends[[0, -1]]
+    x_ends, y_ends = x[ends[[0, -1]]], y[ends[[0, -1]]]
     x_edges, y_edges = x[plan_drawn.edges], y[plan_drawn.edges]
-    across, along = np.diff(x_edges)[:, 0], np.diff(y_edges)[:, 0]
-    carries_on = ~on_side & (np.hypot(across, along) > REPAIR_REACH_M)
-    carries_on &= np.abs(across) < MOST_SIDE_LEAN * np.abs(along)
-    distances = np.hypot(x_edges[..., None] - x[side_ends], y_edges[..., None] - y[side_ends])
-    for e in np.flatnonzero(carries_on & (distances.min(axis=(1, 2)) < REPAIR_REACH_M)):
+    across, along = x_edges[:, 1] - x_edges[:, 0], y_edges[:, 1] - y_edges[:, 0]
+    carries_on = ~on_side & (np.abs(across) < MOST_SIDE_LEAN * np.abs(along))
+    numbers = np.flatnonzero(carries_on & (np.hypot(across, along) > REPAIR_REACH_M))
+    gaps = np.hypot(x_edges[numbers, :, None] - x_ends, y_edges[numbers, :, None] - y_ends)
+    for e in numbers[gaps.min(axis=(1, 2)) < REPAIR_REACH_M]:
         lean = across[e] / along[e]
         line = Side(float(x_edges[e, 0] - lean * y_edges[e, 0]), float(lean), False, side.sigma)
-        shift = np.abs(line.offset + lean * y[side_ends] - x[side_ends]).max()
+        shift = np.abs(line.offset + lean * y_ends - x_ends).max()
         if ON_M < shift < REPAIR_REACH_M:
             yield Repair(float(shift), {key: line})
 
@@ -250,7 +254,7 @@ def list_low_steps(plan_drawn: DrawnPlan) -> Iterator[Repair]:
     pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
     for pair in sorted(set(map(tuple, pairs.tolist()))):
         edges = low_edges[(pairs == pair).all(axis=1)]
-        places = plan_drawn.places[np.unique(plan_drawn.edges[edges])]
+        places = plan_drawn.places[plan_drawn.list_ends(edges)]
         spread = np.linalg.norm(places[:, None] - places, axis=2)
         i, j = np.unravel_index(spread.argmax(), spread.shape)
         terms = equate_heights(plan_drawn, *pair)
@@ -268,7 +272,8 @@ def is_low_step(gaps: np.ndarray) -> np.ndarray:
 
     `gaps` (e, 2) are how far apart their planes are at their ends.
     """
-    return (gaps.max(axis=1) > NO_STEP_M) & (gaps.max(axis=1) < LOW_STEP_M)
+    highest = gaps.max(axis=1)
+    return (highest > NO_STEP_M) & (highest < LOW_STEP_M)
 
 
 def measure_low_steps(plan_drawn: DrawnPlan) -> float:

@@ -264,13 +264,16 @@ def run_round(
     quads = list_quads(state, problem) if area > WINDOW_M2 else []
     present = RepairTrial(state, whole, plan, problem, drawing)
     scene, volumes = problem.scene, problem.volumes
-    for repair in find_repairs(plan, volumes, state.sides, problem.plan, scene, numbers):
+    settled = {key for key, count in trials.items() if count >= TRIALS_A_LINE}
+    for repair in find_repairs(plan, volumes, state.sides, problem.plan, scene, numbers, settled):
         # Planes are as they were until another equation holds, and so is what one more costs.
         if not repair.owners <= state.bases.keys():
             continue
-        key = repair.key, *(count_free(state.bases[k]) for k in sorted(repair.owners))
         lines = repair.sides if len(repair.sides) == 1 else {}  # stairs are few
-        if trials[key] or any(trials[side] >= TRIALS_A_LINE for side in lines):
+        if any(trials[side] >= TRIALS_A_LINE for side in lines):
+            continue
+        key = repair.key, *(count_free(state.bases[k]) for k in sorted(repair.owners))
+        if trials[key]:
             continue
         which = (*repair.sides, *repair.owners)
         if which not in boxes:
