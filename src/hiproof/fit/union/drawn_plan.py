@@ -18,9 +18,7 @@ from ...frames import LocalFrame
 from ...model import Part, Piece, Roof
 from ...settings import ComposeSettings
 from .finish import Planes
-from .plan import Plan
-from .scene import Scene
-from .volumes import DIRECTION
+from .regions import PlanSite
 
 STRAIGHT_CORNER_M = 0.02  # A corner nearer (m) to the line between its two neighbours is none.
 # As in a solid's first attempt.
@@ -120,8 +118,7 @@ def make_part(
     regions: list[list[shapely.Polygon]],
     volumes: np.ndarray,
     planes: list[Planes],
-    plan: Plan,
-    scene: Scene,
+    site: PlanSite,
 ) -> tuple[Part, list[tuple[int, int]]]:
     """Return all volumes over their `regions` as one part, and its planes' owners.
 
@@ -130,11 +127,9 @@ def make_part(
     pieces, owner = [], []
     for k, polygons in enumerate(regions):
         if polygons:
-            numbers = np.flatnonzero(np.isfinite(planes[k].rows[:, 2]))
-            turn = scene.turn[int(volumes[k, DIRECTION])]
-            rows = transform_planes(planes[k].rows[numbers], turn, plan)
+            rows, numbers = site.turn_planes(volumes[k], planes[k])
             pieces += [Piece(polygon, rows) for polygon in polygons]
-            owner += [(k, p) for p in numbers.tolist()] * len(polygons)
+            owner += [(k, p) for p in numbers] * len(polygons)
     return Part("free", tuple(pieces)), owner
 
 
@@ -210,13 +205,3 @@ def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
     slopes = slopes[slopes > EQUAL_PLANE]
     distinct = int((equal_planes(common, EQUAL_PLANE) == np.arange(len(rows))).sum())
     return distinct + int((np.diff(slopes, prepend=0.0) > EQUAL_PLANE).sum())
-
-
-def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
-    """Return planes (k, 3) of local x, y, 1 from those in axes turned from the plan's.
-
-    `turn` has cosine and sine of the angle.
-    """
-    c, s = turn
-    gradients = rows[:, :2] @ np.array([[c, s], [-s, c]]) @ plan.frame.rotation
-    return np.column_stack([gradients, rows[:, 2] - gradients @ plan.frame.origin[:2]])

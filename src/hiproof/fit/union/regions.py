@@ -66,6 +66,16 @@ class PlanSite(NamedTuple):
             self.cache[key] = draw_quad(volume, sides, self.plan, self.scene), sides
         return self.cache[key][0]
 
+    def turn_planes(self, volume: np.ndarray, planes: Planes) -> tuple[np.ndarray, list[int]]:
+        """Return a volume's planes (k, 3) over local x, y, 1, and their numbers."""
+        key = "planes", id(planes)
+        if key not in self.cache:
+            numbers = np.flatnonzero(np.isfinite(planes.rows[:, 2]))
+            turn = self.scene.turn[int(volume[DIRECTION])]
+            rows = transform_planes(planes.rows[numbers], turn, self.plan)
+            self.cache[key] = (rows, numbers.tolist()), planes
+        return self.cache[key][0]
+
     def cut_quad(self, quad: shapely.Polygon) -> shapely.Geometry:
         """Return the part of a volume's plan inside the outline."""
         return self.recall(cut_to_outline, quad, self.outline)
@@ -289,6 +299,16 @@ def transform_places(xy: np.ndarray, volume: np.ndarray, site: PlanSite) -> np.n
     """Return local places (n, 2) in a volume's axes."""
     frame, (c, s) = site.plan.frame, site.scene.turn[int(volume[DIRECTION])]
     return (xy - frame.origin[:2]) @ frame.rotation.T @ np.array([[c, -s], [s, c]])
+
+
+def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
+    """Return planes (k, 3) over local x, y, 1 from those in axes turned from the plan's.
+
+    `turn` has cosine and sine of the angle.
+    """
+    c, s = turn
+    gradients = rows[:, :2] @ np.array([[c, s], [-s, c]]) @ plan.frame.rotation
+    return np.column_stack([gradients, rows[:, 2] - gradients @ plan.frame.origin[:2]])
 
 
 def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:

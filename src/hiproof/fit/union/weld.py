@@ -197,7 +197,7 @@ def draw_window(state: RoofState, window: Window, problem: WeldProblem) -> Drawi
     for site in window.sites:
         regions = given_regions or sketch_regions(volumes, planes, sides, site, window.base)
         all_regions.append(regions)
-        part, owner = make_part(regions, volumes, planes, problem.plan, problem.scene)
+        part, owner = make_part(regions, volumes, planes, site)
         parts.append(part)
         plans.append(draw_plan(part, owner, site.outline))
     return Drawing(all_regions, parts, plans)
