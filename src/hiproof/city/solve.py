@@ -31,6 +31,7 @@ from ..read.assign import PointGrid, grow_polygon
 from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import hashes, thin_to_count, without_repeats
+from ..settings import Settings
 from ..stages import add_remark, distinct, largest_polygon, shift_remark
 from ..status import Doubt, Status
 from ..write.files import atomic_file
@@ -88,6 +89,11 @@ class Surroundings:
         self.points, self.grid = points, PointGrid(self.roof)
         self.shifts: dict[int, Shift] = {}
         self.latest: tuple[shapely.Polygon, np.ndarray] = shapely.Polygon(), np.zeros(0, np.int64)
+
+    @functools.cached_property
+    def settings(self) -> Settings:
+        """The settings of the fit: footprints have been moved before."""
+        return self.plan.settings.replace({"reconstruct": {"align": "off"}})
 
     @functools.cached_property
     def noise_grid(self) -> PointGrid:
@@ -536,12 +542,11 @@ def reconstruct_job(
 
     `bare` (m, 3) are points of bare ground inside its area.
     """
-    aligned = surroundings.plan.settings.replace({"reconstruct": {"align": "off"}})
     arguments = (
         used_points,
         job.footprint,
         surroundings.choose_terrain(job),
-        aligned,
+        surroundings.settings,
         job.id,
         bare,
     )

@@ -302,7 +302,7 @@ def transform_places(xy: np.ndarray, volume: np.ndarray, site: PlanSite) -> np.n
 
 
 def transform_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
-    """Return planes (k, 3) over local x, y, 1 from those in axes turned from the plan's.
+    """Return planes (k, 3) over local x, y, 1 from those in a volume's axes.
 
     `turn` has cosine and sine of the angle.
     """

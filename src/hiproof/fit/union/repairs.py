@@ -23,7 +23,7 @@ from .volumes import DIRECTION, N_SIDES
 REPAIR_REACH_M = 1.0
 LOW_STEP_M = 0.4  # A step so low (m) may be a fold line.
 NO_STEP_M = 2e-3  # A lower step (m) is none.
-# Planes whose gradients (rise over run) differ less have no fold line, but may be one.
+# Planes whose gradients (rise over run) differ less have no clear fold line.
 LEAST_BREAK = 0.1
 ON_M = 0.004  # A place so near a line (m) lies on it: crossings are set aside by a millimetre.
 
@@ -248,7 +248,7 @@ def find_fold_line(plane: np.ndarray, other: np.ndarray, edge: int) -> tuple[flo
 
 
 def list_low_steps(plan_drawn: DrawnPlan) -> Iterator[Repair]:
-    """Yield repairs of low steps: two planes meet along the step, or are one."""
+    """Yield repairs of low steps: two planes meet along the step."""
     highest, lengths = plan_drawn.gaps.max(axis=1), plan_drawn.lengths
     low_edges = np.flatnonzero(is_low_step(plan_drawn.gaps))
     pairs = np.sort(plan_drawn.beside[low_edges], axis=1)
@@ -260,11 +260,6 @@ def list_low_steps(plan_drawn: DrawnPlan) -> Iterator[Repair]:
         terms = equate_heights(plan_drawn, *pair)
         size, length = float(highest[edges].max()), float(lengths[edges].sum())
         yield Repair(size, equations=((places[i], terms), (places[j], terms)), length=length)
-        slope_break = np.hypot(*(plan_drawn.planes[pair[0]] - plan_drawn.planes[pair[1]])[:2])
-        if slope_break < LEAST_BREAK:
-            third_place = places[i] + np.array([[0.0, -1.0], [1.0, 0.0]]) @ (places[j] - places[i])
-            equations = tuple((place, terms) for place in (places[i], places[j], third_place))
-            yield Repair(size, equations=equations, length=length)
 
 
 def is_low_step(gaps: np.ndarray) -> np.ndarray:
