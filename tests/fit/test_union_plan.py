@@ -11,6 +11,7 @@ from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.apart import split_volumes
 from hiproof.fit.union.cants import fit_planes, list_walls
 from hiproof.fit.union.finish import (
+    fit_volume_planes,
     invert_matrix,
     solve_least_squares,
     sum_moments,
@@ -448,3 +449,17 @@ def test_the_inverse_of_a_symmetric_matrix_is_numpys(size):
     assert invert_matrix(matrix, 0.1) == pytest.approx(
         np.linalg.inv(matrix + 0.1 * np.eye(size)), rel=1e-9
     )
+
+
+def test_planes_of_a_volume_whose_sides_are_one_line_are_fitted():
+    """Where both sides take one line of the outline, no pyramid lies between them."""
+    outline = shapely.box(0, 0, 10, 6)
+    volumes = np.concatenate([make_base(-9.0), make_base(5.0)])
+    volumes[1, U0 : V1 + 1] = (-5.0, 5.0, -3.0, 3.0)
+    volumes[1, OFFSET0 : OFFSET0 + LEVEL] = 7.0
+    volumes[1, OFFSET0 + LEVEL] = np.inf
+    volumes[1, SLOPE0 : SLOPE0 + LEVEL] = 0.5
+    _, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
+    sides = [Side(5.0), Side(5.0), Side(-3.0), Side(3.0)]
+    planes = fit_volume_planes(volumes[1], sides, scene, np.arange(scene.n))
+    assert planes.rows[:LEVEL, 2] == pytest.approx(np.full(LEVEL, 7.0), abs=0.05)

@@ -132,7 +132,7 @@ def fit_volume_planes(
         )
         if trial.cost <= best.cost + base * (len(anchored) - 1) + LEVEL_SLACK * len(members):
             best = trial
-    if numbers == [*range(N_SIDES)]:
+    if numbers == [*range(N_SIDES)] and all(sides[k].offset < sides[k + 1].offset for k in (0, 2)):
         leans = square_leans(sides, (0, 1, 2, 3), facing)
         trial = fit_design(best, design_pyramid(sides, leans), points, scene)
         n_saved = max(len(set(group_slopes(volume))) - 1, 0)
