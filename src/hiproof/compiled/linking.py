@@ -15,12 +15,37 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
-from numba.core import bytecode, compiler, types
+from numba.core import (
+    bytecode,
+    compiler,
+    compiler_machinery,
+    typed_passes,
+    types,
+    untyped_passes,
+)
+
+from . import references
+from .typing_memory import Remembering
 
 # numba numbers the functions of its own library from 1 in every process, and the numbers stand in
 # their symbols: code that two processes kept would meet in a third with one symbol for two
 # functions.
 bytecode.FunctionIdentity._unique_ids = itertools.count(uuid.uuid4().int >> 80)
+
+# What numba does to functions without closures, generators, objects, and literals as arguments.
+PASSES = (
+    untyped_passes.TranslateByteCode,
+    untyped_passes.FixupArgs,
+    untyped_passes.IRProcessing,
+    untyped_passes.GenericRewrites,
+    untyped_passes.ReconstructSSA,
+    typed_passes.NopythonTypeInference,
+    typed_passes.PreLowerStripPhis,
+    typed_passes.NopythonRewrites,
+    typed_passes.IRLegalization,
+    references.Lowering,
+    typed_passes.NoPythonBackend,
+)
 
 LARGE = 80  # instructions; LLVM inlines fewer
 
@@ -50,7 +75,16 @@ def make_pipeline(stamp: str) -> type[compiler.Compiler]:
             identity.unique_name = f"{identity.func_qualname}${stamp}"
             compiler.ExtractByteCode().run_pass(self.state)
             self.state.lifted, self.state.lifted_from = (), None
+            self.state.type_annotation = ""  # is for people who look into numba
+            self.state.typingctx = Remembering(self.state.typingctx, self.state.flags)
             return self._compile_bytecode()
+
+        def define_pipelines(self) -> list[compiler_machinery.PassManager]:
+            passes = compiler_machinery.PassManager("plain")
+            for one in PASSES:
+                passes.add_pass(one, one.__name__)
+            passes.finalize()
+            return [passes]
 
     return Stamped
 

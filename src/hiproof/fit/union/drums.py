@@ -199,7 +199,10 @@ def move_circle(
         right_y += way_y * sign * wrong / softness
         right_r += sign * wrong / softness
     move_x, move_y, wider, _ = solve_three(xx, xy, xr, yy, yr, rr, right_x, right_y, right_r)
-    return np.array([min(max(x, -softness), softness) for x in (move_x, move_y, wider)])
+    step = np.array([move_x, move_y, wider])
+    for k in range(len(step)):
+        step[k] = min(max(step[k], -softness), softness)
+    return step
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:

@@ -1,0 +1,44 @@
+"""Types of calls with numbers, found once a process.
+
+numba looks through all templates of `+` or `max` at every place where one stands, which took a
+tenth of the time to compile.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core import types, typing
+
+
+class Remembering(typing.Context):
+    """numba's typing context, which remembers what calls of functions with numbers return.
+
+    It serves functions that are compiled with the same `options`.
+    """
+
+    __slots__ = ("found",)  # not in the dictionary, which is that of numba's context
+
+    def __init__(self, context: typing.Context, options: Any):
+        self.__dict__ = context.__dict__
+        self.found = FOUND.setdefault(options, {})
+
+    def resolve_function_type(self, func: Any, args: tuple, kws: dict) -> Any:
+        """Return the signature of a call, from memory where it has numbers alone."""
+        if kws or not isinstance(func, types.Function) or not all(map(is_number, args)):
+            return super().resolve_function_type(func, args, kws)
+        key = func, tuple(args)
+        if key not in self.found:
+            signature = super().resolve_function_type(func, args, kws)
+            self.found[key] = signature, func.get_impl_key(signature)
+        signature, implementation = self.found[key]
+        func._impl_keys[signature.args] = implementation  # the one for these options
+        return signature
+
+
+FOUND: dict[Any, dict[tuple, tuple]] = {}
+"""Signatures and their implementations, by options, function and types of arguments."""
+
+
+def is_number(kind: types.Type) -> bool:
+    return isinstance(types.unliteral(kind), types.Number | types.Boolean)
