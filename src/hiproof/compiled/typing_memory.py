@@ -17,11 +17,18 @@ class Remembering(typing.Context):
     It serves functions that are compiled with the same `options`.
     """
 
-    __slots__ = ("found",)  # not in the dictionary, which is that of numba's context
+    __slots__ = ("found", "original")  # not in the dictionary, which is that of numba's context
 
     def __init__(self, context: typing.Context, options: Any):
-        self.__dict__ = context.__dict__
+        self.__dict__, self.original = context.__dict__, context
         self.found = FOUND.setdefault(options, {})
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether both are one context of numba, for which it keeps its own functions."""
+        return getattr(other, "original", other) is self.original
+
+    def __hash__(self) -> int:
+        return hash(self.original)
 
     def resolve_function_type(self, func: Any, args: tuple, kws: dict) -> Any:
         """Return the signature of a call, from memory where it has numbers alone."""
