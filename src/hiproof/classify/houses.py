@@ -20,6 +20,7 @@ import shapely
 
 from ..compiled import compiled
 from ..fit.direction import measure_support, quarter_gap
+from ..geometry.arrays import measure_range
 from ..geometry.rings import OVERLAY_GRID_M, with_area
 from .surfaces import Surfaces, find_surfaces
 
@@ -370,10 +371,11 @@ def crossings(ends, state, weight, normal, lines_m):
         x, y, across, position_along = ends[:, e, 0], ends[:, e, 1], v[e], u[e]
         for b in range(n):
             across[b], position_along[b] = c * x[b] + s * y[b], (c * y[b] - s * x[b]) * along
-    first, start = math.floor(v.min()), math.floor(u.min())
-    crossed = np.zeros(
-        (3, int(math.floor(v.max()) - first) + 1, int(math.floor(u.max()) - start) + 1)
-    )
+    (v0, v1), (v2, v3) = measure_range(v[0]), measure_range(v[1])
+    (u0, u1), (u2, u3) = measure_range(u[0]), measure_range(u[1])
+    first, start = math.floor(min(v0, v2)), math.floor(min(u0, u2))
+    lines, stretches = math.floor(max(v1, v3)) - first + 1, math.floor(max(u1, u3)) - start + 1
+    crossed = np.zeros((3, int(lines), int(stretches)))
     for b in range(n):
         lower, upper = (0, 1) if v[0, b] < v[1, b] else (1, 0)
         v_low, u_low = v[lower, b], u[lower, b]
@@ -392,10 +394,11 @@ def is_between(points, ends, normal, lines_m, first, start, template):
     The table (lines, stretches) has the shape of `template`. Along the border of a block there is
     nothing to be cut.
     """
-    near_line, is_visited = (
-        np.zeros((2, *template.shape), np.bool_),
-        np.zeros(points.max() + 1, np.bool_),
-    )
+    n_points = 0
+    for b in range(len(points)):
+        n_points = max(n_points, points[b, 0] + 1, points[b, 1] + 1)
+    near_line = np.zeros((2, *template.shape), np.bool_)
+    is_visited = np.zeros(n_points, np.bool_)
     for b in range(len(ends)):
         for e in range(2):
             if is_visited[points[b, e]]:

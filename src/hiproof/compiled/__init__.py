@@ -8,8 +8,11 @@ files are compiled into it, and takes old code for new after an upgrade. Here co
 stamp of all its sources (stamp.py) and is kept under it (kept.py). Wheels and images carry code for
 a kind of processors (kinds.py). Large functions are called, not copied (linking.py), kept ones are
 loaded without a compiler (loading.py), and only functions that Python calls get a wrapper for that
-(dispatcher.py). numba's runtime is kept as well (runtime.py). Whoever wants to show that something
-is being compiled listens to news.py.
+(dispatcher.py). numba compiles with few of its passes (linking.py), looks up once what a sum of
+numbers is (typing_memory.py), and counts few references (references.py). So compiled functions have
+no closures, comprehensions or generators, and LLVM alone decides what is inlined. numba's runtime
+is kept as well (runtime.py). Whoever wants to show that something is being compiled listens to
+news.py.
 """
 
 from __future__ import annotations

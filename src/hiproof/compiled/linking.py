@@ -4,6 +4,7 @@ numba links a function's code into every caller's, where LLVM optimises all of i
 is too large to be inlined nothing comes of that but time: here a caller gets an empty module in its
 place, and the address when it is loaded. So a function's symbol has to be the same in whatever
 process it was compiled (its stamp is in it), and what a function calls has to be loaded before it.
+Functions are compiled with the passes of numba that they need.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from .typing_memory import Remembering
 # functions.
 bytecode.FunctionIdentity._unique_ids = itertools.count(uuid.uuid4().int >> 80)
 
-# What numba does to functions without closures, generators, objects, and literals as arguments.
+# What numba does to functions without closures, generators, objects and literal arguments.
 PASSES = (
     untyped_passes.TranslateByteCode,
     untyped_passes.FixupArgs,
@@ -81,8 +82,8 @@ def make_pipeline(stamp: str) -> type[compiler.Compiler]:
 
         def define_pipelines(self) -> list[compiler_machinery.PassManager]:
             passes = compiler_machinery.PassManager("plain")
-            for one in PASSES:
-                passes.add_pass(one, one.__name__)
+            for step in PASSES:
+                passes.add_pass(step, step.__name__)
             passes.finalize()
             return [passes]
 

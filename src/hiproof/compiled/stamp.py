@@ -27,7 +27,7 @@ PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abif
 VERSIONS = ("numba", "llvmlite", "numpy")
 HERE = Path(__file__).parent
 PACKAGE = HERE.parent
-DECIDING = ("__init__.py", "dispatcher.py", "linking.py")
+DECIDING = ("__init__.py", "dispatcher.py", "linking.py", "references.py", "typing_memory.py")
 
 
 @functools.cache

@@ -599,7 +599,7 @@ def choose_heir(xy, edges, face, label, region, length, planes, sliver, anyone):
     return heir
 
 
-@compiled(inline="always")
+@compiled
 def evaluate_height(plane, place):
     return plane[0] * place[0] + plane[1] * place[1] + plane[2]
 

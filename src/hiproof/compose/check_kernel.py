@@ -13,7 +13,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.area_vectors import cross, dot, enclosed_volume, newell
-from ..geometry.arrays import copy_row, sort_order
+from ..geometry.arrays import copy_row, measure_range, sort_order
 from ..geometry.point_in_polygon import flips
 from .bends import SURELY_FLAT_COSINE
 from .joined import find_root, join
@@ -435,7 +435,10 @@ def directed_edges(index, ring_start, face_start):
                 edges[count, 0], edges[count, 1] = min(a, b), max(a, b)
                 edges[count, 2], edges[count, 3] = 1 if a < b else -1, f
                 count += 1
-    key = 1.0 * edges[:, 0] * (index.max() + 1) + edges[:, 1]
+    highest = 0
+    for k in index:
+        highest = max(highest, k)
+    key = 1.0 * edges[:, 0] * (highest + 1) + edges[:, 1]
     return edges[sort_order(key)]
 
 
@@ -647,8 +650,11 @@ def sweep_axis(low_box, high_box):
     """
     best, minimum = 0, np.inf
     for axis in range(3):
-        whole = high_box[:, axis].max() - low_box[:, axis].min()
-        overlaps = (high_box[:, axis] - low_box[:, axis]).sum() / whole if whole > 0 else np.inf
+        lowest, highest, total = np.inf, -np.inf, 0.0
+        for f in range(len(low_box)):
+            lowest, highest = min(lowest, low_box[f, axis]), max(highest, high_box[f, axis])
+            total += high_box[f, axis] - low_box[f, axis]
+        overlaps = total / (highest - lowest) if highest > lowest else np.inf
         if overlaps < minimum:
             best, minimum = axis, overlaps
     return best
@@ -664,7 +670,7 @@ def check_intersections(
     """
     low_box, high_box = face_boxes(vertices, index, ring_start, face_start)
     slack = flatness + 2e-4
-    widest, axis = slack.max(), sweep_axis(low_box, high_box)
+    widest, axis = measure_range(slack)[1], sweep_axis(low_box, high_box)
     order = sort_order(low_box[:, axis].copy())
     axis_of = largest_axes(normals)
     flat = np.empty((len(vertices), 2))

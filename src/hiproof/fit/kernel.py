@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import copy_row
+from ..geometry.arrays import copy_row, measure_range
 
 MAX_PLANES = 64  # of a primitive: a dome's facets
 # places in theta (9,); after the last come q1, q2, q3
@@ -588,13 +588,13 @@ def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
     `centre_precision`.
     """
     count = len(shifts)
-    logs = np.empty((count, count))
+    logs, top = np.empty((count, count)), -np.inf
     for a in range(count):
         for b in range(count):
             centre, growth = 0.5 * (shifts[a] - shifts[b]), 0.5 * (shifts[a] + shifts[b])
             logs[a, b] = plus[a] + minus[b] - inliers * math.log(1.0 + growth / half_extent)
             logs[a, b] -= 0.5 * centre_precision * centre * centre
-    top = logs.max()
+            top = max(top, logs[a, b])
     total = centre_sum = growth_sum = centre_squares = growth_squares = 0.0
     for a in range(count):
         for b in range(count):
@@ -659,7 +659,7 @@ def mode(values, bin_m, counts):
 
     `counts` is working space.
     """
-    smallest, largest = values.min(), values.max()
+    smallest, largest = measure_range(values)
     bins = min(int((largest - smallest) / bin_m) + 2, len(counts))
     counts[:bins] = 0
     for value in values:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import sort_order
+from ..geometry.arrays import find_place, sort_order
 
 WALL_REACH_SPACINGS = 1.2  # how far around a point is looked
 STEEPEST_ROOF = 2.0  # slope of a roof: 63 degrees
@@ -32,7 +32,7 @@ def on_walls(points, neighbours, spacing):
     ascending = x_of_neighbours[order]
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        k = np.searchsorted(ascending, x - reach)
+        k = find_place(ascending, x - reach)
         while k < len(order) and ascending[k] <= x + reach and not result[i]:
             j = order[k]
             mask = (neighbours[j, 0] - x) ** 2 + (neighbours[j, 1] - y) ** 2 < reach * reach

@@ -45,6 +45,39 @@ def sort_values(values):
 
 
 @compiled
+def find_place(ascending, value):
+    """Return how many of `ascending` values (n,), float64, are below `value`.
+
+    >>> find_place(np.array([1.0, 2.0, 2.0, 5.0]), 2.0)
+    1
+    """
+    low, high = 0, len(ascending)
+    while low < high:
+        middle = (low + high) // 2
+        if ascending[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def measure_range(values):
+    """Return the lowest and the highest of `values` (n,), float64.
+
+    They are infinite without any.
+
+
+    >>> measure_range(np.array([2.0, 1.0, 3.0]))
+    (1.0, 3.0)
+    """
+    lowest, highest = np.inf, -np.inf
+    for value in values:
+        lowest, highest = min(lowest, value), max(highest, value)
+    return lowest, highest
+
+
+@compiled
 def compute_median(values):
     """Return the median of `values` (n,), float64, of which there is one at least.
 
@@ -65,7 +98,7 @@ def compute_median(values):
             low = i
         if half < i:
             high = j
-    return x[half] if len(x) % 2 == 1 else 0.5 * (x[:half].max() + x[half])
+    return x[half] if len(x) % 2 == 1 else 0.5 * (measure_range(x[:half])[1] + x[half])
 
 
 @compiled

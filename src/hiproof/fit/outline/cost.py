@@ -26,7 +26,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ...geometry.arrays import copy_row
+from ...geometry.arrays import copy_row, find_place
 from ...geometry.point_in_polygon import flips
 from .lines import SAME_RAD, compute_area, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
@@ -129,7 +129,7 @@ def nearest_sides(corners, x, y, court, reach):
         x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[k, 0], corners[k, 1]
         lower, upper = min(y0, y1) - reach, max(y0, y1) + reach
         if lower <= y[-1] and upper >= y[0]:
-            nearby = slice(np.searchsorted(y, lower), np.searchsorted(y, upper))
+            nearby = slice(find_place(y, lower), find_place(y, upper))
             update_nearest(x0, y0, x1, y1, x[nearby], y[nearby], squared[nearby], inside[nearby])
     return squared, inside
 
@@ -270,8 +270,8 @@ def select_points(old, corners, i, count, new_items, border):
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
     reach = SURE_BLURS * border.blur
     first, last = (
-        np.searchsorted(border.y, y_low - reach),
-        np.searchsorted(border.y, y_high + reach),
+        find_place(border.y, y_low - reach),
+        find_place(border.y, y_high + reach),
     )
     nearby, m = np.empty(last - first, np.int64), 0
     for k in range(first, last):

@@ -179,7 +179,8 @@ def shift_lines(drawing, border, step):
         cost = drawing.cost
         for _ in range(len(drawing.lines)):
             drawing = shift_first_line(drawing, border, step)
-            lines, corners = np.roll(drawing.lines, -2), np.roll(drawing.corners, -2)  # a line on
+            lines = np.concatenate((drawing.lines[1:], drawing.lines[:1]))  # a line on
+            corners = np.concatenate((drawing.corners[1:], drawing.corners[:1]))
             drawing = Drawing(
                 lines, drawing.kappa, corners, drawing.own, drawing.structure, drawing.cost
             )

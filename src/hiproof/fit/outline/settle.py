@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from ...geometry.arrays import sort_values
+from ...geometry.arrays import measure_range, sort_values
 from .lines import find_corners
 from .soft import SURE_BLURS, share_inside
 
@@ -155,8 +155,10 @@ def interpolate_offset(depth, length, density, table):
         inside += d > SHALLOW_M
     a_metre = max(inside / ((DEEP_M - SHALLOW_M) * length), LEAST_DENSITY * density) * length
     logs = log_likelihoods(depth, a_metre, table)
-    likely = np.exp(logs - logs.max())
-    moment = 0.0
+    top, moment = -np.inf, 0.0
+    for row in logs:
+        top = max(top, measure_range(row)[1])
+    likely = np.exp(logs - top)
     for q in range(len(OFFSETS_M)):
         share = 0.0
         for walls in range(len(likely)):

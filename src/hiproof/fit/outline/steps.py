@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import find_place
 from .cost import apply_change, interpolate_cost
 from .lines import quarter_gap, replace_lines, replaced_by
 from .moves import GAIN, TURN_RAD
@@ -160,7 +161,7 @@ def find_band(y, azimuth, distance, lower, upper):
                 min(minimum, out * s + position * c),
                 max(limit, out * s + position * c),
             )
-    return np.searchsorted(y, minimum), np.searchsorted(y, limit)
+    return find_place(y, minimum), find_place(y, limit)
 
 
 @compiled

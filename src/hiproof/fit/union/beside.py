@@ -111,7 +111,7 @@ def gather_edge(volumes, walls, neighbours, k, j, edge, beside):
         samples[j, edge, STEP_BARE, q] = samples[j, edge, STEP_COVERED, q] = NO_STEP
 
 
-@compiled(inline="always")
+@compiled
 def fill_heights_twice(volumes, walls, neighbours, k, j, edge, m, beside):
     """Fill the heights beside an edge of volume j without volume k, and under it."""
     n, is_raised, places = pad_count(m), False, walls.places

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import find_place
 from .around import compute_roof_everywhere
 from .beside import BOX0, gather_neighbour_edges, make_room, price_neighbour_edge
 from .objective import BASE_SHARE, compute_costs
@@ -88,7 +89,9 @@ def move_edges(volumes, scene, k, value, reach, context):
             t = places[q]
             if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
                 continue
-            p = np.searchsorted(distance, sign * t, side="right")
+            p = find_place(distance, sign * t)
+            while p < len(distance) and distance[p] == sign * t:
+                p += 1
             bounds[q] = fixed + (gains[p - 1] if p > 0 else 0.0)
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
                 bounds[q] += scene.evidence * BASE_COST
@@ -162,8 +165,8 @@ def find_place_between(distance, gains, sign, start):
     `distance` (m,) are the points' distances along the edge's way out, ascending, and `gains` (m,)
     is the misfit up to each of them.
     """
-    first = np.searchsorted(distance, sign * start - BETWEEN_M)
-    last = np.searchsorted(distance, sign * start + BETWEEN_M)
+    first = find_place(distance, sign * start - BETWEEN_M)
+    last = find_place(distance, sign * start + BETWEEN_M)
     lowest, place = np.inf, start
     for p in range(max(first, 1), min(last, len(distance) - 1) + 1):
         if gains[p - 1] < lowest:

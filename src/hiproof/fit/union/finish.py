@@ -270,7 +270,10 @@ def solve_least_squares(rows, design, points, dead, width):
             rows, points, (dead + width) * (2.0 if turn == 0 else 1.5)
         )
         normal, right = form_normal_equations(design, moments, products, is_present)
-        ridge, share = 1e-6 * max(np.trace(normal) / len(normal), 1e-6), misfit / max(weight, 1.0)
+        trace = 0.0
+        for q in range(len(normal)):
+            trace += normal[q, q]
+        ridge, share = 1e-6 * max(trace / len(normal), 1e-6), misfit / max(weight, 1.0)
         inverse = invert_matrix(normal, ridge)
         unknowns = multiply(inverse, right + ridge * anchor)
         rows = np.full((len(rows), 3), np.nan)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import measure_range
 from .around import measure_context
 from .edges import EVERYWHERE, NO_GAIN, move_edges
 from .facings import face_walls
@@ -130,7 +131,7 @@ def simplify(volumes, scene, value, steepest):
         value_before = value
         k = 1
         while k < len(volumes):
-            if volumes[k, SLOPE0 : SLOPE0 + N_SIDES].max() <= steepest:
+            if measure_range(volumes[k, SLOPE0 : SLOPE0 + N_SIDES])[1] <= steepest:
                 trial = remove_volume(volumes, k)
                 trial_value = compute_objective(
                     trial, scene, value + BEGIN_UNITS * scene.evidence + 2.0 * BEGIN_SHARE * scene.n

@@ -161,21 +161,21 @@ def remove_plane(row, plane):
 @compiled
 def flatten(volumes, scene, value, k, context):
     """Replace the nearly level planes of volume k by one level top."""
-    flat = (volumes[k, OFFSET0 : OFFSET0 + N_SIDES] < np.inf) & (
-        volumes[k, SLOPE0 : SLOPE0 + N_SIDES] < ALMOST_LEVEL
-    )
-    if not flat.any() or volumes[k, OFFSET0 + LEVEL] < np.inf:
+    if volumes[k, OFFSET0 + LEVEL] < np.inf:
         return volumes, value
-    trial = volumes.copy()
+    trial, count = volumes.copy(), 0
     u, v = 0.5 * (volumes[k, U0] + volumes[k, U1]), 0.5 * (volumes[k, V0] + volumes[k, V1])
     total = 0.0
     for plane in range(N_SIDES):
-        if flat[plane]:
+        if volumes[k, OFFSET0 + plane] < np.inf and volumes[k, SLOPE0 + plane] < ALMOST_LEVEL:
+            count += 1
             total += volumes[k, OFFSET0 + plane] + volumes[k, SLOPE0 + plane] * measure_run(
                 volumes[k], plane, u, v
             )
             remove_plane(trial[k], plane)
-    trial[k, OFFSET0 + LEVEL] = total / flat.sum()
+    if count == 0:
+        return volumes, value
+    trial[k, OFFSET0 + LEVEL] = total / count
     trial, trial_value = settle_move(trial, scene, k, value, EVERYWHERE, context)
     return (trial, trial_value) if trial_value < np.inf else (volumes, value)
 
@@ -283,7 +283,7 @@ def count_seeds(volumes, scene, k, z_now, everywhere, beneath):
     return seeds
 
 
-@compiled(inline="always")
+@compiled
 def is_seed(height, z, z_now, floor, dead, width):
     """Return whether a new plane may pass through the point `z`, well below a volume."""
     r = min(max(abs(z_now - z) - dead, 0.0) / width, 1.0)
@@ -314,10 +314,10 @@ def list_trial_slopes(row, plane, slopes):
         if q < N_SIDES and row[OFFSET0 + q] == np.inf:
             continue
         slope = row[SLOPE0 + q] if q < N_SIDES else slopes[q - N_SIDES]
-        if (
-            count < MOST_TRIED_SLOPES
-            and (np.abs(trial_slopes[:count] - slope) >= SLOPES_APART).all()
-        ):
+        is_new = count < MOST_TRIED_SLOPES
+        for p in range(count):
+            is_new = is_new and abs(trial_slopes[p] - slope) >= SLOPES_APART
+        if is_new:
             trial_slopes[count] = slope
             count += 1
     return trial_slopes[:count]

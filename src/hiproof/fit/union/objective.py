@@ -21,7 +21,7 @@ from .volumes import LEVEL, OFFSET0, compute_roof_heights, is_allowed, price_vol
 BASE_SHARE = 0.01  # The base costs nothing if it is visible on less of the outline's area.
 
 
-@compiled(inline="always")
+@compiled
 def compute_point_cost(z_point, z_roof, dead, width):
     r = max(abs(z_point - z_roof) - dead, 0.0) / width
     r *= r
@@ -33,7 +33,7 @@ def compute_misfits(z: np.ndarray, height: np.ndarray | float, scene) -> np.ndar
     return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
 
 
-@compiled(inline="always")
+@compiled
 def compute_cell_cost(z_roof, weight, shade, z_low, z_high):
     return (
         weight

@@ -61,7 +61,7 @@ def find_lowest_row(rows, u, v):
     return best, plane
 
 
-@compiled(inline="always")
+@compiled
 def solve_three(xx, xy, x1, yy, y1, n, xz, yz, z1):
     """Solve a symmetric 3 x 3 system.
 
@@ -195,7 +195,7 @@ def fit_symmetric_gable(cloud, members, planes, tau):
             spread += w * s * s
             heights[side] += w * cloud.z[i]
             product += w * s * cloud.z[i]
-        if weights.min() < 1.0:
+        if min(weights[0], weights[1]) < 1.0:
             return fitted, False
         height, other_height, slope, ok = solve_three(
             weights[0] + 1e-6,

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
+from ...geometry.arrays import measure_range
 from ...geometry.rings import is_convex
 from .around import compute_roof_everywhere, measure_context
 from .objective import compute_cell_cost, compute_point_cost
@@ -203,7 +204,10 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
     direction = int(volumes[k, DIRECTION])
     numbers = find_near_places(volumes[k], across_u, scene.U[direction], scene.V[direction])
     gain = measure_gain(volumes, k, numbers, scene)
-    points_gain = np.where(numbers < scene.n, gain, 0.0)
+    points_gain = gain.copy()
+    for q in range(len(numbers)):
+        if numbers[q] >= scene.n:
+            points_gain[q] = 0.0
     uv = scene.U[direction][numbers], scene.V[direction][numbers]
     offsets, lean, anchored, sigma = (
         volumes[k, U0 : V1 + 1].copy(),
@@ -412,8 +416,8 @@ def estimate_place_sigma(volume, edge, uv, gain, line):
         if gain[i] != 0.0 and is_beside and abs(x[i]) < MOVED_M:
             for m in range(len(cost)):
                 cost[m] += gain[i] if sign * x[i] <= moved[m] else 0.0
-    weight = np.exp(-NATS_A_POINT * (cost - cost.min()))
-    if max(weight[0], weight[-1]) > LEAST_KNOWN * weight.max():
+    weight = np.exp(-NATS_A_POINT * (cost - measure_range(cost)[0]))
+    if max(weight[0], weight[-1]) > LEAST_KNOWN * measure_range(weight)[1]:
         return np.inf
     return np.sqrt((weight * moved**2).sum() / weight.sum() + POINT_SIGMA_M**2)
 

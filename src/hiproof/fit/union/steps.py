@@ -115,7 +115,7 @@ def price_edge(volumes, walls, k, edge, neighbours):
     return price_length(whole_price, step * shown_count, step * low_count)
 
 
-@compiled(inline="always")
+@compiled
 def classify_step(gap):
     """Return which kind of step a gap (m) between the heights beside an edge is."""
     gap = abs(gap)
@@ -134,7 +134,7 @@ def price_whole_edge(walls, direction, axis, place, in_line, m):
     return EDGE_PRICES.any_step - EDGE_PRICES.at_corner * n_ends
 
 
-@compiled(inline="always")
+@compiled
 def price_length(whole_price, shown_length, low_length):
     """Compute the units of an edge that is a step, or a low one, on these lengths (m)."""
     return (
@@ -195,13 +195,13 @@ def place_samples(volumes, walls, k, edge):
     return m, step
 
 
-@compiled(inline="always")
+@compiled
 def pad_count(count):
     """Return the next multiple of SAMPLES_AT_ONCE."""
     return (count + SAMPLES_AT_ONCE - 1) // SAMPLES_AT_ONCE * SAMPLES_AT_ONCE
 
 
-@compiled(inline="always")
+@compiled
 def fill_heights(volumes, walls, k, edge, neighbours, m):
     """Fill walls.inside and walls.outside with the heights on either side of an edge.
 
@@ -221,7 +221,7 @@ def fill_heights(volumes, walls, k, edge, neighbours, m):
             )
 
 
-@compiled(inline="always")
+@compiled
 def turn_line(volumes, turn, k, edge, j):
     """Return the line of an edge of volume k in the axes of volume j.
 
@@ -241,7 +241,7 @@ def turn_line(volumes, turn, k, edge, j):
     return sine * place, cosine, cosine * place, -sine
 
 
-@compiled(inline="always")
+@compiled
 def widen_rectangle(volumes, j):
     """Return where volume j covers places: its rectangle and a little more."""
     return (
@@ -252,7 +252,7 @@ def widen_rectangle(volumes, j):
     )
 
 
-@compiled(inline="always")
+@compiled
 def meets_line(line, ends, first, last):
     """Return whether the bounds of a line from `first` to `last` meet a rectangle."""
     a0, a, b0, b = line

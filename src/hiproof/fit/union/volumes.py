@@ -82,13 +82,13 @@ def read_coefficients(volumes, k):
     )
 
 
-@compiled(inline="always")
+@compiled
 def read_rectangle(volumes, k):
     """Return where volume k begins and ends along u and along v."""
     return volumes[k, 1], volumes[k, 2], volumes[k, 3], volumes[k, 4]
 
 
-@compiled(inline="always")
+@compiled
 def is_fixed(volumes, k):
     """Return whether no move may change volume k: it reaches out of the search window."""
     return volumes[k, SETTLED] == np.inf
@@ -99,7 +99,7 @@ def list_movable(volumes: np.ndarray) -> np.ndarray:
     return 1 + np.nonzero(volumes[1:, SETTLED] < np.inf)[0]
 
 
-@compiled(inline="always")
+@compiled
 def is_within(ends, u, v):
     """Return whether u, v lies in a rectangle with these `ends`.
 
@@ -108,7 +108,7 @@ def is_within(ends, u, v):
     return (ends[0] <= u) & (u <= ends[1]) & (ends[2] <= v) & (v <= ends[3])
 
 
-@compiled(inline="always")
+@compiled
 def find_lowest(c, u, v):
     """Return the height at u, v of a volume with coefficients c.
 
@@ -119,7 +119,7 @@ def find_lowest(c, u, v):
     return min(min(along, across), c[4])
 
 
-@compiled(inline="always")
+@compiled
 def find_lowest_plane(c, u, v):
     """Return the height at u, v, and the lowest plane there."""
     z0, z1 = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
@@ -132,7 +132,7 @@ def find_lowest_plane(c, u, v):
     return best, plane
 
 
-@compiled(inline="always")
+@compiled
 def measure_run(row, k, u, v):
     """Return the run of plane k of a volume at u, v: metres from the axes' origin.
 
