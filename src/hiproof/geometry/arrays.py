@@ -67,7 +67,6 @@ def measure_range(values):
 
     They are infinite without any.
 
-
     >>> measure_range(np.array([2.0, 1.0, 3.0]))
     (1.0, 3.0)
     """
