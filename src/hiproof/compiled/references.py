@@ -65,14 +65,14 @@ class Lower(lowering.Lower):
     def list_undefined(self) -> set[str]:
         """List the variables that a block may read before they are assigned.
 
-        A single assignment must dominate the block, and be translated earlier.
+        A single assignment must dominate the block, and be translated sooner.
         """
         lifetime = self.func_ir.variable_lifetime
         dominators, usedefs = lifetime.cfg.dominators(), lifetime.usedefs
         names: set[str] = set()
-        for place, used in usedefs.usemap.items():
-            earlier = [block for block in dominators[place] if block < place]
-            names |= used.difference(*(usedefs.defmap[block] for block in earlier))
+        for place, reads in usedefs.usemap.items():
+            dominating = [block for block in dominators[place] if block < place]
+            names |= reads.difference(*(usedefs.defmap[block] for block in dominating))
         return names
 
     def lower_assign(self, ty: Any, inst: Any) -> Any:
@@ -82,7 +82,7 @@ class Lower(lowering.Lower):
         return super().lower_assign(ty, inst)
 
     def delvar(self, name: str) -> None:
-        """Count one reference less to a variable that is used no more."""
+        """Count one reference less to a variable that is read no more."""
         if name in self.arguments:
             return
         if is_counted(self.context, self.typeof(name)):
