@@ -82,7 +82,7 @@ class Lower(lowering.Lower):
         return super().lower_assign(ty, inst)
 
     def delvar(self, name: str) -> None:
-        """Count one reference less to a variable that is read no more."""
+        """Count one reference less to a variable that is used no more."""
         if name in self.arguments:
             return
         if is_counted(self.context, self.typeof(name)):

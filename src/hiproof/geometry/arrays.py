@@ -51,14 +51,14 @@ def find_place(ascending, value):
     >>> find_place(np.array([1.0, 2.0, 2.0, 5.0]), 2.0)
     1
     """
-    low, high = 0, len(ascending)
-    while low < high:
-        middle = (low + high) // 2
+    start, stop = 0, len(ascending)
+    while start < stop:
+        middle = (start + stop) // 2
         if ascending[middle] < value:
-            low = middle + 1
+            start = middle + 1
         else:
-            high = middle
-    return low
+            stop = middle
+    return start
 
 
 @compiled
