@@ -18,15 +18,14 @@ from .large import find_in_windows
 from .moves import ALMOST_LEVEL
 from .objective import compute_objective
 from .plan import Plan
-from .prices import COMMON_HOUSE_M2, LARGE_ROOF_M2, compute_unit_points
+from .prices import LARGE_ROOF_M2, compute_unit_points
 from .regions import PlanSite
 from .run_on import extend_ends
 from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
 
 SEARCH_POINTS = 600  # Points in which structure is searched. All of them settle it.
-LENIENT_DEAD_M = 0.1  # Difference (m) that a person would leave out of low-pitched roofs.
-LENIENT_MORE_M = 0.04  # Difference (m) that a person would leave out of large roofs besides.
+LENIENT_DEAD_M = 0.1  # Difference (m) that a person would leave out.
 LENIENT_SOFT_M = 0.18  # Distance (m) over which larger differences grow to the cost of a point.
 
 
@@ -56,7 +55,7 @@ def find_volumes(
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
     volumes, value = settle_volumes(volumes, full_scene)
-    lenient = soften_scene(scene, outline.area)
+    lenient = scene._replace(dead=LENIENT_DEAD_M, width=LENIENT_SOFT_M)
     volumes, _ = simplify(
         volumes, lenient, compute_objective(volumes, lenient, np.inf), ALMOST_LEVEL
     )
@@ -70,9 +69,3 @@ def trim_and_extend(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """Draw hidden edges in, and extend ends that stand out of a neighbour into it."""
     volumes, value = trim(volumes, scene, compute_objective(volumes, scene, np.inf))
     return extend_ends(volumes, scene, value)[0]
-
-
-def soften_scene(scene: Scene, area_m2: float) -> Scene:
-    """Return the scene with larger residuals free of cost."""
-    dead = LENIENT_DEAD_M + LENIENT_MORE_M * min(max((area_m2 - COMMON_HOUSE_M2) / 100.0, 0.0), 1.0)
-    return scene._replace(dead=dead, width=LENIENT_SOFT_M)
