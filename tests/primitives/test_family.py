@@ -283,6 +283,20 @@ def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes
     assert 0.0 < max(sigma.values()) < 0.01
 
 
+def test_a_part_has_deviations_of_its_own_parameters_where_changes_have_more():
+    """A side that rises along itself after a change has a skew, and had none before."""
+    member = draw_member(np.random.default_rng(3), "side_hip", regular=False).canonical()
+    straight = replace(member, leans=np.zeros(4), eaves=member.eaves + [0.0, 0.1, 0.2, 0.3])
+    side = straight.sides[0]
+    changed = replace(straight, slopes=straight.slopes * 1.01)
+    skewed = replace(changed, leans=np.where(np.arange(4) == side, 0.01, 0.0))
+    outline = [shapely.Polygon(list_corners(straight))]
+    straight_sigma, skewed_sigma = (
+        straight.part(outline, None, stack_members([one])).sigma for one in (changed, skewed)
+    )
+    assert skewed_sigma == pytest.approx(straight_sigma) and straight_sigma
+
+
 @pytest.mark.parametrize("regular", [False, True])
 @each_shape
 def test_several_members_are_measured_as_each_of_them(shape, regular):
@@ -306,9 +320,10 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
             stack_members(singles).measure_as(kind, kappa),
             [members.measure_as(kind, kappa) for members in singles],
         )
-        assert np.array([np.broadcast_to(values, 3) for values in together]) == pytest.approx(
-            np.array(separate).T, abs=1e-12
-        )
+        assert all(list(one) == list(together) for one in separate)
+        for name, values in together.items():
+            each = [one[name] for one in separate]
+            assert np.broadcast_to(values, 3) == pytest.approx(each, abs=1e-12)
 
 
 def stack_members(members):

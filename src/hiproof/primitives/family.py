@@ -370,19 +370,20 @@ class Member:
                 parameters[f"skew_{SIDES[side]}"] = degrees(self.leans[side])
         return parameters | name_cant_values(self.cants, base)
 
-    def measure_as(self, shape: Primitive | None, kappa: float) -> list[Any]:
-        """Return the parameters and t_z that this member has as `shape`.
+    def measure_as(self, shape: Primitive | None, kappa: float) -> dict[str, Any]:
+        """Return the parameters and t_z that this member has as `shape`, by name.
 
         Each of several has its own. Without a shape they are side by side. They are seen from
         `kappa` or its opposite, so that a small change does not turn the member round.
         """
         if shape is None:
-            return [*self.list_side_measures().values(), self.base]
+            return {**self.list_side_measures(), "t_z": self.base}
         aligned = self.turn(2) if math.cos(self.kappa - kappa) < 0.0 else self
         theta = aligned.theta(shape)
         if math.cos(aligned.kappa - kappa) <= ALONG_COSINE:
             theta = np.apply_along_axis(shape.canonical_theta, 0, theta)
-        return shape.measures_at(list(theta[HALF_WIDTH:]))
+        values = shape.measures_at(list(theta[HALF_WIDTH:]))
+        return dict(zip([*shape.measures, "t_z"], values, strict=True))
 
     def part(
         self,
@@ -421,10 +422,9 @@ class Member:
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
         quantities = {**parameters, "t_z": float(translation[2])}
         squares = np.zeros((len(quantities), changes.eaves.shape[1]))
-        for k, (value, changed) in enumerate(
-            zip(quantities.values(), changes.measure_as(shape, kappa), strict=True)
-        ):
-            squares[k] = (changed - value) ** 2
+        changed = changes.measure_as(shape, kappa)
+        for k, (name, value) in enumerate(quantities.items()):
+            squares[k] = (changed.get(name, 0.0) - value) ** 2  # level sides have no skew
         informed = squares.shape[1] - untold
         variances, unknown = (
             squares[:, :informed].sum(axis=1).tolist(),
