@@ -31,7 +31,9 @@ def test_places_inside_an_area_and_on_its_border_are_found(seed):
     area = shapely.difference(shapely.union_all(boxes), shapely.box(3, 3, 5, 5 + seed % 3))
     nodes = np.reshape(np.meshgrid(np.arange(0, 9, 0.5), np.arange(0, 9, 0.5)), (2, -1))
     turned, chance = shapely.affinity.rotate(area, 10.0 * seed), rng.uniform(0, 9, (2, 300))
-    for polygon, (x, y) in ((area, nodes), (turned, chance), (shapely.Polygon(), nodes)):
+    many = shapely.segmentize(turned, 0.05)
+    cases = (area, nodes), (turned, chance), (many, chance), (shapely.Polygon(), nodes)
+    for polygon, (x, y) in cases:
         expected = shapely.intersects_xy(polygon, x, y)
         assert find_inside(polygon, x, y).tolist() == expected.tolist()
 

@@ -23,7 +23,6 @@ import numpy as np
 import shapely
 
 from ..geometry.grid import number_cells
-from ..geometry.point_in_polygon import find_inside
 
 FARTHEST_SHIFT_M = 4.8
 """Longest common shift (m) that is looked for.
@@ -329,6 +328,7 @@ def rasterise(polygons: list[shapely.Polygon], lower: np.ndarray, shape: np.ndar
                 RASTER_PITCH_M * (lower[axis] + np.arange(first[axis], last[axis]))
                 for axis in (0, 1)
             )
-            mask = find_inside(polygon, np.repeat(x, len(y)), np.tile(y, len(x)))
-            inside[first[0] : last[0], first[1] : last[1]][mask.reshape(len(x), -1)] = 1.0
+            shapely.prepare(polygon)
+            mask = shapely.contains_xy(polygon, *np.meshgrid(x, y, indexing="ij"))
+            inside[first[0] : last[0], first[1] : last[1]][mask] = 1.0
     return inside
