@@ -8,7 +8,7 @@ import shapely
 from ..compiled import compiled
 from .rings import ring_edges
 
-MOST_CORNERS = 200  # Of more, shapely is faster: it looks only at those near a point.
+MOST_OWN_CORNERS = 200  # Of more, shapely is faster: it looks only at those near a point.
 
 
 @compiled(inline="always")
@@ -34,7 +34,7 @@ def find_inside(area: shapely.Geometry, x: np.ndarray, y: np.ndarray) -> np.ndar
     [True, True, False]
     """
     starts, ends = ring_edges(area)
-    if len(starts) > MOST_CORNERS:
+    if len(starts) > MOST_OWN_CORNERS:
         shapely.prepare(area)
         return np.asarray(shapely.intersects_xy(area, x, y))
     return mark_inside(np.ascontiguousarray(x, float), np.ascontiguousarray(y, float), starts, ends)
