@@ -11,7 +11,7 @@ from .rings import ring_edges
 MOST_OWN_CORNERS = 200  # Of more, shapely is faster: it looks only at those near a point.
 
 
-@compiled(inline="always")
+@compiled
 def flips(x0, y0, x1, y1, x, y):
     """Return whether an edge crosses the ray from (x, y) towards larger x.
 
