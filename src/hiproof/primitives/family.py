@@ -422,9 +422,10 @@ class Member:
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
         quantities = {**parameters, "t_z": float(translation[2])}
         squares = np.zeros((len(quantities), changes.eaves.shape[1]))
-        changed = changes.measure_as(shape, kappa)
+        straight = {f"skew_{side}": 0.0 for side in SIDES}
+        changed = straight | changes.measure_as(shape, kappa)
         for k, (name, value) in enumerate(quantities.items()):
-            squares[k] = (changed.get(name, 0.0) - value) ** 2  # level sides have no skew
+            squares[k] = (changed[name] - value) ** 2
         informed = squares.shape[1] - untold
         variances, unknown = (
             squares[:, :informed].sum(axis=1).tolist(),
