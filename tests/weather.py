@@ -1,5 +1,6 @@
 """Weather of a typical year as EPW, TMY3 and PVGIS files."""
 
+import datetime
 import json
 
 import numpy as np
@@ -12,7 +13,12 @@ def simulate_weather(latitude=52.0, longitude=4.36, zone=1):
     import pandas
     import pvlib
 
-    times = pandas.date_range("2023-01-01 00:30", periods=8760, freq="h", tz=f"Etc/GMT-{zone}")
+    times = pandas.date_range(
+        "2023-01-01 00:30",
+        periods=8760,
+        freq="h",
+        tz=datetime.timezone(datetime.timedelta(hours=zone)),
+    )
     sky = pvlib.location.Location(latitude, longitude).get_clearsky(times)
     dull = times.day_of_year.to_numpy() % 3 == 0
     ghi = np.where(dull, 0.3 * sky["ghi"], sky["ghi"]).round(1)
@@ -21,16 +27,24 @@ def simulate_weather(latitude=52.0, longitude=4.36, zone=1):
     return times, {"ghi": ghi, "dhi": dhi, "dni": dni}
 
 
-def write_epw(path, latitude=52.0, longitude=4.36, zone=1):
-    """Write weather of a year as EPW."""
+def write_epw(
+    path, latitude=52.0, longitude=4.36, zone=1, said_zone=None, change=lambda columns: None
+):
+    """Write weather of a year as EPW.
+
+    Its head may name another zone, and `change` may spoil its columns: irradiance, and stamps.
+    """
     times, values = simulate_weather(latitude, longitude, zone)
-    ghi, dhi, dni = (values[name] for name in NAMES)
-    head = [f"LOCATION,Delft,-,NLD,TEST,0,{latitude},{longitude},{zone},0.0"]
+    stamps = [f"2023,{time.month},{time.day},{time.hour + 1},60,?9" for time in times]
+    columns = {name: np.array(column, float) for name, column in values.items()}
+    change(columns := {**columns, "stamps": stamps})
+    ghi, dhi, dni = (columns[name] for name in NAMES)
+    said_zone = zone if said_zone is None else said_zone
+    head = [f"LOCATION,Delft,-,NLD,TEST,0,{latitude},{longitude},{said_zone},0.0"]
     head += ["DESIGN CONDITIONS,0", "TYPICAL/EXTREME PERIODS,0", "GROUND TEMPERATURES,0"]
     head += ["HOLIDAYS/DAYLIGHT SAVINGS,No,0,0,0", "COMMENTS 1,a test", "COMMENTS 2,a test"]
     lines = [*head, "DATA PERIODS,1,1,Data,Sunday, 1/ 1,12/31"]
-    for k, time in enumerate(times):
-        stamp = f"2023,{time.month},{time.day},{time.hour + 1},60,?9"
+    for k, stamp in enumerate(columns["stamps"]):
         lines.append(",".join([stamp, *["10"] * 7, f"{ghi[k]},{dni[k]},{dhi[k]}", *["0"] * 19]))
     path.write_text("\n".join(lines) + "\n")
     return times, values

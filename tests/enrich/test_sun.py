@@ -188,7 +188,8 @@ def test_the_files_of_a_run_have_the_sun(tmp_path):
     folder = write_street(tmp_path, [place_house("a", 0, 0), place_house("b", 9, 0, rise=3.0)])
     write_epw(tmp_path / "a.epw")
     command = ["enrich", str(folder), "--sun", "--weather", str(tmp_path / "a.epw"), "--jobs", "1"]
-    assert CliRunner().invoke(app, command).exit_code == 0
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0 and f"sun: weather of {tmp_path / 'a.epw'}" in result.output
     import pyogrio
 
     for layer, declared in (("buildings", ENRICHED_SUN), ("roof_surfaces", ENRICHED_SUN_SURFACE)):
@@ -196,7 +197,8 @@ def test_the_files_of_a_run_have_the_sun(tmp_path):
         table = dict(zip(head["fields"], columns, strict=True))
         names = {OWN + a.name for a in declared} - {"hiproof_wall_sun_kwh"}
         assert names <= set(table)
-        assert all((table[name] >= 0).all() for name in names)
+        assert all((table[name] >= 0).all() for name in names - {"hiproof_sun_sky"})
+        assert set(table.get("hiproof_sun_sky", ["a.epw"])) == {"a.epw"}
 
 
 def test_a_run_without_a_crs_has_no_sun(tmp_path):

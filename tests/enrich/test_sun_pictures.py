@@ -47,7 +47,7 @@ def test_qgis_draws_roofs_by_the_sun(folder):
     assert len(rows) == 3
     for value, name in rows:
         least = max(stop for stop, _ in SUN_STOPS if value >= stop)
-        assert name == f"from {least:g} kWh/m2"
+        assert name == f"from {least:g} kWh/m2 (clear sky)"
 
 
 def test_without_the_sun_qgis_draws_roof_types(folder):

@@ -1,18 +1,24 @@
 """Weather files: every format gives the same sun, and what does not fit is refused."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hiproof.cli.app import app
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sky import make_sky
+from hiproof.enrich.weather import read_year
 from hiproof.errors import InputError
 from hiproof.settings import EnrichSettings
 from streets import place_house, write_street
 from weather import write_epw, write_pvgis, write_tmy3
 
-pytest.importorskip("pvlib", reason="needs the extra sun")
+pvlib = pytest.importorskip("pvlib", reason="needs the extra sun")
 
 DELFT = (52.0, 4.36)
 
@@ -47,8 +53,90 @@ def test_a_year_with_a_gap_gets_a_sentence(tmp_path):
     write_tmy3(tmp_path / "a.csv")
     lines = (tmp_path / "a.csv").read_text().splitlines()
     (tmp_path / "a.csv").write_text("\n".join(lines[:-24]) + "\n")
-    with pytest.raises(InputError, match=r"expected 8760 hours of irradiance in .*, got 8736"):
+    with pytest.raises(InputError, match=r"expected the 8760 hours of a year in .*, got 8736"):
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.csv"))
+
+
+def spoil(hours=slice(None), **factors):
+    """Return a change of the columns of an EPW file in some hours."""
+
+    def change(columns):
+        for name, value in factors.items():
+            columns[name][hours] = value(columns[name][hours]) if callable(value) else value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "change, reason",
+    [
+        (spoil(slice(4000, 4030), ghi=9999, dhi=9999, dni=9999), "got 30 hours in which one is mi"),
+        (spoil(dhi=9999, dni=9999), "got 8,760 hours in which one is missing"),
+        (spoil(4000, dhi=-9900), "got 1 hour in which one is missing"),
+        (spoil(4000, ghi=1e9), "got 1 hour in which one is missing"),
+        (spoil(4000, ghi=np.nan), "got 1 hour in which one is missing"),
+        (
+            spoil(dhi=0, dni=0),
+            "got diffuse and direct radiation 100% off the global|got global rad",
+        ),
+        (spoil(4164, ghi=100, dhi=50, dni=1200), "got global radiation of 100 W/m2 beside 50 diff"),
+        (spoil(4164, ghi=5000, dhi=5000, dni=0), "beyond what reaches the atmosphere"),
+        (spoil(ghi=lambda v: 3.6 * v, dhi=lambda v: 3.6 * v), "beyond what reache"),
+        (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), 0)), "got only 0.0% of what reaches the atm"),
+        (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / 1000)), "got only 0.0% of wha"),
+        (spoil(ghi=lambda v: np.roll(v, 1)), "beyond what reaches the atmosphere at its hours"),
+        (
+            lambda columns: columns["stamps"].__setitem__(9, columns["stamps"][8]),
+            "once in .* row 10",
+        ),
+    ],
+)
+def test_radiation_that_its_sun_cannot_make_is_refused(change, reason, tmp_path):
+    write_epw(tmp_path / "a.epw", change=change)
+    with pytest.raises(InputError, match=reason):
+        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    latitude=st.floats(-65, 65),
+    longitude=st.floats(-180, 180),
+    off=st.sampled_from([-9, -4, -1, 0, 1, 2, 7]),
+)
+def test_a_year_is_taken_only_in_its_own_time_zone(latitude, longitude, off):
+    zone = round(longitude / 15)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "a.epw")
+        write_epw(path, latitude, longitude, zone, said_zone=zone + off)
+        if off:
+            with pytest.raises(InputError, match=r"expected radiation in .* that fits the sun"):
+                read_year(str(path))
+        else:
+            assert read_year(str(path)).where == (latitude, longitude)
+
+
+def test_the_stations_of_pvlib_are_taken():
+    for path in Path(pvlib.__path__[0], "data").glob("7*TY*"):
+        assert len(read_year(str(path)).times) == 8760
+
+
+def test_names_of_towns_are_read_in_latin_1(tmp_path):
+    write_epw(tmp_path / "a.epw")
+    data = (tmp_path / "a.epw").read_bytes()
+    (tmp_path / "b.epw").write_bytes(data.replace(b"Delft", "Zürich".encode("latin-1")))
+    plain, accented = (read_year(str(tmp_path / name)) for name in ("a.epw", "b.epw"))
+    assert plain.values["ghi"].equals(accented.values["ghi"])
+
+
+@pytest.mark.parametrize("place", ["nan", "91", "here"])
+def test_a_station_has_a_place(place, tmp_path):
+    write_epw(tmp_path / "a.epw")
+    text = (tmp_path / "a.epw").read_text()
+    (tmp_path / "a.epw").write_text(text.replace("52.0", place, 1))
+    with pytest.raises(
+        InputError, match=r"expected weather of a typical year .*, got a file of an"
+    ):
+        read_year(str(tmp_path / "a.epw"))
 
 
 @pytest.mark.parametrize(

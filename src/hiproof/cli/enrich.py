@@ -65,13 +65,19 @@ def enrich_folder(run: Path, out: Path | None, settings: EnrichSettings, jobs: i
     for failure in result.failures:
         click.echo(f"not enriched: building {failure.id}: {failure.reason}", err=True)
     if console_level() is not Level.error:
-        print_result(result)
+        print_result(result, settings)
     return result.exit_code
 
 
-def print_result(result: Enriched) -> None:
-    """Print how many buildings have answers, and the files."""
+def print_result(result: Enriched, settings: EnrichSettings) -> None:
+    """Print how many buildings have answers, under which sky, and the files."""
     failed = len(result.failures)
     enriched = f"{result.buildings - failed:,} of " if failed else ""
     click.echo(f"{enriched}{count_things(result.buildings, 'building')} enriched")
+    if settings.sun and settings.weather:
+        click.echo(f"sun: weather of {settings.weather}")
+    elif settings.sun:
+        click.echo(
+            "sun: a clear sky, more than any year has; --weather takes that of a typical one"
+        )
     click.echo("files: " + ", ".join(map(str, result.files)))

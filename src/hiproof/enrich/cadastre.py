@@ -24,7 +24,7 @@ from .sky import Sky, make_sky
 from .sun import Irradiation, irradiate, sample_face, sample_wall
 from .town import Town
 from .walls import find_walls
-from .weather import import_pvlib
+from .weather import import_pvlib, name_sky
 
 SKY_CELL_M = 10_000.0  # side (m) of a square that has one sky: its sun differs by 0.1 degrees
 LEVEL_ROOF = 1e-3  # least share of a roof face that plan shows: steeper ones are walls
@@ -86,6 +86,7 @@ class Cadastre:
         These are by number in its `solid`, of which the faces `party` are party walls.
         """
         attributes, surfaces = self.describe_roofs(number, solid)
+        attributes[f"{OWN}sun_sky"] = name_sky(self.settings.weather)
         if self.settings.sun_on_walls:
             sums, walls = self.describe_walls(number, solid, party)
             attributes, surfaces = attributes | sums, surfaces | walls

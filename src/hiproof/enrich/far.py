@@ -42,14 +42,16 @@ def read_horizon(path: str, convergence: float = 0.0) -> np.ndarray:
             f"expected a horizon file in {path}, got: {error!s:.200}; give heights in degrees at "
             "equal angles, clockwise from the north, one a line"
         ) from error
-    if len(heights) < 2 or not (np.isfinite(heights).all() and (np.abs(heights) < 90.0).all()):
+    others = heights[~((heights >= 0.0) & (heights < 90.0))]
+    if len(heights) < 2 or len(others):
+        got = f"{others[0]:g}" if len(others) else f"{len(heights)}"
         raise InputError(
-            f"expected 2 or more heights between 0 and 90 degrees in {path}, got {len(heights)} or "
-            "others; mend the file"
+            f"expected 2 or more heights between 0 and 90 degrees in {path}, got {got}; mend the "
+            "file"
         )
     azimuths = np.arange(len(heights)) * (360.0 / len(heights))
     sectors = np.interp(MIDDLES_DEG + convergence, azimuths, heights, period=360.0)
-    return np.tan(np.radians(np.maximum(sectors, 0.0)))
+    return np.tan(np.radians(sectors))
 
 
 class TerrainHorizon:

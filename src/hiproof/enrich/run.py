@@ -35,6 +35,7 @@ from .cadastre import Cadastre, refuse_unfit, refuse_unusable
 from .energy import refuse_other_citygml
 from .records import Index, Records, index_records
 from .town import Town
+from .weather import name_sky
 from .write import EnrichFailure, make_fragments, read_failure
 
 BLOCK_BUILDINGS = 64  # buildings of a task: a second of work
@@ -100,7 +101,7 @@ def enrich_run(
             progress(done, total)
     finally:
         executor.close()
-    files, failures = join_blocks(blocks, find_head(records), out)
+    files, failures = join_blocks(blocks, find_head(records, settings), out)
     result = Enriched(list(files.values()), total, failures)
     write_record(parameters.parent, out, settings, result)
     shutil.rmtree(waiting.parent, ignore_errors=True)
@@ -166,7 +167,7 @@ def enrich_block(
 ) -> None:
     """Write the texts of the buildings [first, last) to the file `block`."""
     town, cadastre = open_town(parameters, settings, str(Path(block).with_name("index.npz")))
-    head = find_head(town.records)
+    head = find_head(town.records, settings)
     parts = [
         make_fragments(town, number, head, settings, cadastre) for number in range(first, last)
     ]
@@ -188,14 +189,16 @@ def open_town(
     return town, Cadastre(town, settings) if settings.sun else None
 
 
-def find_head(records: Records) -> FileHead:
+def find_head(records: Records, settings: EnrichSettings) -> FileHead:
     """Return the head of the enriched files.
 
     Each building is one solid, whose walls are cut. Where the run names no offset of the CityJSON
     file, its first building sets it, as `hiproof build` has it.
     """
     head = dataclasses.replace(
-        records.head, write=dataclasses.replace(records.head.write, parts_as="one")
+        records.head,
+        write=dataclasses.replace(records.head.write, parts_as="one"),
+        sky=name_sky(settings.weather) if settings.sun else "",
     )
     if head.offset is not None or not len(records):
         return head

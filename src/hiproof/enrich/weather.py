@@ -2,11 +2,14 @@
 
 EPW and TMY3 have means over the hour that ends at the stamp, in local standard time: the sun stands
 where it is in the middle of that hour. PVGIS has values of a moment near the stamp, in UTC.
+
+No year is used that the sun over its station cannot have made.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+import io
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,12 +18,27 @@ import numpy as np
 
 from ..errors import InputError
 from ..extras import import_extra
+from ..log import count_things
 
 YEAR = "2023"  # of all hours: no leap year, and its sun is that of any year
 HOURS = 8760  # of a year that is no leap year
 FARTHEST_STATION_KM = 300.0  # distance (km) beyond which weather says nothing of a place
 EARTH_RADIUS_KM = 6371.0  # mean radius
-PVGIS_CSV = b"Latitude"  # beginning of PVGIS' tables; other tables are TMY3's
+PVGIS_CSV = "Latitude"  # beginning of PVGIS' tables; other tables are TMY3's
+MISSING_WM2 = 9999.0  # irradiance (W/m2) from which EPW calls a value missing; others use negatives
+SUN_MINUTES = (-20, 0, 20)  # times in an hour whose mean sun stands for that of the hour
+GREATEST_EXCESS = 0.007
+"""Share of a year's global radiation that may exceed what reaches the top of the atmosphere.
+
+It is 0.0001 in pvlib's TMY3 files, at most 0.004 where stamps name the middle of an hour, and 0.012
+or more where hours are one off.
+"""
+GREATEST_GAP = 0.15
+"""Sum of the hours' differences between global radiation and its diffuse and direct parts, as a
+share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one off.
+"""
+GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
+LEAST_SHARE = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
 
 
 class Weather(NamedTuple):
@@ -39,6 +57,15 @@ def import_pvlib() -> Any:
     return import_extra("pvlib", "sun", "--sun")
 
 
+def name_sky(weather: str) -> str:
+    """Return the name of the sky that a weather file makes, or none.
+
+    >>> name_sky("data/delft.epw"), name_sky("")
+    ('delft.epw', 'clear sky')
+    """
+    return Path(weather).name if weather else "clear sky"
+
+
 def make_clear_sky(place: Any) -> tuple[Any, Any]:
     """Return the middles of a year's hours (UTC) and the clear sky at a place.
 
@@ -48,31 +75,20 @@ def make_clear_sky(place: Any) -> tuple[Any, Any]:
     return times, place.get_clearsky(times)
 
 
-def list_hours() -> Any:
-    """Return the beginnings of the hours of YEAR (UTC)."""
-    return import_module("pandas").date_range(f"{YEAR}-01-01", periods=HOURS, freq="h", tz="UTC")
+def list_hours(zone: Any = "UTC") -> Any:
+    """Return the beginnings of the hours of YEAR in a time zone."""
+    return import_module("pandas").date_range(f"{YEAR}-01-01", periods=HOURS, freq="h", tz=zone)
 
 
 def read_weather(path: str, place: Any) -> tuple[Any, Any]:
     """Read the weather of a typical year: its times, and their irradiance.
 
-    Raises InputError for a file that cannot be read, and for a station too far away.
+    Raises InputError for a file that cannot be read, for radiation that its sun cannot have made,
+    and for a station too far away.
     """
-    try:
-        weather = choose_reader(Path(path))(Path(path))
-        rows = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
-    except (OSError, ValueError, KeyError, IndexError, TypeError, StopIteration) as error:
-        raise InputError(
-            f"expected weather of a typical year as EPW, TMY3 or PVGIS in {path}, got: "
-            f"{error!s:.200}; check the file"
-        ) from error
-    if len(rows) != HOURS or not (np.isfinite(rows).all() and (rows >= 0).all()):
-        raise InputError(
-            f"expected {HOURS} hours of irradiance in {path}, got {len(rows)} or some that are no "
-            "numbers; use another file"
-        )
+    weather = read_year(path)
     distance = measure_distance(weather.where, (place.latitude, place.longitude))
-    if distance > FARTHEST_STATION_KM:
+    if not distance <= FARTHEST_STATION_KM:
         raise InputError(
             f"expected a weather station within {FARTHEST_STATION_KM:g} km of the buildings, got "
             f"one {distance:.0f} km away in {path}; use another file"
@@ -80,38 +96,143 @@ def read_weather(path: str, place: Any) -> tuple[Any, Any]:
     return weather.times, weather.values
 
 
-def choose_reader(path: Path) -> Callable[[Path], Weather]:
-    """Return the reader of a file by its ending, and by the beginning of a table."""
+@functools.lru_cache(1)
+def read_year(path: str) -> Weather:
+    """Read a file of weather and check it against the sun over its station."""
+    try:
+        weather = parse_weather(Path(path))
+        weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+    except (OSError, ValueError, KeyError, IndexError, TypeError, StopIteration) as error:
+        raise InputError(
+            f"expected weather of a typical year as EPW, TMY3 or PVGIS in {path}, got "
+            f"{explain(error)}; check the file"
+        ) from error
+    refuse_other_hours(weather, path)
+    refuse_missing_hours(weather, path)
+    refuse_other_sun(weather, path)
+    return weather
+
+
+def explain(error: Exception) -> str:
+    """Say why weather could not be read, without what libraries advise their callers."""
+    if isinstance(error, KeyError):
+        return f"a file without {error.args[0]!s:.80}"
+    if isinstance(error, ValueError):
+        return f"a file of another form: {str(error).splitlines()[0].split('. ')[0]:.120}"
+    return f"none: {error.strerror}" if isinstance(error, OSError) else "a file that ends early"
+
+
+def parse_weather(path: Path) -> Weather:
+    """Read a file by its ending, and by the beginning of a table.
+
+    Its text is UTF-8, or Latin-1 as in files with names of towns.
+    """
+    data = path.read_bytes()
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
     ending = path.suffix.lower()
     if ending == ".json":
-        return read_pvgis
+        return parse_pvgis(io.StringIO(text), "json")
     if ending != ".csv":
-        return read_epw
-    with path.open("rb") as file:
-        return read_pvgis if file.readline().startswith(PVGIS_CSV) else read_tmy3
+        return parse_epw(text)
+    if text.startswith(PVGIS_CSV):
+        return parse_pvgis(io.BytesIO(text.encode()), "csv")
+    return parse_tmy3(text)
 
 
-def read_epw(path: Path) -> Weather:
-    """Read an EPW file. Its hours end at their stamps, where pvlib's begin."""
-    values, station = import_pvlib().iotools.read_epw(path, coerce_year=int(YEAR))
+def parse_epw(text: str) -> Weather:
+    """Read EPW. Its hours end at their stamps, where pvlib's begin."""
+    values, station = import_pvlib().iotools.read_epw(io.StringIO(text), coerce_year=int(YEAR))
     return Weather(shift_hours(values.index, 0.5), values, locate_station(station))
 
 
-def read_tmy3(path: Path) -> Weather:
-    """Read a TMY3 file."""
-    values, station = import_pvlib().iotools.read_tmy3(path, coerce_year=int(YEAR))
+def parse_tmy3(text: str) -> Weather:
+    values, station = import_pvlib().iotools.read_tmy3(io.StringIO(text), coerce_year=int(YEAR))
     return Weather(shift_hours(values.index, -0.5), values, locate_station(station))
 
 
-def read_pvgis(path: Path) -> Weather:
+def parse_pvgis(file: io.StringIO | io.BytesIO, form: str) -> Weather:
     """Read a typical year of PVGIS, as a table or JSON."""
-    values, facts = import_pvlib().iotools.read_pvgis_tmy(path)
+    values, facts = import_pvlib().iotools.read_pvgis_tmy(file, pvgis_format=form)
     station = facts["inputs"].get("location") or facts["inputs"]
     offset = {name.replace(" ", "_"): value for name, value in station.items()}
     delay = float(offset.get("irradiance_time_offset") or 0.0)
     # every month is of another year
-    times = shift_hours(list_hours()[: len(values)], delay)
+    stamps = values.index.map(lambda stamp: stamp.replace(year=int(YEAR)))
+    times = shift_hours(stamps, delay)
     return Weather(times, values.set_axis(times), locate_station(station))
+
+
+def refuse_other_hours(weather: Weather, path: str) -> None:
+    """Raise InputError unless each hour of a year is there once, in order."""
+    times = weather.times
+    if len(times) != HOURS:
+        raise InputError(
+            f"expected the {HOURS} hours of a year in {path}, got {len(times)}; use another file"
+        )
+    hours = list_hours(times.tz)
+    late = np.abs((times - hours).total_seconds().to_numpy() / 3600.0 - 0.5) > 0.75
+    if late.any():
+        raise InputError(
+            f"expected each hour of a year once in {path}, in order, got row "
+            f"{int(late.argmax()) + 1} at {times[late.argmax()]:%d %B, %H:%M}; use another file"
+        )
+
+
+def refuse_missing_hours(weather: Weather, path: str) -> None:
+    """Raise InputError where radiation is missing."""
+    rows = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+    is_missing = ~((rows >= 0) & (rows < MISSING_WM2)).all(axis=1)
+    if is_missing.any():
+        raise InputError(
+            f"expected global, diffuse and direct radiation in every hour of {path}, got "
+            f"{count_things(int(is_missing.sum()), 'hour')} in which one is missing (9999, or "
+            f"below 0), the first on {weather.times[is_missing.argmax()]:%d %B, %H:%M}; use "
+            "another file"
+        )
+
+
+def refuse_other_sun(weather: Weather, path: str) -> None:
+    """Raise InputError for radiation that does not fit the sun over the station."""
+    ghi, dhi, dni = (weather.values[name].to_numpy(float) for name in ("ghi", "dhi", "dni"))
+    rise = measure_rise(weather)
+    above = import_pvlib().irradiance.get_extra_radiation(weather.times).to_numpy()
+    got, total = "", max(float(ghi.sum()), 1.0)
+    gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - above * rise, 0.0)
+    share = total / float((above * rise).sum())
+    worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - above, 0.0)).argmax())
+    if excess.sum() > GREATEST_EXCESS * total or excess[worst] > GREATEST_GAP_WM2:
+        got = (
+            f"{excess.sum() / total:.1%} of the year's radiation beyond what reaches the "
+            "atmosphere at its hours: values, hours, time zone or place are wrong"
+        )
+    elif gaps[worst] > GREATEST_GAP_WM2 or (dni > above).any():
+        got = (
+            f"global radiation of {ghi[worst]:g} W/m2 beside {dhi[worst]:g} diffuse and "
+            f"{dni[worst]:g} direct on {weather.times[worst]:%d %B, %H:%M}"
+        )
+    elif gaps.sum() > GREATEST_GAP * total:
+        got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
+    elif share < LEAST_SHARE:
+        got = f"only {share:.1%} of what reaches the atmosphere in a year"
+    if got:
+        raise InputError(
+            f"expected radiation in {path} that fits the sun over its station, got {got}; use "
+            "another file"
+        )
+
+
+def measure_rise(weather: Weather) -> np.ndarray:
+    """Return the mean sine (n,) of the sun's elevation around each time, 0 below the horizon."""
+    pvlib, minute = import_pvlib(), import_module("pandas").Timedelta(minutes=1)
+    place = pvlib.location.Location(*weather.where)
+    zeniths = [
+        place.get_solarposition(weather.times + minutes * minute)["zenith"].to_numpy()
+        for minutes in SUN_MINUTES
+    ]
+    return np.maximum(np.cos(np.radians(zeniths)), 0.0).mean(axis=0)
 
 
 def shift_hours(times: Any, hours: float) -> Any:
@@ -121,7 +242,11 @@ def shift_hours(times: Any, hours: float) -> Any:
 
 
 def locate_station(station: dict[str, Any]) -> tuple[float, float]:
-    return float(station["latitude"]), float(station["longitude"])
+    """Return the latitude and longitude of a station. Raises ValueError for no place on Earth."""
+    latitude, longitude = float(station["latitude"]), float(station["longitude"])
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise ValueError(f"a station at latitude {latitude:g} and longitude {longitude:g}")
+    return latitude, longitude
 
 
 def measure_distance(one: tuple[float, float], other: tuple[float, float]) -> float:

@@ -265,6 +265,12 @@ ENRICHED = (
 """What `hiproof enrich` adds to a building."""
 
 ENRICHED_SUN = (
+    Attribute(
+        "sun_sky",
+        "text",
+        "",
+        "the sky of all these values: the name of the weather file, or `clear sky`",
+    ),
     Attribute("roof_sun_kwh", "number", "kWh", "irradiation of all roof surfaces in a year"),
     Attribute(
         "wall_sun_kwh",

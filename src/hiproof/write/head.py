@@ -34,7 +34,7 @@ class FileHead:
     of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
     sets it, how solids are composed, what is written of buildings, what goes before roofer's
     attribute names, the date that CityGML gives its buildings, if any, and what an update found
-    beside its buildings, None for a run that is no update.
+    beside its buildings, None for a run that is no update. `sky` names that of enriched buildings.
     """
 
     crs: Any = None
@@ -45,6 +45,7 @@ class FileHead:
     prefix: str = PREFIX
     creation_date: datetime.date | None = None
     update: UpdateHead | None = None
+    sky: str = ""
 
     @functools.cached_property
     def units(self) -> FileUnits:

@@ -117,7 +117,10 @@ function entries() {
   if (mode === "residual") {
     return colours.residual.map(([from, colour]) => [`from ${from} m`, colour]);
   }
-  if (mode === "sun") return colours.sun.map(([from, colour]) => [`from ${from} kWh/m²`, colour]);
+  if (mode === "sun") {
+    const sky = buildings.map(building => building.attributes.hiproof_sun_sky).find(Boolean);
+    return colours.sun.map(([from, colour]) => [`from ${from} kWh/m²${sky ? ` (${sky})` : ""}`, colour]);
+  }
   const names = mode === "type" ? types.map(type => entryOf(colours, type))
     : buildings.map(building => building[mode]);
   return Object.entries(colours[mode]).filter(([name]) => names.includes(name));

@@ -32,12 +32,15 @@ function lineOf({ type, parameters }, number, told) {
 
 function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
 
+let sky = "";
+
 // The irradiation of a roof in a year, kWh/m2, null where `hiproof enrich --sun` did not tell it.
 function sunOf(tile, row) {
   tile.suns ||= [];
   if (tile.suns[row] === undefined) {
     const values = Object.fromEntries(tile.table.row(row).map(({ name, value }) => [name, value]));
     const area = values.hiproof_flat_roof_area_m2 + values.hiproof_sloped_roof_area_m2;
+    sky = values.hiproof_sun_sky || sky;
     tile.suns[row] = values.hiproof_roof_sun_kwh > 0 && area > 0 ? values.hiproof_roof_sun_kwh / area : null;
   }
   return tile.suns[row];
@@ -51,7 +54,7 @@ function sunColour(tile, row) {
 function colourRoofs() {
   const isSun = document.getElementById("mode").value === "sun";
   scene.recolourRoofs(isSun ? sunColour : null);
-  if (isSun) showLegend(colours.sun.map(([from, colour]) => [`from ${from} kWh/m²`, colour]));
+  if (isSun) showLegend(colours.sun.map(([from, colour]) => [`from ${from} kWh/m²${sky ? ` (${sky})` : ""}`, colour]));
   else showTypes();
 }
 

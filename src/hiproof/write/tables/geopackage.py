@@ -113,7 +113,7 @@ class AttributesWriter(BuildingWriter):
                 for waiting in (w for w in self.waiting.values() if w.is_needed):
                     columns[waiting.layer] = waiting.kinds(self.head.prefix, MOST_COLUMNS)
                     write_layer(file, waiting, columns[waiting.layer])
-                write_styles(file, choose_styles(columns))
+                write_styles(file, choose_styles(columns, self.head.sky))
                 file.finish()
         except sqlite3.Error as error:
             raise OutputError(

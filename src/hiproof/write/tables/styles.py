@@ -68,21 +68,21 @@ STYLES = (
 SUN_COLUMN = f"{OWN}sun_kwh_m2"
 
 
-def sun_style() -> Style:
-    """Return the style of roof surfaces by the sun, in colours of SUN_STOPS."""
-    names = {f"from {least:g} kWh/m2": least for least, _ in reversed(SUN_STOPS)}
+def sun_style(sky: str) -> Style:
+    """Return the style of roof surfaces by the sun under a sky, in colours of SUN_STOPS."""
+    names = {f"from {least:g} kWh/m2 ({sky})": least for least, _ in reversed(SUN_STOPS)}
     cases = (f"WHEN \"{SUN_COLUMN}\" >= {least:g} THEN '{name}'" for name, least in names.items())
     colours = dict(zip(names, (colour for _, colour in reversed(SUN_STOPS)), strict=True))
     expression = f"CASE {' '.join(cases)} END"
     return Style("roof_surfaces", "sun", expression, colours | {"unknown": UNKNOWN_COLOUR}, 1.0)
 
 
-def choose_styles(columns: Mapping[str, Collection[str]]) -> tuple[Style, ...]:
+def choose_styles(columns: Mapping[str, Collection[str]], sky: str = "") -> tuple[Style, ...]:
     """Return the styles of tables by their columns.
 
     Roof surfaces that have the sun are drawn by it.
     """
-    sun = sun_style()
+    sun = sun_style(sky)
     if SUN_COLUMN not in columns.get(sun.layer, ()):
         return STYLES
     others = (
