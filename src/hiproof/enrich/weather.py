@@ -225,7 +225,10 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
 
 
 def measure_rise(weather: Weather) -> np.ndarray:
-    """Return the mean sine (n,) of the sun's elevation around each time, 0 below the horizon."""
+    """Return the sine (n,) of the sun's elevation, the mean around each time.
+
+    It is 0 below the horizon.
+    """
     pvlib, minute = import_pvlib(), import_module("pandas").Timedelta(minutes=1)
     place = pvlib.location.Location(*weather.where)
     zeniths = [
@@ -242,7 +245,10 @@ def shift_hours(times: Any, hours: float) -> Any:
 
 
 def locate_station(station: dict[str, Any]) -> tuple[float, float]:
-    """Return the latitude and longitude of a station. Raises ValueError for no place on Earth."""
+    """Read the latitude and longitude of a station.
+
+    Raises ValueError for no place on Earth.
+    """
     latitude, longitude = float(station["latitude"]), float(station["longitude"])
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise ValueError(f"a station at latitude {latitude:g} and longitude {longitude:g}")

@@ -69,7 +69,10 @@ SUN_COLUMN = f"{OWN}sun_kwh_m2"
 
 
 def sun_style(sky: str) -> Style:
-    """Return the style of roof surfaces by the sun under a sky, in colours of SUN_STOPS."""
+    """Return the style of roof surfaces by the sun.
+
+    Its colours are those of SUN_STOPS, and the labels name the `sky`.
+    """
     names = {f"from {least:g} kWh/m2 ({sky})": least for least, _ in reversed(SUN_STOPS)}
     cases = (f"WHEN \"{SUN_COLUMN}\" >= {least:g} THEN '{name}'" for name, least in names.items())
     colours = dict(zip(names, (colour for _, colour in reversed(SUN_STOPS)), strict=True))
