@@ -38,7 +38,7 @@ GREATEST_GAP = 0.15
 share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one off.
 """
 GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
-LEAST_SHARE = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
+LEAST_CLEARNESS = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
 
 
 class Weather(NamedTuple):
@@ -215,7 +215,7 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
         )
     elif gaps.sum() > GREATEST_GAP * total:
         got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
-    elif share < LEAST_SHARE:
+    elif share < LEAST_CLEARNESS:
         got = f"only {share:.1%} of what reaches the atmosphere in a year"
     if got:
         raise InputError(
