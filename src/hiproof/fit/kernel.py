@@ -174,7 +174,7 @@ def active_plane(planes, ends, strips, half_width, u, v):
     return active, highest
 
 
-@compiled(fastmath=True)
+@compiled
 def sum_moments(problem, tables, kind, theta, noise, space):
     """Return minus the log likelihood at `theta`, and fill `space`.
 

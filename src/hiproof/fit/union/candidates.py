@@ -378,7 +378,7 @@ def fill_gains(scene, candidates, m, cost_now, floor, gain):
     return sum_gains(gain)
 
 
-@compiled(fastmath=True)
+@compiled
 def sum_gains(gain):
     total = 0.0
     for i in range(len(gain)):  # twice as fast as a loop over the values

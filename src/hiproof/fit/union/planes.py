@@ -427,7 +427,7 @@ def find_best_rectangle(gain, least_sum, reach, column):
     return best, i0_best, i1_best, j0_best, j1_best
 
 
-@compiled(fastmath=True, allocates=False)
+@compiled(allocates=False)
 def fill_point_gains(cloud, planes, count, current, tau, gain):
     """Fill `gain` (n,) with the drop of cost under the min of `planes`.
 
@@ -448,7 +448,7 @@ def fill_point_gains(cloud, planes, count, current, tau, gain):
     return total
 
 
-@compiled(fastmath=True, allocates=False)
+@compiled(allocates=False)
 def fill_cell_gains(cloud, gain_of_point, gain):
     """Fill `gain` (nu, nv) with the sums over each cell's points.
 
