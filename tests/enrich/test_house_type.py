@@ -1,11 +1,16 @@
 """House types, storeys, floor areas and ridges of constructed houses."""
 
 import json
+import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hiproof.enrich.answer import answer
+from hiproof.enrich.storeys import count_storeys, measure_floors, storey_heights
+from hiproof.parametric.building import build
 from hiproof.write.attribute_list import ENRICHED, ENRICHED_3DBAG, OWN
 from streets import answer_street, open_street, place_house
 
@@ -96,9 +101,29 @@ def test_floor_areas_of_a_block_and_of_an_attic(tmp_path):
     # floors at 0.6 and 3.9 m, or at 0 and 2.5 m; the next, at 5 m, lacks headroom
     assert floors["block"] == pytest.approx((120, 120))
     # the roof is 1.5 m over a floor at 5 m where it is at 6.5 m: over 7 of 10 m of the depth
-    # floors at 0.6, 3.9 (its roof at 5.4: 92 %), 7.2 m (8.7: 26 %); at 0, 2.5, 5 and 7.5 m
-    assert floors["gable"][0] == pytest.approx(60 * (1 + 0.92 + 0.26))
+    # floors at 0.6, 3.1, 5.6 (its roof at 7.1: 58 %), 8.9 m (none); at 0, 2.5, 5 and 7.5 m
+    assert floors["gable"][0] == pytest.approx(60 * (1 + 1 + 0.58))
     assert floors["gable"][1] == pytest.approx(60 * (1 + 1 + 0.7 + 0.2))
+
+
+@settings(deadline=None)
+@given(
+    eave_mm=st.integers(1000, 60000),
+    rise=st.sampled_from([0.0, 0.5, 3.0, 8.0]),
+    is_home=st.booleans(),
+)
+def test_storeys_and_floor_areas_are_consistent(eave_mm, rise, is_home):
+    eave = eave_mm / 1000
+    solid = build(place_house("a", 0, 0, eave=eave, rise=rise)).solid
+    low, high = storey_heights(is_home)
+    least, greatest = count_storeys(eave, (low, high))
+    smallest, largest = measure_floors(solid, 0.0, eave, (low, high))
+    assert 1 <= least <= greatest and (greatest == 1 or greatest * low <= eave + 1e-6)
+    if math.ceil((eave - 0.6) / high) <= eave / low:  # storeys fill the height
+        assert least * high >= eave - 0.6 - 1e-6
+    assert least * 60 - 1e-6 <= smallest <= largest + 1e-6
+    if not rise:
+        assert (smallest, largest) == pytest.approx((least * 60, greatest * 60))
 
 
 def test_volume_envelope_and_compactness(tmp_path):

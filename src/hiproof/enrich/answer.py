@@ -71,8 +71,9 @@ def describe_house(town: Town, number: int, areas: dict[str, float], use: Any) -
     figures = roof_figures(building.solid)
     z_ground = find_ground_height(building, figures)
     heights = storey_heights(is_residential(use))
-    storeys = count_storeys(figures.h_eave - z_ground, heights)
-    floors = measure_floors(building.solid, z_ground, heights)
+    eave_m = figures.h_eave - z_ground
+    storeys = count_storeys(eave_m, heights)
+    floors = measure_floors(building.solid, z_ground, eave_m, heights)
     house_type = name_house_type(town, number, sum(floors) / 2, use)
     envelope = sum(areas.values()) - areas["party_wall_area_m2"]
     ridge = find_ridge_direction(building.solid)

@@ -25,36 +25,47 @@ def count_storeys(eave_m: float, heights: tuple[float, float]) -> tuple[int, int
     """Return the least and the greatest number of full storeys below the eaves.
 
     `eave_m` is the height of the eaves over the ground, `heights` those of a storey. An attic is
-    none of them.
+    none of them. Where no number of storeys fills a height, both are the most that fit below it.
 
-    >>> count_storeys(5.6, RESIDENTIAL_STOREY_M), count_storeys(2.0, RESIDENTIAL_STOREY_M)
+    >>> count_storeys(5.6, RESIDENTIAL_STOREY_M), count_storeys(4.5, RESIDENTIAL_STOREY_M)
     ((2, 2), (1, 1))
     """
     low, high = heights
+    greatest = max(1, math.floor(eave_m / low + 1e-9))
     least = max(1, math.ceil((eave_m - HIGHEST_PLINTH_M) / high - 1e-9))
-    return least, max(least, math.floor(eave_m / low + 1e-9))
+    return min(least, greatest), greatest
 
 
 def measure_floors(
-    solid: Solid, z_ground: float, heights: tuple[float, float]
+    solid: Solid, z_ground: float, eave_m: float, heights: tuple[float, float]
 ) -> tuple[float, float]:
     """Return the least and the greatest gross floor area (m2), attics included.
 
-    A floor is as large as the plan in which the roof is at least HEADROOM_M above it.
+    They are those of the least and the greatest number of storeys. A floor is as large as the plan
+    in which the roof is at least HEADROOM_M above it.
     """
     low, high = heights
+    least, greatest = count_storeys(eave_m, heights)
+    height = min(max((eave_m - HIGHEST_PLINTH_M) / least, low), high)
     levels = RoofLevels(solid)
+    z_eave = z_ground + eave_m
     return (
-        sum_floors(levels, z_ground + HIGHEST_PLINTH_M, high),
-        sum_floors(levels, z_ground, low),
+        sum_floors(
+            levels, z_ground + HIGHEST_PLINTH_M + height * np.arange(least + 1), z_eave, high
+        ),
+        sum_floors(levels, z_ground + low * np.arange(greatest + 1), z_eave, low),
     )
 
 
-def sum_floors(levels: RoofLevels, z_first: float, storey_m: float) -> float:
-    """Return the area (m2) of floors, the first at height `z_first` (m)."""
-    floors = np.arange(z_first + HEADROOM_M, levels.z_top, storey_m)
-    lowest = min(z_first + HEADROOM_M, levels.z_top)
-    return float(sum(map(levels.measure_above, floors))) or levels.measure_above(lowest)
+def sum_floors(levels: RoofLevels, z_floors: np.ndarray, z_eave: float, storey_m: float) -> float:
+    """Return the area (m2) of full storeys and of the attics above them.
+
+    `z_floors` are the heights of the storeys' floors and of the last one's ceiling.
+    """
+    attics = np.arange(max(z_eave, z_floors[-1]), levels.z_top, storey_m)
+    floors = np.concatenate([z_floors[:-1], attics]) + HEADROOM_M
+    floors[0] = min(floors[0], z_eave, levels.z_top)  # low sheds, too, have a floor
+    return float(sum(map(levels.measure_above, floors)))
 
 
 class RoofLevels:
