@@ -42,9 +42,9 @@ def read_horizon(path: str, convergence: float = 0.0) -> np.ndarray:
             f"expected a horizon file in {path}, got: {error!s:.200}; give heights in degrees at "
             "equal angles, clockwise from the north, one a line"
         ) from error
-    others = heights[~((heights >= 0.0) & (heights < 90.0))]
-    if len(heights) < 2 or len(others):
-        got = f"{others[0]:g}" if len(others) else f"{len(heights)}"
+    faulty = heights[~((heights >= 0.0) & (heights < 90.0))]
+    if len(heights) < 2 or len(faulty):
+        got = f"{faulty[0]:g}" if len(faulty) else f"{len(heights)}"
         raise InputError(
             f"expected 2 or more heights between 0 and 90 degrees in {path}, got {got}; mend the "
             "file"

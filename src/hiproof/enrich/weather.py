@@ -198,17 +198,17 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     """Raise InputError for radiation that does not fit the sun over the station."""
     ghi, dhi, dni = (weather.values[name].to_numpy(float) for name in ("ghi", "dhi", "dni"))
     rise = measure_rise(weather)
-    above = import_pvlib().irradiance.get_extra_radiation(weather.times).to_numpy()
+    ceiling = import_pvlib().irradiance.get_extra_radiation(weather.times).to_numpy()
     got, total = "", max(float(ghi.sum()), 1.0)
-    gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - above * rise, 0.0)
-    share = total / float((above * rise).sum())
-    worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - above, 0.0)).argmax())
+    gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - ceiling * rise, 0.0)
+    share = total / float((ceiling * rise).sum())
+    worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - ceiling, 0.0)).argmax())
     if excess.sum() > GREATEST_EXCESS * total or excess[worst] > GREATEST_GAP_WM2:
         got = (
             f"{excess.sum() / total:.1%} of the year's radiation beyond what reaches the "
             "atmosphere at its hours: values, hours, time zone or place are wrong"
         )
-    elif gaps[worst] > GREATEST_GAP_WM2 or (dni > above).any():
+    elif gaps[worst] > GREATEST_GAP_WM2 or (dni > ceiling).any():
         got = (
             f"global radiation of {ghi[worst]:g} W/m2 beside {dhi[worst]:g} diffuse and "
             f"{dni[worst]:g} direct on {weather.times[worst]:%d %B, %H:%M}"
