@@ -27,7 +27,7 @@ import shapely
 from hiproof.city.found import found_roof
 from hiproof.fit import site as fit_site
 from hiproof.frames import LocalFrame
-from hiproof.read.thin import thin_to_grid
+from hiproof.geometry.thin import thin_to_grid
 from hiproof.settings import Settings
 from hiproof.simulate.relief import Plane
 from hiproof.simulate.scanner import Scan, ScanSettings, scan_scene

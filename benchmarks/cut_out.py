@@ -22,8 +22,8 @@ import shapely
 
 from hiproof.classify.cut_out import is_cut_out
 from hiproof.classify.split import is_single
+from hiproof.geometry.point_grid import PointGrid
 from hiproof.read import read_footprints, read_points
-from hiproof.read.assign import PointGrid
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 
 from .judging import SHARED

@@ -34,9 +34,9 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.errors import HiproofError
 from hiproof.frames import LocalFrame
+from hiproof.geometry.point_grid import assign_points
 from hiproof.model import ROOF, Building, Footprint, Model, Roof
 from hiproof.read import read_footprints, read_points
-from hiproof.read.assign import assign_points
 from hiproof.settings import Settings
 from hiproof.status import Status
 from hiproof.write import write_cityjson

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from hiproof import read_footprints, read_points, reconstruct
+from hiproof.geometry.point_grid import assign_points
 from hiproof.model import Building, Footprint, Part, Roof
-from hiproof.read.assign import assign_points
 from hiproof.simulate import SimBuilding, demo_files, read_truth
 
 from .compounds import compare_parts

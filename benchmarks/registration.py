@@ -32,9 +32,9 @@ import shapely
 from hiproof.city.outlines import Outlines, row_outline
 from hiproof.fit.align import AROUND_M, find_shift
 from hiproof.fit.registration import register
+from hiproof.geometry.point_grid import PointGrid
 from hiproof.read import read_footprints, read_points
-from hiproof.read.assign import PointGrid
-from hiproof.stages import distinct
+from hiproof.stages.points import distinct
 
 from .judging import SHARED
 from .towns import TOWNS, read_town

@@ -14,7 +14,7 @@ import pytest
 import shapely
 from click.testing import CliRunner
 
-from hiproof import stages
+from hiproof import method
 from hiproof.city import bundles, solve
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.solve import reconstruct
@@ -110,7 +110,7 @@ def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, set_failing_ids
     reconstruct_area(request)
     expected = read_solved_rows(request.out)["house-1"]
     assert expected["ground_source"] == "terrain model dtm.tif"
-    fail = stages.judge
+    fail = method.judge
 
     def failing(building, *rest):
         if building.id == "house-1" and broken:
@@ -119,7 +119,7 @@ def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, set_failing_ids
 
     broken = [True]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stages, "judge", failing)
+        patch.setattr(method, "judge", failing)
         reconstruct_area(request)
         (bundle,) = bundles.bundles_in(request.out)
         assert repeat(bundle, tmp_path / "again").exit_code == 1

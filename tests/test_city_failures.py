@@ -5,7 +5,7 @@ import pytest
 import shapely
 from click.testing import CliRunner
 
-from hiproof import stages
+from hiproof import method
 from hiproof.city import solve
 from hiproof.city.bundles import folder_name
 from hiproof.city.run import Request, reconstruct_area
@@ -28,13 +28,13 @@ STAGES = (
     (solve, "without_repeats"),
     (solve, "thin_to_count"),
     (solve, "reconstruct"),
-    (stages, "align_footprint"),
-    (stages, "usable"),
-    (stages, "recognise"),
-    (stages, "fit"),
-    (stages, "find_ground"),
-    (stages, "solid_or_simpler"),
-    (stages, "judge"),
+    (method, "align_footprint"),
+    (method, "usable"),
+    (method, "recognise"),
+    (method, "fit"),
+    (method, "find_ground"),
+    (method, "solid_or_simpler"),
+    (method, "judge"),
 )
 WRITERS = (
     (run_files, "measure_or_drop_solid"),
@@ -120,7 +120,7 @@ def test_a_failed_building_keeps_the_largest_polygon_of_its_area():
     """Without footprints the area of a building may have several polygons, and files hold one."""
     small, large = shapely.box(0, 0, 1, 1), shapely.box(5, 0, 9, 4)
     job = solve.Job(0, "a", shapely.MultiPolygon([small, large]), None)
-    plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
+    plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, solve.Settings(), {}, np.zeros(3))
     building, texts = solve.record_failure(plan, job, "KeyError: (False, 0, 0)")
     assert building.status is Status.INTERNAL_ERROR
     assert building.footprint.equals(large)
@@ -136,7 +136,7 @@ def test_an_outline_that_cannot_be_written_leaves_the_id_and_the_message(monkeyp
     job = solve.Job(
         0, "a", shapely.box(0, 0, 4, 4), Footprint("a", shapely.box(0, 0, 4, 4), {"year": 1950})
     )
-    plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
+    plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, solve.Settings(), {}, np.zeros(3))
     building, texts = solve.record_failure(plan, job, "ValueError: first")
     assert (building.id, building.detail, building.footprint) == ("a", "ValueError: first", None)
     assert b"ValueError: first" in texts["parameters"].text

@@ -20,7 +20,7 @@ from hiproof.city.ledger import Ledger, Task
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.sort import Gatherer
 from hiproof.errors import InputError, InputWarning, OutputError
-from hiproof.read.thin import thin_to_count, without_repeats
+from hiproof.geometry.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
 from hiproof.write import files as output_files
 from read.test_lax import write_lax

@@ -42,7 +42,7 @@ MIDDLE = """
 from hiproof.compiled import compiled
 from . import inner
 
-@compiled
+@compiled(allocates=False)
 def doubled(x):
     return inner.number(x) * 2
 """

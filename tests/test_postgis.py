@@ -16,11 +16,11 @@ import hiproof
 from handmade import make_lost_building
 from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
+from hiproof.model.roof_figures import roof_figures
 from hiproof.parametric.run import build_file
 from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_parameters
-from hiproof.write.roof_figures import roof_figures
 from postgis_server import explain_absence, running
 from sample_models import write_sample_run
 from sample_parameters import RING, YARD

@@ -11,7 +11,7 @@ import hiproof
 from hiproof import Grade, NoModelError, Status
 from hiproof.compose import check_solid
 from hiproof.settings import Settings
-from hiproof.stages import candidates
+from hiproof.stages.fit import candidates
 from tiny_town import gable
 
 PLAIN = Settings.from_dict({"segment": {"network": "never"}})

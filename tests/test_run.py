@@ -306,16 +306,16 @@ def test_a_killed_run_goes_on_and_ends_the_same(finished_run, files, tmp_path):
 def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(
     files, tmp_path, monkeypatch
 ):
-    from hiproof import stages
+    from hiproof import method
 
-    original = stages.fit
+    original = method.fit
 
     def fail_for_one_building(points, outline, recognised, settings):
         if outline.bounds[0] < -6.4:
             raise RuntimeError("planted")
         return original(points, outline, recognised, settings)
 
-    monkeypatch.setattr(stages, "fit", fail_for_one_building)
+    monkeypatch.setattr(method, "fit", fail_for_one_building)
     summary = reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1])))
     assert summary.exit_code == 1
     assert 1 <= summary.by_status["internal_error"] < 4

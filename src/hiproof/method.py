@@ -9,10 +9,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from . import stages
 from .frames import LocalFrame
 from .model import Building, Footprint, Roof, as_xyz
 from .settings import Settings
+from .stages.arguments import refuse_other_kinds, refuse_without_network
+from .stages.fit import fit
+from .stages.footprint import align_footprint, start_building
+from .stages.ground import find_ground, look_at_ground
+from .stages.judge import judge
+from .stages.outline import to_local
+from .stages.points import usable
+from .stages.recognise import recognise
+from .stages.remarks import add_remark
+from .stages.solid import (
+    add_installations,
+    add_overhangs,
+    open_passages,
+    reach_terrain,
+    solid_or_simpler,
+)
 from .status import Status
 
 if TYPE_CHECKING:
@@ -52,36 +67,34 @@ def reconstruct(
     >>> reconstruct(roof).type
     'gable'
     """
-    stages.refuse_other_kinds(footprint, terrain, settings)
+    refuse_other_kinds(footprint, terrain, settings)
     points, settings = as_xyz(points), settings or Settings()
-    stages.refuse_without_network(settings)
-    building = stages.start_building(footprint, id)
+    refuse_without_network(settings)
+    building = start_building(footprint, id)
     given, surroundings = footprint, points
-    building, footprint, of_footprint = stages.align_footprint(building, points, settings)
-    points, outline, status = stages.usable(points, footprint)
+    building, footprint, of_footprint = align_footprint(building, points, settings)
+    points, outline, status = usable(points, footprint)
     if status is not Status.MODELLED:
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = LocalFrame.around(points)
-    points, outline = frame.to_local(points), stages.to_local(outline, frame)
-    site = stages.look_at_ground(points, outline, ground, frame, terrain, settings)
+    points, outline = frame.to_local(points), to_local(outline, frame)
+    site = look_at_ground(points, outline, ground, frame, terrain, settings)
     if site.is_empty:
         return dataclasses.replace(building, status=Status.NO_BUILDING, detail=site.remark)
     points, outline = site.points, site.outline
-    recognised = stages.recognise(points, settings)
+    recognised = recognise(points, settings)
     building = dataclasses.replace(building, recognised=recognised.types)
-    fitted = stages.fit(points, outline, recognised, settings)
+    fitted = fit(points, outline, recognised, settings)
     if not fitted.parts:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
     roof = Roof(fitted.parts, fitted.outline, frame)
-    base = stages.find_ground(
-        fitted.outline, points, frame, terrain, roof, settings.reconstruct.walls
-    )
-    roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
-    building = stages.judge(building, roof, solid, points, fitted, base, settings, unused)
-    building = stages.reach_terrain(building, base, settings)
-    building = stages.open_passages(building, base, given)
-    building = stages.add_installations(building, points, settings)
-    building = stages.add_overhangs(building, surroundings, neighbours, settings)
+    base = find_ground(fitted.outline, points, frame, terrain, roof, settings.reconstruct.walls)
+    roof, solid, fitted = solid_or_simpler(roof, points, base, fitted, settings)
+    building = judge(building, roof, solid, points, fitted, base, settings, unused)
+    building = reach_terrain(building, base, settings)
+    building = open_passages(building, base, given)
+    building = add_installations(building, points, settings)
+    building = add_overhangs(building, surroundings, neighbours, settings)
     for text in (of_footprint, site.remark):
-        building = stages.add_remark(building, text)
+        building = add_remark(building, text)
     return building

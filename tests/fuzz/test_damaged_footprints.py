@@ -9,13 +9,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fuzz.damaged_footprints import ODD, SOUND_IN_THE_WORLD, wavy, write_beside_a_sound_one
-from hiproof import stages
 from hiproof.city.plan import WorkPlan, make_jobs
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.geometry.point_grid import PointGrid, grow_polygon
 from hiproof.model import Footprint
-from hiproof.read.assign import PointGrid, grow_polygon
 from hiproof.read.polygons import MOST_MEETINGS, WIDEST_BUILDING_M, meetings, simple_polygons
 from hiproof.settings import Settings
+from hiproof.stages.outline import MOST_OUTLINE_VERTICES, without_needless_vertices
 from run_records import by_id
 from tiny_town import make_town, write_cloud, write_footprints
 
@@ -62,9 +62,9 @@ def test_an_odd_footprint_gets_a_status_and_harms_no_other(name, cloud, single_r
 
 def test_an_outline_keeps_its_shape_and_says_how_far():
     outline = shapely.Polygon(wavy(5000))
-    simple, remark = stages.without_needless_vertices(outline)
+    simple, remark = without_needless_vertices(outline)
     distance = float(remark.rsplit("within ", 1)[1].removesuffix(" m"))
-    assert shapely.get_num_coordinates(simple) <= stages.MOST_OUTLINE_VERTICES
+    assert shapely.get_num_coordinates(simple) <= MOST_OUTLINE_VERTICES
     assert simple.is_valid and distance <= 0.08
     assert shapely.hausdorff_distance(simple.exterior, outline.exterior) <= distance + 1e-9
 
@@ -78,7 +78,7 @@ def comb(teeth):
 @pytest.mark.parametrize("outline", [comb(2000), comb(40_000), shapely.Polygon(wavy(40_000))])
 def test_an_outline_of_thousands_of_teeth_is_simplified(outline):
     """4,000 teeth took 52 s and 1.7 GB, most of it to grow the outline by the reach of a shift."""
-    simple, remark = stages.without_needless_vertices(outline)
+    simple, remark = without_needless_vertices(outline)
     shapely.prepare(simple)
     PointGrid(np.zeros((1, 2))).find_within(simple, 4.0)
     assert f"outline of {len(outline.exterior.coords)} vertices" in remark
@@ -107,14 +107,14 @@ def test_a_plan_keeps_the_footprint_and_works_on_a_simpler_area(tmp_path):
 
 
 def test_an_outline_of_few_vertices_stays_as_it_is():
-    outline = shapely.Polygon(wavy(stages.MOST_OUTLINE_VERTICES - 1))
-    assert stages.without_needless_vertices(outline) == (outline, "")
+    outline = shapely.Polygon(wavy(MOST_OUTLINE_VERTICES - 1))
+    assert without_needless_vertices(outline) == (outline, "")
 
 
 def test_courtyards_narrower_than_what_is_left_out_go_with_it():
     yards = [shapely.box(x, y, x + 0.1, y + 0.1).exterior for x in range(20) for y in range(20)]
     outline = shapely.Polygon(shapely.box(-1, -1, 21, 21).exterior, yards)
-    simple, remark = stages.without_needless_vertices(outline)
+    simple, remark = without_needless_vertices(outline)
     assert len(simple.interiors) == 0 and "of 2005 vertices" in remark
 
 

@@ -16,11 +16,11 @@ from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
 from hiproof.model import Building, Model, Part, Piece, Roof, shown
+from hiproof.model.roof_figures import roof_figures
 from hiproof.model.shown import share_surface
 from hiproof.status import Status
 from hiproof.write import write_all
 from hiproof.write.osm_tags import osm_tags
-from hiproof.write.roof_figures import roof_figures
 from hiproof.write.tables.rows import table_rows
 from roof_zoo import FRAME, KINDS, generate_roof
 

@@ -13,11 +13,12 @@ from pyproj import CRS, Transformer
 
 import hiproof.read.attribute_columns
 import hiproof.read.polygons
+from hiproof.city.overlap import check_overlap
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.read.overlap import check_overlap, doubtful_place, refuse_degrees
 from hiproof.read.polygons import simple_polygons
+from hiproof.read.positions import doubtful_place, refuse_degrees
 from hiproof.settings import Settings
 
 pytestmark = pytest.mark.filterwarnings(

@@ -11,11 +11,11 @@ import rasterio
 from pyproj import Transformer
 from rasterio.transform import from_origin
 
-import hiproof.read.thin
+import hiproof.geometry.thin
 from hiproof.errors import InputError
+from hiproof.geometry.thin import thin_to_grid
 from hiproof.read import raster
 from hiproof.read.terrain import TerrainChain, read_terrain
-from hiproof.read.thin import thin_to_grid
 
 WEST, NORTH = 85000.0, 446200.0
 
@@ -56,7 +56,7 @@ def ground(count=4000, seed=2):
 
 
 def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.thin).failed == 0
+    assert doctest.testmod(hiproof.geometry.thin).failed == 0
 
 
 def test_a_raster_is_interpolated_between_pixel_centres(tmp_path):

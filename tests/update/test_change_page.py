@@ -7,6 +7,7 @@ import pytest
 
 from hiproof.evaluate.report import write_report
 from hiproof.evaluate.run import evaluate_run
+from hiproof.update.before_after import draw_changes
 from pages import at_every_size, is_too_wide, list_complaints, needs_browser, open_page
 from sample_models import sample_points, write_sample_run
 
@@ -40,7 +41,7 @@ def report(tmp_path_factory):
     models = (raised, replace(gone, solid=None), *earlier.models[2:])
     points = (earlier.points[0] + [0.0, 0.0, RAISED_M], np.empty((0, 3)), *earlier.points[2:])
     run = replace(earlier, models=models, points=points)
-    write_report(folder / "report.html", run, "an update", earlier=earlier)
+    write_report(folder / "report.html", run, "an update", changes=draw_changes(run, earlier))
     return (folder / "report.html").as_uri()
 
 

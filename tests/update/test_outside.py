@@ -16,6 +16,7 @@ from hiproof.model import PointCloud
 from hiproof.parametric.run import build_file
 from hiproof.parametric.schema import schema
 from hiproof.settings import ReadSettings
+from hiproof.update.change_tables import write_changes
 from hiproof.update.outside import SurveyCells, load_survey
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
@@ -77,6 +78,7 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
 def test_build_makes_the_same_tables_of_the_parameters(update, tmp_path):
     _, out = update
     build_file(out / "parameters.jsonl", tmp_path)
+    write_changes(tmp_path)
     for name in ("changes.csv", "changes.gpkg"):
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
     validator = Draft202012Validator(schema())

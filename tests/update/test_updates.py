@@ -21,6 +21,7 @@ from hiproof.edit.points import RunPoints
 from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.building import build
 from hiproof.parametric.run import build_file
+from hiproof.update.change_tables import write_changes
 from hiproof.update.dates import find_survey_date
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
@@ -222,6 +223,7 @@ def test_dates_and_models_that_ended_live_on(run, update, cloud, tmp_path):
 def test_build_makes_the_same_files_from_the_parameters(update, tmp_path):
     _, out, _ = update
     build_file(out / "parameters.jsonl", tmp_path / "built")
+    write_changes(tmp_path / "built")
     assert records(tmp_path / "built") == records(out)
     for name in ("changes.csv", "changes.gpkg"):
         assert (tmp_path / "built" / name).read_bytes() == (out / name).read_bytes(), name
@@ -232,6 +234,7 @@ def test_a_change_that_cannot_be_read_is_left_out_of_the_tables(update, tmp_path
     text = (out / "parameters.jsonl").read_text()
     (tmp_path / "parameters.jsonl").write_text(text.replace('"roof_raised"', "[]"))
     built = build_file(tmp_path / "parameters.jsonl", tmp_path / "built")
+    write_changes(tmp_path / "built")
     assert [id for id, _ in built.not_built] == ["house-1"]
     rows = (tmp_path / "built" / "changes.csv").read_text().splitlines()[1:]
     assert [row.partition(",")[0] for row in rows] == ["house-2"]

@@ -12,9 +12,9 @@ import shapely
 from benchmarks.campaign_scenes import SceneSettings, place_building
 
 import hiproof
-from hiproof import stages
+from hiproof import method
+from hiproof.geometry.point_grid import assign_points
 from hiproof.read import read_footprints, read_points
-from hiproof.read.assign import assign_points
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES
 from hiproof.status import Status
@@ -84,7 +84,7 @@ def test_a_part_that_no_file_can_hold_is_given_up_alone_and_the_building_says_so
     """Whatever a fit comes to, what is written can be read."""
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4)))
     points = np.column_stack([x, y, np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)])
-    original = stages.fit
+    original = method.fit
 
     def fit_wrongly(*args):
         fitted = original(*args)
@@ -96,7 +96,7 @@ def test_a_part_that_no_file_can_hold_is_given_up_alone_and_the_building_says_so
             fitted, parts=(*other_parts, replace(gable, parameters=sizes | sided | wrong))
         )
 
-    monkeypatch.setattr(stages, "fit", fit_wrongly)
+    monkeypatch.setattr(method, "fit", fit_wrongly)
     building = hiproof.reconstruct(points, shapely.box(0, 0, 12, 7), settings=PLAIN)
     assert building.status is Status.SIMPLIFIED
     assert "part 2 (gable) was" in building.detail

@@ -10,11 +10,11 @@ import shapely
 import hiproof
 from handmade import box, make_building, make_lost_building
 from hiproof.model import ROOF
+from hiproof.model.roof_figures import roof_figures
 from hiproof.primitives import CATALOGUE
 from hiproof.write.attribute_list import Attribute
 from hiproof.write.building_attributes import building_attributes
 from hiproof.write.osm_tags import ONE_ENDED, OSM, osm_tags
-from hiproof.write.roof_figures import roof_figures
 
 # The values that OpenStreetMap's page of roof:shape documents for roofs of planes.
 DOCUMENTED = {

@@ -12,6 +12,7 @@ passages      passages below buildings, of a layer or a column
 overrides     what is known better of some buildings, and which of them have to be made again
 table_values  values of columns as overrides want them
 changed       a run whose footprints changed: what is the same stays
+overlap       whether footprints lie where the cloud does
 prepare       the plan made: which buildings there are, from footprints or the cloud
 from_overture footprints of an Overture Maps release, kept as a file before they are read
 frame         the CRS and units of an area

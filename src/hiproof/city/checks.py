@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import InputError, SettingsError
 from ..settings import Settings, format_value
-from ..stages import refuse_without_network
+from ..stages.arguments import refuse_without_network
 
 MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
 

@@ -15,8 +15,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..compiled import compiled
+from ..geometry.thin import rank_in_cells, thin_to_grid, without_repeats
 from ..read.terrain import Terrain
-from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
 
 # cells looked at around a position, the next where fewer than three are known; within the reach
 RINGS = (2, 5, 9)

@@ -23,7 +23,7 @@ from ..model import Footprint
 from ..read.crs import parse_crs
 from ..read.operations import Operation
 from ..settings import Settings
-from ..stages import without_needless_vertices
+from ..stages.outline import without_needless_vertices
 from ..write.cityjson.features import choose_offset
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name

@@ -13,7 +13,7 @@ from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..masking import mask
 from ..model import Footprint
-from ..read.overlap import format_box
+from ..read.positions import format_box
 from ..settings import Settings
 from ..write.naming import FileUnits
 from ..write.reprojected import choose_file_crs
@@ -95,7 +95,7 @@ def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> N
 
     That is another place than that of the buildings.
     """
-    from ..read.overlap import doubtful_place
+    from ..read.positions import doubtful_place
 
     boxes = shapely.bounds([job.area for job in jobs])
     corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
@@ -194,8 +194,8 @@ def jobs_from_footprints(
     The outlines are those around that were not requested. All are moved by the shift, None where it
     is not looked for.
     """
-    from ..read.overlap import check_overlap
     from .frame import plan_bounds
+    from .overlap import check_overlap
     from .registration import find_registration, is_registered, warn_if_moved
 
     footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
@@ -338,7 +338,7 @@ def list_operations(
     """
     from ..read.crs import horizontal_crs, names_place, same_horizontal
     from ..read.operations import find_operation
-    from ..read.overlap import reproject_positions
+    from ..read.positions import reproject_positions
 
     boxes = shapely.bounds([job.area for job in jobs])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]

@@ -28,7 +28,7 @@ from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
 from ..progress import show_in_notebook
 from ..read.decoded import forget_points, hold_points
-from ..stages import asks_network, fits_one
+from ..stages.recognise import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
 from ..write.head import FileHead

@@ -21,18 +21,21 @@ import shapely
 from ..errors import DamagedRaster, report_error
 from ..fit.align import Shift, find_shift
 from ..frames import Units
+from ..geometry.point_grid import PointGrid, grow_polygon
+from ..geometry.thin import hashes, thin_to_count, without_repeats
 from ..log import LOGGER
 from ..masking import mask
 from ..method import reconstruct
 from ..model import Building
 from ..parametric.fallback import list_fallback_columns, use_fallback
 from ..parametric.override import Override, overridden
-from ..read.assign import PointGrid, grow_polygon
 from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
-from ..read.thin import hashes, thin_to_count, without_repeats
 from ..settings import Settings
-from ..stages import add_remark, distinct, largest_polygon, shift_remark
+from ..stages.footprint import shift_remark
+from ..stages.outline import largest_polygon
+from ..stages.points import distinct
+from ..stages.remarks import add_remark
 from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments

@@ -23,9 +23,9 @@ import shapely
 
 from ..errors import OutputError, is_interrupt
 from ..frames import Units
+from ..geometry.cell_kernel import mask_at
+from ..geometry.point_grid import PointGrid
 from ..model import PointCloud
-from ..read.assign import PointGrid
-from ..read.cell_kernel import mask_at
 from ..read.decoded import is_held, take_places
 from ..read.las import is_copc
 from ..read.lax import read_lax

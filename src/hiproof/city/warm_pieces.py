@@ -147,7 +147,7 @@ def points() -> None:
     These are those of one building, the ground around it, and whether its footprint lies off.
     """
     from ..fit.align import find_shift
-    from ..read.assign import PointGrid
+    from ..geometry.point_grid import PointGrid
     from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
     from .sort import Reach
 

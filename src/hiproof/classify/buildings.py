@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from ..read.assign import PointGrid
+from ..geometry.point_grid import PointGrid
 from ..read.pointcloud import Box
 from .cells import SquareCells, plan_density
 from .ground import ground_grid

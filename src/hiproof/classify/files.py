@@ -15,8 +15,8 @@ from ..frames import Units
 from ..read.crs import find_units, parse_crs
 from ..read.las import read_checked_facts, translate_errors
 from ..read.las_crs import las_crs
-from ..read.overlap import refuse_degrees
 from ..read.pointcloud import common_crs, file_kind, refuse_implausible
+from ..read.positions import refuse_degrees
 from ..settings import Settings
 from ..write.files import atomic
 from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.components import label_components
-from ..read.thin import hashes
+from ..geometry.thin import hashes
 
 # m; clouds are thinned to one point in such a cube, so that a drone's cloud costs no more
 VOXEL_M = 0.5

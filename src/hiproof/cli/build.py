@@ -66,8 +66,10 @@ def build(
 
     with show_progress("build") as update:
         from ..parametric.run import build_file
+        from ..update.change_tables import write_changes
 
         built = build_file(parameters, out, lambda done: update("build", done), changes)
+        write_changes(out)
     for id, reason in built.not_built:
         click.echo(f"not built: building {id}: {reason}", err=True)
     click.echo(

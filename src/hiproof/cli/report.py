@@ -36,10 +36,10 @@ def report(
     input.
     """
     with show_progress("measure"):
-        from ..evaluate.before_after import evaluate_earlier
         from ..evaluate.report import write_report
         from ..evaluate.run import evaluate_run
         from ..read.damage import SkippedBuildings
+        from ..update.before_after import draw_changes, evaluate_earlier
         from ..write.files import elsewhere
 
         path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
@@ -48,9 +48,9 @@ def report(
         )
         left_out.refuse_all(model.is_damaged for model in run.models)
         try:
-            earlier = evaluate_earlier(run.record, left_out)
+            changes = draw_changes(run, evaluate_earlier(run.record, left_out))
             title = f"hiproof: {Path(folder).resolve().name}"
-            write_report(path, run, title=title, earlier=earlier)
+            write_report(path, run, title=title, changes=changes)
         except OutputError as error:
             raise (
                 elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error

@@ -17,27 +17,34 @@ news.py.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 
-def compiled(function: Callable) -> Any:
+def compiled(function: Callable | None = None, *, allocates: bool = True) -> Any:
     """Compile a function at the top of a module, and keep its code.
 
     Sums keep their order (no `fastmath`), so that every processor takes the same decisions.
-    A division by zero gives infinity or NaN, as in NumPy.
+    A division by zero gives infinity or NaN, as in NumPy. A function that makes no array and is
+    called a million times says `allocates=False`: then it counts no references to those it reads,
+    which cost a tenth of its time.
 
-    >>> @compiled
+    >>> @compiled(allocates=False)
     ... def half(x):
     ...     return x / 2
     >>> half(3.0)
     1.5
     """
+    if function is None:
+        return functools.partial(compiled, allocates=allocates)
     import numba  # not before it is needed: the command line shows its help without
 
     # both only for what is compiled sooner
     options: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+    if not allocates:
+        options["_nrt"] = False
     file = Path(function.__code__.co_filename)
     if numba.config.DISABLE_JIT or not file.is_file():
         return numba.njit(**options)(function)

@@ -71,7 +71,7 @@ class Dispatcher(CPUDispatcher):
 
         Its wrapper is read from disk or compiled.
         """
-        context = self.targetctx.subtarget(enable_nrt=True)
+        context = self.targetctx.subtarget(enable_nrt=self.targetoptions.get("_nrt", True))
         described, environment = result.fndesc, result.environment
         if wrapper := self._cache.load_wrapper(signature, context):
             environment.consts[:], machine_code = wrapper

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from .. import stages
 from ..city.noted import noted_file
 from ..city.plan import PLAN_FILE, Job, WorkPlan
 from ..city.resume import STATE_FOLDER
@@ -24,9 +23,10 @@ from ..city.surveys import SurveyPoints
 from ..errors import HiproofError, InputError
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
+from ..geometry.thin import thin_to_count
 from ..parametric.record import read_outline
 from ..read.raster import import_rasterio
-from ..read.thin import thin_to_count
+from ..stages.points import distinct, usable
 
 # work tiles and buildings whose points stay in memory: those a person goes back and forth between
 KEPT_TILES, KEPT_BUILDINGS = 3, 64
@@ -88,7 +88,7 @@ class RunPoints:
         except (HiproofError, OSError) as error:
             self.missing = explain_unreadable(error)
             return np.zeros((0, 3))
-        return stages.usable(result, outline)[0]
+        return usable(result, outline)[0]
 
     def read_job(self, index: int, epochs: tuple[str, ...]) -> np.ndarray:
         """Return points (n, 3) in and around the area of a building.
@@ -102,7 +102,7 @@ class RunPoints:
         return (
             points
             if len(points) <= max_points_a_building
-            else thin_to_count(stages.distinct(points), max_points_a_building)
+            else thin_to_count(distinct(points), max_points_a_building)
         )
 
     def read_tile(self, tile: str) -> SurveyPoints:

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import shapely
 
 from ..model import Building, Solid
+from ..model.roof_figures import find_ground_height, roof_figures
 from ..write.attribute_list import OWN
-from ..write.roof_figures import find_ground_height, roof_figures
 from ..write.values import plain_text, round_value
 from .areas import OF_3DBAG, measure_areas
 from .cadastre import Cadastre

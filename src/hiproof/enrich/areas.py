@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import CEILING, GROUND, ROOF, WALL, Solid
-from ..write.roof_figures import FLAT_SLOPE_DEG, make_triangles, sum_by_face
+from ..model.roof_figures import FLAT_SLOPE_DEG, make_triangles, sum_by_face
 
 OF_3DBAG = {
     "ground_area_m2": "b3_opp_grond",

@@ -12,12 +12,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import GROUND, ROOF
+from ..model.roof_figures import FLAT_SLOPE_DEG
 from ..settings import Settings
 from ..write.attribute_list import OWN
 from ..write.citygml.surfaces import surface_ids
 from ..write.citygml.version2 import choose_solid
 from ..write.fragments import Sheet
-from ..write.roof_figures import FLAT_SLOPE_DEG
 from ..write.values import round_value
 from ..write.xml_text import xml_text
 from .areas import measure_faces

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import ROOF, Solid
-from ..write.roof_figures import LEVEL_RIDGE_M
+from ..model.roof_figures import LEVEL_RIDGE_M
 from .areas import area_vectors
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..model import ROOF, Solid
-from ..write.roof_figures import make_triangles
+from ..model.roof_figures import make_triangles
 
 RESIDENTIAL_STOREY_M, OTHER_STOREY_M = (2.5, 3.3), (3.0, 5.0)
 """Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling

@@ -14,6 +14,4 @@ run                a finished run with its points: what the commands start from
 report             the page about a run: map, distributions, the worst twenty, 3D
 report_data        what that page draws, packed
 report_pictures    its small pictures
-before_after       buildings that an update changed, before and after
-change_scenes      these in 3D, packed
 """

@@ -93,7 +93,7 @@ def evaluate_building(
         )
         missed = Quality(points=len(points), share_within_20cm=share)
         return BuildingFigures(model.id, model.roof_type, model.status, missed)
-    from ..write.roof_figures import roof_figures
+    from ..model.roof_figures import roof_figures
 
     frame = LocalFrame.around(model.solid.vertices)
     solid = model.solid.move(-frame.origin)
@@ -117,7 +117,7 @@ def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
 
     The azimuth's difference is the smaller angle, signed.
     """
-    from ..write.roof_figures import roof_figures
+    from ..model.roof_figures import roof_figures
 
     if not (solid.select_faces(ROOF) and reference.select_faces(ROOF)):
         return Comparison(reference_id)

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ..geometry.cell_kernel import cell_keys
 from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import OVERLAY_GRID_M
+from ..geometry.thin import cell_range, occupied_cells
 from ..model import ROOF, Fit, Quality, Solid
-from ..read.cell_kernel import cell_keys
-from ..read.thin import cell_range, occupied_cells
 from .distance import point_surface_distances, surface_and_vertical_distances
 
 NEAR_M = 0.2

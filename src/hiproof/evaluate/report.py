@@ -21,8 +21,6 @@ from .. import __version__
 from ..log import count_things
 from ..masking import masked_values
 from ..status import Grade, Status
-from .before_after import draw_changes, find_changes
-from .change_scenes import make_scenes
 from .evaluation import summarise
 from .metrics import psd
 from .overview import BuildingOutcome, Overview, show_command
@@ -50,15 +48,15 @@ def write_report(
     run: EvaluatedRun,
     title: str = "hiproof",
     most_shown: int = MOST_SHOWN,
-    earlier: EvaluatedRun | None = None,
+    changes: tuple[str, list[dict[str, Any]]] = ("", []),
 ) -> None:
     """Write the page to `path`. Raises OutputError when the file cannot be written.
 
-    `earlier` is the run that an update began with.
+    `changes` are the section on changed buildings, and their scenes in 3D.
     """
     from ..write.files import atomic_file
 
-    page = report_html(run, title, most_shown, earlier)
+    page = report_html(run, title, most_shown, changes)
     with atomic_file(path) as file:
         file.write(page.encode())
 
@@ -67,7 +65,7 @@ def report_html(
     run: EvaluatedRun,
     title: str = "hiproof",
     most_shown: int = MOST_SHOWN,
-    earlier: EvaluatedRun | None = None,
+    changes: tuple[str, list[dict[str, Any]]] = ("", []),
 ) -> str:
     """Return the page as text.
 
@@ -77,8 +75,7 @@ def report_html(
     worst = worst_indices(run)
     buildings = choose_buildings(run, worst, most_shown)
     places = run.only(buildings)
-    changes = find_changes(run, earlier)
-    scenes = [] if earlier is None else make_scenes(run, earlier, changes)
+    section, scenes = changes
     record = json.dumps(masked_values(run.record), indent=1, ensure_ascii=False)
     scripts = ["viewer.js", "report.js", *(["changes.js"] if scenes else [])]
     sections = {
@@ -90,7 +87,7 @@ def report_html(
         "qualities": grade_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
-        "changes": draw_changes(run, earlier, changes, read_asset("changes.html")),
+        "changes": section,
         "worst": worst_buildings(run, worst, buildings),
         "record": f'<pre tabindex="0" role="region" aria-label="run.json">{escape(record)}</pre>',
         "data": embed_json(report_data(places, places_on_map(places)) | {"changes": scenes}),

@@ -9,7 +9,6 @@ underside   how the building of an object ends below
 installations  those of an object
 overhangs   the overhangs of an object
 building    the object built: composed, checked, measured, as a run does
-change_tables  changes.csv and changes.gpkg of an update
 run         a file of parameters into the files of a run
 finished    finished models read building by building, of any file
 change      one part changed: another type, a height, a side

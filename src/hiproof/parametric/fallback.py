@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .. import stages
 from ..errors import CompositionError, SettingsError
 from ..frames import LocalFrame
 from ..model import Building
 from ..settings import ReadSettings, Settings
+from ..stages.ground import ASSUMED_WALL_M, Ground, find_ground
+from ..stages.outline import largest_polygon, to_local
+from ..stages.remarks import add_remark
 from ..status import Doubt, Status
 from ..write.parameters import outline_record
 from .building import build
@@ -102,7 +104,7 @@ def use_fallback(
     try:
         return build_block(building, heights, terrain, settings)
     except CompositionError as error:
-        return stages.add_remark(building, f"its heights make no block: {error}")
+        return add_remark(building, f"its heights make no block: {error}")
 
 
 def prefer_override(heights: FallbackHeights, override: Override) -> FallbackHeights:
@@ -123,19 +125,19 @@ def build_block(
     Its ground is the terrain's, else that of its attributes.
     """
     shift = np.array(building.shift)
-    outline = shapely.transform(stages.largest_polygon(building.footprint), lambda xy: xy + shift)
+    outline = shapely.transform(largest_polygon(building.footprint), lambda xy: xy + shift)
     corners = shapely.get_coordinates(outline)
     frame = LocalFrame.around(np.column_stack([corners, np.zeros(len(corners))]))
-    local = stages.to_local(outline, frame)
-    ground = stages.find_ground(local, np.zeros((1, 3)), frame, terrain)
+    local = to_local(outline, frame)
+    ground = find_ground(local, np.zeros((1, 3)), frame, terrain)
     if ground.source.startswith("assumed"):
         if heights.ground_m is not None:
-            ground = stages.Ground(heights.ground_m, "attribute")
+            ground = Ground(heights.ground_m, "attribute")
         elif heights.roof_m is not None:
-            below = heights.roof_m - stages.ASSUMED_WALL_M
-            ground = stages.Ground(below, f"assumed {stages.ASSUMED_WALL_M:g} m below its roof")
+            below = heights.roof_m - ASSUMED_WALL_M
+            ground = Ground(below, f"assumed {ASSUMED_WALL_M:g} m below its roof")
         else:
-            return stages.add_remark(building, "its height is known, but not that of its ground")
+            return add_remark(building, "its height is known, but not that of its ground")
     top = ground.z + heights.block_m if heights.block_m is not None else heights.roof_m
     rings = outline_record(local)
     part = {

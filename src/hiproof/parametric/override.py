@@ -25,7 +25,6 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .. import stages
 from ..compose.readable import MOST_PARTS
 from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
@@ -34,6 +33,12 @@ from ..primitives.catalogue import CATALOGUE
 from ..read.damage import excerpt
 from ..read.plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from ..settings import Settings
+from ..stages.footprint import align_footprint, start_building
+from ..stages.ground import Ground, find_ground, query_terrain
+from ..stages.outline import to_local
+from ..stages.points import usable
+from ..stages.remarks import add_remark, without_doubt
+from ..stages.solid import add_installations, add_overhangs, open_passages, reach_terrain
 from ..status import Doubt, Status
 from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
@@ -271,7 +276,7 @@ def overridden(
     Arguments and result are those of `hiproof.reconstruct`.
     """
     points, settings = as_xyz(points), settings or Settings()
-    building = stages.start_building(footprint, id)
+    building = start_building(footprint, id)
     if override.leave_out:
         return dataclasses.replace(building, status=Status.LEFT_OUT, detail=override.told)
     try:
@@ -282,10 +287,10 @@ def overridden(
     except HiproofError as error:
         result = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
     if lies_under(result, override.z_ground):
-        result = stages.add_remark(result, "the ground given lies above its lowest eave")
-    result = stages.add_overhangs(result, points, neighbours, settings)
-    result = stages.add_remark(result, remark_given_ground(result, override.z_ground, terrain))
-    return stages.add_remark(result, override.told)
+        result = add_remark(result, "the ground given lies above its lowest eave")
+    result = add_overhangs(result, points, neighbours, settings)
+    result = add_remark(result, remark_given_ground(result, override.z_ground, terrain))
+    return add_remark(result, override.told)
 
 
 def lies_under(building: Building, z_ground: float | None) -> bool:
@@ -305,7 +310,7 @@ def remark_given_ground(building: Building, z_ground: float | None, terrain: Any
     """
     if z_ground is None or terrain is None or building.built is None:
         return ""
-    heights, source = stages.query_terrain(
+    heights, source = query_terrain(
         terrain, building.roof.frame.to_world(shapely.get_coordinates(building.roof.outline))
     )
     if (
@@ -333,8 +338,8 @@ def build_given(
 
     It is measured on its points where there are any, and its footprint is moved as a run moves it.
     """
-    building, footprint, of_footprint = stages.align_footprint(building, points, settings)
-    points, outline, status = stages.usable(points, footprint)
+    building, footprint, of_footprint = align_footprint(building, points, settings)
+    points, outline, status = usable(points, footprint)
     if status is Status.BAD_FOOTPRINT and override.outline is None:
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = (
@@ -343,7 +348,7 @@ def build_given(
         else choose_frame(points, outline)
     )
     local = frame.to_local(points)
-    rings = override.outline or outline_record(stages.to_local(outline, frame))
+    rings = override.outline or outline_record(to_local(outline, frame))
     if rings is None:
         raise InputError(
             "expected an outline, or a footprint, of a building whose parts are given, got "
@@ -383,10 +388,10 @@ def build_given(
         shift=building.shift,
     )
     created = measure_building(created, local) if len(local) else created
-    created = stages.reach_terrain(created, ground, settings)
-    created = stages.open_passages(created, ground, given)
-    created = stages.add_installations(created, local, settings)
-    return stages.add_remark(created, of_footprint)
+    created = reach_terrain(created, ground, settings)
+    created = open_passages(created, ground, given)
+    created = add_installations(created, local, settings)
+    return add_remark(created, of_footprint)
 
 
 def choose_frame(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
@@ -406,9 +411,9 @@ def choose_ground(
     frame: LocalFrame,
     terrain: Any,
     walls: str,
-) -> stages.Ground:
+) -> Ground:
     """Return the ground: as given, else the terrain's."""
-    ground = stages.find_ground(
+    ground = find_ground(
         outline, points if len(points) else np.zeros((1, 3)), frame, terrain, walls=walls
     )
     if override.z_ground is not None:
@@ -460,7 +465,7 @@ def fit_within(
             "ground_source": "override",
         }
         repeat = rebuild(building, record)
-        detail = stages.without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
+        detail = without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
         repeat = dataclasses.replace(repeat, quality=building.quality, grade=building.grade)
         building = dataclasses.replace(repeat, status=building.status, detail=detail)
     return building

@@ -390,7 +390,7 @@ def measure_building(building: Building, points_local: np.ndarray) -> Building:
     """
     from ..compose.settle import round_building
     from ..evaluate.metrics import quality
-    from ..stages import grade_building
+    from ..stages.judge import grade_building
 
     roof = building.roof
     result = quality(building.solid.move(-roof.frame.origin), points_local, roof.outline)

@@ -37,7 +37,6 @@ from ..write.naming import FileUnits, UniqueNames, gml_name
 from ..write.run_files import fragments, join_fragments
 from ..write.values import plain_text
 from .building import build
-from .change_tables import write_changes
 from .file import opened_parameters
 
 # sentences kept of buildings that could not be built; a wrong file may have millions
@@ -112,7 +111,6 @@ def build_file(
             make_fragments(maker, records, built, progress),
             maker.head,
         )
-    write_changes(out)
     write_record(path, out, maker.head, built)
     return built
 

@@ -15,7 +15,6 @@ ply           PLY files
 text          XYZ, CSV and the like
 columns       which column of a table of points holds what
 plausible     what no input may say
-thin          one point a cell
 crs           reference systems and their units
 axes          what no roof can be built in is refused
 operations    which operation of PROJ lies between two of them, and how accurate it is
@@ -33,9 +32,7 @@ geoparquet    GeoParquet files, of which only the row groups around an extent ar
 parquet_table footprints from such a file
 stac          static STAC catalogues
 overture      footprints of an Overture Maps release
-overlap       whether footprints lie where the cloud does
-assign        which points belong to which footprint
-cell_kernel   points and cells; compiled
+positions     positions in a CRS: reprojected, doubted, described
 terrain       how high the ground is
 raster        terrain models
 raster_checks whether a raster can be one, and in which unit it counts
@@ -56,8 +53,6 @@ from typing import Any
 _HOME = {
     **dict.fromkeys(("read_points", "iter_points", "read_header", "PointFileHeader"), "pointcloud"),
     **dict.fromkeys(("read_footprints", "footprint_crs"), "footprints"),
-    "check_overlap": "overlap",
-    **dict.fromkeys(("assign_points", "PointGrid"), "assign"),
     **dict.fromkeys(("read_terrain", "Terrain", "TerrainChain"), "terrain"),
     **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
     **dict.fromkeys(("same_horizontal", "combine", "parse_crs"), "crs"),

@@ -33,9 +33,9 @@ from .crs import (
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
 from .operations import find_operation, warn_if_coarse
-from .overlap import format_box, refuse_degrees
 from .plain_geopackage import Features, is_geopackage, read_plain_crs, read_plain_geopackage
 from .polygons import is_surface, simple_polygons
+from .positions import format_box, refuse_degrees
 from .remote import is_url
 
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")

@@ -29,6 +29,9 @@ named      surveys as the user names them for a run of several
 several    such a run: its surveys registered, and its tiles solved
 best       the best survey of each building, and the model made of it
 run        the steps above, one after the other
+change_tables  changes.csv and changes.gpkg: what is not unchanged
+before_after   the report on buildings that changed, before and after
+change_scenes  these in 3D, packed
 
 Earlier and new points are compared with each other wherever the earlier clouds still exist: what
 the earlier model left out, such as a chimney, then is no change. Otherwise the new points are

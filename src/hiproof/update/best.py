@@ -29,7 +29,7 @@ from ..city.solve import (
 from ..city.surveys import SurveyPoints
 from ..model import Building
 from ..parametric.override import Override
-from ..stages import add_remark
+from ..stages.remarks import add_remark
 from ..status import Change
 from ..write.fragments import Fragments
 from ..write.run_files import fragments

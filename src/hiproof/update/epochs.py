@@ -16,7 +16,7 @@ from ..city.plan import Job, load_plan, neighbourhood
 from ..city.solve import Surroundings, open_terrain
 from ..city.sort import load_points
 from ..city.surveys import SurveyPoints
-from ..read.thin import without_repeats
+from ..geometry.thin import without_repeats
 from .plan import EARLIER_FOLDER
 from .register import SurveyShift
 from .request import EACH_BUILDING, SIGNIFICANCE

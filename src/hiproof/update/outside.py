@@ -18,8 +18,8 @@ import shapely
 
 from ..city.plan import WorkPlan
 from ..geometry.components import label_components
+from ..geometry.thin import occupied_cells
 from ..model import PointCloud
-from ..read.thin import occupied_cells
 from ..settings import ReadSettings
 from ..status import ChangeKind
 from ..write.files import atomic, atomic_file

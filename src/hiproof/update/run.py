@@ -17,10 +17,10 @@ from ..city.resume import open_state
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..errors import InputError, OutputError, SettingsError
 from ..garbage import collect_rarely
-from ..parametric.change_tables import write_changes
 from ..status import Change
 from ..write.head import FileHead, UpdateHead
 from .before import prepare_surveys, remove_earlier_points
+from .change_tables import write_changes
 from .dates import find_survey_date
 from .earlier import EarlierRun, choose_read_settings, read_earlier
 from .epochs import SURVEYS_FILE, Surveys

@@ -29,6 +29,7 @@ described    a building with its attributes, into a file of any format
 run_files    all files of a run in one pass
 """
 
+from ..model.roof_figures import RoofFigures, roof_figures
 from .building_attributes import building_attributes
 from .citygml.version2 import CityGMLWriter, write_citygml
 from .cityjson.features import CityJSONWriter, write_cityjson
@@ -36,7 +37,6 @@ from .files import atomic, atomic_file
 from .fragments import Fragments, load_fragments, save_fragments
 from .head import FileHead
 from .parameters import ParametersWriter, write_parameters
-from .roof_figures import RoofFigures, roof_figures
 from .run_files import fragments, join_fragments, write_all
 from .tables.geopackage import AttributesWriter, write_attributes
 from .writer import BuildingWriter

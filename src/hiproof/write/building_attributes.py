@@ -13,11 +13,11 @@ import numpy as np
 
 from ..frames import METRES, Units
 from ..model import Building, Model, Solid
+from ..model.roof_figures import RoofFigures, find_ground_height, roof_figures
 from ..status import Status
 from .attribute_list import OWN, PREFIX
 from .osm_tags import osm_tags
 from .reprojected import Reprojected
-from .roof_figures import RoofFigures, find_ground_height, roof_figures
 from .terrain_figures import measure_terrain
 from .values import metres, plain, plain_text, round_value
 

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 from ..formats import FORMATS, import_format
 from ..model import Building
+from ..model.roof_figures import RoofFigures
 from .head import FileHead
 from .meshes.viewed import view_building
 from .parameters import crs_text
-from .roof_figures import RoofFigures
 
 
 class Described(NamedTuple):

@@ -20,8 +20,8 @@ import numpy as np
 
 from ..errors import OutputError
 from ..model import Building, Solid
+from ..model.roof_figures import RoofFigures, roof_figures
 from .head import FileHead
-from .roof_figures import RoofFigures, roof_figures
 from .shapes import Shapes, make_shapes
 
 NOTHING = (np.nan,) * 6

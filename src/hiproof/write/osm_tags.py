@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..model import ROOF, Building
+from ..model.roof_figures import RoofFigures, find_ground_height
 from ..primitives.catalogue import CATALOGUE
 from .attribute_list import OSM
-from .roof_figures import RoofFigures, find_ground_height
 from .values import round_value
 
 ONE_ENDED = ("side_hip", "side_half_hip")
@@ -25,7 +25,7 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     None what cannot be told or, of a flat roof, has no meaning.
 
     >>> import hiproof
-    >>> from hiproof.write.roof_figures import roof_figures
+    >>> from hiproof.model.roof_figures import roof_figures
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
     >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(),
     ...     5 - 0.5 * abs(y.ravel() - 2.75)]))

@@ -19,10 +19,10 @@ import numpy as np
 import shapely
 
 from ..model import Building, Eaves, Installation, Model, Part
+from ..model.roof_figures import RoofFigures
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
-from .roof_figures import RoofFigures
 from .values import plain, plain_text
 from .writer import BuildingWriter
 

@@ -17,12 +17,12 @@ import numpy as np
 
 from ..formats import FORMATS, Format, import_format, list_requested_files, requested_fragments
 from ..model import Building
+from ..model.roof_figures import RoofFigures
 from ..settings import Settings
 from ..status import Status
 from .building_attributes import building_attributes, measure_figures
 from .fragments import Fragments, Sheet
 from .head import FileHead
-from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from ..errors import CompositionError
 from ..model import GROUND, Building, Face, Solid
+from ..model.roof_figures import RoofFigures, roof_figures
 from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
 from .building_attributes import shape_attributes
-from .roof_figures import RoofFigures, roof_figures
 from .tables.rows import part_values
 from .values import metres, plain
 

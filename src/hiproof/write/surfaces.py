@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..model import ROOF, Face, Part
+from ..model.roof_figures import FLAT_SLOPE_DEG, RoofFigures
 from ..primitives.catalogue import SMOOTH
-from .roof_figures import FLAT_SLOPE_DEG, RoofFigures
 from .values import round_value
 
 SUMMED = ("_kwh", "_area_m2")  # Ends of the names of values that add up; others are means by area.

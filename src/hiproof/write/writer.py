@@ -11,9 +11,9 @@ from contextlib import AbstractContextManager, ExitStack
 from typing import Any, BinaryIO, Self
 
 from ..model import Building
+from ..model.roof_figures import RoofFigures
 from .files import atomic_file
 from .fragments import Fragment
-from .roof_figures import RoofFigures
 
 
 class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):

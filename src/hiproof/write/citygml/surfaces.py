@@ -14,7 +14,7 @@ import numpy as np
 
 from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Face, Part, Solid
-from ..roof_figures import RoofFigures
+from ...model.roof_figures import RoofFigures
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
 from ..values import round_value
 from ..xml_text import generic_attribute

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from ...model import GROUND, Building, Face, Solid
+from ...model.roof_figures import RoofFigures, find_ground_height
 from ...settings import WriteSettings
 from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..installations import FUNCTION_SPACE, FUNCTIONS
 from ..naming import UniqueNames, gml_name, srs_name
-from ..roof_figures import RoofFigures, find_ground_height
 from ..shapes import PartShape
 from ..values import WIDEST
 from ..writer import BuildingWriter

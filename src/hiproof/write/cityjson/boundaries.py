@@ -14,8 +14,8 @@ import shapely
 
 from ...frames import METRES, Units
 from ...model import GROUND, ROOF, Building, Face, Solid
+from ...model.roof_figures import RoofFigures
 from ..building_attributes import OWN
-from ..roof_figures import RoofFigures
 from ..shapes import PartShape, Shapes
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
 from ..values import plain, round_value

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...model import Building
+from ...model.roof_figures import RoofFigures
 from ...settings import WriteSettings
 from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
 from ..files import scratch
@@ -25,7 +26,6 @@ from ..head import FileHead
 from ..installations import FUNCTIONS
 from ..json_text import dump
 from ..naming import UniqueNames, reference_system
-from ..roof_figures import RoofFigures
 from ..shapes import PartShape
 from ..values import WIDEST, metres, plain_text
 from ..writer import BuildingWriter

@@ -17,13 +17,13 @@ from typing import Any
 
 from ...errors import OutputError
 from ...model import Building
+from ...model.roof_figures import RoofFigures
 from ..attribute_list import HIPROOF, OSM, PREFIX, ROOFER
 from ..building_attributes import building_attributes, measure_figures
 from ..files import atomic, scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..naming import plan_wkt
-from ..roof_figures import RoofFigures
 from ..writer import BuildingWriter
 from .geopackage_file import GeometryType, GeoPackage
 from .rows import split_lines, table_rows

@@ -16,9 +16,9 @@ import shapely
 from ...errors import OutputError
 from ...frames import METRES, Units
 from ...model import ROOF, Building, Face, Part
+from ...model.roof_figures import RoofFigures
 from ...primitives.cants import CANTED, MEASURES, list_cants
 from ..attribute_list import HISTORY_LAYER, SHAPE
-from ..roof_figures import RoofFigures
 from ..surfaces import number_surfaces
 from ..values import metres, plain_text, round_value
 

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 import shapely
 
-from ..geometry.point_in_polygon import find_inside
-from ..model import Footprint
 from .cell_kernel import cell_keys
+from .point_in_polygon import find_inside
 from .thin import cell_range
 
 # of an outline; hardly a building has more corners, and growing it takes a quarter of a second
@@ -112,10 +112,8 @@ def grow_polygon(polygon: shapely.Polygon, distance_m: float, **options: int) ->
     return shapely.buffer(polygon, distance_m, **options)
 
 
-def assign_points(
-    cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]
-) -> list[np.ndarray]:
-    """Return for each footprint the ascending indices of its points.
+def assign_points(cloud_xyz: np.ndarray, footprints: Iterable[Any]) -> list[np.ndarray]:
+    """Return for each footprint or polygon the ascending indices of its points.
 
     Indices are into `cloud_xyz` (n, 2 or 3). Points on the border count as inside.
 
@@ -123,8 +121,4 @@ def assign_points(
     what a building gets never depends on its neighbours.
     """
     grid = PointGrid(cloud_xyz)
-    return [grid.inside(project_footprint(footprint)) for footprint in footprints]
-
-
-def project_footprint(footprint: Footprint | shapely.Polygon) -> shapely.Polygon:
-    return footprint.polygon if isinstance(footprint, Footprint) else footprint
+    return [grid.inside(getattr(footprint, "polygon", footprint)) for footprint in footprints]

@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model import GROUND, ROOF, Building, Solid
+from .building import Building
+from .solid import GROUND, ROOF, Solid
 
 LEVEL_RIDGE_M = 0.05  # ends of a ridge differ in height by less
 # a face below drains but does not slope to the eye; it has no azimuth worth telling

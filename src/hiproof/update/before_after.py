@@ -11,13 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from ..evaluate.inputs import locate_input
+from ..evaluate.metrics import psd
+from ..evaluate.models import BuildingModel
+from ..evaluate.report import read_asset
+from ..evaluate.report_pictures import building_pictures
+from ..evaluate.run import EvaluatedRun, evaluate_run
 from ..read.damage import Damaged, refuse
 from ..write.attribute_list import OWN
-from .inputs import locate_input
-from .metrics import psd
-from .models import BuildingModel
-from .report_pictures import building_pictures
-from .run import EvaluatedRun, evaluate_run
+from .change_scenes import make_scenes
 
 MOST_DRAWN_CHANGES = 20  # buildings shown with pictures: as many as are read to the end
 SHOWN = ("changed", "gone")  # classes of buildings that have a model before
@@ -51,22 +53,23 @@ def find_changes(run: EvaluatedRun, earlier: EvaluatedRun | None) -> list[tuple[
 
 
 def draw_changes(
-    run: EvaluatedRun, earlier: EvaluatedRun | None, pairs: list[tuple[int, int]], section: str
-) -> str:
-    """Return the `section` of the buildings that changed most.
+    run: EvaluatedRun, earlier: EvaluatedRun | None
+) -> tuple[str, list[dict[str, Any]]]:
+    """Return the report's section on changed buildings, and their scenes in 3D.
 
-    It is empty where there are none. `pairs` are those of `find_changes`.
+    It has those that changed most, and is empty where there are none.
     """
+    pairs = find_changes(run, earlier)
     if earlier is None or not pairs:
-        return ""
+        return "", []
     ids = [run.models[after].id for after, _ in pairs]
     options = [f'<option value="{number}">{escape(id)}</option>' for number, id in enumerate(ids)]
     cards = [
         draw_card(run, after, earlier, before, number)
         for number, (after, before) in enumerate(pairs)
     ]
-    section = section.replace("<!--options-->", "".join(options))
-    return section.replace("<!--cards-->", "".join(cards))
+    section = read_asset("changes.html").replace("<!--options-->", "".join(options))
+    return section.replace("<!--cards-->", "".join(cards)), make_scenes(run, earlier, pairs)
 
 
 def measure_change(model: BuildingModel) -> float:

@@ -6,7 +6,7 @@ import shapely
 
 from handmade import box, courtyard, gable_house, prism
 from hiproof.model import GROUND, ROOF, WALL, Face, Solid
-from hiproof.write.roof_figures import roof_figures
+from hiproof.model.roof_figures import roof_figures
 
 
 def hip_house():

@@ -5,8 +5,8 @@ import doctest
 import numpy as np
 import pytest
 
-import hiproof.read.thin
-from hiproof.read.thin import cell_range, occupied_cells, rank_in_cells, without_repeats
+import hiproof.geometry.thin
+from hiproof.geometry.thin import cell_range, occupied_cells, rank_in_cells, without_repeats
 
 
 @pytest.mark.parametrize("points", [0, 1, 7, 3000])
@@ -57,4 +57,4 @@ def test_the_range_of_cells_holds_all_points():
 
 
 def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.thin).failed == 0
+    assert doctest.testmod(hiproof.geometry.thin).failed == 0

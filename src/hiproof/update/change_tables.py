@@ -17,6 +17,8 @@ import shapely
 
 from ..errors import InputError
 from ..formats import FORMATS
+from ..parametric.file import opened_parameters
+from ..parametric.record import polygon, read_change, read_outline
 from ..write.colours import CHANGE_COLOURS
 from ..write.files import atomic
 from ..write.head import FileHead, UpdateHead
@@ -24,8 +26,6 @@ from ..write.naming import plan_wkt
 from ..write.tables.geopackage import OUTLINE_GEOMETRY, write_styles
 from ..write.tables.geopackage_file import GeoPackage
 from ..write.tables.styles import Style
-from .file import opened_parameters
-from .record import polygon, read_change, read_outline
 
 CSV_FILE, GPKG_FILE = "changes.csv", "changes.gpkg"
 CHANGE_COLUMNS: dict[str, type] = {

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..evaluate.models import BuildingModel
+from ..evaluate.run import EvaluatedRun
 from ..write.meshes.page_mesh import pack_values, solid_mesh
-from .models import BuildingModel
-from .run import EvaluatedRun
 
 MOST_CHANGE_POINTS = 2000
 """Points of a survey drawn of a building: at 10 points/m2 all of a house, 32 kB in the page."""

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
-import hiproof.read.assign
+import hiproof.geometry.point_grid
+from hiproof.geometry.point_grid import PointGrid, assign_points
 from hiproof.model import Footprint
-from hiproof.read.assign import PointGrid, assign_points
 
 
 def some_footprints(seed, count=12):
@@ -65,4 +65,4 @@ def test_no_points_and_no_polygon_find_nothing():
 
 
 def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.assign).failed == 0
+    assert doctest.testmod(hiproof.geometry.point_grid).failed == 0

@@ -14,7 +14,7 @@ LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is 
 
 
 @compiled
-def measure_area_below(level, z, plan):
+def measure_area_below(level: float, z: np.ndarray, plan: np.ndarray) -> float:
     """Return the plan area of triangles at or below `level`.
 
     They have sorted heights `z` (t, 3) and signed plan areas `plan` (t,).
@@ -33,7 +33,7 @@ def measure_area_below(level, z, plan):
 
 
 @compiled
-def find_level(share, z, plan):
+def find_level(share: float, z: np.ndarray, plan: np.ndarray) -> float:
     """Return the level below which `share` of the roof's plan area lies.
 
     Between corner heights the area below a level is quadratic in the level, at the height of a
