@@ -9,10 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hiproof.enrich.answer import answer
+from hiproof.enrich.run import enrich_run
 from hiproof.enrich.storeys import count_storeys, measure_floors, storey_heights
+from hiproof.errors import InputError
 from hiproof.parametric.building import build
+from hiproof.settings import EnrichSettings
 from hiproof.write.attribute_list import ENRICHED, ENRICHED_3DBAG, OWN
-from streets import answer_street, open_street, place_house
+from streets import answer_street, open_street, place_house, write_street
 
 RIGHT_SHARE = 0.97  # of house types on simulated streets
 
@@ -163,3 +166,10 @@ def test_answers_are_as_declared(tmp_path):
     declared = {OWN + a.name for a in ENRICHED} | {a.name for a in ENRICHED_3DBAG}
     assert set(values) == declared - {"hiproof_not_enriched"}
     assert json.dumps(values)
+
+
+def test_a_use_that_no_building_has_is_refused(tmp_path):
+    folder = write_street(tmp_path, [place_house("a", 0, 0, use="office"), place_house("b", 9, 0)])
+    with pytest.raises(InputError, match=r"of the buildings \(use\) as --use-attribute, got 'uze'"):
+        enrich_run(folder, settings=EnrichSettings(use_attribute="uze"))
+    enrich_run(folder, settings=EnrichSettings(use_attribute="use"), processes=1)

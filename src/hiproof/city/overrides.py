@@ -20,12 +20,13 @@ from ..log import LOGGER, count_things
 from ..masking import mask
 from ..read.attribute_columns import make_known_condition, restore_declared_types
 from ..read.footprints import attribute_rows
+from ..read.numbers import SkippedValues
 from ..settings import ReadSettings
 from ..write.files import atomic
 from .ledger import Ledger
 from .merge import tile_parts
 from .plan import Job, WorkPlan
-from .table_values import SkippedValues
+from .table_values import select_possible
 
 if TYPE_CHECKING:
     from ..parametric.override import Override
@@ -163,7 +164,7 @@ def table_records(path: str) -> list[dict[str, Any]]:
     )
     rows = attribute_rows(names, columns, len(columns[0]) if columns else 0)
     left_out = SkippedValues(mask(path))
-    records = [left_out.possible(row, str(row.get("id", ""))) for row in rows]
+    records = [select_possible(row, str(row.get("id", "")), left_out) for row in rows]
     left_out.warn()
     return records
 
@@ -281,8 +282,8 @@ def column_override(
     It is empty where they hold nothing; impossible values are noted.
     """
     attributes = job.footprint.attributes if job.footprint else {}
-    result = impossible.possible(
-        {key: attributes[name] for name, key in names if name in attributes}, job.id
+    result = select_possible(
+        {key: attributes[name] for name, key in names if name in attributes}, job.id, impossible
     )
     return {key: value for key, value in result.items() if (key, value) != ("leave_out", False)}
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import warnings
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 
-from ..errors import InputError, InputWarning
+from ..errors import InputWarning
 from ..log import count_things
 from ..model import Footprint
+from ..read.numbers import MOST_SHOWN_VALUES, read_number
+from ..read.plausible import HIGHEST_BUILDING_M
 from .request import Request
+from .table_values import refuse_missing_column
 
 if TYPE_CHECKING:
     from .frame import AreaFrame
@@ -33,7 +34,7 @@ def add_passages(
     """
     column = request.settings.read.raised_column
     if column:
-        refuse_missing_column(footprints, column, "the footprints")
+        refuse_missing_column(footprints, column, "the footprints", "the clearance")
         footprints = tuple(raise_footprint(footprint, column) for footprint in footprints)
     if request.underpasses is None:
         return footprints
@@ -60,43 +61,31 @@ def read_passages(request: Request, frame: AreaFrame) -> list[tuple[shapely.Poly
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # passages may overlap
         features = read_footprints(path, target_crs=frame.cloud, settings=request.settings)
-    refuse_missing_column(features, column, f"the underpasses in {path}")
+    refuse_missing_column(features, column, f"the underpasses in {path}", "the clearance")
+    values = [feature.attributes.get(column) for feature in features]
     layer = [
         (feature.polygon, clearance)
-        for feature in features
-        if (clearance := read_clearance(feature.attributes.get(column))) is not None
-        and not feature.polygon.is_empty
+        for feature, value in zip(features, values, strict=True)
+        if (clearance := read_clearance(value)) is not None and not feature.polygon.is_empty
     ]
     if missing := len(features) - len(layer):
+        unread = [str(value)[:20] for value in values if read_clearance(value) is None]
+        subset = f" ({', '.join(unread[:MOST_SHOWN_VALUES])})" if unread else ""
         warnings.warn(
             f"{count_things(missing, 'underpass', 'underpasses')} of {path} left out: column "
-            f"{column} has no number over 0 there",
+            f"{column} has no number over 0 there{subset}",
             InputWarning,
         )
     return layer
 
 
-def refuse_missing_column(features: Iterable[Footprint], column: str, subject: str) -> None:
-    """Raise InputError where no feature has a column."""
-    columns = {name for feature in features for name in feature.attributes}
-    if columns and column not in columns:
-        raise InputError(
-            f"expected a column {column} of {subject} ({', '.join(sorted(columns))}), got none; "
-            "name the one that holds the clearance"
-        )
-
-
 def read_clearance(value: Any) -> float | None:
     """Read a clearance in metres, None where there is none.
 
-    >>> read_clearance("3.2"), read_clearance(0), read_clearance("high")
+    >>> read_clearance("3,2 m"), read_clearance(0), read_clearance("high")
     (3.2, None, None)
     """
-    try:
-        clearance = float(value)
-    except (TypeError, ValueError):
-        return None
-    return clearance if math.isfinite(clearance) and clearance > 0.0 else None
+    return read_number(value, 0.0, HIGHEST_BUILDING_M) or None
 
 
 def select_below(

@@ -33,6 +33,7 @@ from .plan import (
     unusual_names,
 )
 from .request import Box, Request
+from .table_values import check_number_columns
 
 if TYPE_CHECKING:
     from ..fit.registration import Registration
@@ -199,6 +200,7 @@ def jobs_from_footprints(
     from .registration import find_registration, is_registered, warn_if_moved
 
     footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
+    check_number_columns(footprints, settings.read)
     footprints = add_passages(footprints, request, frame)
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))

@@ -1,23 +1,30 @@
 """Values of columns, converted to those of an override.
 
-Columns are a table's or the footprints'.
-
-Columns are filled by people and programs: text stands where numbers should, and codes such as
--9999, or a block height of 0, stand for "unknown". What no building can have is left out and
-counted, so that one cell spoils neither its building nor the run.
+Columns are a table's or the footprints'. What no building can have is left out and counted.
 """
 
 from __future__ import annotations
 
-import math
-import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+import functools
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
-from ..errors import InputWarning
+from ..errors import InputError
+from ..read.numbers import (
+    FIRST_YEAR,
+    LAST_YEAR,
+    NumberColumn,
+    SkippedValues,
+    is_empty,
+    read_number,
+    read_year,
+    warn_of_values,
+)
+from ..read.plausible import HIGHEST_BUILDING_M
+from ..settings import ReadSettings
 
-MOST_SHOWN_VALUES = 3  # values that a sentence shows
+if TYPE_CHECKING:
+    from ..model import Footprint
 
 YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fromkeys(
     ("0", "0.0", "false", "no", "f", "n", ""), False
@@ -25,69 +32,83 @@ YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fr
 """What tables say for true and false."""
 
 
-@dataclass
-class SkippedValues:
-    """Values that no building can have, by key, as "VALUE of ID"."""
+def check_number_columns(footprints: Iterable[Footprint], read: ReadSettings) -> None:
+    """Warn of numbers in columns of the footprints that are left out.
 
-    source: str
-    values: dict[str, list[str]] = field(default_factory=dict)
+    Raises InputError for a year of construction that no footprint has.
+    """
+    if read.year_column:
+        subject = "the footprints"
+        refuse_missing_column(footprints, read.year_column, subject, "the year of construction")
+    rows = ((footprint.id, footprint.attributes) for footprint in footprints)
+    warn_of_values(rows, list_number_columns(read), "columns of the footprints")
 
-    def possible(self, record: Mapping[str, Any], id: str) -> dict[str, Any]:
-        """Return the record without empty and impossible values.
 
-        The latter are noted.
-        """
-        result = {}
-        for key, value in record.items():
-            value = convert_value(key, value)
-            if is_empty(value):
-                continue
-            if is_possible(key, value):
-                result[key] = value
-            else:
-                self.values.setdefault(key, []).append(f"{str(value)[:20]} of {id}")
-        return result
+def list_number_columns(read: ReadSettings) -> list[NumberColumn]:
+    """Return the columns of footprints whose numbers the settings name."""
+    ranges = {read.raised_column: (0.0, HIGHEST_BUILDING_M)}
+    if read.fallback_roof_height or read.fallback_ground_height:
+        from ..parametric.fallback import find_fallback_ranges
 
-    def warn(self) -> None:
-        """Warn once for each key of which values were left out."""
-        for key, values in self.values.items():
+        ranges |= find_fallback_ranges(read)
+    columns = [
+        NumberColumn(
+            name,
+            f"{name} from {least:g} to {greatest:g} m",
+            functools.partial(read_number, least=least, greatest=greatest),
+        )
+        for name, (least, greatest) in ranges.items()
+        if name
+    ]
+    if name := read.year_column:
+        columns.append(
+            NumberColumn(name, f"{name} as a year from {FIRST_YEAR} to {LAST_YEAR}", read_year)
+        )
+    return columns
+
+
+def refuse_missing_column(
+    features: Iterable[Footprint], column: str, subject: str, meaning: str
+) -> None:
+    """Raise InputError where no feature has a column."""
+    columns = {name for feature in features for name in feature.attributes}
+    if columns and column not in columns:
+        raise InputError(
+            f"expected a column {column} of {subject} ({', '.join(sorted(columns))}), got none; "
+            f"name the one that holds {meaning}"
+        )
+
+
+def select_possible(record: Mapping[str, Any], id: str, skipped: SkippedValues) -> dict[str, Any]:
+    """Return the record without empty and impossible values.
+
+    The latter are noted in `skipped`.
+    """
+    result = {}
+    for key, cell in record.items():
+        value = convert_value(key, cell)
+        if is_empty(value):
+            continue
+        if is_possible(key, value):
+            result[key] = value
+        else:
             lower, upper = find_range(key) or (0.0, 0.0)
-            subset = ", ".join(values[:MOST_SHOWN_VALUES]) + (
-                ", ..." if len(values) > MOST_SHOWN_VALUES else ""
-            )
-            warnings.warn(
-                f"{self.source}: expected {key} from {lower:g} to {upper:g}, left out "
-                f"{len(values)} of "
-                f"its values: {subset}",
-                InputWarning,
-            )
+            skipped.note(f"{key} from {lower:g} to {upper:g}", value, id)
+    return result
 
 
 def convert_value(key: str, value: Any) -> Any:
     """Convert a table's value to that of the override's key.
 
-    >>> convert_value("z_ground", "0"), convert_value("leave_out", "0"), convert_value("id", 7)
-    (0.0, False, '7')
+    >>> convert_value("z_ground", "0,5 m"), convert_value("leave_out", "0"), convert_value("id", 7)
+    (0.5, False, '7')
     """
     if key == "leave_out":
         return YES_OR_NO.get(str(value).strip().lower(), value)
     if find_range(key) and isinstance(value, str):
-        try:
-            return float(value) if value.strip() else None
-        except ValueError:
-            return value
+        number = read_number(value)
+        return value if number is None else number
     return str(value) if key == "id" else value
-
-
-def is_empty(value: Any) -> bool:
-    """Return whether a cell is empty. A 0 is a value.
-
-    >>> is_empty(0.0), is_empty(None), is_empty(" ")
-    (False, True, True)
-    """
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return True
-    return isinstance(value, str) and not value.strip()
 
 
 def is_possible(key: str, value: Any) -> bool:

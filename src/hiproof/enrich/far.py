@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,8 @@ def read_horizon(path: str, convergence: float = 0.0) -> np.ndarray:
     """
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
+        if re.search(r"\d,\d", text) and len(text.split()) > 1:
+            raise ValueError("a comma that may stand for a decimal point, or between two heights")
         heights = np.array([float(word) for word in text.replace(",", " ").split()])
     except (OSError, ValueError) as error:
         raise InputError(

@@ -36,7 +36,7 @@ class Index(NamedTuple):
 
     `offsets` (n,) are their places in the file in bytes, `boxes` (n, 4) those of their outlines in
     plan, `modelled` (n,) whether they have a model. `gml_names` has the names of those in `renamed`
-    whose gml:id another building has taken.
+    whose gml:id another building has taken. `attributes` are the names of all attributes.
     """
 
     offsets: np.ndarray
@@ -44,6 +44,7 @@ class Index(NamedTuple):
     modelled: np.ndarray
     renamed: np.ndarray
     gml_names: np.ndarray
+    attributes: np.ndarray
 
 
 def index_records(path: Path) -> Index:
@@ -53,6 +54,7 @@ def index_records(path: Path) -> Index:
     """
     offsets, boxes, modelled = array("q"), array("d"), array("b")
     ids: set[str] = set()
+    attributes: dict[str, None] = {}
     names, renamed = UniqueNames(), {}
     with path.open("rb") as file:
         file.readline()
@@ -67,6 +69,8 @@ def index_records(path: Path) -> Index:
                         "one another"
                     )
                 ids.add(id)
+                if isinstance(record.get("attributes"), dict):
+                    attributes.update(dict.fromkeys(record["attributes"]))
                 name = names.take(gml_name(record["id"]))
                 if name != gml_name(record["id"]):
                     renamed[len(offsets)] = name
@@ -80,6 +84,7 @@ def index_records(path: Path) -> Index:
         np.array(modelled, bool),
         np.array(list(renamed), np.int64),
         np.array(list(renamed.values()), str),
+        np.array(list(attributes), str),
     )
 
 

@@ -17,6 +17,7 @@ import shapely
 from ..errors import CompositionError, SettingsError
 from ..frames import LocalFrame
 from ..model import Building
+from ..read.numbers import read_number
 from ..settings import ReadSettings, Settings
 from ..stages.ground import ASSUMED_WALL_M, Ground, find_ground
 from ..stages.outline import largest_polygon, to_local
@@ -52,8 +53,23 @@ def list_fallback_columns(read: ReadSettings) -> list[str]:
             "expected a column of heights in the world as --fallback-ground-height, got "
             f"{read.fallback_ground_height}; only --fallback-roof-height takes +COLUMN"
         )
-    named = read.fallback_roof_height.removeprefix(ABOVE_GROUND), read.fallback_ground_height
-    return [name for name in named if name]
+    return list(find_fallback_ranges(read))
+
+
+def find_fallback_ranges(read: ReadSettings) -> dict[str, tuple[float, float]]:
+    """Return the least and largest height that each column may hold, by its name."""
+    roof, is_block = split_roof_column(read)
+    ranges = {
+        roof: RANGES["block_height" if is_block else "ridge_height"],
+        read.fallback_ground_height: RANGES["z_ground"],
+    }
+    return {name: bounds for name, bounds in ranges.items() if name}
+
+
+def split_roof_column(read: ReadSettings) -> tuple[str, bool]:
+    """Return the column of roof heights, and whether they count from the ground."""
+    name = read.fallback_roof_height
+    return name.removeprefix(ABOVE_GROUND), name.startswith(ABOVE_GROUND)
 
 
 def read_fallback(attributes: Mapping[str, Any], read: ReadSettings) -> FallbackHeights:
@@ -61,25 +77,15 @@ def read_fallback(attributes: Mapping[str, Any], read: ReadSettings) -> Fallback
 
     What no building can have, such as -9999, is unknown.
 
-    >>> read_fallback({"h": "9.5"}, ReadSettings(fallback_roof_height="+h")).block_m
+    >>> read_fallback({"h": "9,5 m"}, ReadSettings(fallback_roof_height="+h")).block_m
     9.5
     """
-    roof = read.fallback_roof_height
-    is_block = roof.startswith(ABOVE_GROUND)
-    kind = "block_height" if is_block else "ridge_height"
-    height = read_height(attributes.get(roof.removeprefix(ABOVE_GROUND)), kind)
-    ground = read_height(attributes.get(read.fallback_ground_height), "z_ground")
+    (roof, is_block), ranges = split_roof_column(read), find_fallback_ranges(read)
+    height, ground = (
+        read_number(attributes.get(name), *ranges[name]) if name else None
+        for name in (roof, read.fallback_ground_height)
+    )
     return FallbackHeights(None if is_block else height, height if is_block else None, ground)
-
-
-def read_height(value: Any, kind: str) -> float | None:
-    """Read a height that a building can have, None for any other value."""
-    try:
-        height = float(value)
-    except (TypeError, ValueError):
-        return None
-    lower, upper = RANGES[kind]
-    return height if lower <= height <= upper else None
 
 
 def use_fallback(

@@ -31,7 +31,7 @@ from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
 from ..primitives.catalogue import CATALOGUE
 from ..read.damage import excerpt
-from ..read.plausible import HIGHEST_LAND_M, LOWEST_LAND_M
+from ..read.plausible import HIGHEST_BUILDING_M, HIGHEST_LAND_M, LOWEST_LAND_M
 from ..settings import Settings
 from ..stages.footprint import align_footprint, start_building
 from ..stages.ground import Ground, find_ground, query_terrain
@@ -67,14 +67,12 @@ FAR_GIVEN_GROUND_M = 5.0
 along the walls.
 """
 
-HIGHEST_M = 1000.0
-"""Highest building (m above its ground): the Burj Khalifa has 828."""
-
 RANGES = {
     **dict.fromkeys(
-        ("z_ground", "ridge_height", "eave_height"), (LOWEST_LAND_M, HIGHEST_LAND_M + HIGHEST_M)
+        ("z_ground", "ridge_height", "eave_height"),
+        (LOWEST_LAND_M, HIGHEST_LAND_M + HIGHEST_BUILDING_M),
     ),
-    "block_height": (0.1, HIGHEST_M),
+    "block_height": (0.1, HIGHEST_BUILDING_M),
     "parts": (1.0, float(MOST_PARTS)),
 }
 """Least and largest possible value of keys that are numbers. Codes such as -9999 lie beyond."""

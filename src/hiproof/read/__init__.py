@@ -13,6 +13,7 @@ runs          where the points of a file lie, run by run
 lax           LAStools' index beside a file
 ply           PLY files
 text          XYZ, CSV and the like
+numbers       numbers in columns that people fill
 columns       which column of a table of points holds what
 plausible     what no input may say
 crs           reference systems and their units

@@ -23,6 +23,9 @@ LOWEST_LAND_M, HIGHEST_LAND_M = -600.0, 9000.0
 lower. Codes for "no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet.
 """
 
+HIGHEST_BUILDING_M = 1000.0
+"""Highest building (m above its ground): the Burj Khalifa has 828."""
+
 
 class Implausible(ValueError):
     """A file's content cannot be true.

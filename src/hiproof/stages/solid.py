@@ -11,6 +11,7 @@ import shapely
 from ..errors import CompositionError
 from ..geometry.outline_edges import describe_sides, list_outline_edges
 from ..model import Building, Footprint, Roof, Solid
+from ..read.plausible import HIGHEST_BUILDING_M
 from ..settings import Settings
 from ..status import Doubt, Status
 from .fit import Fitted, flat
@@ -112,7 +113,7 @@ def open_passages(
     frame, model = building.roof.frame, building.model
     for polygon, clearance in passages:
         outline = settled_outline(largest_polygon(shapely.transform(polygon, frame.to_local)))
-        ceiling = round_number(ground.z + clearance, PLAN_DIGITS)
+        ceiling = round_number(ground.z + min(clearance, HIGHEST_BUILDING_M), PLAN_DIGITS)
         try:
             model = add_passage(model, outline, ceiling)
         except CompositionError as error:

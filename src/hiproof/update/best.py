@@ -10,7 +10,6 @@ import dataclasses
 import functools
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from ..city.solve import (
 from ..city.surveys import SurveyPoints
 from ..model import Building
 from ..parametric.override import Override
+from ..read.numbers import read_year
 from ..stages.remarks import add_remark
 from ..status import Change
 from ..write.fragments import Fragments
@@ -122,7 +122,8 @@ def solve_best(
     """
 
     def solve() -> tuple[Building, Fragments]:
-        year = read_year(job, plan.settings.read.year_column)
+        attributes = job.footprint.attributes if job.footprint else {}
+        year = read_year(attributes.get(plan.settings.read.year_column))
         names = [name for name in surveys.names if year is None or int(name[:4]) >= year]
         remark = "" if names else f"its year, {year}, is after that of every survey"
         name, others = choose_survey(
@@ -153,12 +154,3 @@ def choose_survey(points: dict[str, np.ndarray]) -> tuple[str, list[str]]:
     least = WELL_COVERED * max(cells.values())
     name = next(name for name, count in cells.items() if count >= least)
     return name, [other for other, count in cells.items() if other != name and count]
-
-
-def read_year(job: Job, column: str) -> int | None:
-    """Return the year in which a building was built, None where it is unknown."""
-    value: Any = job.footprint.attributes.get(column) if column and job.footprint else None
-    try:
-        return int(float(str(value)[:4]))
-    except ValueError:
-        return None
