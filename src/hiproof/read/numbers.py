@@ -22,16 +22,23 @@ METRES_OF = {
 }
 """Metres of the units of length that may follow a number."""
 
-NUMBER = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?)\s*([a-z']*)", re.IGNORECASE)
+PLAIN_NUMBER = re.compile(
+    r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?)\s*([a-z']*)", re.IGNORECASE
+)
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\D*")  # 1,234 may be either
-YEAR = re.compile(r"(\d{4})(?:\.0+|-\d\d(?:-\d\d.*)?)?")  # alone, or a date that begins with it
+PLAIN_YEAR = re.compile(
+    r"(\d{4})(?:\.0+|-\d\d(?:-\d\d.*)?)?"
+)  # alone, or a date that begins with it
 FIRST_YEAR, LAST_YEAR = 1000, 2100  # years of construction that a register may hold
 
 MOST_SHOWN_VALUES = 3  # values that a sentence shows
 
 
 class NumberColumn(NamedTuple):
-    """A column of numbers: what its values are, and what reads one, None where it is unknown."""
+    """A column of numbers, what is expected there, and what reads a value.
+
+    It reads None where a value is unknown.
+    """
 
     name: str
     expected: str
@@ -86,7 +93,7 @@ def read_number(value: Any, least: float = -math.inf, greatest: float = math.inf
     [12.0, 12.0, 12.5, 12.192, None, None]
     """
     if isinstance(value, str):
-        match = NUMBER.fullmatch(value.strip())
+        match = PLAIN_NUMBER.fullmatch(value.strip())
         if not match or match[2].lower() not in METRES_OF or THOUSANDS.fullmatch(value.strip()):
             return None
         number = round(float(match[1].replace(",", ".")) * METRES_OF[match[2].lower()], 9)
@@ -104,7 +111,7 @@ def read_year(value: Any) -> int | None:
     >>> [read_year(text) for text in (1950.0, "1950", "1950-03-01", "ca. 1950", 9999, "19th")]
     [1950, 1950, 1950, None, None, None]
     """
-    match = YEAR.fullmatch(str(value).strip())
+    match = PLAIN_YEAR.fullmatch(str(value).strip())
     year = int(match[1]) if match else 0
     return year if FIRST_YEAR <= year <= LAST_YEAR else None
 
