@@ -18,7 +18,7 @@ from .stages.footprint import align_footprint, start_building
 from .stages.ground import find_ground, look_at_ground
 from .stages.judge import judge
 from .stages.outline import to_local
-from .stages.points import usable
+from .stages.points import drop_neighbour_roofs, usable
 from .stages.recognise import recognise
 from .stages.remarks import add_remark
 from .stages.solid import (
@@ -56,11 +56,11 @@ def reconstruct(
     at the foot of walls that are seen. ground: (m, 3) ground points in and around the footprint, by
     which bare ground inside it is cut out (`footprint_trust`). unused: further points (m, 3) of the
     building that are not fitted, thinned out or of a noise class; the verdict on the model names
-    them where they lie together off the roof. neighbours: outlines of other buildings, which
-    overhangs (LoD2.3) do not cross. What the data hold never raises: the outcome is the
-    Building's `status`, and its `detail` says why. Raises InputError for points of another shape,
-    for a footprint, a terrain or settings of another kind, and for settings that ask the network
-    where the extra `network` is not installed.
+    them where they lie together off the roof. neighbours: outlines of other buildings, whose roofs
+    may reach over this one, and which its own overhangs (LoD2.3) do not cross. What the data hold
+    never raises: the outcome is the Building's `status`, and its `detail` says why. Raises
+    InputError for points of another shape, for a footprint, a terrain or settings of another kind,
+    and for settings that ask the network where the extra `network` is not installed.
 
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
     >>> roof = np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)])
@@ -81,7 +81,8 @@ def reconstruct(
     site = look_at_ground(points, outline, ground, frame, terrain, settings)
     if site.is_empty:
         return dataclasses.replace(building, status=Status.NO_BUILDING, detail=site.remark)
-    points, outline = site.points, site.outline
+    outline = site.outline
+    points = drop_neighbour_roofs(site.points, outline, surroundings, neighbours, frame)
     recognised = recognise(points, settings)
     building = dataclasses.replace(building, recognised=recognised.types)
     fitted = fit(points, outline, recognised, settings)

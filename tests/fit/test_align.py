@@ -64,6 +64,18 @@ def test_a_roof_larger_or_smaller_than_its_footprint_is_no_shift_and_is_said(rea
     assert result.is_size_clear and result.beyond == pytest.approx(reach, abs=0.1)
 
 
+def test_a_roof_that_reaches_unequally_beyond_its_walls_moves_no_footprint():
+    """Such a roof may stand over these walls, whatever its overhangs are."""
+    stayed = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        length, width, *reach = *rng.uniform((7, 6), (20, 12)), *rng.uniform(-0.4, 1.2, 4).clip(0)
+        roof = shapely.box(-reach[0], -reach[1], length + reach[2], width + reach[3])
+        found = find_shift(points_in(roof, seed=seed)[:, :2], shapely.box(0, 0, length, width))
+        stayed.append(not found.is_clear)
+    assert sum(stayed) >= 19
+
+
 @pytest.mark.parametrize("count", [0, 1, 19])
 def test_few_points_tell_nothing(count):
     assert not find_shift(points_in(L_SHAPE)[:count, :2], L_SHAPE).is_clear
@@ -93,9 +105,10 @@ def test_align_off_leaves_it():
 
 @pytest.mark.parametrize("overhang", [0.8, 1.0])
 @pytest.mark.parametrize("distance", [0.0, 0.5, 2.0])
-def test_a_roof_that_overhangs_all_around_does_not_hide_the_shift(overhang, distance):
+def test_a_roof_that_overhangs_all_around_does_not_hide_a_shift_of_more(overhang, distance):
+    """One of less may be a roof that reaches farther on one side than on the other."""
     shift = distance * np.array([0.8, 0.6])
     roof = points_in(L_SHAPE.buffer(overhang, join_style="mitre"))[:, :2]
     result = find_shift(roof, move(L_SHAPE, -shift))
-    assert np.hypot(*(result.xy - shift)) < 0.1 and result.is_clear == (distance > 0)
+    assert np.hypot(*(result.xy - shift)) < 0.1 and result.is_clear == (distance > overhang)
     assert result.is_size_clear and result.beyond == pytest.approx(overhang, abs=0.1)

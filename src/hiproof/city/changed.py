@@ -22,7 +22,7 @@ from ..write.fragments import Fragment, Fragments, load_fragments, save_fragment
 from .ledger import Ledger, Task
 from .merge import remove_tiles, tile_parts, write_tile
 from .overrides import REDO, load_redo
-from .plan import PLAN_FILE, WorkPlan, encode_passages
+from .plan import OVERHANG_REACH_M, PLAN_FILE, WorkPlan, encode_passages
 
 
 class StoredText(NamedTuple):
@@ -109,8 +109,8 @@ def find_row_outlines(plan: WorkPlan, index: int) -> list[str]:
 
 
 def find_neighbours(plan: WorkPlan, index: int) -> list[str]:
-    """Return the outlines that a building's overhangs do not cross."""
-    near = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
+    """Return the outlines beside a building."""
+    near = plan.outlines.select_near(index, OVERHANG_REACH_M)
     return [polygon.wkb_hex for polygon in near]
 
 

@@ -62,7 +62,7 @@ from .other_classes import (
 )
 from .outlines import row_outline
 from .overrides import load_overrides, load_redo
-from .plan import Job, WorkPlan, load_plan, make_job, neighbourhood
+from .plan import OVERHANG_REACH_M, Job, WorkPlan, load_plan, make_job, neighbourhood
 from .solved import count_building
 from .sort import load_points
 from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
@@ -185,12 +185,12 @@ class Surroundings:
         return dataclasses.replace(found, points=np.concatenate([found.points, outside]))
 
     def select_neighbours(self, job: Job) -> list[shapely.Polygon]:
-        """Return the outlines that a building's overhangs do not cross, moved with it."""
-        if not self.plan.beyond_m or job.area.is_empty:
+        """Return the outlines beside a building, moved with it."""
+        if job.area.is_empty:
             return []
         planned = self.plan.jobs[job.index].area
         shift = np.subtract(job.area.bounds[:2], planned.bounds[:2])
-        near = self.plan.outlines.select_near(job.index, self.plan.beyond_m)
+        near = self.plan.outlines.select_near(job.index, OVERHANG_REACH_M)
         return [shapely.transform(polygon, lambda xy: xy + shift) for polygon in near]
 
     def select_noise(self, job: Job, roof: np.ndarray) -> np.ndarray:

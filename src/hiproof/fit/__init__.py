@@ -18,6 +18,7 @@ bare_ground    yards and lost wings inside a footprint, cut out
 standing       whether anything stands on a footprint
 installations  chimneys and other objects on a roof
 overhang       how far a roof reaches beyond its outline
+neighbour_roofs  points on a neighbour's roof that reaches over the outline
 
 `fit_roof` is imported on first use, because it brings the compiler along.
 """

@@ -7,6 +7,9 @@ far the roof reaches beyond the footprint on every side. A side that a neighbour
 beyond tells nothing, so a house in a row is not moved along the row. A roof much larger than its
 footprint leaves no free ground before its walls: where the sides do not agree, the footprint is
 grown all around.
+
+A shift moves all sides alike, while overhangs may differ from side to side. So a roof that reaches
+beyond its footprint everywhere is no shift: some side of it must end behind one of the footprint.
 """
 
 from __future__ import annotations
@@ -53,6 +56,9 @@ ROUNDS, NEAR_M = 3, 0.2
 LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.5
 # share where an overhang all around is assumed: else it takes in the roofs of neighbours
 LEAST_FREE_OVERHUNG = 0.85
+# m by which a moved footprint's roof ends behind one of its sides: one that reaches beyond all of
+# them, however unequally, may stand over these walls
+LEAST_BEHIND_M = 0.25
 # free sides: two directions and one to check them; share of the points outside, below which the
 # footprint fits
 LEAST_SIDES, LEAST_OUTSIDE = 3, 0.01
@@ -67,6 +73,8 @@ class Shift:
     `xy` (2,) m is its shift from the footprint with standard deviations `sigma` (2,), infinite
     along which nothing is known. `beyond` (m) is how far the roof reaches over the moved footprint,
     negative where it stays behind, with `beyond_sigma`, and `disagreement` (m) that of the sides.
+    `behind` (m) is how far the roof ends behind that side of the unmoved footprint where it does
+    most.
     """
 
     xy: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -74,6 +82,7 @@ class Shift:
     beyond: float = 0.0
     beyond_sigma: float = math.inf
     disagreement: float = math.inf
+    behind: float = 0.0
 
     @property
     def is_none(self) -> bool:
@@ -90,6 +99,7 @@ class Shift:
             LEAST_SHIFT_M <= length <= FARTHEST_M
             and length > SIGMAS * is_determined
             and self.disagreement < MOST_DISAGREEMENT_M
+            and self.behind > LEAST_BEHIND_M
         )
 
     @property
@@ -282,7 +292,10 @@ def by_sides(
     gap = targets - design @ solution
     disagreement = math.sqrt(float((gap**2 * lengths).sum() / lengths.sum()))
     spread = np.sqrt(np.diag(inverse)) * max(1.0, math.sqrt(float((weight * gap**2).mean())))
-    return Shift(solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement)
+    behind = -float(targets.min())
+    return Shift(
+        solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement, behind
+    )
 
 
 @compiled

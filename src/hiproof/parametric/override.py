@@ -281,7 +281,8 @@ def overridden(
         if override.parts is not None or override.block_height is not None:
             result = build_given(override, points, building, terrain, settings, footprint)
         else:
-            result = fit_within(override, points, footprint, terrain, settings, id, ground)
+            arguments = points, footprint, terrain, settings, id, ground
+            result = fit_within(override, *arguments, neighbours)
     except HiproofError as error:
         result = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
     if lies_under(result, override.z_ground):
@@ -432,6 +433,7 @@ def fit_within(
     settings: Settings,
     id: str,
     ground: np.ndarray | None,
+    neighbours: Sequence[shapely.Polygon],
 ) -> Building:
     """Fit the building and hold what is given."""
     from ..method import reconstruct
@@ -441,7 +443,7 @@ def fit_within(
     # whoever says how a building is says that it stands
     settings = settings.replace({"fit": changes, "reconstruct": {"empty_footprints": "model"}})
     level = settings.replace({"write": {"lods": ("2.2",)}})  # overhangs follow the last change
-    building = reconstruct(points, footprint, terrain, level, id, ground)
+    building = reconstruct(points, footprint, terrain, level, id, ground, neighbours=neighbours)
     if building.built is None:
         return building
     changed = False

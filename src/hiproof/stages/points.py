@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 
+from ..frames import LocalFrame
 from ..read.plausible import is_plausible
 from ..status import Status
 from .outline import largest_polygon
@@ -33,6 +36,27 @@ def usable(
     if footprint is None and (len(points) < FEWEST_POINTS or on_a_line(points[:, :2])):
         return points, None, Status.NO_ROOF
     return points, footprint, Status.MODELLED
+
+
+def drop_neighbour_roofs(
+    points: np.ndarray,
+    outline: shapely.Polygon | None,
+    surroundings: np.ndarray,
+    neighbours: Sequence[shapely.Geometry],
+    frame: LocalFrame,
+) -> np.ndarray:
+    """Drop the points on neighbours' roofs that reach over the outline.
+
+    `points` (n, 3) and the outline are in the local frame, what lies around it is in the world.
+    """
+    if outline is None or not neighbours:
+        return points
+    from ..fit.neighbour_roofs import find_neighbour_roofs
+
+    area = shapely.transform(shapely.union_all(neighbours), frame.to_local)
+    area = shapely.difference(area, outline)
+    points_beside = distinct(compress_inside(frame.to_local(finite(surroundings)), area))
+    return points[~find_neighbour_roofs(points, outline, points_beside, area)]
 
 
 def compress_inside(points: np.ndarray, area: shapely.Geometry) -> np.ndarray:
