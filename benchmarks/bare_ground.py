@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from hiproof.city.found import found_roof
+from hiproof.city.work.found import found_roof
 from hiproof.fit import site as fit_site
 from hiproof.frames import LocalFrame
 from hiproof.geometry.thin import thin_to_grid

@@ -26,21 +26,21 @@ from hiproof.city.run import Request, Summary, reconstruct_area
 
 DELFT = Path(__file__).parents[1].parent / "shared" / "data" / "delft"
 STAGES = {
-    "find the common shift of footprints": "hiproof.city.prepare.jobs_from_footprints",
-    "make the rest of the plan": "hiproof.city.resume.make_plan",
-    "sort points into tiles": "hiproof.city.sort.sort_cloud",
-    "load the points of a tile": "hiproof.city.solve.load_points",
-    "move rows of footprints": "hiproof.city.solve.Surroundings.move",
-    "gather the points of a building": "hiproof.city.solve.Surroundings.select_roof_points",
+    "find the common shift of footprints": "hiproof.city.plan.prepare.jobs_from_footprints",
+    "make the rest of the plan": "hiproof.city.folder.resume.make_plan",
+    "sort points into tiles": "hiproof.city.work.sort.sort_cloud",
+    "load the points of a tile": "hiproof.city.work.solve.load_points",
+    "move rows of footprints": "hiproof.city.work.solve.Surroundings.move",
+    "gather the points of a building": "hiproof.city.work.solve.Surroundings.select_roof_points",
     "use the points inside the footprint": "hiproof.method.usable",
     "look at the ground inside the footprint": "hiproof.method.look_at_ground",
     "fit": "hiproof.method.fit",
     "find the ground around": "hiproof.method.find_ground",
     "compose the solid": "hiproof.method.solid_or_simpler",
     "judge": "hiproof.method.judge",
-    "look at points of other classes": "hiproof.city.solve.Surroundings.inspect",
-    "make the texts of all files": "hiproof.city.solve.fragments",
-    "keep the texts of a tile": "hiproof.city.solve.save_fragments",
+    "look at points of other classes": "hiproof.city.work.solve.Surroundings.inspect",
+    "make the texts of all files": "hiproof.city.work.solve.fragments",
+    "keep the texts of a tile": "hiproof.city.work.solve.save_fragments",
     "join the files": "hiproof.city.run.merge",
 }
 

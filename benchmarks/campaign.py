@@ -46,8 +46,8 @@ from unittest.mock import patch
 import laspy
 import numpy as np
 
-from hiproof.city import solve
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work import solve
 from hiproof.cli.check import check_file, count_bad
 from hiproof.compose import check_solid
 from hiproof.compose.solid import LENIENT_M

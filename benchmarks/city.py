@@ -36,7 +36,7 @@ import shapely
 
 from hiproof import read_parameters
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.workers import stop_server
+from hiproof.city.work.workers import stop_server
 from hiproof.compose import check_solid
 from hiproof.read import read_footprints, read_header
 from hiproof.read.solids import read_solids

@@ -26,9 +26,9 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
-from hiproof.city import solve
-from hiproof.city.overrides import read_overrides
+from hiproof.city.plan.overrides import read_overrides
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work import solve
 from hiproof.parametric.file import read_parameters
 from hiproof.parametric.run import build_file
 from hiproof.settings import Settings

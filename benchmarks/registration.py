@@ -29,7 +29,7 @@ from collections.abc import Iterator
 import numpy as np
 import shapely
 
-from hiproof.city.outlines import Outlines, row_outline
+from hiproof.city.plan.outlines import Outlines, row_outline
 from hiproof.fit.align import AROUND_M, find_shift
 from hiproof.fit.registration import register
 from hiproof.geometry.point_grid import PointGrid

@@ -12,7 +12,7 @@ import planted
 from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.tasks import ALL, make_ready
+from hiproof.city.work.tasks import ALL, make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
 from tiny_town import write_town

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hiproof.city import solve
-from hiproof.city.plan import make_jobs
+from hiproof.city.plan.work_plan import make_jobs
+from hiproof.city.work import solve
 from hiproof.compiled import news
 from hiproof.model import Building, Quality
 from hiproof.read.footprints import read_footprints

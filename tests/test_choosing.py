@@ -10,8 +10,8 @@ import pytest
 import shapely
 from click.testing import CliRunner
 
-from hiproof.city.plan import make_jobs
-from hiproof.city.prepare import make_plan
+from hiproof.city.plan.prepare import make_plan
+from hiproof.city.plan.work_plan import make_jobs
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.plan import WorkPlan
-from hiproof.city.prepare import make_plan
+from hiproof.city.plan.prepare import make_plan
+from hiproof.city.plan.work_plan import WorkPlan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputWarning

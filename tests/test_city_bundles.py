@@ -15,9 +15,9 @@ import shapely
 from click.testing import CliRunner
 
 from hiproof import method
-from hiproof.city import bundles, solve
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.solve import reconstruct
+from hiproof.city.work import bundles, solve
+from hiproof.city.work.solve import reconstruct
 from hiproof.cli.app import app
 from hiproof.errors import InputError
 from hiproof.settings import Settings

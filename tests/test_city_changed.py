@@ -10,9 +10,9 @@ import shapely
 
 import planted
 from hiproof.city import run as city_run
-from hiproof.city import solve
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
+from hiproof.city.work import solve
 from hiproof.settings import Settings
 from run_records import records
 from tiny_town import make_town, write_footprints, write_town

@@ -11,8 +11,8 @@ import pytest
 import shapely
 
 from hiproof import build, read_parameters
-from hiproof.city.found import found_roof
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work.found import found_roof
 from hiproof.errors import InputError, InputWarning
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, random_compound, scan

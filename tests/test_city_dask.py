@@ -10,8 +10,8 @@ import pytest
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.tasks import WORK
-from hiproof.city.workers import stop_server
+from hiproof.city.work.tasks import WORK
+from hiproof.city.work.workers import stop_server
 from hiproof.errors import InputError, OutputError
 from hiproof.update import run as update_run
 from hiproof.update.request import UpdateRequest
@@ -47,7 +47,7 @@ def cluster(forked_workers):
 
 @pytest.fixture(autouse=True)
 def small_tiles(monkeypatch):
-    monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
+    monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 1)
 
 
 def test_a_cluster_whose_worker_is_killed_changes_no_byte(
@@ -90,7 +90,7 @@ def test_a_building_that_kills_dask_workers_is_left_out_alone(
     # one death is enough to blame a task here: each costs the start of a worker
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
-    monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
+    monkeypatch.setattr("hiproof.city.work.quarantine.TRIES", 1)
     summary = reconstruct_area(
         Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address)
     )
@@ -99,7 +99,7 @@ def test_a_building_that_kills_dask_workers_is_left_out_alone(
 
 
 def test_an_address_without_a_scheduler_gets_one_sentence(town_files, tmp_path, monkeypatch):
-    monkeypatch.setattr("hiproof.city.executors.CONNECT_S", 1)
+    monkeypatch.setattr("hiproof.city.work.executors.CONNECT_S", 1)
     with pytest.raises(InputError, match=r"Dask scheduler at tcp://127.0.0.1:9"):
         reconstruct_area(
             Request((town_files[0],), tmp_path, town_files[1], scheduler="tcp://127.0.0.1:9")
@@ -109,8 +109,8 @@ def test_an_address_without_a_scheduler_gets_one_sentence(town_files, tmp_path, 
 def test_a_cluster_without_workers_ends_the_run_with_one_sentence(
     town_files, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("hiproof.city.executors.WORKERLESS_S", 1)
-    monkeypatch.setattr("hiproof.city.executors.POLL_S", 0.5)
+    monkeypatch.setattr("hiproof.city.work.executors.WORKERLESS_S", 1)
+    monkeypatch.setattr("hiproof.city.work.executors.POLL_S", 0.5)
     with (
         distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=":0") as empty,
         pytest.raises(OutputError, match="expected workers at the Dask scheduler"),

@@ -11,7 +11,7 @@ import rasterio
 from rasterio.transform import from_origin
 
 from hiproof import read_parameters
-from hiproof.city.prepare import make_plan
+from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli.running import print_summary
 from hiproof.errors import InputError, InputWarning

@@ -6,9 +6,9 @@ import shapely
 from click.testing import CliRunner
 
 from hiproof import method
-from hiproof.city import solve
-from hiproof.city.bundles import folder_name
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work import solve
+from hiproof.city.work.bundles import folder_name
 from hiproof.classify import buildings, split
 from hiproof.cli.app import app
 from hiproof.model import Footprint

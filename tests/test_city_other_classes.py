@@ -5,13 +5,13 @@ import pytest
 import shapely
 
 from hiproof import read_parameters
-from hiproof.city.other_classes import (
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work.other_classes import (
     OtherPoints,
     explain_missing_points,
     ground_under_roof,
     remark_other_classes,
 )
-from hiproof.city.run import Request, reconstruct_area
 from hiproof.settings import Settings
 from hiproof.status import Doubt
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city import quarantine
-from hiproof.city.executors import InProcess
-from hiproof.city.ground import (
+from hiproof.city.folder.ledger import Ledger, Outcome, Task
+from hiproof.city.plan.work_plan import Job, cut_into_tiles, neighbourhood
+from hiproof.city.work import quarantine
+from hiproof.city.work.executors import InProcess
+from hiproof.city.work.ground import (
     BareAround,
     Cells,
     GroundAround,
@@ -19,11 +21,9 @@ from hiproof.city.ground import (
     ground_cells,
     lowest_in_cells,
 )
-from hiproof.city.ledger import Ledger, Outcome, Task
-from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
-from hiproof.city.processes import Processes
-from hiproof.city.sort import Reach
-from hiproof.city.tasks import WorkerLost
+from hiproof.city.work.processes import Processes
+from hiproof.city.work.sort import Reach
+from hiproof.city.work.tasks import WorkerLost
 from small_tasks import die_at_second_task, double, has_imported, number_function
 
 
@@ -168,7 +168,7 @@ def test_a_ledger_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypat
     ledger = Ledger(path)
     ledger.set(merged="yes")
     ledger.close()
-    monkeypatch.setattr("hiproof.city.ledger.os.access", lambda *_: False)
+    monkeypatch.setattr("hiproof.city.folder.ledger.os.access", lambda *_: False)
     reader = Ledger(path, read_only=True)
     assert reader.get("merged") == "yes" and list(tmp_path.iterdir()) == [path]
 
@@ -186,7 +186,7 @@ def test_executors_return_every_task_with_result_or_error(executor):
 def test_workers_import_what_tasks_need_before_there_are_tasks():
     executor = Processes(1)
     executor.start()
-    ((_, result, error),) = executor.run(has_imported, [("hiproof.city.solve",)])
+    ((_, result, error),) = executor.run(has_imported, [("hiproof.city.work.solve",)])
     executor.close()
     assert result and error is None
 

@@ -22,10 +22,10 @@ import hiproof
 import planted
 from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.city import run as city_run
-from hiproof.city.lock import hold_folder
-from hiproof.city.marks import compute_mark, describe_inputs, describe_selection, file_stamps
-from hiproof.city.outputs import broken_claims, claims
-from hiproof.city.plan import Job, WorkPlan
+from hiproof.city.folder.lock import hold_folder
+from hiproof.city.folder.marks import compute_mark, describe_inputs, describe_selection, file_stamps
+from hiproof.city.merge.outputs import broken_claims, claims
+from hiproof.city.plan.work_plan import Job, WorkPlan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
@@ -208,7 +208,8 @@ def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tm
 
 
 def test_a_lock_holds_across_processes_and_ends_with_kill_9(tmp_path):
-    code = "import sys, time\nfrom pathlib import Path\nfrom hiproof.city.lock import hold_folder\n"
+    code = "import sys, time\nfrom pathlib import Path\n"
+    code += "from hiproof.city.folder.lock import hold_folder\n"
     code += "with hold_folder(Path(sys.argv[1])):\n    print('held', flush=True)\n"
     code += "    time.sleep(60)"
     path = {**os.environ, "PYTHONPATH": str(Path(hiproof.__file__).parents[1])}

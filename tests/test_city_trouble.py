@@ -15,10 +15,10 @@ import shapely
 
 import planted
 from hiproof.city import run as city_run
-from hiproof.city.bundles import bundles_in
-from hiproof.city.ledger import Ledger, Task
+from hiproof.city.folder.ledger import Ledger, Task
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.sort import Gatherer
+from hiproof.city.work.bundles import bundles_in
+from hiproof.city.work.sort import Gatherer
 from hiproof.errors import InputError, InputWarning, OutputError
 from hiproof.geometry.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
@@ -31,7 +31,7 @@ from tiny_town import make_town, write_cloud, write_footprints, write_town
 
 @pytest.fixture(autouse=True)
 def small_tiles(monkeypatch):
-    monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 2)
+    monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 2)
 
 
 def test_a_worker_killed_from_outside_changes_no_byte(
@@ -51,7 +51,7 @@ def test_a_building_that_ends_its_process_is_left_out_alone(
 ):
     monkeypatch.setattr(city_run, "solve_tile", solve)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
-    monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
+    monkeypatch.setattr("hiproof.city.work.quarantine.TRIES", 1)
     summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
     assert summary.exit_code == 1
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
@@ -179,7 +179,7 @@ def test_a_full_disk_is_no_fault_of_the_ledger(town_files, tmp_path, monkeypatch
     (tmp_path / ".hiproof").mkdir()
     (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(b"cut off where the disk was full" * 9)
     monkeypatch.setattr(
-        "hiproof.city.resume.shutil.disk_usage", lambda _: SimpleNamespace(free=4096)
+        "hiproof.city.folder.resume.shutil.disk_usage", lambda _: SimpleNamespace(free=4096)
     )
     for restart in (False, True):
         with pytest.raises(OutputError, match="free some space, the same command then goes on"):
@@ -202,7 +202,7 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_p
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     chunks, flush = [], Gatherer.flush
     monkeypatch.setattr(Gatherer, "flush", lambda self: (chunks.append(self.number), flush(self)))
-    monkeypatch.setattr("hiproof.city.sort.HELD_POINTS", 1000)
+    monkeypatch.setattr("hiproof.city.work.sort.HELD_POINTS", 1000)
     monkeypatch.setattr("hiproof.read.pointcloud.CHUNK_POINTS", 3000)
     town, rng = make_town(), np.random.default_rng(5)
     middle = np.median(town.xyz[:, 0])
@@ -289,7 +289,7 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(
     reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
+    monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     town = make_town()
     cloud = write_copc(tmp_path / "cloud.copc.laz", town.xyz, town.classification)
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 
 import hiproof
-from hiproof.city import warm
+from hiproof.city.work import warm
 from hiproof.compiled import kept, kinds, news, stamp
 from hiproof.errors import NotKeptWarning
 
@@ -223,7 +223,7 @@ def test_code_for_a_kind_of_processors_is_loaded_on_each_of_them(town, monkeypat
     script = """
 import llvmlite.binding
 llvmlite.binding.get_host_cpu_name = lambda: {host!r}
-from hiproof.city.warm import mark, read_processor
+from hiproof.city.work.warm import mark, read_processor
 from town.outer import answer
 print(mark("solid", "stamp", read_processor()), answer(10), bool(answer._cache_hits))
 """
@@ -683,7 +683,7 @@ def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
 import sys
 from pathlib import Path
 from hiproof.city.run import Request, list_compiled_pieces, reconstruct_area
-from hiproof.city.warm_pieces import PIECES
+from hiproof.city.work.warm_pieces import PIECES
 from hiproof.settings import Settings
 from hiproof.compiled import kept
 from hiproof.simulate import demo_files

@@ -4,11 +4,12 @@ import os
 
 import pytest
 
-from hiproof.city import cores, run
-from hiproof.city.cores import BUILDINGS_A_PROCESS, as_many_as_pay, limit_threads
-from hiproof.city.executors import InProcess
-from hiproof.city.processes import Processes
+from hiproof.city import run
 from hiproof.city.request import Request
+from hiproof.city.work import cores
+from hiproof.city.work.cores import BUILDINGS_A_PROCESS, as_many_as_pay, limit_threads
+from hiproof.city.work.executors import InProcess
+from hiproof.city.work.processes import Processes
 
 
 @pytest.mark.parametrize(

@@ -196,7 +196,7 @@ def test_every_named_number_has_a_reason():
     [
         ("hiproof", "'torch', 'dask', 'numba', 'scipy', 'onnxruntime'"),
         (
-            "hiproof.city.run, hiproof.city.solve, hiproof.fit.union",
+            "hiproof.city.run, hiproof.city.work.solve, hiproof.fit.union",
             "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.sparse', 'scipy.spatial', "
             "'scipy.special', 'onnxruntime', 'rasterio', 'xml.etree'",
         ),

@@ -13,8 +13,8 @@ import pytest
 import planted
 from hiproof import log
 from hiproof.city import run as city_run
-from hiproof.city.processes import Processes
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work.processes import Processes
 from hiproof.cli import main
 from hiproof.errors import InputError, InputWarning, OutputError
 

@@ -89,9 +89,9 @@ def test_every_error_masks_its_own_text(kind):
 def test_a_run_leaves_no_secret_in_any_of_its_files(town_files, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr(
-        "hiproof.city.prepare.jobs_from_footprints", planted.read_jobs_from(town_files[1])
+        "hiproof.city.plan.prepare.jobs_from_footprints", planted.read_jobs_from(town_files[1])
     )
-    monkeypatch.setattr("hiproof.city.frame.footprint_crs", lambda *_: None)
+    monkeypatch.setattr("hiproof.city.plan.frame.footprint_crs", lambda *_: None)
     broken = "https://adm:s3cret@localhost:1/missing.laz"
     address = "postgresql://adm:s3cret@host/db?table=fp&password=s3cret"
     with warnings.catch_warnings():

@@ -8,9 +8,9 @@ import warnings
 import pytest
 
 from hiproof import log
-from hiproof.city.checks import refuse_unusable
-from hiproof.city.processes import Processes
+from hiproof.city.plan.checks import refuse_unusable
 from hiproof.city.run import Summary
+from hiproof.city.work.processes import Processes
 from hiproof.cli import main
 from hiproof.errors import InputWarning
 from hiproof.evaluate.overview import Overview

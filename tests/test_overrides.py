@@ -13,10 +13,11 @@ import shapely
 
 import hiproof
 from hiproof.city import run as city_run
-from hiproof.city import solve, table_values
-from hiproof.city.ledger import Ledger
-from hiproof.city.noted import noted_file, save_run_boxes
-from hiproof.city.overrides import table_records
+from hiproof.city.folder.ledger import Ledger
+from hiproof.city.plan import table_values
+from hiproof.city.plan.overrides import table_records
+from hiproof.city.work import solve
+from hiproof.city.work.noted import noted_file, save_run_boxes
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.override import overridden, read_override

@@ -14,7 +14,7 @@ from pyproj import Transformer
 
 import planted
 from hiproof.city import run as city_run
-from hiproof.city.prepare import make_plan
+from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
 from hiproof.cli.reconstruct import find_settings_file

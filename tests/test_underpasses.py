@@ -11,9 +11,9 @@ import shapely
 from lxml import etree
 
 import hiproof
-from hiproof.city.passages import add_passages
-from hiproof.city.plan import WorkPlan, make_job
-from hiproof.city.prepare import make_plan
+from hiproof.city.plan.passages import add_passages
+from hiproof.city.plan.prepare import make_plan
+from hiproof.city.plan.work_plan import WorkPlan, make_job
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning

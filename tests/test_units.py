@@ -21,8 +21,8 @@ import hiproof.write.naming
 import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
-from hiproof.city.ledger import Ledger
-from hiproof.city.prepare import make_plan
+from hiproof.city.folder.ledger import Ledger
+from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
@@ -280,7 +280,7 @@ def crs_of_header(header, folder):
 def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     """COPC and `.lax` save points, but none that a building needs."""
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
+    monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
     monkeypatch.setattr("hiproof.read.decoded.MOST_HELD_POINTS", 0)  # as larger files
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")

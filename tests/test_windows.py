@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import hiproof
-from hiproof.city import processes
+from hiproof.city.work import processes
 from hiproof.write.files import atomic_file
 from naming import iterate_statements, parse
 
@@ -21,7 +21,11 @@ WITHOUT_POSIX = """
 import errno, os, pkgutil, importlib, signal
 del errno.EDQUOT, os.sched_getaffinity, os.fork, signal.SIGKILL
 import hiproof
-from hiproof.city import cores, executors, lock, run, warm
+from hiproof.city import run
+from hiproof.city.work import cores
+from hiproof.city.work import executors
+from hiproof.city.folder import lock
+from hiproof.city.work import warm
 from hiproof.write import files
 print(cores.cores() > 0)
 """

@@ -14,7 +14,7 @@ import pytest
 
 import hiproof
 from flat_town import make_request
-from hiproof.city.overrides import read_overrides
+from hiproof.city.plan.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.doubt import measure_doubt

@@ -9,7 +9,7 @@ import pytest
 import hiproof
 import pages
 from flat_town import make_request
-from hiproof.city.overrides import read_overrides
+from hiproof.city.plan.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.edits import EDITS_FILE

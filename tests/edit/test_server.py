@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from hiproof.city.overrides import read_overrides
+from hiproof.city.plan.overrides import read_overrides
 from hiproof.edit.desk import Desk
 from hiproof.edit.edits import EDITS_FILE, UNTOUCHED
 from hiproof.edit.server import Server, Service

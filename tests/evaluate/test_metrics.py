@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.ledger import Ledger
+from hiproof.city.folder.ledger import Ledger
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.evaluate.metrics import (
     iou,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import hiproof
 from hiproof import Grade
-from hiproof.city.ledger import Ledger
+from hiproof.city.folder.ledger import Ledger
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.running import graded_words

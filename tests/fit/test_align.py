@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from hiproof import reconstruct
-from hiproof.city.plan import AROUND_M as PLANNED_AROUND_M
+from hiproof.city.plan.work_plan import AROUND_M as PLANNED_AROUND_M
 from hiproof.fit.align import AROUND_M, find_shift
 from hiproof.settings import Settings
 

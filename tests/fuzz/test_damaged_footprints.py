@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fuzz.damaged_footprints import ODD, SOUND_IN_THE_WORLD, wavy, write_beside_a_sound_one
-from hiproof.city.plan import WorkPlan, make_jobs
+from hiproof.city.plan.work_plan import WorkPlan, make_jobs
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.geometry.point_grid import PointGrid, grow_polygon
 from hiproof.model import Footprint

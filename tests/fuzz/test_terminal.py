@@ -15,7 +15,7 @@ import planted
 from fuzz.damaged_models import change, sound_lines
 from hiproof import cli
 from hiproof.city import run as city_run
-from hiproof.city.processes import Processes
+from hiproof.city.work.processes import Processes
 from hiproof.cli.evaluate import evaluate
 from hiproof.compiled import news
 from tiny_town import make_town, write_town

@@ -11,7 +11,7 @@ import shapely
 from shapely import affinity
 
 from handmade import RD_ORIGIN, courtyard, make_building, make_lost_building
-from hiproof.city.solve import make_outcome
+from hiproof.city.work.solve import make_outcome
 from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 
 import hiproof
-from hiproof.city.overrides import override_records
+from hiproof.city.plan.overrides import override_records
 from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid

@@ -13,7 +13,7 @@ from pyproj import CRS, Transformer
 
 import hiproof.read.attribute_columns
 import hiproof.read.polygons
-from hiproof.city.overlap import check_overlap
+from hiproof.city.plan.overlap import check_overlap
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.footprints import footprint_crs, read_footprints

@@ -9,9 +9,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hiproof.city.passages import add_passages
+from hiproof.city.plan.passages import add_passages
+from hiproof.city.plan.table_values import check_number_columns
 from hiproof.city.request import Request
-from hiproof.city.table_values import check_number_columns
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.parametric.fallback import read_fallback

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 import hiproof.read.features
-from hiproof.city.prepare import say_if_columns_run_out
+from hiproof.city.plan.prepare import say_if_columns_run_out
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.footprints import read_footprints

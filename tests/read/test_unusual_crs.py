@@ -14,8 +14,8 @@ from pyproj import CRS
 
 import hiproof.read.axes
 import hiproof.read.geokeys
-from hiproof.city.frame import settle_frame
-from hiproof.city.prepare import read_headers
+from hiproof.city.plan.frame import settle_frame
+from hiproof.city.plan.prepare import read_headers
 from hiproof.city.run import Request
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.crs import UnknownCRS, find_units, names_place, parse_crs, vertical_crs

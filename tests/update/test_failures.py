@@ -5,9 +5,9 @@ import logging
 
 import pytest
 
-from hiproof.city.repro import solve_bundle
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
+from hiproof.city.work.repro import solve_bundle
 from hiproof.errors import DamagedRaster
 from hiproof.parametric.building import build
 from hiproof.update import best, several, solve

@@ -11,8 +11,8 @@ import pytest
 import shapely
 from lxml import etree
 
-from hiproof.city.plan import make_jobs
-from hiproof.city.prepare import warn_files_elsewhere
+from hiproof.city.plan.prepare import warn_files_elsewhere
+from hiproof.city.plan.work_plan import make_jobs
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli.convert import convert
 from hiproof.compose import compose

@@ -32,24 +32,31 @@ from ..stages.recognise import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
 from ..write.head import FileHead
-from . import solved
-from .bundle_folders import find_bundle_folder, remove_bundles
-from .checks import refuse_unusable
-from .cores import as_many_as_pay
-from .executors import Arguments, Executor, Outcome, make_executor
-from .from_cloud import Progress
-from .from_overture import choose_footprints, read_source
-from .ledger import Failure, Ledger
-from .lock import hold_folder
-from .merge import merge, output_files
-from .outputs import claims
-from .overrides import REDO, load_redo
-from .plan import WorkPlan
-from .prepare import make_plan
-from .quarantine import is_loss, run_isolated, solve_in_quarantine
+from .folder.ledger import Failure, Ledger
+from .folder.lock import hold_folder
+from .folder.resume import open_ledger, open_state, resume_or_plan
+from .merge.join import merge, output_files
+from .merge.outputs import claims
+from .plan.checks import refuse_unusable
+from .plan.from_cloud import Progress
+from .plan.from_overture import choose_footprints, read_source
+from .plan.overrides import REDO, load_redo
+from .plan.prepare import make_plan
+from .plan.work_plan import WorkPlan
 from .request import Request
-from .resume import open_ledger, open_state, resume_or_plan
-from .tasks import MAIN_JOB, ONE_PRIMITIVE, RECOGNISING, WITHOUT_FOOTPRINTS, solve_tile, sort_cloud
+from .work import solved
+from .work.bundle_folders import find_bundle_folder, remove_bundles
+from .work.cores import as_many_as_pay
+from .work.executors import Arguments, Executor, Outcome, make_executor
+from .work.quarantine import is_loss, run_isolated, solve_in_quarantine
+from .work.tasks import (
+    MAIN_JOB,
+    ONE_PRIMITIVE,
+    RECOGNISING,
+    WITHOUT_FOOTPRINTS,
+    solve_tile,
+    sort_cloud,
+)
 
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 

@@ -52,8 +52,8 @@ def fetch_footprints(
 
     Returns their source.
     """
-    from ..city.from_overture import keep_footprints
-    from ..city.prepare import read_headers
+    from ..city.plan.from_overture import keep_footprints
+    from ..city.plan.prepare import read_headers
     from ..city.request import Request
     from ..read.pointcloud import expand_paths
     from ..settings import Settings

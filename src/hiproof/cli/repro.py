@@ -30,7 +30,7 @@ def repro(
     from ..status import Status
 
     with show_progress("repeat"):
-        from ..city.repro import solve_bundle
+        from ..city.work.repro import solve_bundle
 
         building, trace = solve_bundle(folder, out)
     if trace:

@@ -17,7 +17,7 @@ from .parameters import Argument, Option
 from .running import describe_overview
 
 if TYPE_CHECKING:
-    from ..city.ledger import Ledger, Task
+    from ..city.folder.ledger import Ledger, Task
 
 CLOSED = ("done", "failed")
 
@@ -30,7 +30,7 @@ def status(
 
     The run may be finished or still going on.
     """
-    from ..city.ledger import Ledger
+    from ..city.folder.ledger import Ledger
 
     path = folder / ".hiproof" / "ledger.sqlite"
     if not path.is_file():

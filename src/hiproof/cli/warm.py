@@ -24,7 +24,7 @@ def warm(
 
     This takes a minute or two, once for each version.
     """
-    from ..city.tasks import ALL, MAIN_JOB, make_ready
+    from ..city.work.tasks import ALL, MAIN_JOB, make_ready
 
     with show_progress("compile"):
         make_ready(ALL if everything else MAIN_JOB, own=True)

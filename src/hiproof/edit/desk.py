@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..city.overrides import read_overrides
+from ..city.plan.overrides import read_overrides
 from ..draw.primitives import primitive_svg
 from ..errors import HiproofError, InputError, InputWarning
 from ..evaluate.inputs import found_inputs

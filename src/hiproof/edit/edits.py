@@ -19,7 +19,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..city.overrides import read_overrides
+from ..city.plan.overrides import read_overrides
 from ..errors import HiproofError, InputError, OutputError
 from ..parametric.override import read_override
 from ..write.files import atomic

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from ..city.noted import noted_file
-from ..city.plan import PLAN_FILE, Job, WorkPlan
-from ..city.resume import STATE_FOLDER
-from ..city.solve import terrain_model
-from ..city.sort import Gatherer, Reaches, wanted_points
-from ..city.surveys import SurveyPoints
+from ..city.folder.resume import STATE_FOLDER
+from ..city.plan.work_plan import PLAN_FILE, Job, WorkPlan
+from ..city.work.noted import noted_file
+from ..city.work.solve import terrain_model
+from ..city.work.sort import Gatherer, Reaches, wanted_points
+from ..city.work.surveys import SurveyPoints
 from ..errors import HiproofError, InputError
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record

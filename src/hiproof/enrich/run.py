@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import __version__
-from ..city.cores import as_many_as_pay
-from ..city.executors import make_executor
+from ..city.work.cores import as_many_as_pay
+from ..city.work.executors import make_executor
 from ..errors import InputError, OutputError
 from ..evaluate.run import run_record
 from ..formats import FORMATS, list_requested_files

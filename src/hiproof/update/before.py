@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..city.plan import WorkPlan
+from ..city.plan.work_plan import WorkPlan
 from ..city.run import absolute
-from ..city.solve import pass_over_failure
+from ..city.work.solve import pass_over_failure
 from ..errors import InputError
 from ..evaluate.inputs import RunSurvey
 from ..log import LOGGER

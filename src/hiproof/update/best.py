@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..city.bundles import keep_failure
-from ..city.ledger import Outcome
-from ..city.overrides import load_overrides
-from ..city.plan import Job, WorkPlan, load_plan
-from ..city.solve import (
+from ..city.folder.ledger import Outcome
+from ..city.plan.overrides import load_overrides
+from ..city.plan.work_plan import Job, WorkPlan, load_plan
+from ..city.work.bundles import keep_failure
+from ..city.work.solve import (
     KeepFailure,
     Surroundings,
     open_terrain,
@@ -25,7 +25,7 @@ from ..city.solve import (
     solve_one,
     solve_safely,
 )
-from ..city.surveys import SurveyPoints
+from ..city.work.surveys import SurveyPoints
 from ..model import Building
 from ..parametric.override import Override
 from ..read.numbers import read_year

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..city.found import FoundRoof
-from ..city.plan import Job, load_plan, neighbourhood
-from ..city.solve import Surroundings, open_terrain
-from ..city.sort import load_points
-from ..city.surveys import SurveyPoints
+from ..city.plan.work_plan import Job, load_plan, neighbourhood
+from ..city.work.found import FoundRoof
+from ..city.work.solve import Surroundings, open_terrain
+from ..city.work.sort import load_points
+from ..city.work.surveys import SurveyPoints
 from ..geometry.thin import without_repeats
 from .plan import EARLIER_FOLDER
 from .register import SurveyShift

@@ -11,9 +11,9 @@ from typing import Any
 
 import shapely
 
-from ..city.frame import AreaFrame
-from ..city.plan import Job, make_job
-from ..city.prepare import read_requested_footprints
+from ..city.plan.frame import AreaFrame
+from ..city.plan.prepare import read_requested_footprints
+from ..city.plan.work_plan import Job, make_job
 from ..model import Footprint
 from ..parametric.record import polygon, read_outline, read_shift
 from ..parametric.underside import read_passage

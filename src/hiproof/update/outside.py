@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..city.plan import WorkPlan
+from ..city.plan.work_plan import WorkPlan
 from ..geometry.components import label_components
 from ..geometry.thin import occupied_cells
 from ..model import PointCloud

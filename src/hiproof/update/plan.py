@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..city.classes import settle_classes
-from ..city.frame import plan_bounds, settle_frame
-from ..city.plan import (
+from ..city.plan.classes import settle_classes
+from ..city.plan.frame import plan_bounds, settle_frame
+from ..city.plan.prepare import TILE_M, limit_buildings_per_tile, read_headers
+from ..city.plan.work_plan import (
     Job,
     WorkPlan,
     cut_into_tiles,
     unusual_names,
 )
-from ..city.prepare import TILE_M, limit_buildings_per_tile, read_headers
 from ..errors import InputError, InputWarning
 from ..masking import mask
 from ..read.crs import describe_crs, find_units, same_horizontal

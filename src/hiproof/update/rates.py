@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..city.plan import WorkPlan
+from ..city.plan.work_plan import WorkPlan
 from .tile import judge_tile
 
 

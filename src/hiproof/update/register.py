@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from ..city.plan import WorkPlan
-from ..city.registration import SAMPLE_CELL_M, hash_cell
+from ..city.plan.registration import SAMPLE_CELL_M, hash_cell
+from ..city.plan.work_plan import WorkPlan
 from ..model import Roof
 from .cells import SurveyNoise, compare_points, select_inner, shrink_outline
 from .clusters import flag_cells

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..city.checks import refuse_unusable
-from ..city.from_cloud import Progress
-from ..city.lock import hold_folder
-from ..city.plan import WorkPlan
-from ..city.resume import open_state
+from ..city.folder.lock import hold_folder
+from ..city.folder.resume import open_state
+from ..city.plan.checks import refuse_unusable
+from ..city.plan.from_cloud import Progress
+from ..city.plan.work_plan import WorkPlan
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..errors import InputError, OutputError, SettingsError
 from ..garbage import collect_rarely

@@ -13,15 +13,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..city.checks import refuse_unusable
-from ..city.from_cloud import Progress
-from ..city.lock import hold_folder
-from ..city.plan import WorkPlan
+from ..city.folder.lock import hold_folder
+from ..city.folder.resume import open_state
+from ..city.plan.checks import refuse_unusable
+from ..city.plan.from_cloud import Progress
+from ..city.plan.work_plan import WorkPlan
 from ..city.request import Request
-from ..city.resume import open_state
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
-from ..city.solve import Surroundings, open_terrain, pass_over_failure, solve_one
-from ..city.sort import load_points
+from ..city.work.solve import Surroundings, open_terrain, pass_over_failure, solve_one
+from ..city.work.sort import load_points
 from ..errors import InputError
 from ..garbage import collect_rarely
 from ..write.files import atomic

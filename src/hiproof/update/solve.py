@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..city.bundles import keep_failure
-from ..city.ledger import Outcome
-from ..city.overrides import load_overrides
-from ..city.plan import Job, WorkPlan, load_plan
-from ..city.solve import (
+from ..city.folder.ledger import Outcome
+from ..city.plan.overrides import load_overrides
+from ..city.plan.work_plan import Job, WorkPlan, load_plan
+from ..city.work.bundles import keep_failure
+from ..city.work.solve import (
     KeepFailure,
     pass_over_failure,
     solve_buildings,

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..city.merge import tile_parts
-from ..city.plan import PLAN_FILE, WorkPlan
-from ..city.resume import STATE_FOLDER
+from ..city.folder.resume import STATE_FOLDER
+from ..city.merge.join import tile_parts
+from ..city.plan.work_plan import PLAN_FILE, WorkPlan
 from ..errors import HiproofError
 from ..evaluate.run import run_record
 from ..model import Building

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ..city.ledger import Outcome
+from ..city.folder.ledger import Outcome
 
 
 def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
@@ -12,8 +12,8 @@ def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict
 
     `epoch` is the name of the survey where it is one of several.
     """
-    from ..city.plan import load_plan
-    from ..city.sort import sort_cloud
+    from ..city.plan.work_plan import load_plan
+    from ..city.work.sort import sort_cloud
     from .outside import CELLS_FOLDER, SurveyCells
 
     cells = SurveyCells(load_plan(Path(folder)).settings.read)
@@ -27,7 +27,7 @@ def sort_epoch(epochs: tuple[str, ...], folder: str, number: int, address: str) 
 
     It is file `number` of those in `epochs`.
     """
-    from ..city.sort import sort_cloud
+    from ..city.work.sort import sort_cloud
 
     return sort_cloud(folder, number, address, epoch=epochs[number])
 

@@ -1,0 +1,136 @@
+"""The mark by which an output folder knows whose run it holds.
+
+The mark is made of every field of the request, of what stands in the files that it names, and of
+the version. A field takes no part only where its declaration says what else it decides: one that is
+added later cannot be forgotten.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ... import __version__
+from ...masking import masked_values
+from ..request import Request
+
+# parts of one file that formats keep beside it
+SIDECAR_ENDINGS = (".dbf", ".shx", ".prj", ".cpg", ".tfw")
+APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
+SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was replaced
+
+
+def describe_inputs(request: Request) -> dict[str, Any]:
+    """Return everything that decides the result of a building, by name.
+
+    These are values, and size and time of the files that they name.
+    """
+    return {"version": __version__} | dict(named_values("", request, "the result"))
+
+
+def describe_selection(request: Request) -> dict[str, Any]:
+    """Return everything that decides which buildings there are.
+
+    It is by name, as from `describe_inputs`.
+    """
+    return dict(named_values("", request, "which buildings"))
+
+
+def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any]]:
+    """Yield (name, JSON value) of each deciding leaf of a dataclass.
+
+    `decides` is in the leaf's declaration; the names of fields in fields are joined by dots.
+
+    What stands at a path counts of leaves that are declared to name files alone: any word may be
+    the name of a folder, too.
+    """
+    for declared in dataclasses.fields(value):
+        if declared.metadata.get("decides", "the result") == decides:
+            inner, result = (
+                f"{name}.{declared.name}" if name else declared.name,
+                getattr(value, declared.name),
+            )
+            if dataclasses.is_dataclass(result):
+                yield from named_values(inner, result, decides)
+            else:
+                yield (
+                    inner,
+                    with_files(result) if declared.metadata.get("names") == "files" else result,
+                )
+
+
+def with_files(value: Any) -> Any:
+    """Return `value` for JSON, with the state of a file or folder it names."""
+    if isinstance(value, (tuple, list)):
+        return [with_files(inner) for inner in value]
+    stamps = file_stamps(Path(value)) if value and isinstance(value, (str, Path)) else []
+    return stamps or (str(value) if isinstance(value, Path) else value)
+
+
+def file_stamps(path: Path) -> list[tuple[str, int, int]]:
+    """Return (name, bytes, time in ns) of a file and its companions.
+
+    They are those of the file at `path`, or of a folder's files; there are none if nothing exists.
+
+    The names are those within its folder: what was moved whole is the same.
+    """
+    with suppress(OSError, ValueError):  # ValueError: a text that is no path at all
+        if path.is_dir():
+            folder, files = path, [file for file in path.rglob("*") if file.is_file()]
+        else:
+            sidecars = [path.with_suffix(end) for end in SIDECAR_ENDINGS] + [
+                Path(f"{path}{end}") for end in APPENDED
+            ]
+            folder, files = (
+                path.parent,
+                [file for file in {path, *sidecars} if path.is_file() and file.is_file()],
+            )
+        stamps = [(file.relative_to(folder).as_posix(), file.stat()) for file in files]
+        return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stamps)
+    return []
+
+
+def find_changed_files(new_stamps: Any, old_stamps: Any) -> str:
+    """Return which files of an input differ, in brackets.
+
+    Stamps are the values of `with_files` as JSON gives them; the text is empty where they name
+    none.
+
+    >>> find_changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20,
+    ...     2]]])
+    ' (b.laz)'
+    """
+    names = sorted({name for name, *_ in stamps_in(new_stamps) ^ stamps_in(old_stamps)})
+    text = f" and {len(names) - SHOWN_FILES} more" if len(names) > SHOWN_FILES else ""
+    return f" ({', '.join(names[:SHOWN_FILES])}{text})" if names else ""
+
+
+def stamps_in(value: Any) -> set[tuple[str, int, int]]:
+    """Return all (name, bytes, time in ns) in nested lists."""
+    if not isinstance(value, list):
+        return set()
+    if (
+        len(value) == 3
+        and isinstance(value[0], str)
+        and all(type(number) is int for number in value[1:])
+    ):
+        return {(value[0], value[1], value[2])}
+    return set().union(*map(stamps_in, value))
+
+
+def compute_mark(inputs: dict[str, Any], salt: str) -> str:
+    """Return the mark of a run.
+
+    A slow digest with a salt where an address holds a password: nobody shall try them out on it.
+    """
+    text, masked = (
+        json.dumps(value, sort_keys=True, default=str) for value in (inputs, masked_values(inputs))
+    )
+    if text == masked:
+        return hashlib.sha256((salt + text).encode()).hexdigest()
+    return hashlib.scrypt(text.encode(), salt=salt.encode(), n=1 << 14, r=8, p=1, dklen=32).hex()

@@ -1,0 +1,116 @@
+"""Checks of a request before any file is read.
+
+What is wrong is reported at once, and not after an hour.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ...errors import InputError, SettingsError
+from ...settings import Settings, format_value
+from ...stages.arguments import refuse_without_network
+
+MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
+
+
+def refuse_unusable(request: Any) -> None:
+    """Raise SettingsError or InputError for options that cannot be met.
+
+    They are those of a `run.Request`.
+    """
+    processes = request.processes
+    if processes is not None and not (type(processes) is int and 1 <= processes <= MOST_PROCESSES):
+        raise SettingsError(
+            f"expected --jobs between 1 and {MOST_PROCESSES}, got {format_value(processes)}; a "
+            "process a core "
+            "is enough, as it is without this option"
+        )
+    for name in ("layer", "where", "id_attribute"):
+        if getattr(request, name) is not None and request.footprints is None:
+            option = "--" + name.replace("_", "-")
+            raise SettingsError(
+                f"expected footprints with {option}, got none; name them with --footprints"
+            )
+    refuse_settings(request.settings)
+    refuse_missing_packages(request)
+
+
+def refuse_missing_packages(request: Any) -> None:
+    """Raise InputError where a package is missing that this request needs.
+
+    Most requests do not need it.
+    """
+    from ...read import geoparquet
+    from ...read.database import import_psycopg, is_database
+    from ...read.geoparquet import is_parquet
+    from ...read.overture import is_overture
+    from ...read.remote import import_fsspec, is_url
+
+    if request.scheduler:
+        from ..work.executors import import_distributed
+
+        import_distributed()
+    if any(map(is_url, request.clouds)):
+        import_fsspec()
+    if is_database(request.footprints):
+        import_psycopg()
+    if request.terrain:
+        from ...read.raster import import_rasterio
+
+        import_rasterio()
+    if is_overture(request.footprints) or is_parquet(request.footprints or ""):
+        geoparquet.import_pyarrow()
+        if is_overture(request.footprints) or is_url(request.footprints):
+            geoparquet.import_fsspec()
+    if request.settings.write.parquet:
+        geoparquet.import_pyarrow()
+
+
+def refuse_settings(settings: Settings) -> None:
+    """Raise SettingsError or InputError for values that cannot be used.
+
+    They are well formed.
+    """
+    refuse_unknown_types(settings.fit)
+    refuse_crs(settings.read)
+    refuse_without_network(settings)
+    segment = settings.segment
+    if segment.network != "never" and (segment.weights or segment.device != "cpu"):
+        from ...segment.inference import SHIPPED_WEIGHTS, load
+
+        load(segment.weights or str(SHIPPED_WEIGHTS), segment.device)
+
+
+def refuse_unknown_types(fit: Any) -> None:
+    """Raise SettingsError for roof types outside the catalogue."""
+    from ...primitives import CATALOGUE
+
+    allowed = tuple(CATALOGUE)
+    unknown = [name for name in fit.types if name not in allowed]
+    if unknown:
+        import difflib
+
+        nearby = [
+            difflib.get_close_matches(name.lower(), allowed, n=1, cutoff=0.5) for name in unknown
+        ]
+        meant = [
+            f"{format_value(name)} (did you mean {result[0]}?)" if result else format_value(name)
+            for name, result in zip(unknown, nearby, strict=True)
+        ]
+        raise SettingsError(
+            f"expected roof types among {', '.join(allowed)}, got {', '.join(meant)}"
+        )
+
+
+def refuse_crs(read: Any) -> None:
+    """Raise an error unless the CRS given to the clouds can be used.
+
+    It must be known, projected, and of the unit that the settings give.
+    """
+    from ...read.crs import find_units, parse_crs
+
+    try:
+        find_units(parse_crs(read.crs), "the point clouds", read.unit)
+    except InputError as error:
+        raise SettingsError(str(error)) from error

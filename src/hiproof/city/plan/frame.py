@@ -1,0 +1,173 @@
+"""The CRS and units in which an area is worked out.
+
+Clouds and footprints name them, and assumptions are made if they do not.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError, InputWarning
+from ...frames import Units
+from ...read.crs import (
+    combine,
+    describe_crs,
+    find_units,
+    names_heights_alone,
+    names_place,
+    parse_crs,
+    vertical_crs,
+)
+from ...read.footprints import footprint_crs
+from ...read.pointcloud import PointFileHeader, common_crs, warn_coarse
+from ...read.positions import doubtful_place, refuse_degrees, stretch
+
+# of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
+SAME_UNIT = 1e-5
+# of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
+MOST_STRETCH = 0.01
+
+
+@dataclass(frozen=True)
+class AreaFrame:
+    """The CRSs of clouds and footprints, and the area's units.
+
+    CRSs are pyproj's, None where none is named.
+    """
+
+    cloud: Any
+    footprints: Any
+    units: Units
+
+    @property
+    def crs(self) -> Any:
+        """The CRS of everything written, None where no input names one.
+
+        It is the clouds', else the footprints'.
+        """
+        return self.cloud or self.footprints
+
+
+def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
+    """Choose the frame of a `run.Request` whose point files have `headers`.
+
+    The CRS that the settings give the clouds goes before that of their headers, and clouds that
+    name none are taken to be in the footprints'; whatever is assumed is said by an InputWarning.
+    Raises InputError for clouds of several CRSs and for degrees.
+    """
+    read = request.settings.read
+    cloud = common_crs(
+        {header.path: header.crs for header in headers}, parse_crs(read.crs), read.unit
+    )
+    footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
+    if not names_place(cloud):
+        refuse_degrees_in_inputs(request.footprints, footprints, headers)
+        cloud = place_crs(cloud, footprints, headers[0].path, read.unit)
+    frame = AreaFrame(cloud, footprints, find_units(cloud or footprints, unit_name=read.unit))
+    if cloud is None and (footprints is not None or read.unit == "auto"):
+        log_assumed_crs(headers[0].path, frame)
+    warn_coarse(headers, frame.units)
+    if frame.crs is not None:
+        warn_outside_area_of_use(headers, frame)
+    return frame
+
+
+def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
+    """Return the CRS of clouds that leave their place open.
+
+    It is the footprints' with the clouds' heights, else the clouds' local one.
+
+    None where they name no plan at all. Raises InputError where the units of clouds and footprints
+    differ.
+    """
+    if cloud is None:
+        return None
+    if not names_place(footprints):
+        find_units(cloud, unit_name=unit)
+        if names_heights_alone(cloud):
+            return None
+        place = "which is no place on the Earth, and so are the models; say with --crs where it is"
+        warnings.warn(f"{path}: names a local CRS, {describe_crs(cloud)}, {place}", InputWarning)
+        return cloud
+    units = find_units(footprints, "the footprints")
+    if (
+        not names_heights_alone(cloud)
+        and abs(find_units(cloud, unit_name=unit).plan / units.plan - 1) > SAME_UNIT
+    ):
+        raise InputError(
+            f"expected clouds and footprints in one CRS, got {describe_crs(cloud)} in "
+            f"{find_units(cloud)} and "
+            f"{describe_crs(footprints)} in {units}; say with --crs in which the clouds are"
+        )
+    heights = cloud if names_heights_alone(cloud) else vertical_crs(cloud)
+    text = f"taken to be in the footprints' {describe_crs(footprints)}; say otherwise with --crs"
+    warnings.warn(
+        f"{path}: names {describe_crs(cloud)}, which is no place on the Earth; {text}", InputWarning
+    )
+    return combine(footprints, heights)
+
+
+def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -> None:
+    """Warn once where the CRS is not made for the place of the clouds.
+
+    It is another or of another unit then, or its lengths there are not those on the ground.
+    """
+    bounds = plan_bounds(headers)
+    if not len(bounds):
+        return
+    middles = (bounds[:, :2] + bounds[:, 2:]) / 2
+    doubt = doubtful_place(frame.crs, middles)
+    if doubt:
+        warnings.warn(
+            f"{headers[0].path}: lies at {doubt}; check the CRS and its unit", InputWarning
+        )
+    elif abs((times := stretch(frame.crs, middles)) - 1.0) > MOST_STRETCH:
+        warnings.warn(
+            f"{headers[0].path}: in {describe_crs(frame.crs)} a metre on the ground is {times:.2f} "
+            "m "
+            "long there, and so are "
+            "roofs, but not their heights; reproject clouds and footprints to the UTM zone or the "
+            "national grid",
+            InputWarning,
+        )
+
+
+def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
+    """Return boxes (n, 4) of the point files in plan, in their own unit.
+
+    Those without points are left out.
+    """
+    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
+    return bounds[np.isfinite(bounds).all(axis=1)]
+
+
+def refuse_degrees_in_inputs(
+    path: str | None, footprints: Any, headers: list[PointFileHeader]
+) -> None:
+    """Refuse clouds or footprints in degrees.
+
+    Clouds that name no CRS may not be in degrees, nor can footprints in degrees stand in for their
+    CRS.
+    """
+    if footprints is not None and footprints.is_geographic:
+        raise InputError(
+            f"expected footprints that tell the CRS of clouds that name none, got {path} in "
+            f"{describe_crs(footprints)}, which "
+            "is in degrees; name the clouds' CRS with --crs, or reproject the footprints"
+        )
+    advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
+    if footprints is None:
+        refuse_degrees(plan_bounds(headers), "the point clouds", advice)
+
+
+def log_assumed_crs(path: str, frame: AreaFrame) -> None:
+    """Log once what is assumed where no cloud names a CRS."""
+    if frame.footprints is None:
+        text = f"its unit is taken as {frame.units}"
+    else:
+        text = f"taken to be in the footprints' {describe_crs(frame.footprints)}"
+    warnings.warn(f"{path}: names no CRS; {text}; say otherwise with --crs or --unit", InputWarning)

@@ -1,0 +1,119 @@
+"""The buildings of a run without footprints.
+
+They come from a cloud of roof points, whose class is known or found.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from ...errors import InputError, InputWarning
+from ...frames import Units
+from ...log import count_things
+from ...model import PointCloud
+from ...settings import Settings
+from ..request import Box, Request
+from .classes import choose_classes
+from .work_plan import Job
+
+if TYPE_CHECKING:
+    from ...read.pointcloud import PointFileHeader
+
+MOST_BLOCK_M = 250.0
+"""Distance (m) from the box of a run beyond which point files are not read for its buildings: no
+block of touching houses is longer."""
+
+Progress = Callable[[str, int, int | None], None]
+
+
+def jobs_from_cloud(
+    request: Request,
+    headers: list[PointFileHeader],
+    units: Units,
+    settings: Settings,
+    progress: Progress,
+) -> tuple[tuple[Job, ...], Settings]:
+    """Return one job a building found, and the settings for its points.
+
+    These choose all points in a cloud of roofs alone. With a box in the request there may be no
+    jobs, and some may lie beside it.
+    """
+    from ...classify.split import split_buildings
+
+    progress("read", 0, None)
+    names = select_clouds(request, headers, units)
+    cloud = readable_points(names, settings)
+    has_roofs = not settings.read.by_class or np.isin(cloud.classes, settings.read.building_classes)
+    if len(names) < len(request.clouds) and not np.any(has_roofs):
+        return (), settings
+    box = None if request.bbox is None else box_in_metres(request.bbox, units)
+    buildings = split_buildings(cloud, settings, box, progress)
+    if settings.read.roofs == "shape" and buildings and buildings[0].is_cut_out:
+        roofs = count_things(len(buildings), "roof") if len(buildings) > 1 else "one roof"
+        text = (
+            f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks "
+            "like ground"
+        )
+        warnings.warn(text, InputWarning)
+        settings = choose_classes(settings, roofs="alone")
+    return tuple(
+        Job(i, item.id, item.area, None, item.error) for i, item in enumerate(buildings)
+    ), settings
+
+
+def select_clouds(
+    request: Request, headers: list[PointFileHeader], units: Units
+) -> tuple[str, ...]:
+    """Return the point files to look for buildings in: all, or those near the box."""
+    if request.bbox is None:
+        return request.clouds
+    box = shapely.box(*box_in_metres(request.bbox, units))
+
+    def is_distant(header: PointFileHeader) -> bool:
+        west, south, _, east, north, _ = header.bounds
+        extent = box_in_metres((west, south, east, north), units)
+        return bool(
+            np.isfinite(extent).all() and shapely.distance(box, shapely.box(*extent)) > MOST_BLOCK_M
+        )
+
+    distant = {header.path for header in headers if is_distant(header)}
+    return tuple(name for name in request.clouds if name not in distant)
+
+
+def box_in_metres(box: Box, units: Units) -> Box:
+    """Convert a box in `units` to world metres."""
+    xmin, ymin, xmax, ymax = units.to_metres(np.reshape(box, (2, 2)).astype(float)).ravel()
+    return xmin, ymin, xmax, ymax
+
+
+def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
+    """Read the points of all files that can be read.
+
+    The step that sorts points names the others.
+    """
+    from ...read.pointcloud import read_points
+
+    try:
+        return read_points(*clouds, settings=settings)
+    except InputError:
+        readable = [name for name in clouds if is_readable(name)]
+        if len(readable) in (0, len(clouds)):
+            raise
+        return read_points(*readable, settings=settings)
+
+
+def is_readable(name: str) -> bool:
+    """Return whether a point file can be read from end to end."""
+    from ...read.pointcloud import iter_points
+
+    try:
+        for _ in iter_points(name):
+            pass
+    except InputError:
+        return False
+    return True

@@ -1,0 +1,327 @@
+"""Overrides of a run: read, matched to its buildings, and remembered.
+
+A run with others redoes those buildings alone.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import InputError, InputWarning, OutputError
+from ...log import LOGGER, count_things
+from ...masking import mask
+from ...read.attribute_columns import make_known_condition, restore_declared_types
+from ...read.footprints import attribute_rows
+from ...read.numbers import SkippedValues
+from ...settings import ReadSettings
+from ...write.files import atomic
+from ..folder.ledger import Ledger
+from ..merge.join import tile_parts
+from .table_values import select_possible
+from .work_plan import Job, WorkPlan
+
+if TYPE_CHECKING:
+    from ...parametric.override import Override
+
+OVERRIDES_FILE, REDO = "overrides.jsonl", "redo.json"
+TABLE_ENDINGS = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
+MOST_SHOWN_IDS = 5  # ids in a sentence; more would hide what is said
+
+
+def settle_overrides(
+    path: str | None, plan: WorkPlan, state: Path, ledger: Ledger, is_new: bool
+) -> None:
+    """Keep the overrides at `path` for the workers.
+
+    Of a run that is not `is_new`, the tiles are opened of buildings whose override is another than
+    before. Raises InputError for a file that cannot be read or contradicts itself.
+    """
+    records = match_overrides(dict(read_overrides(path)) if path else {}, plan)
+    digests = {index: digest_override(record) for index, record in records.items()}
+    with atomic(state / OVERRIDES_FILE) as temporary:
+        Path(temporary).write_text(
+            "".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())),
+            encoding="utf-8",
+        )
+    stored = ledger.overrides()
+    changed = {index for index in digests | stored if digests.get(index) != stored.get(index)}
+    if is_new or not changed:
+        ledger.set_overrides(digests)
+        return
+    redo = tiles_to_redo(changed, plan, state, ledger)
+    with atomic(state / REDO) as temporary:
+        Path(temporary).write_text(json.dumps(redo), encoding="utf-8")
+    LOGGER.info(
+        "%s with another override than before to be redone", count_things(len(changed), "building")
+    )
+    ledger.open_again([f"solve:{tile}" for tile in redo], digests)
+
+
+def tiles_to_redo(
+    changed: set[int], plan: WorkPlan, state: Path, ledger: Ledger
+) -> dict[str, list[int]]:
+    """Return the buildings to solve, by tile.
+
+    They are those `changed`, what a killed run left to redo, and all of a tile not solved yet.
+    """
+    finished = {task.name for task in ledger.tasks() if task.state == "done"}
+    remainder, redo = load_redo(state), {}
+    for tile, members in plan.tiles.items():
+        overlap = changed.intersection(members)
+        if not tile_parts(state, tile).exists():
+            overlap = set(members)
+        elif f"solve:{tile}" not in finished:
+            overlap |= set(remainder.get(tile, members))
+        if overlap:
+            redo[tile] = sorted(overlap)
+    return redo
+
+
+def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (id, record) of every override in a JSONL file or a table.
+
+    Those of a parameters.jsonl are lists of parts.
+    """
+    from ...parametric.override import read_override
+
+    visited: dict[str, dict[str, Any]] = {}
+    for where, record in override_records(path):
+        try:
+            id = read_override(record).id
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+        if id in visited and visited[id] != record:
+            raise InputError(
+                f"expected one override a building in {path}, got two that differ of {id!r}; keep "
+                "one"
+            )
+        visited[id] = record
+        yield id, record
+
+
+def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (where, record) of every line or row."""
+    from ...parametric.file import objects
+
+    if str(path).lower().endswith(TABLE_ENDINGS):
+        yield from (
+            (f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1)
+        )
+        return
+    try:
+        # editors may begin it with a mark of the encoding
+        with Path(path).open(encoding="utf-8-sig") as file:
+            for number, record in objects(file, path):
+                if not is_other_line(record):
+                    yield f"line {number} of {path}", record
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"expected overrides (JSONL or a table) at {path}, got: {error}; check the path"
+        ) from error
+
+
+def is_other_line(record: Any) -> bool:
+    """Return whether a line of a parameters.jsonl is no override.
+
+    Its head and buildings without a model say nothing of how to build.
+    """
+    from ...parametric.file import HEAD_KEY
+
+    return isinstance(record, dict) and (
+        HEAD_KEY in record or ("status" in record and not record.get("parts"))
+    )
+
+
+def table_records(path: str) -> list[dict[str, Any]]:
+    """Return the rows of a table.
+
+    Numbers that a CSV holds as text become numbers.
+    """
+    import pyogrio
+
+    from ...read.vector_file import translate_read_errors
+
+    def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
+        meta, _, _, columns = translate_read_errors(
+            lambda: pyogrio.raw.read(str(path), read_geometry=False, where=where), path
+        )
+        return list(meta["fields"]), list(meta["dtypes"]), columns
+
+    names, declared, columns = read()
+    columns = restore_declared_types(
+        names,
+        declared,
+        columns,
+        lambda name: read(make_known_condition(name, None))[2][names.index(name)],
+    )
+    rows = attribute_rows(names, columns, len(columns[0]) if columns else 0)
+    left_out = SkippedValues(mask(path))
+    records = [select_possible(row, str(row.get("id", "")), left_out) for row in rows]
+    left_out.warn()
+    return records
+
+
+def match_overrides(
+    records: dict[str, dict[str, Any]], plan: WorkPlan
+) -> dict[int, dict[str, Any]]:
+    """Return the overrides by the number of their building.
+
+    Those that columns of the footprints hold are among them; unknown ones are reported.
+    """
+    names, result, remainder = pair_columns(plan), {}, dict(records)
+    impossible = SkippedValues("columns of the footprints")
+    for job in plan.jobs:
+        override = merge_override(
+            column_override(job, names, impossible), remainder.pop(job.id, {}), job.id
+        )
+        if override:
+            result[job.index] = {**override, "id": job.id}
+    impossible.warn()
+    if remainder:
+        subset = ", ".join(list(remainder)[:MOST_SHOWN_IDS]) + (
+            " and others" if len(remainder) > MOST_SHOWN_IDS else ""
+        )
+        warnings.warn(
+            f"no building of this run for {len(remainder)} of "
+            f"{count_things(len(records), 'override')}: "
+            f"{subset}",
+            InputWarning,
+        )
+    return result
+
+
+def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str) -> dict[str, Any]:
+    """Merge a file's override of building `id` with that of columns.
+
+    Values of columns stay that can stand beside the file's.
+
+    Raises InputError where columns contradict themselves.
+
+    >>> merge_override({"type": "hip", "z_ground": 2.5}, {"leave_out": True}, "a")
+    {'leave_out': True, 'z_ground': 2.5}
+    """
+    if of_columns:
+        from ...parametric.override import read_override
+
+        read_override({**of_columns, "id": id})
+    combined = dict(of_file)
+    for key, value in of_columns.items():
+        if of_file.get(key) in (None, "") and is_override({**combined, key: value, "id": id}):
+            combined[key] = value
+    return combined
+
+
+def is_override(record: dict[str, Any]) -> bool:
+    from ...parametric.override import read_override
+
+    try:
+        read_override(record)
+    except InputError:
+        return False
+    return True
+
+
+def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
+    """Pair columns of the footprints with keys of an override.
+
+    The settings name the pairs.
+
+    Raises InputError for those that are not there.
+    """
+    pairs = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
+    fallbacks = name_fallback_columns(plan.settings.read)
+    if not plan.jobs or not (pairs or fallbacks):
+        return []
+    columns = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
+    for column in fallbacks:
+        if column not in columns:
+            raise InputError(
+                f"expected a column of the footprints ({', '.join(sorted(columns)) or 'none'}) for "
+                f"heights of buildings without points, got {column!r}; name one of these"
+            )
+    from ...parametric.override import KEYS
+
+    refuse_others([column for column, _ in pairs], sorted(columns), "columns of the footprints")
+    refuse_others([key for _, key in pairs], KEYS, "keys of an override")
+    return pairs
+
+
+def name_fallback_columns(read: ReadSettings) -> list[str]:
+    """Return the columns that fallback heights come from, if there are any."""
+    if not (read.fallback_roof_height or read.fallback_ground_height):
+        return []
+    from ...parametric.fallback import list_fallback_columns
+
+    return list_fallback_columns(read)
+
+
+def refuse_others(names: list[str], allowed: Sequence[str], subject: str) -> None:
+    """Raise InputError where something is told in the settings that is not `allowed`."""
+    other = [name for name in names if name not in allowed]
+    if other:
+        raise InputError(
+            f"expected {subject} ({', '.join(allowed) or 'there are none'}) in the setting "
+            f"override_columns, got {other[0]!r}; "
+            'write COLUMN=KEY, such as "daktype=type"'
+        )
+
+
+def column_override(
+    job: Job, names: list[tuple[str, str]], impossible: SkippedValues
+) -> dict[str, Any]:
+    """Return the override in the columns of a building's footprint.
+
+    It is empty where they hold nothing; impossible values are noted.
+    """
+    attributes = job.footprint.attributes if job.footprint else {}
+    result = select_possible(
+        {key: attributes[name] for name, key in names if name in attributes}, job.id, impossible
+    )
+    return {key: value for key, value in result.items() if (key, value) != ("leave_out", False)}
+
+
+def digest_override(record: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def load_redo(state: Path) -> dict[str, list[int]]:
+    """Load the buildings to redo by tile.
+
+    It is empty where whole tiles are to be solved.
+
+    Raises OutputError for a damaged file.
+    """
+    try:
+        return json.loads((state / REDO).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except ValueError as error:
+        raise OutputError(
+            f"expected the buildings to redo in {state / REDO}, got: {error}; begin anew with "
+            "--restart"
+        ) from error
+
+
+def load_overrides(state: Path) -> dict[int, Override]:
+    """Load the overrides of a run by the number of their building.
+
+    The run's state is in `state`; it is read once a process.
+    """
+    path = state / OVERRIDES_FILE
+    return parse_overrides(path, path.stat().st_mtime_ns) if path.exists() else {}
+
+
+@functools.lru_cache(maxsize=1)
+def parse_overrides(path: Path, stamp: int) -> dict[int, Override]:
+    from ...parametric.override import read_override
+
+    with path.open(encoding="utf-8") as file:
+        return {index: read_override(record) for index, record in map(json.loads, file)}

@@ -1,0 +1,417 @@
+"""Making the plan of a run, from footprints or from the cloud itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from ...errors import InputError, InputWarning
+from ...frames import Units
+from ...masking import mask
+from ...model import Footprint
+from ...read.positions import format_box
+from ...settings import Settings
+from ...write.naming import FileUnits
+from ...write.reprojected import choose_file_crs
+from ...write.tables.geopackage import attributes_with_a_column
+from ..request import Box, Request
+from .classes import settle_classes
+from .from_cloud import Progress, jobs_from_cloud
+from .from_overture import with_overture
+from .outlines import MOST_ROW_M
+from .passages import add_passages
+from .table_values import check_number_columns
+from .work_plan import (
+    Job,
+    WorkPlan,
+    choose_file_offset,
+    cut_into_tiles,
+    make_job,
+    make_jobs,
+    unusual_names,
+)
+
+if TYPE_CHECKING:
+    from ...fit.registration import Registration
+    from ...read.operations import Operation
+    from ...read.raster import RasterTerrain
+    from .frame import AreaFrame
+
+TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
+MOST_BUILDINGS_A_TILE = 100  # buildings; a killed worker loses one tile
+
+
+def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPlan:
+    """Make the plan of a request.
+
+    Raises InputError when nothing can be read.
+    """
+    from ...read.terrain import read_terrain
+    from .frame import plan_bounds, settle_frame
+
+    headers = read_headers(request.clouds)
+    request = with_overture(request, headers)
+    frame = settle_frame(request, headers)
+    refuse_box_elsewhere(request.bbox, plan_bounds(headers))
+    # opened only to be told now if it cannot be read, and not after all points are sorted
+    terrain = read_terrain(request.terrain, frame.crs, frame.units) if request.terrain else None
+    if terrain is not None and not request.footprints:
+        terrain.knows_any(list_places(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
+    settings = settle_classes(request.clouds, request.settings)
+    refuse_underpasses_alone(request)
+    registration, operations, neighbours = None, [], ()
+    if request.footprints:
+        jobs, neighbours, registration = jobs_from_footprints(request, headers, frame, settings)
+        operations += footprint_operations(request, frame, jobs)
+    else:
+        jobs, settings = jobs_from_cloud(request, headers, frame.units, settings, progress)
+        jobs = jobs_in_box(jobs, request, frame.units)
+    if terrain is not None:
+        check_terrain(terrain, jobs)
+        operations += terrain_operations(terrain, frame, jobs)
+    units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
+    if settings.write.out_crs:
+        out_crs = choose_file_crs(frame.crs, settings.write.out_crs)
+        warn_files_elsewhere(jobs, out_crs, units)
+        operations += file_operations(frame, out_crs, jobs)
+    return WorkPlan(
+        jobs=jobs,
+        tiles=cut_into_tiles(jobs, TILE_M, limit_buildings_per_tile(request.settings)),
+        crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
+        settings=settings,
+        names=unusual_names(jobs),
+        translate=choose_file_offset(jobs, units.cityjson),
+        registration=registration,
+        operations=tuple(operations),
+        others=neighbours,
+    )
+
+
+def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> None:
+    """Warn once where the files' CRS is made for another place.
+
+    That is another place than that of the buildings.
+    """
+    from ...read.positions import doubtful_place
+
+    boxes = shapely.bounds([job.area for job in jobs])
+    corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
+    doubt = doubtful_place(crs, corners) if len(corners) else None
+    if doubt:
+        warnings.warn(
+            f"--out-crs: the buildings lie at {doubt}; name the UTM zone or the national grid "
+            "there",
+            InputWarning,
+        )
+
+
+def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
+    """Read the terrain under the buildings before work is spent.
+
+    Damage ends the run. A line warns where no building has a height there: the ground points that
+    stand in for it would else be taken in silence.
+    """
+    corners = shapely.get_coordinates([job.area for job in jobs])
+    if not len(corners) or terrain.knows_any(corners):
+        return
+    lies = (
+        "has no height under any building"
+        if terrain.pixels_at(corners)[2].any()
+        else "no building stands on it"
+    )
+    advice = "its values" if "height" in lies else "its CRS"
+    warnings.warn(
+        f"{mask(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}",
+        InputWarning,
+    )
+
+
+def list_places(corners: np.ndarray) -> np.ndarray:
+    """Return places (k, 2), 8 by 8 of them, over the box of `corners` (n, 2).
+
+    Buildings are looked for there first.
+    """
+    x, y = (
+        np.linspace(lower, upper, 8)
+        for lower, upper in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
+    )
+    return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
+
+
+def limit_buildings_per_tile(settings: Settings) -> int:
+    """Return the most buildings of a tile.
+
+    Progress counts tiles, and the paper's objective takes seconds a building: there each is a tile
+    of its own.
+    """
+    return 1 if settings.fit.objective == "paper" else MOST_BUILDINGS_A_TILE
+
+
+def read_headers(clouds: tuple[str, ...]) -> list:
+    """Return the headers of the point files that hold points.
+
+    A file that cannot be read does not end the run.
+    """
+    from ...read.pointcloud import as_input_error, format_others, read_header
+
+    headers, errors = [], []
+    for name in clouds:
+        try:
+            headers.append(read_header(name))
+        except MemoryError:
+            raise
+        except Exception as error:
+            errors.append(as_input_error(error, name))
+    empty = [header.path for header in headers if not header.count]
+    if len(empty) == len(headers):
+        raise (
+            errors[0]
+            if errors
+            else InputError(f"expected points in {', '.join(empty)}, got none; check the files")
+        )
+    if empty:
+        warnings.warn(f"{empty[0]}{format_others(empty)}: holds no points", InputWarning)
+    return [header for header in headers if header.count]
+
+
+def refuse_underpasses_alone(request: Request) -> None:
+    """Raise InputError for underpasses without footprints."""
+    if request.underpasses is not None and not request.footprints:
+        raise InputError(
+            "expected --footprints with --underpasses, got none; name the outlines of the "
+            "buildings above them"
+        )
+
+
+def jobs_from_footprints(
+    request: Request, headers: list, frame: AreaFrame, settings: Settings
+) -> tuple[tuple[Job, ...], tuple[shapely.Polygon, ...], Registration | None]:
+    """Return one job a footprint, other outlines, and the common shift.
+
+    The outlines are those around that were not requested. All are moved by the shift, None where it
+    is not looked for.
+    """
+    from .frame import plan_bounds
+    from .overlap import check_overlap
+    from .registration import find_registration, is_registered, warn_if_moved
+
+    footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
+    check_number_columns(footprints, settings.read)
+    footprints = add_passages(footprints, request, frame)
+    if request.bbox and not footprints:
+        raise InputError(nothing_in(request.bbox))
+    say_if_columns_run_out(str(request.footprints), footprints)
+    bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
+    if len(bounds):
+        check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
+    is_part = settings.read.by_class and (request.where or request.bbox)
+    data_set = all_footprints(request, frame, headers) if is_part else footprints
+    registration = (
+        find_registration(data_set, headers, frame.units, settings)
+        if is_registered(settings)
+        else None
+    )
+    shift = (0.0, 0.0)
+    if registration is not None:
+        warn_if_moved(registration, str(request.footprints))
+        shift = registration.shift
+    areas = [
+        make_job(0, footprint, shift).area for footprint in select_neighbours(footprints, data_set)
+    ]
+    return make_jobs(footprints, shift), tuple(areas), registration
+
+
+def select_neighbours(
+    footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]
+) -> list[Footprint]:
+    """Return those of a data set near the requested footprints.
+
+    These themselves are left out.
+    """
+    if data_set is footprints:
+        return []
+    polygons_requested = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
+    own_polygons = set(shapely.to_wkb(polygons_requested).tolist())
+    neighbours = [
+        f for f in data_set if not f.polygon.is_empty and f.polygon.wkb not in own_polygons
+    ]
+    if not len(polygons_requested) or not neighbours:
+        return []
+    polygons = np.array([f.polygon for f in neighbours])
+    nearby = shapely.STRtree(polygons_requested).query(
+        polygons, predicate="dwithin", distance=MOST_ROW_M
+    )[0]
+    return [neighbours[i] for i in np.unique(nearby)]
+
+
+def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[Footprint, ...]:
+    """Return the footprints within the clouds, requested or not.
+
+    Of a database they are those that its own condition lets through.
+
+    What is odd about them has been said of those that are asked for.
+    """
+    from ...read.database import is_database
+    from .frame import plan_bounds
+
+    bounds, path = plan_bounds(headers), str(request.footprints)
+    box = (
+        (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
+        if len(bounds)
+        else None
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)
+        return read_requested_footprints(
+            request, frame, where=request.where if is_database(path) else None, bbox=box
+        )
+
+
+def read_requested_footprints(
+    request: Request, frame: AreaFrame, where: str | None, bbox: Box | None
+) -> tuple[Footprint, ...]:
+    from ...read.footprints import read_footprints
+
+    return read_footprints(
+        str(request.footprints),
+        request.layer,
+        request.id_attribute,
+        frame.cloud,
+        settings=request.settings,
+        where=where,
+        bbox=bbox,
+    )
+
+
+def footprint_operations(
+    request: Request, frame: AreaFrame, jobs: tuple[Job, ...]
+) -> list[Operation]:
+    """Return the operation that took footprints to the clouds' CRS.
+
+    A warning said so when they were read.
+    """
+    if frame.cloud is None or frame.footprints is None:
+        return []
+    return list_operations(
+        mask(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs
+    )
+
+
+def terrain_operations(
+    terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job, ...]
+) -> list[Operation]:
+    """Return the operation that takes places to the terrain model's CRS.
+
+    A warning says where it is coarse.
+    """
+    from ...read.operations import warn_if_coarse
+
+    if frame.crs is None or terrain.own_crs is None:
+        return []
+    result = list_operations(mask(terrain.path), frame.crs, terrain.own_crs, frame, jobs)
+    for operation in result:
+        warn_if_coarse(operation)
+    return result
+
+
+def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> list[Operation]:
+    """Return the operation that takes coordinates to the files' CRS.
+
+    A warning says where it is coarse.
+    """
+    from ...read.operations import warn_if_coarse
+
+    result = list_operations("--out-crs", frame.crs, out_crs, frame, jobs)
+    for operation in result:
+        warn_if_coarse(operation)
+    return result
+
+
+def list_operations(
+    subject: str, source: Any, target: Any, frame: AreaFrame, jobs: tuple[Job, ...]
+) -> list[Operation]:
+    """Return the operation between two CRSs in plan, at the buildings.
+
+    There is none where both are the same.
+    """
+    from ...read.crs import horizontal_crs, names_place, same_horizontal
+    from ...read.operations import find_operation
+    from ...read.positions import reproject_positions
+
+    boxes = shapely.bounds([job.area for job in jobs])
+    boxes = boxes[np.isfinite(boxes).all(axis=1)]
+    if (
+        same_horizontal(source, target)
+        or not len(boxes)
+        or not (names_place(source) and names_place(target))
+    ):
+        return []
+    middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
+    x, y = reproject_positions(middle, frame.crs, source)[0]
+    return [
+        find_operation(
+            subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y))
+        )
+    ]
+
+
+def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) -> None:
+    """Warn before any work of more attributes than a GeoPackage has columns.
+
+    They are the footprints'.
+    """
+    count = len({name for footprint in footprints for name in footprint.attributes})
+    if count > (room := attributes_with_a_column()):
+        warnings.warn(
+            f"{mask(str(path))}: has {count:,} attributes; buildings.gpkg holds the first "
+            f"{room:,}, because its tables have at "
+            "most 2,000 columns, and the other files hold all",
+            InputWarning,
+        )
+
+
+def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[Job, ...]:
+    """Return the `jobs` that meet the requested box, numbered again.
+
+    Without a box they are all.
+
+    Raises InputError where none does.
+    """
+    from ...read.footprints import meets
+
+    if request.bbox is None:
+        return jobs
+    met = [job for job in jobs if meets(job.area, request.bbox, units)]
+    if not met:
+        raise InputError(nothing_in(request.bbox))
+    return tuple(dataclasses.replace(job, index=index) for index, job in enumerate(met))
+
+
+def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
+    """Refuse a box that meets none of the clouds' boxes (n, 4).
+
+    Both are in the clouds' own unit. It is refused before anything is read.
+    """
+    if (
+        bbox is None
+        or not len(bounds)
+        or shapely.intersects(shapely.box(*bbox), shapely.box(*bounds.T)).any()
+    ):
+        return
+    extent = [*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)]
+    raise InputError(
+        f"expected a --bbox that meets the clouds, which lie in {format_box(extent)}, got "
+        f"{format_box(bbox)}; give it in their coordinates"
+    )
+
+
+def nothing_in(bbox: Box) -> str:
+    return (
+        f"expected buildings in --bbox {format_box(bbox)}, got none; it is in the coordinates of "
+        "the "
+        "clouds"
+    )

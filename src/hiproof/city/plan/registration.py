@@ -1,0 +1,212 @@
+"""The common shift of a run's footprints onto its roofs.
+
+It is estimated before there are work tiles.
+
+The data set is all footprints of the file within the clouds, whichever of them --where or --bbox
+choose, and the roof points in a sample of its squares of CELL_M. The sample follows from the places
+of the footprints alone. So a building is moved alike in every run on these files.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import warnings
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import shapely
+
+from ...errors import InputWarning, is_interrupt
+from ...fit.registration import FARTHEST_SHIFT_M, Registration, register
+from ...frames import Units
+from ...geometry.grid import number_cells
+from ...masking import mask
+from ...model import Footprint, PointCloud
+from ...read.las import is_copc
+from ...read.lax import read_lax
+from ...read.pointcloud import PointFileHeader, file_kind, iter_points
+from ...settings import Settings
+
+SAMPLE_CELL_M = 250.0
+"""Side (m) of the squares of the world that are sampled: some dozens of houses."""
+
+ENOUGH_FOOTPRINTS, MOST_CELLS, MOST_FILES = 400, 16, 8
+"""The sample ends with so many footprints: their mean is known to 0.02 m.
+
+The others bound what is read for it.
+"""
+
+CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
+"""How far (m) around a square footprints bear on its points."""
+
+Cell = tuple[int, int]
+
+
+def is_registered(settings: Settings) -> bool:
+    """Return whether footprints of a run with these settings are registered.
+
+    They are where classes mark roof points.
+    """
+    return settings.reconstruct.align != "off" and settings.read.by_class
+
+
+def find_registration(
+    footprints: tuple[Footprint, ...],
+    headers: list[PointFileHeader],
+    units: Units,
+    settings: Settings,
+) -> Registration:
+    """Estimate the common shift of `footprints` onto roof points.
+
+    Points are those of the files with `headers`.
+    """
+    polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
+    boxes = read_boxes(headers, units)
+    number_of = footprints_by_cell(polygons)
+    cells, files = sample_cells(number_of, boxes)
+    points = points_by_cell(
+        cells, [headers[i].path for i in sorted(files)], units, settings.read.building_classes
+    )
+    tree = shapely.STRtree(polygons)
+    selected_cells = [cell for cell in cells if cell in points]
+    result = register((points[cell], find_polygons(tree, cell)) for cell in selected_cells)
+    return dataclasses.replace(result, footprints=sum(number_of[cell] for cell in selected_cells))
+
+
+def warn_if_moved(registration: Registration, path: str) -> None:
+    """Warn (InputWarning) where the footprints at `path` are moved."""
+    if registration.is_clear:
+        (x, y), sigma = registration.xy, max(registration.sigma)
+        warnings.warn(
+            f"{mask(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, "
+            f"{y:.2f}) m, with a standard "
+            f"deviation of {sigma:.2f} m; check the CRS of footprints and clouds, or keep them in "
+            "place with --align off",
+            InputWarning,
+        )
+
+
+def read_boxes(headers: list[PointFileHeader], units: Units) -> np.ndarray:
+    """Return boxes (n, 4) of point files in world metres.
+
+    It is the whole plane where a header knows none.
+    """
+    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
+    boxes = units.to_metres(bounds.reshape(-1, 2)).reshape(-1, 4)
+    unknown = ~np.isfinite(boxes).all(axis=1)
+    boxes[unknown] = [-np.inf, -np.inf, np.inf, np.inf]
+    return boxes
+
+
+def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
+    """Count the footprints with their lower left corner in each square."""
+    lower = np.floor(shapely.bounds(polygons).reshape(-1, 4)[:, :2] / SAMPLE_CELL_M).astype(
+        np.int64
+    )
+    places, counts = np.unique(lower, axis=0, return_counts=True)
+    return {(int(i), int(j)): int(n) for (i, j), n in zip(places, counts, strict=True)}
+
+
+def sample_cells(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:
+    """Sample squares, and return the numbers of the files that hold them.
+
+    A hash of their place draws them.
+
+    `number_of` counts the footprints of each square, `boxes` (n, 4) are those of the files.
+    """
+    cells: list[Cell] = []
+    files: set[int] = set()
+    footprints = 0
+    for cell in sorted(number_of, key=hash_cell):
+        meeting = set(np.flatnonzero(meets(boxes, expand_cell(cell))).tolist())
+        if not meeting or len(files | meeting) > max(MOST_FILES, len(meeting)):
+            continue
+        files |= meeting
+        cells.append(cell)
+        footprints += number_of[cell]
+        if footprints >= ENOUGH_FOOTPRINTS or len(cells) >= MOST_CELLS:
+            break
+    return cells, files
+
+
+def hash_cell(cell: Cell) -> bytes:
+    """Return a number as good as a draw, the same on every machine."""
+    return hashlib.blake2b(f"{cell[0]} {cell[1]}".encode(), digest_size=8).digest()
+
+
+def expand_cell(cell: Cell, around_m: float = 0.0) -> tuple[float, float, float, float]:
+    """Return the square of a cell with a margin: (xmin, ymin, xmax, ymax)."""
+    x, y = SAMPLE_CELL_M * cell[0], SAMPLE_CELL_M * cell[1]
+    return x - around_m, y - around_m, x + SAMPLE_CELL_M + around_m, y + SAMPLE_CELL_M + around_m
+
+
+def meets(boxes: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
+    """Return which of `boxes` (n, 4) meet `box`."""
+    return np.all(boxes[:, :2] <= box[2:], axis=1) & np.all(boxes[:, 2:] >= box[:2], axis=1)
+
+
+def find_polygons(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
+    """Return the footprints in and around a cell."""
+    return list(
+        tree.geometries[np.sort(tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M))))]
+    )
+
+
+def points_by_cell(
+    cells: list[Cell], paths: list[str], units: Units, building_classes: tuple[int, ...]
+) -> dict[Cell, np.ndarray]:
+    """Return the roof points (n, 2) of the `cells`, of all readable files.
+
+    The step that sorts points names the others.
+    """
+    result: dict[Cell, list[np.ndarray]] = {}
+    targets = set(cells)
+    for path in paths:
+        for cloud in readable_chunks(path, cells, units):
+            xy = cloud.xyz[np.isin(cloud.classes, building_classes), :2]
+            for cell, points in split_by_cell(xy, targets):
+                result.setdefault(cell, []).append(points)
+    return {cell: np.concatenate(parts) for cell, parts in result.items()}
+
+
+def split_by_cell(xy: np.ndarray, targets: set[Cell]) -> Iterator[tuple[Cell, np.ndarray]]:
+    """Yield the points (n, 2) of each wanted cell among `xy`."""
+    places, number = number_cells(np.floor(xy / SAMPLE_CELL_M))
+    for k, (i, j) in enumerate(places.tolist()):
+        if (i, j) in targets:
+            yield (i, j), xy[number == k]
+
+
+def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[PointCloud]:
+    """Yield the chunks of a file that may hold points of the cells.
+
+    They go up to where the file breaks off.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # the step that sorts points says them
+        try:
+            for chunks in read_chunks(path, cells, units):
+                yield from chunks
+        except MemoryError:
+            raise
+        except Exception as error:
+            if is_interrupt(error):
+                raise KeyboardInterrupt from error
+
+
+def read_chunks(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[PointCloud]]:
+    """Return what to read of a file.
+
+    Of one with a spatial index it is only what lies near the cells.
+    """
+    boxes = [expand_cell(cell) for cell in cells]
+    if file_kind(path) != "las":
+        return [iter_points(path, units=units)]
+    if is_copc(path):
+        return (iter_points(path, box=box, units=units) for box in boxes)
+    index = read_lax(path)
+    if index is None:
+        return [iter_points(path, units=units)]
+    file_boxes = units.from_metres(np.array(boxes).reshape(-1, 2)).reshape(-1, 4)
+    return [iter_points(path, runs=index.find_runs(file_boxes), units=units)]

@@ -1,0 +1,129 @@
+"""The executor of worker processes on this machine: see executors.py."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import Connection
+from multiprocessing.sharedctypes import RawValue
+from typing import Any
+
+from ... import log
+from . import solved
+from .cores import limit_threads
+from .tasks import WorkerLost, import_work, is_ready, make_ready
+from .workers import begin_worker, choose_context, describe_start
+
+MOST_ON_WINDOWS = 61  # processes that one can wait for there
+COUNT_S = 0.5  # seconds between looks at how many buildings the workers of this machine have solved
+
+
+class Processes:
+    """`count` worker processes.
+
+    See workers.py for how they begin.
+    """
+
+    def __init__(self, count: int):
+        self.count = min(count, MOST_ON_WINDOWS) if sys.platform == "win32" else count
+        self.pool: ProcessPoolExecutor | None = None
+        self.word: Connection | None = None
+        self.count_solved = RawValue("q", 0)  # by all workers, shared with them
+        self.told = 0
+
+    def start(self) -> None:
+        """Start the workers, which import what tasks need."""
+        for _ in range(self.count):
+            self.submit(import_work, ())
+
+    def prepare(self, pieces: Sequence[str]) -> None:
+        """Compile what no run compiled before.
+
+        A worker looks, so that this process imports the compiler only if it is needed.
+        """
+        answer = self.submit(is_ready, (pieces,))
+        if answer.exception() or not answer.result():
+            make_ready(pieces)
+
+    def run(
+        self, function: Callable, tasks: Iterable[tuple]
+    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        try:
+            yield from self.outcomes(function, tasks)
+        # Ctrl-C, most of all: nobody waits any more for what the workers are at
+        except BaseException:
+            if self.word is not None:
+                self.word.close()
+            raise
+
+    def outcomes(
+        self, function: Callable, tasks: Iterable[tuple]
+    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        waiting = iter(tasks)
+        running: dict[Future, tuple] = {}
+        while True:
+            # two tasks a worker in the queue: enough to keep it busy, few enough to lose little
+            # when one dies
+            while len(running) < 2 * self.count and (task := next(waiting, None)) is not None:
+                running[self.submit(function, task)] = task
+            if not running:
+                return
+            finished, _ = wait(running, timeout=COUNT_S, return_when=FIRST_COMPLETED)
+            self.tell_count()
+            if any(isinstance(future.exception(), BrokenProcessPool) for future in finished):
+                yield from self.bury(running)
+                continue
+            for future in finished:
+                error: Any = future.exception()
+                yield running.pop(future), None if error else future.result(), error
+
+    def tell_count(self) -> None:
+        """Tell the listener how many more buildings the workers have solved."""
+        number = self.count_solved.value - self.told
+        if number > 0:
+            self.told += number
+            solved.listener(number)
+
+    def submit(self, function: Callable, task: tuple) -> Future:
+        if self.pool is None:
+            context = choose_context()
+            heard, self.word = context.Pipe(duplex=False)
+            state = describe_start(context)
+            arguments: Any = (heard, state, log.worker_arguments(), self.count_solved)
+            self.pool = ProcessPoolExecutor(
+                self.count, mp_context=context, initializer=begin_worker, initargs=arguments
+            )
+        try:
+            with limit_threads():
+                return self.pool.submit(function, *task)
+        except BrokenProcessPool as error:
+            lost: Future = Future()
+            lost.set_exception(error)
+            return lost
+
+    def bury(self, running: dict[Future, tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        """Hand back what finished, and report the rest as lost.
+
+        A worker died and the pool with it; a new pool is started.
+        """
+        wait(running)
+        self.close()
+        for future, task in list(running.items()):
+            error: Any = future.exception()
+            lost = isinstance(error, BrokenProcessPool)
+            yield (
+                task,
+                None if error else future.result(),
+                WorkerLost("a worker process died") if lost else error,
+            )
+        running.clear()
+
+    def isolate(self) -> Processes:
+        return Processes(1)
+
+    def close(self) -> None:
+        if self.pool is not None:
+            self.pool.shutdown(wait=True, cancel_futures=True)
+            self.pool = None

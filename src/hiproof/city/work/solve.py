@@ -1,0 +1,642 @@
+"""Reconstruction of the buildings of one work tile.
+
+Their parts of the output files are left ready to be joined.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import functools
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+import shapely
+
+from ...errors import DamagedRaster, report_error
+from ...fit.align import Shift, find_shift
+from ...frames import Units
+from ...geometry.point_grid import PointGrid, grow_polygon
+from ...geometry.thin import hashes, thin_to_count, without_repeats
+from ...log import LOGGER
+from ...masking import mask
+from ...method import reconstruct
+from ...model import Building
+from ...parametric.fallback import list_fallback_columns, use_fallback
+from ...parametric.override import Override, overridden
+from ...read.raster import RasterTerrain
+from ...read.terrain import Terrain, TerrainChain, read_terrain
+from ...settings import Settings
+from ...stages.footprint import shift_remark
+from ...stages.outline import largest_polygon
+from ...stages.points import distinct
+from ...stages.remarks import add_remark
+from ...status import Doubt, Status
+from ...write.files import atomic_file
+from ...write.fragments import Fragments, load_fragments, save_fragments
+from ...write.run_files import fragments
+from ..folder.ledger import Outcome
+from ..merge.join import tile_parts, write_tile
+from ..plan.outlines import row_outline
+from ..plan.overrides import load_overrides, load_redo
+from ..plan.work_plan import OVERHANG_REACH_M, Job, WorkPlan, load_plan, make_job, neighbourhood
+from .bundles import TerrainRecorder, keep_failure
+from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, find_lone_roof, found_roof
+from .ground import (
+    BareAround,
+    Cells,
+    GroundAround,
+    LowestAround,
+    WhereSeen,
+    ground_cells,
+    lowest_in_cells,
+)
+from .other_classes import (
+    OtherPoints,
+    explain_missing_points,
+    find_bare_cells,
+    ground_under_roof,
+    remark_other_classes,
+)
+from .solved import count_building
+from .sort import load_points
+from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
+
+# corners that change an outline by less make the area beside it slow to draw and no truer
+COARSEST_THINNING_M = 0.05
+
+RecordTerrain: TypeAlias = Callable[[], TerrainRecorder | None]
+"""Solves a building again and records its terrain."""
+KeepFailure: TypeAlias = Callable[[Job, str, RecordTerrain], None]
+"""Keeps the input of a building that failed, with the traceback."""
+
+DIED = "the process died while it worked on this building"
+
+# m around a building that show whether there is ground between roofs; yards are as wide
+BESIDE_ALL_M = 10.0
+
+
+class Surroundings:
+    """All points of a work tile, and its terrain model if there is one.
+
+    They are looked up building by building.
+    """
+
+    def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
+        self.roof, self.noise, self.model, self.plan = points["roof"], points["noise"], model, plan
+        self.points, self.grid = points, PointGrid(self.roof)
+        self.shifts: dict[int, Shift] = {}
+        self.latest: tuple[shapely.Polygon, np.ndarray] = shapely.Polygon(), np.zeros(0, np.int64)
+
+    @functools.cached_property
+    def settings(self) -> Settings:
+        """The settings of the fit: footprints have been moved before."""
+        return self.plan.settings.replace({"reconstruct": {"align": "off"}})
+
+    @functools.cached_property
+    def noise_grid(self) -> PointGrid:
+        """The noise points by place."""
+        return PointGrid(self.noise)
+
+    @functools.cached_property
+    def ground(self) -> Cells:
+        """The ground points by cell; an update may do without them."""
+        return ground_cells(self.points["ground"])
+
+    @functools.cached_property
+    def low(self) -> Cells:
+        """The lowest points of other classes by cell."""
+        return Cells(lowest_in_cells(self.points["low"]))
+
+    def find_row_shift(self, job: Job) -> Shift:
+        """Return the shift of a job's area from its roof, that of its whole row."""
+        row = (
+            self.plan.outlines.row(job.index)
+            if self.plan.moves_rows and not job.area.is_empty
+            else []
+        )
+        if not row:
+            return Shift()
+        label = int(self.plan.outlines.labels[job.index])
+        if label not in self.shifts:
+            outline = row_outline(row)
+            origin = np.floor(outline.bounds[:2])
+            nearby = distinct(self.take_near(outline))
+            self.shifts[label] = find_shift(
+                nearby[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin)
+            )
+        return self.shifts[label]
+
+    def move(self, job: Job) -> tuple[Job, str]:
+        """Return the job with its area on its roof, and a remark.
+
+        The remark is for a row that was moved there.
+        """
+        shift = self.find_row_shift(job)
+        if job.footprint is None:
+            return job, ""
+        remark = shift_remark(
+            shift, len(self.plan.outlines.row(job.index)) if shift.is_clear else 1
+        )
+        if not shift.is_clear:
+            return job, remark
+        x, y = (round(float(value), 3) for value in shift.xy)
+        whole = round(job.footprint.shift[0] + x, 3), round(job.footprint.shift[1] + y, 3)
+        return make_job(job.index, job.footprint, whole), remark
+
+    def select_roof_points(self, job: Job) -> FoundRoof:
+        """Return the roof points (n, 3) inside the job's area, or near it.
+
+        Its footprint may have to be moved onto those near.
+
+        A point that stands in two files comes twice. Roofs found by shape, or alone, are those
+        inside the area.
+        """
+        read = self.plan.settings.read
+        if read.by_class or job.area.is_empty:
+            return FoundRoof(self.take_near(job.area))
+        nearby = self.select_points(job, 0.0)
+        if read.roofs == "alone":
+            return self.add_outer_points(job, find_lone_roof(nearby, job.area))
+        height = nearby[:, 2] - self.ground_to_leave_out(job).height_at(nearby)
+        found = found_roof(nearby, job.area, height, job.footprint is not None)
+        return self.add_outer_points(job, found)
+
+    def take_near(self, area: shapely.Polygon) -> np.ndarray:
+        """Take the roof points (n, 3) in an area and around it.
+
+        Of a house alone, the second call for the same area finds the points of the first.
+        """
+        if self.latest[0] is not area:
+            self.latest = area, self.grid.find_within(area, self.plan.around_m)
+        return self.roof.take(self.latest[1], axis=0)
+
+    def add_outer_points(self, job: Job, found: FoundRoof) -> FoundRoof:
+        """Return the roof with the points beyond a footprint that may show overhangs."""
+        if not self.plan.beyond_m or job.footprint is None:
+            return found
+        around = self.select_points(job, self.plan.beyond_m)
+        outside = around[~shapely.intersects_xy(job.area, around[:, 0], around[:, 1])]
+        return dataclasses.replace(found, points=np.concatenate([found.points, outside]))
+
+    def select_neighbours(self, job: Job) -> list[shapely.Polygon]:
+        """Return the outlines beside a building, moved with it."""
+        if job.area.is_empty:
+            return []
+        planned = self.plan.jobs[job.index].area
+        shift = np.subtract(job.area.bounds[:2], planned.bounds[:2])
+        near = self.plan.outlines.select_near(job.index, OVERHANG_REACH_M)
+        return [shapely.transform(polygon, lambda xy: xy + shift) for polygon in near]
+
+    def select_noise(self, job: Job, roof: np.ndarray) -> np.ndarray:
+        """Return noise points (m, 3) over the job's area that lie high.
+
+        They lie higher than half of its `roof` points (n, 3): where they are many they are a spire,
+        not birds.
+        """
+        if job.area.is_empty or not len(roof) or not len(self.noise):
+            return np.zeros((0, 3))
+        noise = self.noise.take(self.noise_grid.find_within(job.area, self.plan.around_m), axis=0)
+        return without_repeats(noise[noise[:, 2] > np.median(roof[:, 2])])
+
+    def select_points(self, job: Job, reach_m: float) -> np.ndarray:
+        """Return points (n, 3) that may be roofs around a building, each once.
+
+        They lie in the whole-metre box that reaches so far.
+        """
+        lower, upper = neighbourhood(job, reach_m).reshape(2, 2)
+        nearby = self.roof[self.grid.candidates((*lower, *upper))]
+        return without_repeats(
+            nearby[((nearby[:, :2] >= lower) & (nearby[:, :2] <= upper)).all(axis=1)]
+        )
+
+    def ground_to_leave_out(self, job: Job) -> TerrainChain:
+        """Return the ground around the building.
+
+        Among roofs cut out beforehand, whose lowest points are no ground, it is the terrain model's
+        alone.
+        """
+        from ...classify.cut_out import is_cut_out
+
+        # classes tell it
+        if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):
+            return TerrainChain(self.find_grounds(job))
+        surroundings = self.select_points(job, BESIDE_ALL_M)
+        return TerrainChain(
+            [self.model]
+            if len(surroundings) and is_cut_out(surroundings)
+            else self.find_grounds(job)
+        )
+
+    def find_grounds(self, job: Job) -> list[Terrain | None]:
+        """Return the terrain model, ground points and ground of a building.
+
+        They are those in the whole-metre box around it.
+        """
+        box = neighbourhood(job, self.plan.terrain_reach_m)
+        result = WhereSeen(BareAround(self.low, box), lambda: self.has_points_around(job, box))
+        points = GroundAround(self.ground, box)
+        return [self.model and WhereLikeGround(self.model, points), points, result]
+
+    def has_points_around(self, job: Job, box: np.ndarray) -> bool:
+        """Return whether anything beside the building is known.
+
+        Otherwise the lowest points are the roof's own.
+        """
+        points = self.low.inside(box)
+        outline = grow_polygon(shapely.simplify(job.area, COARSEST_THINNING_M), BESIDE_M)
+        return (
+            int((~shapely.intersects_xy(outline, points[:, 0], points[:, 1])).sum())
+            >= FEWEST_BESIDE
+        )
+
+    def choose_terrain(self, job: Job) -> TerrainChain | None:
+        """Return the terrain around the building.
+
+        It is that of `find_grounds`, else the lowest points.
+        """
+        if job.area.is_empty:
+            return None
+        box = neighbourhood(job, self.plan.terrain_reach_m)
+        lowest = WhereSeen(LowestAround(self.low, box), lambda: self.has_points_around(job, box))
+        return TerrainChain([*self.find_grounds(job), lowest])
+
+    def remark_terrain(self, job: Job) -> str:
+        """Return a remark where the terrain model contradicts ground points.
+
+        They lie around a building. It is empty otherwise.
+        """
+        if self.model is None or job.area.is_empty:
+            return ""
+        box = neighbourhood(job, self.plan.terrain_reach_m)
+        return check_terrain(
+            self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area)
+        )
+
+    def select_other_points(self, job: Job) -> OtherPoints | None:
+        """Return the points of other classes inside the building's area.
+
+        None where classes tell no roofs.
+        """
+        if not self.plan.settings.read.by_class or job.area.is_empty:
+            return None
+        box = neighbourhood(job, 0.0)
+        terrain = TerrainChain(self.find_grounds(job))
+        return OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
+
+    def bare(self, job: Job, result: FoundRoof, neighbours: OtherPoints | None) -> np.ndarray:
+        """Return points (n, 3) of bare ground inside the building's area.
+
+        They are of the ground class where nothing of another class stands over them, or were told
+        from the roof by their height.
+        """
+        if job.area.is_empty or job.footprint is None:
+            return result.ground
+        if neighbours is not None:
+            return find_bare_cells(neighbours)
+        classified = self.ground.inside(neighbourhood(job, 0.0))
+        return np.concatenate([result.ground, classified])
+
+    def inspect(self, building: Building, points: OtherPoints | None, roof: np.ndarray) -> Building:
+        """Return the building with the remarks of other classes' points.
+
+        They are made where classes mark roofs.
+
+        `roof` (n, 3) are its own.
+        """
+        if points is None:
+            return building
+        if building.status is Status.NO_POINTS:
+            missing_points = explain_missing_points(
+                points, self.plan.settings.read.building_classes
+            )
+            return (
+                dataclasses.replace(building, detail=missing_points) if missing_points else building
+            )
+        return add_remark(
+            add_remark(building, remark_other_classes(points, roof)),
+            ground_under_roof(points, roof),
+        )
+
+
+def solve_tile(
+    folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
+) -> list[Outcome]:
+    """Reconstruct all buildings of `tile`, and write its part file.
+
+    They stand on the terrain model `terrain`.
+
+    `avoid` are the buildings that killed their worker before: they become internal errors without
+    being tried again. Returns a row a building for the ledger.
+    """
+    root = Path(folder)
+    plan = load_plan(root)
+    surroundings = Surroundings(load_points(root, tile), open_terrain(plan, terrain), plan)
+    overrides = load_overrides(root)
+    keep = functools.partial(keep_failure, root, lambda: surroundings.points, plan)
+
+    def solve(job: Job) -> tuple[Building, Fragments]:
+        return solve_one(plan, job, surroundings, overrides.get(job.index), keep)
+
+    return solve_buildings(root, plan, tile, solve, keep, avoid)
+
+
+def solve_buildings(
+    root: Path,
+    plan: WorkPlan,
+    tile: str,
+    solve: Callable[[Job], tuple[Building, Fragments]],
+    keep: KeepFailure,
+    avoid: tuple[int, ...],
+) -> list[Outcome]:
+    """Solve the buildings of `tile` one by one, and write its part file.
+
+    `keep` is called with those to `avoid`.
+    """
+    selection = kept_parts(root, tile, plan)
+    parts, rows = [], []
+    for index in plan.tiles[tile]:
+        if index in selection:
+            parts.append(selection[index])
+            continue
+        job, start = plan.jobs[index], time.perf_counter()
+        if index in avoid:
+            building, part = record_failure(plan, job, DIED)
+            keep(job, DIED, no_terrain)
+        else:
+            building, part = solve(job)
+        parts.append(part)
+        rows.append(make_outcome(index, building, time.perf_counter() - start))
+        count_building()
+    write_tile(plan, root.parent, tile, parts)
+    with atomic_file(tile_parts(root, tile)) as file:
+        save_fragments(file, parts)
+    return rows
+
+
+def open_terrain(plan: WorkPlan, path: str | None) -> RasterTerrain | None:
+    """Return the terrain model of a run, opened once a thread."""
+    return terrain_model(path, plan.crs_wkt, plan.units, threading.get_ident())
+
+
+def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
+    """Return the texts of buildings that need not be made again, by number.
+
+    They are all of a tile but those whose override changed.
+    """
+    redo = load_redo(root).get(tile)
+    if redo is None or set(redo) == set(plan.tiles[tile]):
+        return {}
+    texts = zip(plan.tiles[tile], load_fragments(tile_parts(root, tile)), strict=True)
+    return {index: part for index, part in texts if index not in redo}
+
+
+@functools.lru_cache(maxsize=32)
+def terrain_model(
+    path: str | None, crs_wkt: str | None, units: Units, thread: int
+) -> RasterTerrain | None:
+    """Return the terrain model, opened once a thread.
+
+    GDAL's data sets are not to be shared.
+    """
+    from pyproj import CRS
+
+    return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
+
+
+def keep_nothing(job: Job, trace: str, terrain: RecordTerrain) -> None:
+    """Keep nothing of a building that failed."""
+
+
+def no_terrain() -> None:
+    """Record no terrain: the building must not be solved again here."""
+
+
+def solve_one(
+    plan: WorkPlan,
+    job: Job,
+    surroundings: Surroundings,
+    override: Override | None = None,
+    keep: KeepFailure = keep_nothing,
+) -> tuple[Building, Fragments]:
+    """Return one building and its texts, whatever happens.
+
+    An exception becomes its status.
+
+    `keep` is called with the traceback.
+    """
+    record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
+    if job.error is not None:
+        keep(job, job.error.trace, no_terrain)
+        return record_failure(plan, job, job.error.detail)
+
+    def solve() -> tuple[Building, Fragments]:
+        # first of all: a footprint is put where points are many
+        moved_job, remark = surroundings.move(job)
+        building = solve_by_points(plan, moved_job, remark, surroundings, override)
+        if building.built is None and list_fallback_columns(plan.settings.read):
+            terrain = surroundings.choose_terrain(moved_job)
+            building = use_fallback(building, override, terrain, plan.settings)
+        building, texts = fragments(building, plan.list_names(job), plan.head)
+        if building.status is Status.INTERNAL_ERROR:
+            keep(job, building.detail, record_terrain)
+        return building, texts
+
+    return solve_safely(plan, job, solve, keep, record_terrain)
+
+
+def solve_safely(
+    plan: WorkPlan,
+    job: Job,
+    solve: Callable[[], tuple[Building, Fragments]],
+    keep: KeepFailure,
+    record_terrain: RecordTerrain = no_terrain,
+) -> tuple[Building, Fragments]:
+    """Return what `solve` makes of a building, so that it never stops the others.
+
+    An exception becomes its status, and `keep` is called with the traceback.
+
+    MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried
+    again alone. So is DamagedRaster, for the terrain model is the run's and not the building's.
+    """
+    try:
+        return solve()
+    except DamagedRaster:
+        raise
+    except Exception as error:
+        report = report_error(error)
+        keep(job, report.trace, record_terrain)
+        return record_failure(plan, job, report.detail)
+
+
+@contextmanager
+def pass_over_failure(job: Job) -> Iterator[None]:
+    """Pass over an error of a building in what precedes its solution.
+
+    It is logged. Errors that `solve_safely` raises are raised here, too.
+    """
+    try:
+        yield
+    except DamagedRaster:
+        raise
+    except Exception as error:
+        LOGGER.info("building %s is passed over:\n%s", job.id, report_error(error).trace)
+
+
+def solve_by_points(
+    plan: WorkPlan, job: Job, moved: str, surroundings: Surroundings, override: Override | None
+) -> Building:
+    """Return a building as its points and its override have it.
+
+    `moved` is the remark on its footprint.
+    """
+    roof_points = surroundings.select_roof_points(job)
+    if (
+        not roof_points.is_seen
+        and override is None
+        and not (roof_points.is_ground and keeps_empty(plan))
+    ):
+        return make_unseen_building(job, roof_points)
+    points = without_repeats(roof_points.points)
+    in_use = thin_to_count(points, plan.settings.city.max_points_a_building)
+    other_points = surroundings.select_other_points(job)
+    bare = surroundings.bare(job, roof_points, other_points)
+    building = reconstruct_job(job, points, in_use, bare, surroundings, override)
+    if len(in_use) < len(points):
+        building = add_full_density(building, len(in_use), len(points))
+    building = add_remark(add_remark(building, moved), roof_points.remark)
+    building = add_remark(building, surroundings.remark_terrain(job))
+    return add_remark(
+        surroundings.inspect(building, other_points, points), remark_missing_ground(building)
+    )
+
+
+def recorded_terrain(
+    plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None
+) -> TerrainRecorder | None:
+    """Solve the building again, recording the terrain heights it looks up.
+
+    None without a model.
+    """
+    if surroundings.model is None:
+        return None
+    repeat = copy.copy(surroundings)
+    repeat.model = recorder = TerrainRecorder(surroundings.model)
+    solve_one(plan, job, repeat, override)
+    return recorder
+
+
+def reconstruct_job(
+    job: Job,
+    points: np.ndarray,
+    used_points: np.ndarray,
+    bare: np.ndarray,
+    surroundings: Surroundings,
+    override: Override | None,
+) -> Building:
+    """Reconstruct a building from `used_points`, or by its override.
+
+    It is fitted to these and judged by all `points` (n, 3), noise over it included.
+
+    `bare` (m, 3) are points of bare ground inside its area.
+    """
+    arguments = (
+        used_points,
+        job.footprint,
+        surroundings.choose_terrain(job),
+        surroundings.settings,
+        job.id,
+        bare,
+    )
+    neighbours = surroundings.select_neighbours(job)
+    if override is not None:
+        return overridden(override, *arguments, neighbours)
+    unused = np.concatenate(
+        [find_thinned_out(points, used_points), surroundings.select_noise(job, points)]
+    )
+    return reconstruct(*arguments, unused=unused, neighbours=neighbours)
+
+
+def find_thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:
+    """Return the `points` (n, 3), each once, not among `used_points` (m, 3)."""
+    if len(used_points) == len(points):
+        return points[:0]
+    return points[~np.isin(hashes(points), hashes(used_points))]
+
+
+def add_full_density(building: Building, in_use: int, count: int) -> Building:
+    """Add the density of all `count` points to a building.
+
+    A model says that it is fitted to those `in_use`.
+    """
+    quality = dataclasses.replace(
+        building.quality, density=building.quality.density * count / in_use
+    )
+    remark = (
+        f"fitted to {in_use} of its {count} points" if building.status is Status.MODELLED else ""
+    )
+    return add_remark(dataclasses.replace(building, quality=quality), remark)
+
+
+def remark_missing_ground(building: Building) -> str:
+    """Return a remark where no ground was found around a building.
+
+    Volume and height over ground then depend on a wall's usual height.
+    """
+    if building.built is None or not building.ground_source.startswith("assumed"):
+        return ""
+    return (
+        f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over "
+        "ground are guesses"
+    )
+
+
+def keeps_empty(plan: WorkPlan) -> bool:
+    """Return whether a footprint on which nothing stands gets a model."""
+    return plan.settings.reconstruct.empty_footprints == "model"
+
+
+def make_unseen_building(job: Job, result: FoundRoof) -> Building:
+    """Make a building whose outline holds no roof, as far as points show."""
+    status = Status.NO_BUILDING if result.is_ground and job.footprint else Status.NO_ROOF
+    return add_input(Building(job.id, status, result.remark), job)
+
+
+def add_input(building: Building, job: Job) -> Building:
+    """Add the input's outline and attributes to a building without a model."""
+    if job.footprint is None:
+        return dataclasses.replace(building, footprint=largest_polygon(job.area))
+    footprint, attributes = largest_polygon(job.footprint.polygon), job.footprint.attributes
+    return dataclasses.replace(
+        building, footprint=footprint, attributes=attributes, shift=job.footprint.shift
+    )
+
+
+def record_failure(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
+    """Record a building that hiproof failed on.
+
+    The outline and attributes may be the cause of the failure. If writing them fails as well, the
+    record consists of the id and the message.
+    """
+    building = Building(job.id, Status.INTERNAL_ERROR, mask(detail))
+    try:
+        return fragments(add_input(building, job), plan.list_names(job), plan.head)
+    except Exception as error:
+        LOGGER.info(
+            "building %s: its outline cannot be written: %s", job.id, report_error(error).detail
+        )
+        return fragments(building, plan.list_names(job), plan.head)
+
+
+def make_outcome(position: int, building: Building, seconds: float) -> Outcome:
+    value = building.quality.share_within_20cm
+    share = float(value) if np.isfinite(value) else None
+    status, grade = building.status.code, None if building.grade is None else building.grade.code
+    return Outcome(
+        position, building.id, status, grade, building.type, building.detail, share, seconds
+    )

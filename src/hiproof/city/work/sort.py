@@ -1,0 +1,347 @@
+"""Sorting of points into work tiles.
+
+Each point file is read once, in chunks, and each tile gets the points that its buildings may need.
+
+Roof points are those of the building classes in the whole-metre box of a building; terrain points
+those of the ground classes in the wider box around it; of all others the lowest a cell is kept, in
+case there is no ground class, and of noise what lies where roof points may, in case it is a spire.
+What a building gets out of them depends on its own area alone, not on tiles, files or chunks.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ...errors import OutputError, is_interrupt
+from ...frames import Units
+from ...geometry.cell_kernel import mask_at
+from ...geometry.point_grid import PointGrid
+from ...model import PointCloud
+from ...read.decoded import is_held, take_places
+from ...read.las import is_copc
+from ...read.lax import read_lax
+from ...read.pointcloud import as_input_error, file_kind, iter_points, read_header
+from ...settings import ReadSettings
+from ...write.files import atomic_file
+from ..plan.overrides import REDO, load_redo
+from ..plan.work_plan import PLAN_FILE, WorkPlan, load_plan
+from .ground import lowest_in_cells
+from .noted import load_run_boxes, noted_file, save_run_boxes
+
+NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
+POINT_KINDS = ("roof", "ground", "low", "noise")
+ROOF, GROUND, OTHER, NOISE = range(4)  # kinds of points, by what a work tile needs them for
+# points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
+SQUARE_M = 50.0
+HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
+MASKS_KEPT = 200  # tiles whose mask stays in memory; 100 kB each make 20 MB
+QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its points
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The boxes in which points of a tile's buildings may lie.
+
+    They are whole-metre boxes (m, 4) of the areas and of their surroundings.
+    """
+
+    roof_boxes: np.ndarray
+    terrain_boxes: np.ndarray
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """(xmin, ymin, xmax, ymax) of all boxes."""
+        boxes = np.vstack([self.terrain_boxes, self.roof_boxes])
+        return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+
+    @cached_property
+    def mask(self) -> np.ndarray:
+        """A byte a whole-metre cell (columns, rows).
+
+        Bit 0 is in a roof box, bit 1 in a terrain box.
+        """
+        lower, upper = self.bounds[:2], self.bounds[2:]
+        mask = np.zeros((upper - lower).astype(int), np.uint8)
+        for bit, boxes in ((1, self.roof_boxes), (2, self.terrain_boxes)):
+            for xmin, ymin, xmax, ymax in (boxes - np.tile(lower, 2)).astype(int):
+                mask[xmin:xmax, ymin:ymax] |= bit
+        return mask
+
+    def bits(self, xy: np.ndarray, index: np.ndarray) -> np.ndarray:
+        """Return the mask (k,) at the points `xy[index]` of (n, 2 or more).
+
+        It is 0 outside the bounds; boxes exclude upper sides.
+        """
+        return mask_at(self.mask, xy, index, *self.bounds[:2])
+
+
+class Reaches:
+    """The reach of every work tile that needs points, found by place.
+
+    It is made once a process.
+
+    Where `only` names tiles, and of each the buildings that points are wanted for, it is the reach
+    of these alone.
+    """
+
+    def __init__(self, plan: WorkPlan, only: Mapping[str, Sequence[int]] | None = None):
+        bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
+        lower, upper = bounds[:, :2], bounds[:, 2:]
+        self.roof_boxes, reach_m = plan.roof_boxes, plan.terrain_reach_m
+        self.terrain_boxes = np.hstack([np.floor(lower - reach_m), np.ceil(upper + reach_m)])
+        has_area = np.isfinite(bounds[:, 0])
+        self.is_partial = only is not None
+        tiles = plan.tiles if only is None else only
+        members = {tile: [i for i in own_items if has_area[i]] for tile, own_items in tiles.items()}
+        self.members = {tile: own_items for tile, own_items in members.items() if own_items}
+        self.names = list(self.members)
+        self.place = {tile: number for number, tile in enumerate(self.names)}
+        boxes = [
+            np.vstack([self.terrain_boxes[own_items], self.roof_boxes[own_items]])
+            for own_items in self.members.values()
+        ]
+        self.bounds = np.array(
+            [[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]
+        ).reshape(-1, 4)
+        self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
+
+    def near(self, box: Iterable[float]) -> list[str]:
+        """Return names of the tiles whose reach meets a box, in plan order.
+
+        `box` is (xmin, ymin, xmax, ymax).
+        """
+        return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
+
+    def compute_bounds(self, tiles: Sequence[str]) -> np.ndarray:
+        """Return boxes (t, 4) of the tiles' reaches."""
+        return self.bounds[[self.place[tile] for tile in tiles]].reshape(-1, 4)
+
+    def of(self, tile: str) -> Reach:
+        members = self.members[tile]
+        return Reach(self.roof_boxes[members], self.terrain_boxes[members])
+
+
+@functools.lru_cache(maxsize=1)
+def load_reaches(root: Path, stamp: int) -> Reaches:
+    """Load the reaches of the plan in `root`.
+
+    Its file has the time `stamp`. Where buildings are redone, they are theirs alone.
+    """
+    return Reaches(load_plan(root), load_redo(root) or None)
+
+
+class Gatherer:
+    """A collector of one file's points by work tile.
+
+    It writes them to `folder`, as often as memory asks for it.
+    """
+
+    def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
+        self.folder, self.number, self.read = folder, number, read
+        self.reach_of, self.near = functools.lru_cache(maxsize=MASKS_KEPT)(reaches.of), reaches.near
+        self.low_kinds = (OTHER, ROOF) if read.roofs == "shape" else (OTHER,)
+        self.found: dict[str, dict[str, list[np.ndarray]]] = {}
+        self.classes: Counter[int] = Counter()
+        self.points = self.held = self.flushes = 0
+
+    def add(self, cloud: PointCloud) -> None:
+        """Take from a chunk what any tile needs."""
+        self.points += len(cloud)
+        classes = cloud.classes
+        self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
+        kinds = self.classify_las_classes()[classes]
+        grid = PointGrid(cloud.xyz, SQUARE_M)
+        for tile in self.near(grid.bounds):
+            reach = self.reach_of(tile)
+            candidates = grid.candidates(reach.bounds)
+            bits = reach.bits(cloud.xyz, candidates)
+            mask = bits > 0
+            candidates, bits = candidates[mask], bits[mask]
+            kind = kinds[candidates]
+            self.keep(
+                tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0)
+            )
+            self.keep(
+                tile,
+                "ground",
+                cloud.xyz.take(candidates[(kind == GROUND) & (bits & 2 > 0)], axis=0),
+            )
+            self.keep(
+                tile, "noise", cloud.xyz.take(candidates[(kind == NOISE) & (bits & 1 > 0)], axis=0)
+            )
+            lower = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
+            self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(lower, axis=0)))
+        if self.held > HELD_POINTS:
+            self.flush()
+
+    def classify_las_classes(self) -> np.ndarray:
+        """Return ROOF, GROUND, OTHER or NOISE (256,) by LAS class.
+
+        A class that is both counts as roof.
+        """
+        kinds = np.full(256, OTHER, np.uint8)
+        for classes, kind in (
+            (NOISE_CLASSES, NOISE),
+            (self.read.ground_classes, GROUND),
+            (self.read.building_classes, ROOF),
+        ):
+            kinds[list(classes)] = kind
+        return kinds
+
+    def keep(self, tile: str, kind: str, points: np.ndarray) -> None:
+        if len(points):
+            self.found.setdefault(tile, {}).setdefault(kind, []).append(points)
+            self.held += len(points)
+
+    def flush(self) -> None:
+        """Write what is held, a file a tile.
+
+        Done again after a kill, it writes the same files.
+        """
+        for tile, result in sorted(self.found.items()):
+            with atomic_file(self.folder / tile / f"{self.number}-{self.flushes}.npz") as file:
+                arrays: dict[str, Any] = {
+                    kind: np.concatenate(items) for kind, items in result.items()
+                }
+                np.savez(file, **arrays)
+        self.found, self.held, self.flushes = {}, 0, self.flushes + 1
+
+    def discard(self) -> None:
+        """Remove what was written of this file."""
+        for written in self.folder.glob(f"*/{self.number}-*.npz"):
+            written.unlink(missing_ok=True)
+
+
+def sort_cloud(
+    folder: str,
+    number: int,
+    address: str,
+    watch: Callable[[PointCloud], None] | None = None,
+    epoch: str = "",
+) -> dict:
+    """Sort the point file at `address`, file `number` of the plan in `folder`.
+
+    Returns {"points": read, "classes": {class: count}}. Of a file that breaks off, or is not what
+    its header says, nothing is kept. Raises InputError for whatever reading it comes to, so that a
+    file's failure is that file's alone; what writing comes to passes through. With `watch`, which
+    is called with each chunk, the whole file is read. The points of an `epoch` stand in a folder of
+    their own.
+    """
+    root = Path(folder)
+    plan, reaches = load_plan(root), load_reaches(root, newest(root / PLAN_FILE, root / REDO))
+    gatherer = Gatherer(reaches, plan.settings.read, root / "points" / epoch, number)
+    noted = noted_file(root, number)
+    result: list[np.ndarray] = []
+    if places := take_places(address):
+        save_run_boxes(noted, places, read_header(address).count)
+    try:
+        is_whole = watch is not None
+        for cloud in wanted_points(address, reaches, plan.units, noted, result, is_whole):
+            gatherer.add(cloud)
+            if watch is not None:
+                watch(cloud)
+    except (MemoryError, OutputError):
+        raise
+    except Exception as error:
+        gatherer.discard()
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        raise as_input_error(error, address) from error
+    gatherer.flush()
+    if result:
+        save_run_boxes(noted, result, read_header(address).count)
+    return {"points": gatherer.points, "classes": dict(gatherer.classes)}
+
+
+def newest(*paths: Path) -> int:
+    """Return the latest time [ns] of those files that exist."""
+    return max(path.stat().st_mtime_ns for path in paths if path.exists())
+
+
+def wanted_points(
+    path: str,
+    reaches: Reaches,
+    units: Units,
+    noted: Path,
+    result: list[np.ndarray] | None = None,
+    is_whole: bool = False,
+) -> Iterator[PointCloud]:
+    """Yield the chunks of a file in `units` that may be needed.
+
+    They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the
+    places of its points in the file `noted`, only what holds buildings' surroundings. Where it is
+    read from end to end, `result` gets these places (noted.py).
+    """
+    if file_kind(path) != "las":
+        return iter_points(path, units=units)
+    header = read_header(path)
+    west, south, _, east, north, _ = header.bounds
+    box = units.to_metres(np.array([[west, south], [east, north]], float)).ravel()
+    if is_whole:
+        return iter_points(path, units=units, noted=None if is_copc(path) else result)
+    if reaches.is_partial and np.isfinite(box).all() and not reaches.near(box):
+        return iter(())
+    if is_copc(path):
+        return points_by_squares(path, reaches, units)
+    index = read_lax(path) or load_run_boxes(noted, header.count)
+    if index is None or is_held(path):
+        return iter_points(path, units=units, noted=result)
+    boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
+    return iter_points(path, runs=index.find_runs(boxes), units=units)
+
+
+def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
+    """Yield a COPC file's points around buildings.
+
+    They lie in the boxes that hold buildings' surroundings.
+
+    The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at
+    their common borders are decoded twice. A point on a border may come twice, as in files that
+    overlap.
+    """
+    (xmin, ymin), (xmax, ymax) = units.to_metres(
+        np.reshape(read_header(path).bounds, (2, 3))[:, :2]
+    )
+    bounds = reaches.compute_bounds(reaches.near((xmin, ymin, xmax, ymax)))
+    corners = np.floor(
+        np.clip(bounds, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M
+    ).astype(np.int64)
+    columns_and_rows = {
+        (column, row)
+        for left, lower, right, upper in corners.tolist()
+        for column in range(left, right + 1)
+        for row in range(lower, upper + 1)
+    }
+    for column, row in sorted(columns_and_rows):
+        square = QUERY_M * np.array([column, row, column + 1, row + 1])
+        nearby = reaches.compute_bounds(reaches.near(square))
+        if len(nearby):
+            lower, upper = nearby[:, :2].min(axis=0), nearby[:, 2:].max(axis=0)
+            box = (*np.maximum(square[:2], lower), *np.minimum(square[2:], upper))
+            yield from iter_points(path, box=box, units=units)
+
+
+def load_points(root: Path, tile: str, epoch: str = "") -> dict[str, np.ndarray]:
+    """Load the points (n, 3) of a work tile from all files, by kind.
+
+    They are those of an `epoch`, where the run has several. Kinds are "roof", "ground", "low" and
+    "noise".
+    """
+    # a name that starts with a dot is what a killed worker left unfinished
+    folder = root / "points" / epoch / tile
+    files = sorted(path for path in folder.glob("*.npz") if not path.name.startswith("."))
+    result: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in POINT_KINDS}
+    for path in files:
+        with np.load(path) as part:
+            for kind in part.files:
+                result[kind].append(part[kind])
+    return {kind: np.concatenate(arrays) for kind, arrays in result.items()}

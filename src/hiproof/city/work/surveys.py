@@ -1,0 +1,67 @@
+"""The points of several surveys in a work tile.
+
+Those of a building are those of the surveys of which its model is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...read.raster import RasterTerrain
+from ..plan.work_plan import WorkPlan
+from .solve import Surroundings
+from .sort import POINT_KINDS, load_points
+
+
+class SurveyPoints:
+    """The points of some surveys in a work tile, by name, alone and together.
+
+    `points` (n, 3) are those of each survey by kind, the newest first.
+    """
+
+    def __init__(
+        self,
+        points: dict[str, dict[str, np.ndarray]],
+        terrain: RasterTerrain | None,
+        plan: WorkPlan,
+    ):
+        self.points, self.terrain, self.plan = points, terrain, plan
+        self.views: dict[tuple[str, ...], Surroundings] = {}
+
+    @staticmethod
+    def load(
+        root: Path,
+        tile: str,
+        terrain: RasterTerrain | None,
+        shifts: dict[str, np.ndarray],
+        plan: WorkPlan,
+    ) -> SurveyPoints:
+        """Load the points of surveys, and take off the shift (3,) of each."""
+        points = {
+            name: {kind: xyz - shift for kind, xyz in load_points(root, tile, name).items()}
+            for name, shift in shifts.items()
+        }
+        return SurveyPoints(points, terrain, plan)
+
+    def unite(self, names: tuple[str, ...]) -> Surroundings:
+        """Return the points of some surveys together."""
+        if names not in self.views:
+            united = {
+                kind: np.concatenate([self.points[name][kind] for name in names])
+                for kind in POINT_KINDS
+            }
+            self.views[names] = Surroundings(united, self.terrain, self.plan)
+        return self.views[names]
+
+    def choose(self, record: Mapping[str, Any]) -> Surroundings:
+        """Return the points of which the model of an object of parameters.jsonl is made.
+
+        They are those of the newest survey where it names none of them.
+        """
+        used = record.get("epochs_used") or ()
+        names = tuple(name for name in self.points if name in used)
+        return self.unite(names or tuple(self.points)[:1])

@@ -1,0 +1,192 @@
+"""The compiled code of a run, in pieces that share next to nothing.
+
+So several processes can compile at the same time.
+
+    echo check | python -m hiproof.city.work.warm_pieces # prints the names of ready functions
+
+Each piece calls what the main job calls, on next to no data: compiling asks for the types of the
+arguments alone.
+"""
+
+from __future__ import annotations
+
+import gc
+import sys
+import traceback
+from collections.abc import Callable
+
+import numpy as np
+import shapely
+
+from ...compiled import news
+from ...garbage import RARELY
+
+# m; a house small enough to be fitted while code compiles
+OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)
+# m; and one with a corner that points inwards
+L_OUTLINE = shapely.box(0.0, 0.0, 6.0, 7.0) | shapely.box(6.0, 2.0, 9.0, 7.0)
+
+
+def house() -> np.ndarray:
+    """Return points (n, 3) of a gable and a flat annex over OUTLINE."""
+    x, y = (
+        axis.ravel() for axis in np.meshgrid(np.arange(0.3, 9.0, 0.6), np.arange(0.3, 7.0, 0.6))
+    )
+    return np.column_stack([x, y, np.where(x < 6.0, 8.0 - 0.7 * np.abs(y - 3.5), 3.0)])
+
+
+def moves() -> None:
+    """Compile the search for volumes.
+
+    Moves come first, so that `planes` is ready elsewhere when it is needed.
+    """
+    from ...fit.union import fit_building
+    from ...fit.union.improve import improve, simplify
+    from ...fit.union.objective import compute_objective
+    from ...fit.union.volumes import make_base
+
+    scene, base = make_house_scene()[1], make_base(-3.0)
+    value = compute_objective(base, scene, np.inf)
+    improve(base, scene, value, np.array([0.7]), 1)
+    simplify(base, scene, value, 0.1)
+    fit_building(house(), L_OUTLINE)
+
+
+def planes() -> None:
+    """Compile the planes and gables with which the search begins."""
+    from ...fit.union.candidates import MOST_PLANES, list_candidates
+
+    _, scene = make_house_scene()
+    list_candidates(scene, np.arange(scene.n), MOST_PLANES)
+
+
+def make_house_scene() -> tuple:
+    """Return the plan of the house, and the search's scene."""
+    from ...fit.union.allowed import list_allowed_shapes
+    from ...fit.union.plan import lay_out_plan
+    from ...fit.union.scene import find_directions, make_scene
+
+    plan = lay_out_plan(house(), OUTLINE)
+    return plan, make_scene(
+        plan, OUTLINE, find_directions(OUTLINE, plan), 1.5, 0.25, list_allowed_shapes(())
+    )
+
+
+def check() -> None:
+    """Compile the check of a solid."""
+    from ...compose import check_solid
+    from ...model import Face, Solid
+
+    box = np.array([[x, y, z] for z in (0.0, 3.0) for y in (0.0, 5.0) for x in (0.0, 5.0)])
+    rings = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces = tuple(Face((ring,), "WallSurface") for ring in rings)
+    check_solid(Solid(box, faces))
+
+
+def solid() -> None:
+    """Compile plan cells, the closed shell, its quality and its texts.
+
+    A building of three points is composed without a fit.
+    """
+    from ...compose import compose
+    from ...frames import LocalFrame
+    from ...method import reconstruct
+    from ...model import Part, Piece, Roof
+    from ...write.head import FileHead
+    from ...write.run_files import fragments
+
+    gable = Piece(shapely.box(0.0, 0.0, 6.0, 7.0), np.array([[0.0, 0.7, 5.55], [0.0, -0.7, 10.45]]))
+    annex = Piece(shapely.box(5.0, 1.0, 9.0, 7.0), np.array([[0.5, 0.0, 3.0]]))
+    compose(Roof((Part("free", (gable, annex)),), OUTLINE, LocalFrame(np.zeros(3))), 0.0)
+    fragments(reconstruct(house()[:3], OUTLINE), ("a", "a"), FileHead(offset=np.zeros(3)))
+
+
+def single() -> None:
+    """Compile the fit of one primitive by itself.
+
+    A roof without a footprint, or `--parts one`, begins with it.
+    """
+    from ...fit import fit_roof
+
+    fit_roof(house())
+
+
+def curves() -> None:
+    """Compile what shows that a part is none of the curved shapes."""
+    from ...fit.union.drums import find_circle
+    from ...fit.union.round_tops import find_centre, measure_fall
+
+    xyz, middle = house(), np.array([3.0, 3.5])
+    measure_fall(xyz, find_centre(xyz, middle, 3.0), 3.0, 0.5)
+    find_circle(xyz, 3.0, xyz[:, 2] == 3.0)
+
+
+def warm_recognition() -> None:
+    """Compile the arrangement of a cloud for the network."""
+    from ...segment.arrange import Layout, arrange
+
+    arrange(house(), Layout())
+
+
+def outlines() -> None:
+    """Compile what runs without footprints draw.
+
+    Touching houses are separated, and each gets an outline.
+    """
+    from ...classify.houses import separate_houses
+    from ...fit.outline import estimate_outline
+
+    separate_houses(house(), OUTLINE, 1.0)
+    estimate_outline(house(), 0.3)
+
+
+def points() -> None:
+    """Compile the sorting of points, and what a building needs of them.
+
+    These are those of one building, the ground around it, and whether its footprint lies off.
+    """
+    from ...fit.align import find_shift
+    from ...geometry.point_grid import PointGrid
+    from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+    from .sort import Reach
+
+    xyz, boxes = house(), np.array([[0.0, 0.0, 9.0, 7.0]])
+    Reach(boxes, boxes).bits(xyz, np.arange(len(xyz)))
+    PointGrid(xyz).inside(OUTLINE)
+    GroundAround(ground_cells(xyz), boxes[0]).height_at(xyz[:, :2])
+    LowestAround(Cells(lowest_in_cells(xyz)), boxes[0]).height_at(xyz[:, :2])
+    find_shift(xyz[:, :2], shapely.box(1.0, 0.5, 10.0, 7.5))
+
+
+PIECES: dict[str, Callable[[], None]] = {
+    piece.__name__: piece
+    for piece in (moves, planes, outlines, solid, check, points, single, curves, warm_recognition)
+}
+
+
+def main() -> None:
+    """Compile the pieces whose names come in, a line each.
+
+    Prints the names of functions as they become ready; after each piece its own.
+    """
+    reported: set[str] = set()
+
+    def tell(finished: int, total: int) -> None:
+        for new in sorted(news.ready - reported):
+            print(new, flush=True)
+        reported.update(news.ready)
+
+    news.listener = tell
+    gc.set_threshold(RARELY)
+    for name in map(str.strip, sys.stdin):
+        try:
+            PIECES[name]()
+        except Exception:
+            traceback.print_exc()
+            name = news.FAILED
+        tell(0, 0)
+        print(name, flush=True)
+
+
+if __name__ == "__main__":
+    main()
