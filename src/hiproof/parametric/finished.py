@@ -24,7 +24,7 @@ from ..frames import LocalFrame
 from ..geometry.rings import repair_polygons, ring_normal, ring_normals
 from ..model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Roof, Solid
 from ..read.cityjson import documents, reference_system
-from ..read.crs import find_units, parse_crs
+from ..read.crs import find_units, parse_crs, read_named_crs
 from ..read.damage import Damaged, refuse
 from ..read.solids import CITYGML_SUFFIXES, find_citygml_crs, read_building_solids
 from ..settings import ComposeSettings
@@ -90,23 +90,24 @@ def open_run(path: str | os.PathLike[str], crs: Any = None) -> Run:
         file = path
     elif not file.is_file():
         file = run_models(path)
-    head = read_file_head(file, record)
-    return Run(file, head if crs is None else dataclasses.replace(head, crs=parse_crs(crs)), record)
+    return Run(file, read_file_head(file, record, parse_crs(crs)), record)
 
 
-def read_file_head(file: Path, record: dict[str, Any]) -> FileHead:
+def read_file_head(file: Path, record: dict[str, Any], crs: Any = None) -> FileHead:
     """Read what a file says of its models.
 
-    The CRS is that of `record` where the file names none.
+    The CRS is `crs`, else that of the file, else that of `record`.
     """
     if is_parameters(file):
         with opened_parameters(file) as (head, _):
-            return head
+            return head if crs is None else dataclasses.replace(head, crs=crs)
+    if crs is not None:
+        return FileHead(crs)
     if file.suffix.lower() in CITYGML_SUFFIXES:
         name = find_citygml_crs(file)
     else:
         name = reference_system(next(documents(file))[0])
-    return FileHead(parse_crs(name) if name else run_crs(record))
+    return FileHead(read_named_crs(name, file) if name else run_crs(record))
 
 
 def is_parameters(file: Path) -> bool:
@@ -150,10 +151,10 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[De
 
 
 def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[BuildingModel]:
-    if path.suffix.lower() in CITYGML_SUFFIXES:
-        solids = read_building_solids(path, damaged)
-        return (BuildingModel(id, {}, solid) for id, solid in solids)
     units = find_units(head.crs) if head.crs is not None else head.units.cityjson
+    if path.suffix.lower() in CITYGML_SUFFIXES:
+        solids = read_building_solids(path, damaged, units)
+        return (BuildingModel(id, {}, solid) for id, solid in solids)
     return read_models(path, units, damaged=damaged, must_be_valid=True)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..frames import METRES, Units
-from .crs import find_named_units
+from .crs import find_named_units, refuse_other_crs
 from .damage import Damaged, excerpt, readable, refuse
 from .plausible import is_plausible
 from .shells import read_vertices
@@ -57,12 +57,17 @@ def features(
     comes without objects. Raises InputError as `documents` does.
     """
     transform, units = None, crs_units or alternative
+    first_name, seen_head = None, False
     for document, place in documents(path, damaged):
         if not document:
             yield Feature({}, np.empty((0, 3)), place, units, True)
             continue
-        if name := reference_system(document):
+        name = reference_system(document)
+        if seen_head:
+            refuse_other_crs(first_name, name, place)
+        elif name:
             units = crs_units or find_named_units(name, alternative)
+        first_name, seen_head = first_name if seen_head else name, True
         try:
             transform = read_transform(document) or transform
             yield Feature(

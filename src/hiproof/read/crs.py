@@ -11,7 +11,7 @@ import numpy as np
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from ..errors import InputError
+from ..errors import InputError, InputWarning
 from ..frames import METRES, Units
 from .axes import check_height_axis, check_plan_axes
 
@@ -27,6 +27,17 @@ NAMED_UNITS = {
 """Units by the setting's name, for coordinates without a CRS."""
 
 
+ADV_NAMES = {
+    **{f"ETRS89_UTM{zone}": 25800 + zone for zone in (31, 32, 33)},
+    **{f"DE_DHDN_3GK{zone}": 31464 + zone for zone in (2, 3, 4, 5)},
+    "DE_DHHN12_NH": 7699,
+    "DE_DHHN85_NH": 5784,
+    "DE_DHHN92_NH": 5783,
+    "DE_DHHN2016_NH": 7837,
+}
+"""EPSG codes of names in `urn:adv:crs:PLAN*HEIGHT`, as German surveying authorities write them."""
+
+
 @dataclass(frozen=True)
 class UnknownCRS:
     """A CRS that a file defines, but that cannot be understood, and why."""
@@ -37,15 +48,18 @@ class UnknownCRS:
 def parse_crs(value: Any) -> CRS | None:
     """Return the pyproj CRS of an EPSG number, "EPSG:7415", WKT or a CRS.
 
-    None and "" stay None. Raises InputError otherwise.
+    Names of the German surveying authorities are understood, too. None and "" stay None. Raises
+    InputError otherwise.
 
     >>> parse_crs("EPSG:28992").to_epsg()
     28992
+    >>> parse_crs("urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH").name
+    'ETRS89 / UTM zone 32N + DHHN2016 height'
     """
     if value is None or (isinstance(value, str) and not value.strip()):
         return None
     try:
-        return CRS.from_user_input(value)
+        return CRS.from_user_input(translate_adv(value) if isinstance(value, str) else value)
     except CRSError as error:
         text = str(value)[:60]
         raise InputError(
@@ -53,6 +67,47 @@ def parse_crs(value: Any) -> CRS | None:
             f"({explain_crs_error(error)}); "
             "give its EPSG code or its WKT"
         ) from error
+
+
+def translate_adv(name: str) -> str:
+    """Return the EPSG codes of a name of the German surveying authorities.
+
+    Other names stay.
+    """
+    parts = name.strip().removeprefix("urn:adv:crs:").split("*")
+    codes = [ADV_NAMES.get(part) for part in parts]
+    return name if None in codes else "EPSG:" + "+".join(map(str, codes))
+
+
+def read_named_crs(name: Any, path: Any) -> CRS | None:
+    """Return the CRS that a file names.
+
+    None, with a warning, where PROJ does not know it.
+    """
+    try:
+        return parse_crs(name)
+    except InputError:
+        warnings.warn(
+            f"{path}: names a CRS that PROJ does not know, {str(name)[:60]!r}; it is taken as a "
+            "file that names none. Name another in the file, or with --crs",
+            InputWarning,
+        )
+        return None
+
+
+def refuse_other_crs(first: str | None, name: str | None, place: str) -> None:
+    """Raise InputError where a `place` in a file names another CRS than its beginning."""
+    if name is None or name == first:
+        return
+    try:
+        if first is not None and parse_crs(first) == parse_crs(name):
+            return
+    except InputError:
+        pass
+    raise InputError(
+        f"expected one CRS in a file, got {name:.80} in {place} after "
+        f"{'none' if first is None else first[:80]}; write a file for each"
+    )
 
 
 def explain_crs_error(error: CRSError) -> str:

@@ -28,6 +28,7 @@ from .crs import (
     names_heights_alone,
     names_place,
     parse_crs,
+    read_named_crs,
     same_horizontal,
 )
 from .database import is_database, read_table, table_crs
@@ -87,7 +88,7 @@ def read_footprints(
     meta, numbers, geometries, columns = read_features(path, layer, where, bbox, target)
     attributes = attribute_rows(list(meta["fields"]), columns, len(geometries))
     ids = feature_ids(attributes, numbers, id_attribute, path)
-    source = plan_crs(meta["crs"])
+    source = plan_crs(meta["crs"], path)
     surfaces = np.array([is_surface(geometry) for geometry in geometries])
     geometries = transform_geometries(geometries, source, target, path)
     units = find_units(target or source, f"the footprints of {path}", read.unit)
@@ -116,24 +117,24 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     Raises InputError as `read_footprints` does.
     """
     if is_database(path):
-        return plan_crs(table_crs(str(path)))
+        return plan_crs(table_crs(str(path)), path)
     if is_parquet(path):
         from .parquet_table import parquet_crs
 
-        return plan_crs(parquet_crs(path))
+        return plan_crs(parquet_crs(path), path)
     if is_geopackage(path) and (code := read_plain_crs(path, layer)) is not None:
-        return plan_crs(code)
+        return plan_crs(code, path)
     from .vector_file import vector_file_crs
 
-    return plan_crs(vector_file_crs(path, layer))
+    return plan_crs(vector_file_crs(path, layer), path)
 
 
-def plan_crs(text: str | CRS | None) -> CRS | None:
+def plan_crs(text: str | CRS | None, path: str | Path) -> CRS | None:
     """Return the CRS that a vector file names, None if it has no plan.
 
     GeoPackage's "undefined" is None too.
     """
-    crs = parse_crs(text)
+    crs = read_named_crs(text, path)
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
 
@@ -155,7 +156,7 @@ def read_features(
         return read_table(str(path), where)
     refuse_missing(path)
     features = read_file(
-        path, layer, where, lambda crs: bbox and box_in(plan_crs(crs), bbox, bbox_crs)
+        path, layer, where, lambda crs: bbox and box_in(plan_crs(crs, path), bbox, bbox_crs)
     )
     meta, _, geometries, _ = features
     refuse_nothing(path, len(geometries), meta["total_bounds"], where, bbox)

@@ -22,7 +22,7 @@ from pyproj import CRS
 
 from ..errors import InputError
 from ..extras import import_extra
-from .crs import parse_crs
+from .crs import read_named_crs
 from .remote import is_url, open_binary
 from .wkb import decode_geometries
 
@@ -128,7 +128,7 @@ def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
     return GeometryColumn(
         name=name,
         encoding=encoding,
-        crs=parse_crs(told.get("crs", LONGITUDE_LATITUDE)),
+        crs=read_named_crs(told.get("crs", LONGITUDE_LATITUDE), path),
         others=tuple(other for other in geo["columns"] if other != name),
         sides=sides_of_rows(told, file.schema_arrow),
         # of a box in space the middle two sides are those in plan

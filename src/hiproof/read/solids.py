@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..frames import METRES
+from ..frames import METRES, Units
 from ..log import count_things
 from ..model import WALL, Face, Solid
 from .cityjson import UNUSABLE, Feature, features, unusable
-from .crs import find_named_units
+from .crs import find_named_units, refuse_other_crs
 from .damage import Damaged, refuse
 from .shells import read_geometries, read_shell, require_list
 
@@ -77,12 +77,12 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
     yield from readers[suffix](path, damaged)
 
 
-def read_building_solids(path: Path, damaged: Damaged) -> Iterator[tuple[str, Solid]]:
+def read_building_solids(path: Path, damaged: Damaged, units: Units) -> Iterator[tuple[str, Solid]]:
     """Yield (id, Solid) for each shell of the buildings in a CityGML file.
 
-    Installations are left out; see `read_solids`.
+    `units` are those of its coordinates. Installations are left out; see `read_solids`.
     """
-    return citygml_solids(path, damaged, without=BUILDING_OBJECT)
+    return citygml_solids(path, damaged, BUILDING_OBJECT, units)
 
 
 def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
@@ -171,26 +171,29 @@ def local_name(element: Any) -> str:
 
 
 def citygml_solids(
-    path: Path, damaged: Damaged = refuse, without: str = ""
+    path: Path, damaged: Damaged = refuse, without: str = "", crs_units: Units | None = None
 ) -> Iterator[tuple[str, Solid]]:
     """Yield the shells of all solids of a CityGML file, member by member.
 
-    City objects of the kind `without` are left out.
+    City objects of the kind `without` are left out. `crs_units` are the units of its coordinates,
+    by default those of the CRS that it names.
 
     An object without a gml:Solid gives its boundary surfaces as one shell.
     """
     from lxml import etree
 
-    members, units = 0, METRES
+    members, units, first_name = 0, crs_units or METRES, None
     try:
         for _, element in etree.iterparse(
             str(path), events=("end",), huge_tree=True, resolve_entities=False
         ):
             if local_name(element) == "Envelope" and not members:
-                units = find_named_units(element.get("srsName"))
+                first_name = element.get("srsName")
+                units = crs_units or find_named_units(first_name)
             if local_name(element) not in ("cityObjectMember", "featureMember"):
                 continue
             members += 1
+            refuse_mixed_crs(element, first_name, path)
             try:
                 solids = list(member_solids(element, path, without))
             except InputError as error:
@@ -209,6 +212,12 @@ def citygml_solids(
         raise InputError(
             f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?"
         )
+
+
+def refuse_mixed_crs(member: Any, first_name: str | None, path: Path) -> None:
+    """Raise InputError for a city object in another CRS than the envelope."""
+    for name in {element.get("srsName") for element in member.iter()} if first_name else ():
+        refuse_other_crs(first_name, name, f"{gml_id(member[0])} in {path}")
 
 
 def find_citygml_crs(path: Path) -> str | None:
