@@ -3,8 +3,8 @@
 It is a single slope that breaks once into a shallower upper part.
 
 A primitive is data: its planes as formulas of half width V, half length U and q0..q3, the paper's
-vertices and faces, and where its fit starts. In the package this would be one file in `primitives/`
-and one line in its catalogue.
+vertices and faces, and where its fit starts. In the package this would be one row of
+`data/shapes.toml`.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Laws every shape of the catalogue obeys; a new shape inherits them by its catalogue line."""
+"""Laws every shape of the catalogue obeys; a new shape inherits them by its row of the table."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
-"""A primitive is one file: what `examples/new_primitive.py` registers, every stage knows, the
-network's labels left aside.
+"""A primitive is one declaration: every stage knows what `examples/new_primitive.py`
+registers, the network's labels left aside.
 """
 
 import runpy

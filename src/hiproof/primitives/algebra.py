@@ -71,15 +71,6 @@ class Formula:
             result.append(Formula(tuple(lowered)))
         return tuple(result)
 
-    def with_multiple(self, symbol: str, factor: float) -> Formula:
-        """Replace a symbol by `factor` times that symbol.
-
-        >>> (q1 * V / U).with_multiple("V", 2.0)(V=3.0, U=4.0, q0=0.0, q1=1.0, q2=0.0, q3=0.0)
-        1.5
-        """
-        k = SYMBOLS.index(symbol)
-        return Formula(tuple((f * factor ** powers[k], powers) for f, powers in self.terms))
-
     def __add__(self, other: Formula | float) -> Formula:
         return add_terms(self.terms + formula(other).terms)
 

@@ -29,7 +29,6 @@ import shapely
 from ..errors import FitError
 from ..model import Part, Piece
 from .algebra import Formula, formula
-from .drawing import drawn_slope
 
 # places in theta (9,): centre, rotation, half sizes, and four numbers of the shape
 CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
@@ -38,6 +37,7 @@ SPIRE_SLOPE_MAX = 5.7  # 80 degrees, of spires alone
 SHORTEST_LENGTH_M = 1e-3  # Shortest length (m) of a parameter. Shorter ones are numerical noise.
 WRITTEN_DIGITS = 6  # Digits of a length (m) in files of parameters: micrometres.
 SLOPE_SHARE = 1e-3  # Largest error of a slope or a share that rounded parameters may cause.
+SIDES = ("left", "right", "front", "back")
 LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: -u, +u, -v, +v, none
 
 Plane = tuple[Formula | float, Formula | float, Formula | float]
@@ -63,7 +63,6 @@ class Sides(Protocol):
     @property
     def top(self) -> float: ...
     def apex(self, axis: int) -> float: ...
-    def resize(self, half: np.ndarray) -> Sides: ...
 
 
 @dataclass(frozen=True)
@@ -249,9 +248,8 @@ class Primitive:
         """Draw theta_p of a random roof that is `width` metres wide."""
         if self.draw is not None:
             return self.draw(rng, width)
-        return self.typical(
-            width, width * rng.uniform(1.05, 2.2), 0.5 * width * drawn_slope(rng, 20.0, 45.0)
-        )
+        length, angle = width * rng.uniform(1.05, 2.2), rng.uniform(20.0, 45.0)
+        return self.typical(width, length, 0.5 * width * math.tan(math.radians(angle)))
 
     def from_member(self, member: Sides) -> tuple[float, ...]:
         """Return q of the shape with the slopes of a member's front and right.

@@ -7,14 +7,15 @@ and volumes hold. Stretched in one axis, it is an ellipse.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .algebra import Formula, U, V, q1
-from .contract import Plane
+from .contract import Plane, Primitive
 
 # Farthest (m) that a facet's edge may lie off the circle that it stands for while it is fitted, the
 # default of the setting `compose.chord_tolerance_m`.
@@ -26,13 +27,21 @@ PROFILE_DEG = (0.0, 20.0, 40.0, 60.0, 90.0)
 NUMERICAL_ZERO = 1e-12  # A smaller share is none.
 
 
-def count_sides(p: Mapping[str, float]) -> int:
+def with_facets(
+    make: Callable[[int], Primitive], side_counts: tuple[int, ...] = SIDE_COUNTS, **changes: Any
+) -> Primitive:
+    """Return a round shape that has a variant for each number of sides, one of which is fitted."""
+    first, *others = map(make, side_counts)
+    return replace(first, more=tuple(replace(other, starts=()) for other in others), **changes)
+
+
+def count_sides(diameter: float, most: int = max(SIDE_COUNTS)) -> int:
     """Return the place in SIDE_COUNTS of the fewest sides that keep CHORD_M.
 
-    >>> [SIDE_COUNTS[count_sides({"length": x})] for x in (2.0, 8.0, 30.0, 400.0)]
+    >>> [SIDE_COUNTS[count_sides(x)] for x in (2.0, 8.0, 30.0, 400.0)]
     [8, 16, 32, 64]
     """
-    return SIDE_COUNTS.index(min(find_sides(p["length"] / 2, CHORD_M), max(SIDE_COUNTS)))
+    return SIDE_COUNTS.index(min(find_sides(diameter / 2, CHORD_M), most))
 
 
 def find_sides(radius: float, chord_m: float) -> int:

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -36,9 +36,20 @@ from ..errors import FitError
 from ..model import Part, Piece
 from .cants import compute_cant_planes, name_cant_values, no_cants, read_cants, turn_cants
 from .catalogue import CATALOGUE, get
-from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, Q0, RIGHT, Primitive
+from .contract import (
+    BACK,
+    FRONT,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    KAPPA,
+    LEFT,
+    LEVEL,
+    Q0,
+    RIGHT,
+    SIDES,
+    Primitive,
+)
 
-SIDES = ("left", "right", "front", "back")
 AXIS = np.array([0, 0, 1, 1])
 # the plane from the left rises to +u, from the right to -u, ...
 SIGN = np.array([1.0, -1.0, 1.0, -1.0])
@@ -191,13 +202,6 @@ class Member:
         # from the low side's eave to the ridge
         run = (upper - lower + 2.0 * self.half[axis] * other) / (item + other)
         return lower + item * run
-
-    def resize(self, half: np.ndarray) -> Member:
-        """Return the member with its eaves and slopes over another rectangle.
-
-        `half` (2,) are the new half extents.
-        """
-        return replace(self, half=half)
 
     def turn(self, quarters: int = 1) -> Member:
         """Return the same surface with axes turned by `quarters` times 90 degrees.

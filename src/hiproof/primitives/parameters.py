@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import FitError, InputError
 from .cants import CANTED, MEASURES, list_cants
 from .catalogue import CATALOGUE
-from .contract import LEVEL
-from .family import COMPONENTS, SIDES, list_eaves
+from .contract import LEVEL, SIDES
+from .family import COMPONENTS, list_eaves
 
 SIDED = CANTED | {f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew")}
 """Parameters of a member's sides and cants; a part that has one gives all of its shape side by

@@ -5,37 +5,45 @@ Domes and onions are made so. facets.py draws their profiles.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from .algebra import Formula
-from .contract import Plane, Shape
+from .contract import Corners, Plane, Primitive
 from .facets import ChordProfile, find_apothem, make_facet_planes, make_rim
+from .table import make_shape
 
 
-def make_ring_planes(sides: int, profile: ChordProfile, eave: Formula) -> tuple[Plane, ...]:
-    """Return the planes of all facets above an `eave`."""
+def revolve(
+    name: str,
+    sides: int,
+    profile: ChordProfile,
+    eave: Formula,
+    constants: Mapping[str, float] | None = None,
+    **changes: Any,
+) -> Primitive:
+    """Return the shape of a row whose profile is turned, in so many facets around."""
+    rim = make_rim(sides, find_apothem(sides))
     planes: tuple[Plane, ...] = ()
     for height, fall in profile.chords:
         planes += make_facet_planes(sides, find_apothem(sides), fall, eave + height)
-    return planes
 
+    def corners(p: Mapping[str, float]) -> Corners:
+        """Return the apex, then ring by ring the corners of the facets, last the eave's."""
+        values, ring = shape.shape(p), np.array(rim) * (p["length"] / 2, p["width"] / 2)
+        rings = [
+            np.column_stack([share * ring, np.full(sides, height.at(values))])
+            for share, height in zip(profile.knots[1:], profile.heights[1:], strict=True)
+        ]
+        return np.vstack([[[0.0, 0.0, p["height"]]], *rings])
 
-def list_ring_corners(
-    sides: int, profile: ChordProfile, shape: Callable[[Mapping[str, float]], Shape], p: Mapping
-) -> np.ndarray:
-    """Return the apex, then ring by ring the corners of the facets, last the eave's.
-
-    The `shape` has the parameters `p`.
-    """
-    values = shape(p)
-    ring = np.array(make_rim(sides, find_apothem(sides))) * (p["length"] / 2, p["width"] / 2)
-    rings = [
-        np.column_stack([share * ring, np.full(sides, height.at(values))])
-        for share, height in zip(profile.knots[1:], profile.heights[1:], strict=True)
-    ]
-    return np.vstack([[[0.0, 0.0, p["height"]]], *rings])
+    faces = list_ring_faces(sides, len(profile.chords))
+    shape = make_shape(
+        name, constants, planes=planes, corners=corners, faces=faces, rim=rim, **changes
+    )
+    return shape
 
 
 def list_ring_faces(sides: int, rings: int) -> tuple[tuple[int, ...], ...]:

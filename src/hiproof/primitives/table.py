@@ -1,0 +1,172 @@
+"""Make roof shapes of the rows of data/shapes.toml, where their columns are explained."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from importlib import resources
+from types import CodeType
+from typing import Any
+
+import numpy as np
+
+from .algebra import SYMBOLS, U, V, formula, q0, q1, q2, q3
+from .contract import (
+    HALF_LENGTH,
+    HALF_WIDTH,
+    KAPPA,
+    Q0,
+    SIDES,
+    SLOPE_MAX,
+    SLOPE_MIN,
+    SPIRE_SLOPE_MAX,
+    DerivedStart,
+    Primitive,
+    Shape,
+    Sides,
+    Vote,
+)
+
+FORMULAS = dict(zip(SYMBOLS, (V, U, q0, q1, q2, q3), strict=True))
+LIMITS = {
+    "slope": (SLOPE_MIN, SLOPE_MAX),
+    "spire": (SLOPE_MIN, SPIRE_SLOPE_MAX),
+    "steepest": SLOPE_MAX,
+}
+BASICS: dict[str, Any] = {"__builtins__": {}, "min": min, "max": max, "pi": math.pi}
+TABLE = resources.files("hiproof") / "data" / "shapes.toml"
+ROWS: dict[str, dict[str, Any]] = tomllib.loads(TABLE.read_text(encoding="utf-8"))
+
+
+@cache
+def compile_text(text: str) -> CodeType:
+    return compile(f"({text})", TABLE.name, "eval")
+
+
+def evaluate(text: str, names: Mapping[str, Any], where: Mapping[str, str] | None = None) -> Any:
+    """Return the value of an expression, with the values `where` names before.
+
+    Raises KeyError for a name that has no value.
+
+    >>> evaluate("height / v, 0.0", {"height": 3.0}, {"v": "4.0 / 2"})
+    (1.5, 0.0)
+    """
+    known = {**BASICS, **names}
+    try:
+        for name, part in (where or {}).items():
+            known[name] = eval(compile_text(part), known)
+        return eval(compile_text(text), known)
+    except NameError as error:
+        raise KeyError(error.name) from error
+
+
+def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: Any) -> Primitive:
+    """Return the shape of a row with `changes` of the primitive's fields.
+
+    `constants`, such as a number of teeth, have a name in the row's expressions.
+    """
+    row, constants = ROWS[key], constants or {}
+    symbols = {**FORMULAS, **constants}
+    measures = {"width": 2 * V, "length": 2 * U} | {
+        name: formula(evaluate(text, symbols)) for name, text in row.get("measures", {}).items()
+    }
+
+    def shape(p: Mapping[str, float]) -> Shape:
+        v, u = p["width"] / 2, p["length"] / 2
+        q = evaluate(row["q"], {**p, **constants, "u": u, "v": v})
+        return (v, u, *q, *[0.0] * (4 - len(q)))
+
+    def corners(p: Mapping[str, float]) -> Any:
+        names = {**p, "u": p["length"] / 2, "v": p["width"] / 2}
+        return evaluate(row["corners"], names, row.get("where"))
+
+    def choose_sizes(texts: Mapping[str, str], names: Mapping[str, Any]) -> dict[str, float]:
+        """Return the parameters of sizes that are chosen one after the other."""
+        chosen = {**constants, **names}
+        for name, text in texts.items():
+            chosen[name] = evaluate(text, chosen)
+        return {name: chosen[name] for name in measures}
+
+    def typical(width: float, length: float, height: float) -> dict[str, float]:
+        sizes = {"width": width, "length": length, "height": height}
+        return choose_sizes(row.get("typical", {}), sizes)
+
+    def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+        chances = {
+            "uniform": lambda low, high: float(rng.uniform(low, high)),
+            "slope": lambda low, high: draw_slope(rng, low, high),
+            "integers": lambda low, high: float(rng.integers(low, high)),
+            "random": rng.random,
+        }
+        return choose_sizes(row["draw"], {"width": width, **chances})
+
+    own: dict[str, Any] = {
+        "name": row.get("variant_of", key),
+        "citygml_code": row["codes"][0],
+        "adv_code": row["codes"][1],
+        "osm_shape": row["codes"][2] if len(row["codes"]) > 2 else None,
+        "measures": measures,
+        "eave": formula(evaluate(row["eave"], symbols)),
+        "shape": shape,
+        "corners": corners,
+        "typical": typical,
+        "draw": draw if "draw" in row else None,
+        "bounds": evaluate(row.get("bounds", ""), LIMITS),
+        "starts": read_starts(row.get("starts", []), symbols),
+        "signed": tuple(row.get("signed", ())),
+        "more": tuple(make_shape(k) for k, r in ROWS.items() if r.get("variant_of") == key),
+    }
+    if "planes" in row:
+        own["planes"] = evaluate(row["planes"], symbols)
+        own["faces"] = tuple(map(tuple, row["faces"]))
+    if "vote" in row:
+        vote: Any = {n: tuple(v) if isinstance(v, list) else v for n, v in row["vote"].items()}
+        own["vote"] = Vote(**vote)
+    if "canonical" in row:
+        own["canonical"] = lambda theta: turn_where(row["canonical"], theta)
+    if "member" in row:
+        own["read_member"] = lambda member: evaluate(row["member"], name_member(member))
+    own |= {name: row[name] for name in ("legend", "half_turn_symmetric") if name in row}
+    return Primitive(**own | changes)
+
+
+def read_starts(rows: list[dict[str, Any]], symbols: dict[str, Any]) -> tuple[DerivedStart, ...]:
+    """Return a start for each of the quarters of each row."""
+    return tuple(
+        DerivedStart(
+            row["from"],
+            evaluate(row["q"], symbols),
+            quarters,
+            evaluate(row.get("turn", "0.0"), symbols),
+        )
+        for row in rows
+        for quarters in row.get("quarters", [0])
+    )
+
+
+def turn_where(rule: Mapping[str, Any], theta: np.ndarray) -> np.ndarray:
+    """Return the same surface with its axes turned where the rule holds for theta (9,)."""
+    names = dict(zip(SYMBOLS, theta[HALF_WIDTH:].tolist(), strict=True))
+    if not evaluate(rule["when"], names, rule.get("where")):
+        return theta
+    turned, q = theta.copy(), evaluate(rule["q"], names)
+    turned[KAPPA] += rule["quarters"] * math.pi / 2
+    if rule["quarters"] % 2:
+        turned[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]
+    turned[Q0 : Q0 + len(q)] = q
+    return turned
+
+
+def name_member(member: Sides) -> dict[str, Any]:
+    """Return by name what a row may say of a member of the family."""
+    names = {"v": member.half[1], "ridge": member.apex(1), "top": member.top}
+    for side, slope, eave in zip(SIDES, member.slopes, member.eaves, strict=True):
+        names |= {side: slope, f"{side}_eave": eave}
+    return names
+
+
+def draw_slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> float:
+    """Draw a slope (rise by run) whose angle lies between two, in degrees."""
+    return math.tan(math.radians(rng.uniform(low_deg, high_deg)))
