@@ -28,7 +28,7 @@ OPTIONS |= {"--help", "--version"}
 PLACES = [ROOT, ROOT / "src/hiproof", ROOT / "src/hiproof/primitives", ROOT / "tests"]
 OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ", "projsync ", "docker ")
 
-ATTRIBUTES = {table.prefix + attribute.name for table in TABLES for attribute in table.attributes}
+ATTRIBUTES = {table.prefix + name for table in TABLES.values() for name in table.names}
 # tables of a database, by the prefix that is the default
 ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs", "hiproof_runs"}
 

@@ -14,7 +14,7 @@ from hiproof.enrich.storeys import count_storeys, measure_floors, storey_heights
 from hiproof.errors import InputError
 from hiproof.parametric.building import build
 from hiproof.settings import EnrichSettings
-from hiproof.write.attribute_list import ENRICHED, ENRICHED_3DBAG, OWN
+from hiproof.write.attribute_list import OWN, TABLES
 from streets import answer_street, open_street, place_house, write_street
 
 RIGHT_SHARE = 0.97  # of house types on simulated streets
@@ -163,7 +163,7 @@ def test_a_use_decides_whether_a_building_is_a_house(tmp_path):
 
 def test_answers_are_as_declared(tmp_path):
     values = answer_street(tmp_path, [place_house("a", 0, 0)])["a"].attributes
-    declared = {OWN + a.name for a in ENRICHED} | {a.name for a in ENRICHED_3DBAG}
+    declared = {OWN + name for name in TABLES["enriched"].names} | {*TABLES["enriched_3dbag"].names}
     assert set(values) == declared - {"hiproof_not_enriched"}
     assert json.dumps(values)
 

@@ -19,7 +19,7 @@ from hiproof.enrich.sun import irradiate, measure_sky, sample_face
 from hiproof.errors import InputError
 from hiproof.model import ROOF, WALL
 from hiproof.settings import EnrichSettings
-from hiproof.write.attribute_list import ENRICHED_SUN, ENRICHED_SUN_SURFACE, OWN
+from hiproof.write.attribute_list import OWN, TABLES
 from hiproof.write.head import FileHead
 from hiproof.write.meshes.triangles import faces_triangles
 from streets import open_street, place_house, write_street
@@ -192,10 +192,13 @@ def test_the_files_of_a_run_have_the_sun(tmp_path):
     assert result.exit_code == 0 and f"sun: weather of {tmp_path / 'a.epw'}" in result.output
     import pyogrio
 
-    for layer, declared in (("buildings", ENRICHED_SUN), ("roof_surfaces", ENRICHED_SUN_SURFACE)):
+    for layer, declared in (
+        ("buildings", "enriched_sun"),
+        ("roof_surfaces", "enriched_sun_surface"),
+    ):
         head, _, _, columns = pyogrio.raw.read(folder / "enriched/buildings.gpkg", layer=layer)
         table = dict(zip(head["fields"], columns, strict=True))
-        names = {OWN + a.name for a in declared} - {"hiproof_wall_sun_kwh"}
+        names = {OWN + name for name in TABLES[declared].names} - {"hiproof_wall_sun_kwh"}
         assert names <= set(table)
         assert all((table[name] >= 0).all() for name in names - {"hiproof_sun_sky"})
         assert set(table.get("hiproof_sun_sky", ["a.epw"])) == {"a.epw"}

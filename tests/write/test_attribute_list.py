@@ -14,21 +14,7 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.family import COMPONENTS
 from hiproof.primitives.parameters import list_parameters, list_side_parameters
 from hiproof.write import write_all
-from hiproof.write.attribute_list import (
-    CHANGE,
-    CHANGE_PLACE,
-    EVALUATION,
-    HEAD,
-    HIPROOF,
-    OWN,
-    PARAMETERS,
-    PART,
-    PARTS_LAYER,
-    PREFIX,
-    ROOF_SURFACE,
-    ROOFER,
-    TABLES,
-)
+from hiproof.write.attribute_list import OWN, PREFIX, TABLES
 from hiproof.write.building_attributes import building_attributes, measure_figures
 from hiproof.write.parameters import FileHead, building_record, head_record
 
@@ -36,8 +22,8 @@ DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
 KINDS = {"number": (int, float), "count": int, "text": str}
 
 
-def names(attributes, prefix=""):
-    return [prefix + attribute.name for attribute in attributes]
+def names(table, prefix=""):
+    return [prefix + name for name in TABLES[table].names]
 
 
 def test_the_document_is_current(capsys):
@@ -46,8 +32,8 @@ def test_the_document_is_current(capsys):
 
 
 def test_everything_is_explained():
-    for table in TABLES:
-        assert len(set(names(table.attributes))) == len(table.attributes)
+    for table in TABLES.values():
+        assert len(set(table.names)) == len(table.attributes)
         assert all(attribute.meaning and attribute.kind for attribute in table.attributes)
 
 
@@ -85,14 +71,16 @@ def test_buildings_have_the_attributes_declared():
     feet = Units(0.3048, 0.3048, "foot", "foot")
     sound = make_building(gable_house())
     further = {OWN + name for name in FURTHER}
-    declared = {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)} - further
+    declared = {*names("roofer", PREFIX), *names("hiproof", OWN)} - further
     of_a_change = {OWN + name for name in OF_A_CHANGE}
     for building in (sound, make_lost_building(), change_building(sound)):
         result = building_attributes(building, measure_figures(building), units=feet)
         added = set(result) - set(building.attributes)
         assert added == (declared - of_a_change if building.change is None else declared)
         for attribute, prefix in (
-            (a, p) for table, p in ((ROOFER, PREFIX), (HIPROOF, OWN)) for a in table
+            (a, p)
+            for name, p in (("roofer", PREFIX), ("hiproof", OWN))
+            for a in TABLES[name].attributes
         ):
             value = result.get(prefix + attribute.name)
             assert value is None or isinstance(value, KINDS[attribute.kind]), attribute.name
@@ -118,18 +106,18 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
         if g["type"] == "Solid"
         for s in g["semantics"]["surfaces"]
     ]
-    assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
+    assert {key for s in surfaces for key in s} - {"type"} == set(names("roof_surface"))
     record = building_record(make_building(gable_house()))
-    usual = [name for name in names(PARAMETERS) if name not in FURTHER]
+    usual = [name for name in names("building") if name not in FURTHER]
     assert list(record) == [name for name in usual if name != "change"]
     changed = building_record(change_building(make_building(gable_house())))
     assert list(changed) == usual
-    assert list(changed["change"]) == names(CHANGE)
-    assert list(changed["change"]["places"][0]) == names(CHANGE_PLACE)
-    assert list(record["parts"][0]) == names(PART)
-    assert list(head_record(FileHead())) == [name for name in names(HEAD) if name != "update"]
+    assert list(changed["change"]) == names("change")
+    assert list(changed["change"]["places"][0]) == names("change_place")
+    assert list(record["parts"][0]) == names("part")
+    assert list(head_record(FileHead())) == [name for name in names("head") if name != "update"]
     row = BuildingFigures("a", "gable", "modelled", comparison=Comparison("b")).row()
-    assert sorted(row) == sorted(names(EVALUATION))
+    assert sorted(row) == sorted(names("evaluation"))
 
 
 def test_the_table_of_parts_has_a_column_for_every_parameter():
@@ -138,7 +126,7 @@ def test_the_table_of_parts_has_a_column_for_every_parameter():
         for kind in CATALOGUE
         for parameter in (*list_parameters(kind), *side_by_side_or_none(kind))
     }
-    assert parameters <= set(names(PARTS_LAYER))
+    assert parameters <= set(names("parts"))
 
 
 def side_by_side_or_none(kind):

@@ -11,7 +11,7 @@ from ..geometry.outline_edges import list_outline_edges
 from ..model import Eaves, Overhang, Roof
 from ..model.overhang import ROOF_EDGE, WALLS
 from ..read.damage import excerpt
-from ..write.attribute_list import OVERHANG
+from ..write.attribute_list import TABLES
 from .record import figure, list_at, number, refuse_other_keys, require_mapping
 
 MOST_OVERHANG_M = 10.0  # longer ones are typing errors
@@ -42,19 +42,19 @@ def read_eaves(record: Mapping[str, Any], roof: Roof) -> Eaves | None:
     return Eaves(overhangs, round_number(thickness, DIGITS), kind)
 
 
-def read_overhang(record: Any, where: str, count: int) -> Overhang:
+def read_overhang(record: Any, label: str, count: int) -> Overhang:
     """Read an overhang at one of `count` edges."""
-    refuse_other_keys(require_mapping(record, where), [a.name for a in OVERHANG], where)
+    refuse_other_keys(require_mapping(record, label), TABLES["overhang"].names, label)
     edge = record.get("edge")
     if not isinstance(edge, int) or not 0 <= edge < count:
         raise InputError(
-            f"expected an edge from 0 to {count - 1} of {where}, got {excerpt(edge)}; count the "
+            f"expected an edge from 0 to {count - 1} of {label}, got {excerpt(edge)}; count the "
             "edges of the outline"
         )
-    length = number(record.get("length"), f"length of {where}")
+    length = number(record.get("length"), f"length of {label}")
     if not 0.0 < length <= MOST_OVERHANG_M:
         raise InputError(
-            f"expected a length over 0 m and up to {MOST_OVERHANG_M:g} m of {where}, got {length:g}"
+            f"expected a length over 0 m and up to {MOST_OVERHANG_M:g} m of {label}, got {length:g}"
         )
     sigma = figure(record, "sigma")
     return Overhang(edge, round_number(length, DIGITS), round_number(sigma, DIGITS))

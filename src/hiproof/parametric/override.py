@@ -40,7 +40,7 @@ from ..stages.points import usable
 from ..stages.remarks import add_remark, without_doubt
 from ..stages.solid import add_installations, add_overhangs, open_passages, reach_terrain
 from ..status import Doubt, Status
-from ..write.attribute_list import PARAMETERS
+from ..write.attribute_list import TABLES
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import rebuild
@@ -117,13 +117,7 @@ def read_override(record: Mapping[str, Any]) -> Override:
     has_list = isinstance(record.get("parts"), list)
     # a line of parameters.jsonl is an override; its type and types are what came of the fit
     if has_list:
-        ignored = {attribute.name for attribute in PARAMETERS} - {
-            "id",
-            "parts",
-            "origin",
-            "outline",
-            "z_ground",
-        }
+        ignored = set(TABLES["building"].names) - {"id", "parts", "origin", "outline", "z_ground"}
         record = {key: value for key, value in record.items() if key not in ignored}
     other = [name for name in record if name not in KEYS]
     if other:

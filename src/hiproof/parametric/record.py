@@ -30,15 +30,7 @@ from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
 from ..read.damage import excerpt
 from ..status import Change, Grade, Status
-from ..write.attribute_list import (
-    CHANGE,
-    CHANGE_PLACE,
-    ENDED_MODEL,
-    PARAMETERS,
-    PART,
-    ROOF_OUTSIDE,
-    UPDATE_HEAD,
-)
+from ..write.attribute_list import TABLES
 from ..write.head import UpdateHead
 
 WIDEST_PART_M = 1e5  # of any number of a part, and of heights
@@ -46,9 +38,6 @@ WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 FARTHEST_WORLD_M = 1e8
 LARGEST_NUMBER = 1e15  # at which float64 still holds eighths; larger is no number of a building
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
-CHANGE_KEYS = tuple(attribute.name for attribute in CHANGE)
-ROOF_KEYS = tuple(attribute.name for attribute in ROOF_OUTSIDE)
-PART_KEYS = tuple(attribute.name for attribute in PART)
 FIGURES = ("density", "nodata_share", "unexplained_area_m2")
 RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
 
@@ -60,7 +49,7 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
 
     Raises InputError, one sentence, for an object that makes none.
     """
-    refuse_other_keys(record, [attribute.name for attribute in PARAMETERS], "the building")
+    refuse_other_keys(record, TABLES["building"].names, "the building")
     parts = list_at(record, "parts")
     origin = None if record.get("origin") is None else place(record["origin"], "origin", coordinate)
     outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
@@ -149,24 +138,24 @@ def read_roof(parts: list[Any], outline: shapely.Polygon | None, origin: np.ndar
     return roof
 
 
-def read_part(record: Any, outline: shapely.Polygon, where: str) -> Part:
+def read_part(record: Any, outline: shapely.Polygon, label: str) -> Part:
     """Read a part with its planes.
 
     Without outlines of its own it roofs what its rectangle covers of the building's.
     """
-    refuse_other_keys(require_mapping(record, where), PART_KEYS, where)
+    refuse_other_keys(require_mapping(record, label), TABLES["part"].names, label)
     kind = text_at(record, "type")
-    parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
-    refuse_no_shape(kind, parameters, where)
+    parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
+    refuse_no_shape(kind, parameters, label)
     parameters = {name: round_number(value) for name, value in parameters.items()}
-    position = round_values(place(record.get("position"), f"position of {where}", measure), DIGITS)
-    kappa = math.radians(round_number(number(record.get("rotation", 0.0), f"rotation of {where}")))
-    outlines = read_part_outlines(record, parameters, position, kappa, outline, where)
+    position = round_values(place(record.get("position"), f"position of {label}", measure), DIGITS)
+    kappa = math.radians(round_number(number(record.get("rotation", 0.0), f"rotation of {label}")))
+    outlines = read_part_outlines(record, parameters, position, kappa, outline, label)
     if kind == "shed":
         outlines = by_teeth(outlines, parameters, position, kappa)
     outlines = [rounded_outline(o) for o in outlines]
     pieces = make_pieces(kind, parameters, kappa, position, outlines)
-    sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {where}")
+    sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {label}")
     sigma = {
         ("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s)
         for n, s in sigma.items()
@@ -180,15 +169,15 @@ def read_part_outlines(
     position: np.ndarray,
     kappa: float,
     outline: shapely.Polygon,
-    where: str,
+    label: str,
 ) -> list[shapely.Polygon]:
     """Return the area that a part roofs.
 
     It is the outlines given, else its plan's share of the building's outline.
     """
     if record.get("outlines") is None:
-        return clip_plan(text_at(record, "type"), parameters, position, kappa, outline, where)
-    return [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
+        return clip_plan(text_at(record, "type"), parameters, position, kappa, outline, label)
+    return [polygon(rings, f"an outline of {label}") for rings in list_at(record, "outlines")]
 
 
 def clip_plan(
@@ -197,7 +186,7 @@ def clip_plan(
     position: np.ndarray,
     kappa: float,
     outline: shapely.Polygon,
-    where: str,
+    label: str,
 ) -> list[shapely.Polygon]:
     """Return the polygons that the plan of a part covers of the outline.
 
@@ -205,7 +194,7 @@ def clip_plan(
     """
     if "width" not in parameters or "length" not in parameters:
         raise InputError(
-            f"expected width and length, or outlines, of {where}, got neither; give the rectangle"
+            f"expected width and length, or outlines, of {label}, got neither; give the rectangle"
         )
     u, v = 0.5 * parameters["length"], 0.5 * parameters["width"]
     c, s = math.cos(kappa), math.sin(kappa)
@@ -265,7 +254,7 @@ def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
     return [round_values(line, PLAN_DIGITS) for line in lines if len(line)]
 
 
-def read_places(rows: list[Any], where: str) -> np.ndarray:
+def read_places(rows: list[Any], label: str) -> np.ndarray:
     """Read places (n, 3), one by one only where one of them is wrong."""
     if all(isinstance(row, list) and len(row) == 3 for row in rows):
         values = [value for row in rows for value in row]
@@ -273,7 +262,7 @@ def read_places(rows: list[Any], where: str) -> np.ndarray:
             result = np.array(values, float).reshape(-1, 3)
             if (np.abs(result) < LARGEST_NUMBER).all():
                 return result
-    return np.array([place(row, where) for row in rows])
+    return np.array([place(row, label) for row in rows])
 
 
 def read_grade(record: Mapping[str, Any]) -> Grade | None:
@@ -292,55 +281,35 @@ def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
     """Read what the last update found, None where there is nothing."""
     if record.get("change") is None:
         return None
-    change = dict(require_mapping(record["change"], "the change"))
-    refuse_other_keys(change, [attribute.name for attribute in CHANGE], "the change")
+    code = require_mapping(record["change"], "the change").get("class")
     codes = [change.code for change in Change]
-    if change.get("class") not in codes:
+    if code not in codes:
         raise InputError(
-            f"expected a class of change ({', '.join(codes)}), got "
-            f"{excerpt(change.get('class'))}; leave it as the update wrote it"
+            f"expected a class of change ({', '.join(codes)}), got {excerpt(code)}; leave it as "
+            "the update wrote it"
         )
-    text_at(change, "survey")
-    figure(change, "chance")
+    change = read_values(record["change"], "change", "the change")
     places = [
         read_change_place(place, f"place {k} of the change")
         for k, place in enumerate(list_at(change, "places"))
     ]
+    history = [
+        read_values(model, "ended_model", f"model {k} of the history")
+        for k, model in enumerate(list_at(change, "history"))
+    ]
     lists = {name: list_at(change, name) for name in ("lineage", "predecessors")}
-    for name in ("valid_from", "valid_to"):
-        text_at(change, name)
-    if history := [read_ended(model, k) for k, model in enumerate(list_at(change, "history"))]:
-        lists["history"] = history
-    values = {**change, "places": places, **lists}
-    return {name: values.get(name) for name in CHANGE_KEYS if name != "history" or history}
+    values = {**change, "places": places, **lists, "history": history}
+    return {
+        name: values.get(name) for name in TABLES["change"].names if name != "history" or history
+    }
 
 
-def read_ended(record: Any, number: int) -> dict[str, Any]:
-    """Read a model that ended."""
-    where = f"model {number} of the history"
-    model = dict(require_mapping(record, where))
-    refuse_other_keys(model, [attribute.name for attribute in ENDED_MODEL], where)
-    for name in ("id", "valid_from", "valid_to", "type"):
-        text_at(model, name)
-    for name in ("z_ground", "z_top"):
-        measure(model.get(name), f"{name} of {where}")
-    polygon(model.get("outline"), f"the outline of {where}")
-    list_at(model, "parts")
-    return model
-
-
-def read_change_place(record: Any, where: str) -> dict[str, Any]:
+def read_change_place(record: Any, label: str) -> dict[str, Any]:
     """Read a place that changed."""
-    place = dict(require_mapping(record, where))
-    refuse_other_keys(place, [attribute.name for attribute in CHANGE_PLACE], where)
-    text_at(place, "kind")
-    for name in ("difference", "sigma", "area"):
-        figure(place, name)
-    for rings in list_at(place, "outlines"):
-        polygon(rings, f"an outline of {where}")
+    place = read_values(record, "change_place", label)
     if len(list_at(place, "parts")) not in (0, 2):
         raise InputError(
-            f"expected the earlier and the new part of {where}, got {excerpt(place['parts'])}; "
+            f"expected the earlier and the new part of {label}, got {excerpt(place['parts'])}; "
             "write null for none"
         )
     return place
@@ -348,8 +317,7 @@ def read_change_place(record: Any, where: str) -> dict[str, Any]:
 
 def read_update(record: Any) -> UpdateHead:
     """Read what an update found beside its buildings."""
-    update = dict(require_mapping(record, "update"))
-    refuse_other_keys(update, [attribute.name for attribute in UPDATE_HEAD], "update")
+    update = read_values(record, "update", "update")
     roofs = [
         read_roof_outside(roof, f"roof {k} of roofs_outside")
         for k, roof in enumerate(list_at(update, "roofs_outside"))
@@ -357,16 +325,46 @@ def read_update(record: Any) -> UpdateHead:
     return UpdateHead(text_at(update, "survey"), tuple(roofs))
 
 
-def read_roof_outside(record: Any, where: str) -> dict[str, Any]:
+def read_roof_outside(record: Any, label: str) -> dict[str, Any]:
     """Read a roof outside all outlines."""
-    roof = dict(require_mapping(record, where))
-    refuse_other_keys(roof, [attribute.name for attribute in ROOF_OUTSIDE], where)
-    for name in ("id", "kind"):
-        text_at(roof, name)
-    number(roof.get("area"), f"area of {where}")
-    for rings in list_at(roof, "outlines"):
-        polygon(rings, f"an outline of {where}")
-    return {name: roof.get(name) for name in ROOF_KEYS}
+    number(require_mapping(record, label).get("area"), f"area of {label}")
+    roof = read_values(record, "roof_outside", label)
+    return {name: roof.get(name) for name in TABLES["roof_outside"].names}
+
+
+def read_values(record: Any, table: str, label: str) -> dict[str, Any]:
+    """Read an object that is kept as it is, with the keys and types of a table."""
+    refuse_other_keys(require_mapping(record, label), TABLES[table].names, label)
+    refuse_other_types(record, table, label)
+    return dict(record)
+
+
+def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -> None:
+    """Raise InputError where a value is of another type than the table declares.
+
+    No geometry is made. Objects within are not looked at.
+    """
+    for attribute in TABLES[table].attributes:
+        name, type, value = attribute.name, attribute.type, record.get(attribute.name)
+        if attribute.kind == "text":
+            text_at(record, name)
+        elif type.endswith("[]"):
+            for item in list_at(record, name):
+                if type == "polygon[]":
+                    polygon(item, f"an outline of {label}")
+        elif type == "shares":
+            numbers_by_name(value or {}, name)
+        elif type == "number":
+            measure(value, f"{name} of {label}")
+        elif type == "polygon":
+            polygon(value, f"the {name} of {label}")
+        elif value is not None:
+            if type == "number?":
+                number(value, name)
+            elif type == "place?":
+                place(value, name, coordinate)
+            elif type == "polygon?":
+                polygon(value, name)
 
 
 def read_quality(record: Mapping[str, Any]) -> Quality:
@@ -389,53 +387,44 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
         for index, part in enumerate(list_at(record, "parts"))
     ]
     read_status(record, bool(parts))
-    for name in ("detail", "type", "ground_source", "quality"):
-        text_at(record, name)
-    for name in ("z_ground", "objective"):
-        figure(record, name)
+    refuse_other_types(record, "building")
     read_quality(record)
-    if record.get("origin") is not None:
-        place(record["origin"], "origin", coordinate)
-    if record.get("outline") is not None:
-        polygon(record["outline"], "outline")
-    for name in ("recognised", "types"):
-        numbers_by_name(record.get(name) or {}, name)
     for index, part in enumerate(parts):
         refuse_other_part_kinds(part, f"part {index}")
 
 
-def refuse_other_part_kinds(part: Mapping[str, Any], where: str) -> None:
+def refuse_other_part_kinds(part: Mapping[str, Any], label: str) -> None:
     """Raise InputError where a value of a part is of another kind than a run writes."""
     if text_at(part, "type") not in CATALOGUE:
         raise InputError(
-            f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got "
+            f"expected a roof type ({', '.join(CATALOGUE)}) in {label}, got "
             f"{excerpt(part.get('type'))}"
         )
-    place(part.get("position"), f"position of {where}", measure)
-    number(part.get("rotation", 0.0), f"rotation of {where}")
+    place(part.get("position"), f"position of {label}", measure)
+    number(part.get("rotation", 0.0), f"rotation of {label}")
     for name in ("parameters", "sigma"):
-        numbers_by_name(part.get(name) or {}, f"{name} of {where}")
+        numbers_by_name(part.get(name) or {}, f"{name} of {label}")
 
 
-def refuse_other_keys(record: Mapping[str, Any], allowed: Any, where: str) -> None:
+def refuse_other_keys(record: Mapping[str, Any], allowed: Any, label: str) -> None:
     other = [str(key)[:40] for key in record if key not in allowed]
     if other:
         raise InputError(
-            f"expected the keys {', '.join(allowed)} of {where}, got also "
+            f"expected the keys {', '.join(allowed)} of {label}, got also "
             f"{', '.join(other[:8])}; "
             "remove them"
         )
 
 
-def require_mapping(value: Any, where: str) -> Mapping[str, Any]:
+def require_mapping(value: Any, label: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"expected an object as {where}, got {excerpt(value)}; write {{...}}")
+        raise InputError(f"expected an object as {label}, got {excerpt(value)}; write {{...}}")
     return value
 
 
-def as_list(value: Any, where: str) -> list[Any]:
+def as_list(value: Any, label: str) -> list[Any]:
     if not isinstance(value, list):
-        raise InputError(f"expected a list as {where}, got {excerpt(value)}; write [...]")
+        raise InputError(f"expected a list as {label}, got {excerpt(value)}; write [...]")
     return value
 
 
@@ -450,38 +439,38 @@ def text_at(record: Mapping[str, Any], name: str) -> str:
     return value or ""
 
 
-def number(value: Any, where: str) -> float:
+def number(value: Any, label: str) -> float:
     """Check a finite number that a building can have."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not abs(value) < LARGEST_NUMBER:
         raise InputError(
-            f"expected a number as {where}, got {excerpt(value)}; give metres, or degrees for "
+            f"expected a number as {label}, got {excerpt(value)}; give metres, or degrees for "
             "angles"
         )
     return float(value)
 
 
-def measure(value: Any, where: str) -> float:
+def measure(value: Any, label: str) -> float:
     """Check a size, a height or an angle that something on Earth can have.
 
     >>> measure(1e9, "z_ground")
     Traceback (most recent call last):
     hiproof.errors.InputError: expected z_ground within 100000, got 1e+09; check its unit
     """
-    result = number(value, where)
+    result = number(value, label)
     if abs(result) > WIDEST_PART_M:
         raise InputError(
-            f"expected {where} within {WIDEST_PART_M:g}, got {result:g}; check its unit"
+            f"expected {label} within {WIDEST_PART_M:g}, got {result:g}; check its unit"
         )
     return result
 
 
-def coordinate(value: Any, where: str) -> float:
+def coordinate(value: Any, label: str) -> float:
     """Check a coordinate of a place on Earth."""
-    result = number(value, where)
+    result = number(value, label)
     if abs(result) > FARTHEST_WORLD_M:
         raise InputError(
-            f"expected {where} on Earth, within {FARTHEST_WORLD_M:g} m of its CRS's origin, got "
+            f"expected {label} on Earth, within {FARTHEST_WORLD_M:g} m of its CRS's origin, got "
             f"{result:g}; check its unit"
         )
     return result
@@ -496,10 +485,10 @@ def figure(record: Mapping[str, Any], name: str) -> float:
     return math.nan if record.get(name) is None else number(record[name], name)
 
 
-def numbers_by_name(values: Any, where: str) -> dict[str, float]:
+def numbers_by_name(values: Any, label: str) -> dict[str, float]:
     return {
-        str(name): measure(value, f"{name} in {where}")
-        for name, value in require_mapping(values, where).items()
+        str(name): measure(value, f"{name} in {label}")
+        for name, value in require_mapping(values, label).items()
     }
 
 
@@ -511,28 +500,28 @@ def read_shift(record: Mapping[str, Any]) -> tuple[float, float]:
     return number(value[0], "shift"), number(value[1], "shift")
 
 
-def place(value: Any, where: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
+def place(value: Any, label: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
     """Read three numbers (3,), each by `read`."""
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(
-            f"expected three numbers [x, y, z] as {where}, got {excerpt(value)}; give metres"
+            f"expected three numbers [x, y, z] as {label}, got {excerpt(value)}; give metres"
         )
-    return np.array([read(v, where) for v in value])
+    return np.array([read(v, label) for v in value])
 
 
-def polygon(rings: Any, where: str) -> shapely.Polygon:
+def polygon(rings: Any, label: str) -> shapely.Polygon:
     """Read a polygon of rings, the outer first."""
     result = []
-    for ring in as_list(rings, where):
-        corners = as_list(ring, where)
+    for ring in as_list(rings, label):
+        corners = as_list(ring, label)
         if len(corners) < 3 or not all(isinstance(xy, list) and len(xy) == 2 for xy in corners):
             raise InputError(
-                f"expected rings of three or more [x, y] as {where}, got {excerpt(ring)}; close "
+                f"expected rings of three or more [x, y] as {label}, got {excerpt(ring)}; close "
                 "the ring"
             )
-        result.append([(coordinate(x, where), coordinate(y, where)) for x, y in corners])
+        result.append([(coordinate(x, label), coordinate(y, label)) for x, y in corners])
     if not result:
         raise InputError(
-            f"expected rings, the outer first, as {where}, got none; write null for no outline"
+            f"expected rings, the outer first, as {label}, got none; write null for no outline"
         )
     return shapely.Polygon(result[0], result[1:])

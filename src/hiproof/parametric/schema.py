@@ -14,135 +14,56 @@ from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
 from ..status import Change, ChangeKind, Grade, Status
-from ..write.attribute_list import (
-    CHANGE,
-    CHANGE_PLACE,
-    ENDED_MODEL,
-    HEAD,
-    INSTALLATION,
-    OVERHANG,
-    PARAMETERS,
-    PART,
-    PASSAGE,
-    ROOF_OUTSIDE,
-    UPDATE_HEAD,
-    Attribute,
-)
+from ..write.attribute_list import TABLES, Attribute
 from ..write.parameters import VERSION
 from .installations import BOX_SIZES
 
-NUMBER_SCHEMA, TEXT_SCHEMA = {"type": "number"}, {"type": "string"}
-NUMBER_OR_NULL, TEXT_OR_NULL = {"type": ["number", "null"]}, {"type": ["string", "null"]}
-NUMBERS = {"type": "object", "additionalProperties": NUMBER_SCHEMA}
-SHARES = {"type": "object", "additionalProperties": NUMBER_OR_NULL}
-PLACE = {"type": "array", "items": NUMBER_SCHEMA, "minItems": 3, "maxItems": 3}
-RING = {
-    "type": "array",
-    "minItems": 3,
-    "items": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 2, "maxItems": 2},
-}
-POLYGON_SCHEMA = {"type": "array", "items": RING, "minItems": 1}
+RECORDS = (
+    *("head", "update", "roof_outside", "building", "part", "passage", "installation"),
+    *("overhang", "change", "ended_model", "change_place"),
+)
+NUMBER_SCHEMA = {"type": "number"}
 LENGTH_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
-
-HEAD_KINDS = {
-    "hiproof_parameters": {"const": VERSION},
-    "crs": TEXT_OR_NULL,
-    "unit": {"enum": list(NAMED_UNITS)},
-    "cityjson_offset": {"anyOf": [PLACE, {"type": "null"}]},
-    "compose": NUMBERS,
-    "write": {"type": "object"},
-    "update": {"$ref": "#/$defs/update"},
-}
-UPDATE_KINDS = {
-    "survey": TEXT_SCHEMA,
-    "roofs_outside": {"type": "array", "items": {"$ref": "#/$defs/roof_outside"}},
-}
-ROOF_KINDS = {
-    "id": TEXT_OR_NULL,
-    "kind": {"enum": [kind.code for kind in ChangeKind]},
-    "outlines": {"type": "array", "items": POLYGON_SCHEMA},
-}
-BUILDING_KINDS = {
-    "id": TEXT_SCHEMA,
-    "status": {"enum": [status.code for status in Status]},
-    "quality": {"enum": [*(grade.code for grade in Grade), None]},
-    "detail": TEXT_SCHEMA,
-    "type": TEXT_OR_NULL,
-    "origin": {"anyOf": [PLACE, {"type": "null"}]},
-    "parts": {"type": "array", "items": {"$ref": "#/$defs/part"}},
-    "outline": {"anyOf": [POLYGON_SCHEMA, {"type": "null"}]},
-    "shift": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 2, "maxItems": 2},
-    "z_ground": NUMBER_OR_NULL,
-    "ground_source": TEXT_OR_NULL,
-    "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},
-    "passages": {"type": "array", "items": {"$ref": "#/$defs/passage"}},
-    "installations": {"type": "array", "items": {"$ref": "#/$defs/installation"}},
-    "walls": {"enum": ["level", "terrain"]},
-    "overhangs": {"type": "array", "items": {"$ref": "#/$defs/overhang"}},
-    "roof_thickness": LENGTH_SCHEMA,
-    "footprint_kind": {"enum": [WALLS, ROOF_EDGE]},
-    "attributes": {"type": "object"},
-    "points": {"type": "integer", "minimum": 0},
-    "residuals": SHARES,
-    "recognised": SHARES,
-    "types": SHARES,
-    "survey_date": TEXT_SCHEMA,
-    "epochs_used": {"type": "array", "items": TEXT_SCHEMA},
-    "change": {"$ref": "#/$defs/change"},
-}
-CHANGE_KINDS = {
-    "class": {"enum": [change.code for change in Change]},
-    "survey": TEXT_OR_NULL,
-    "chance": NUMBER_OR_NULL,
-    "places": {"type": "array", "items": {"$ref": "#/$defs/change_place"}},
-    "lineage": {"type": "array", "items": {"type": ["integer", "null"]}},
-    "predecessors": {"type": "array", "items": TEXT_SCHEMA},
-    "valid_from": TEXT_OR_NULL,
-    "valid_to": TEXT_OR_NULL,
-    "history": {"type": "array", "items": {"$ref": "#/$defs/ended_model"}},
-}
-ENDED_KINDS = {
-    "id": TEXT_SCHEMA,
-    "valid_from": TEXT_OR_NULL,
-    "valid_to": TEXT_SCHEMA,
-    "type": TEXT_OR_NULL,
-    "z_ground": NUMBER_SCHEMA,
-    "z_top": NUMBER_SCHEMA,
-    "outline": POLYGON_SCHEMA,
-    "origin": PLACE,
-    "parts": {"type": "array", "items": {"$ref": "#/$defs/part"}},
-}
-PLACE_KINDS = {
-    "kind": {"enum": [kind.code for kind in ChangeKind]},
-    "difference": NUMBER_OR_NULL,
-    "sigma": NUMBER_OR_NULL,
-    "area": NUMBER_OR_NULL,
-    "parts": {"type": "array", "items": {"type": ["integer", "null"]}},
-    "outlines": {"type": "array", "items": POLYGON_SCHEMA},
-}
-PART_KINDS = {
-    "parameters": {**NUMBERS, "properties": {"width": LENGTH_SCHEMA, "length": LENGTH_SCHEMA}},
-    "position": PLACE,
-    "rotation": NUMBER_SCHEMA,
-    "sigma": NUMBERS,
-    "outlines": {"type": "array", "items": POLYGON_SCHEMA},
-}
-PASSAGE_KINDS = {"outline": POLYGON_SCHEMA, "ceiling": NUMBER_SCHEMA}
-OVERHANG_KINDS = {
-    "edge": {"type": "integer", "minimum": 0},
+TYPE_SCHEMAS: dict[str, dict[str, Any]] = {
+    "version": {"const": VERSION},
+    "text": {"type": "string"},
+    "number": NUMBER_SCHEMA,
+    "integer": {"type": "integer"},
+    "natural": {"type": "integer", "minimum": 0},
     "length": LENGTH_SCHEMA,
-    "sigma": NUMBER_OR_NULL,
-}
-INSTALLATION_KINDS = {
-    "type": {"enum": [CHIMNEY, ROOF_OBJECT]},
+    "object": {"type": "object"},
+    "numbers": {"type": "object", "additionalProperties": NUMBER_SCHEMA},
+    "shares": {"type": "object", "additionalProperties": {"type": ["number", "null"]}},
     "parameters": {
+        "type": "object",
+        "additionalProperties": NUMBER_SCHEMA,
+        "properties": dict.fromkeys(("width", "length"), LENGTH_SCHEMA),
+    },
+    "box": {
         "type": "object",
         "properties": dict.fromkeys(BOX_SIZES, LENGTH_SCHEMA),
         "required": list(BOX_SIZES),
         "additionalProperties": False,
     },
-    "position": PLACE,
-    "rotation": NUMBER_SCHEMA,
+    "pair": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 2, "maxItems": 2},
+    "place": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 3, "maxItems": 3},
+}
+TYPE_SCHEMAS["figures"] = TYPE_SCHEMAS["shares"]
+TYPE_SCHEMAS["polygon"] = {
+    "type": "array",
+    "items": {"type": "array", "minItems": 3, "items": TYPE_SCHEMAS["pair"]},
+    "minItems": 1,
+}
+CHOICES: dict[str, Any] = {
+    "unit": NAMED_UNITS,
+    "status": [status.code for status in Status],
+    "grade": [grade.code for grade in Grade],
+    "change_class": [change.code for change in Change],
+    "change_kind": [kind.code for kind in ChangeKind],
+    "roof_type": CATALOGUE,
+    "installation_type": (CHIMNEY, ROOF_OBJECT),
+    "walls": ("level", "terrain"),
+    "footprint_kind": (WALLS, ROOF_EDGE),
 }
 
 
@@ -152,28 +73,8 @@ def schema() -> dict[str, Any]:
     >>> schema()["$defs"]["head"]["properties"]["hiproof_parameters"]["const"]
     1
     """
-    defs = {
-        "head": describe_attributes(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
-        "update": describe_attributes(UPDATE_HEAD, UPDATE_KINDS, required=("survey",)),
-        "roof_outside": describe_attributes(
-            ROOF_OUTSIDE, ROOF_KINDS, required=("kind", "area", "outlines")
-        ),
-        "building": describe_attributes(PARAMETERS, BUILDING_KINDS, required=("id",)),
-        "part": describe_attributes(
-            PART,
-            {"type": {"enum": list(CATALOGUE)}, **PART_KINDS},
-            required=("type", "parameters", "position"),
-        )
-        | {"allOf": parameters_by_type()},
-        "passage": describe_attributes(PASSAGE, PASSAGE_KINDS, required=("outline", "ceiling")),
-        "installation": describe_attributes(
-            INSTALLATION, INSTALLATION_KINDS, required=("type", "parameters", "position")
-        ),
-        "overhang": describe_attributes(OVERHANG, OVERHANG_KINDS, required=("edge", "length")),
-        "change": describe_attributes(CHANGE, CHANGE_KINDS, required=("class",)),
-        "ended_model": describe_attributes(ENDED_MODEL, ENDED_KINDS, required=("id", "valid_to")),
-        "change_place": describe_attributes(CHANGE_PLACE, PLACE_KINDS, required=("kind",)),
-    }
+    defs = {name: describe_record(name) for name in RECORDS}
+    defs["part"]["allOf"] = parameters_by_type()
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "a line of parameters.jsonl",
@@ -184,22 +85,41 @@ def schema() -> dict[str, Any]:
     }
 
 
-def describe_attributes(
-    attributes: tuple[Attribute, ...], kinds: dict[str, Any], required: tuple[str, ...]
-) -> dict[str, Any]:
-    """Return the schema of an object with `attributes`.
-
-    Each has its meaning and unit. Those of no other kind are numbers or null.
-    """
-    properties = {
-        a.name: {
-            "description": f"{a.meaning} [{a.unit}]" if a.unit else a.meaning,
-            **kinds.get(a.name, NUMBER_OR_NULL),
-        }
-        for a in attributes
+def describe_record(name: str) -> dict[str, Any]:
+    """Return the schema of an object; only a head may have further keys."""
+    table = TABLES[name]
+    return {
+        "type": "object",
+        "properties": {a.name: describe_attribute(a) for a in table.attributes},
+        "required": list(table.required),
+        **({} if name == "head" else {"additionalProperties": False}),
     }
-    closed = {"additionalProperties": False} if attributes is not HEAD else {}
-    return {"type": "object", "properties": properties, "required": list(required), **closed}
+
+
+def describe_attribute(attribute: Attribute) -> dict[str, Any]:
+    """Return the schema of an attribute, with its meaning and unit."""
+    unit = f" [{attribute.unit}]" if attribute.unit else ""
+    return {"description": attribute.meaning + unit, **describe_type(attribute.type)}
+
+
+def describe_type(type: str) -> dict[str, Any]:
+    """Return the schema of a type, as data/attributes.toml names it.
+
+    >>> describe_type("text?"), describe_type("passage[]")["items"]
+    ({'type': ['string', 'null']}, {'$ref': '#/$defs/passage'})
+    """
+    if type.endswith("[]"):
+        return {"type": "array", "items": describe_type(type[:-2])}
+    if type.endswith("?"):
+        described = describe_type(type[:-1])
+        if "enum" in described:
+            return {"enum": [*described["enum"], None]}
+        if described.keys() == {"type"}:
+            return {"type": [described["type"], "null"]}
+        return {"anyOf": [described, {"type": "null"}]}
+    if type in CHOICES:
+        return {"enum": list(CHOICES[type])}
+    return {"$ref": f"#/$defs/{type}"} if type in RECORDS else TYPE_SCHEMAS[type]
 
 
 def parameters_by_type() -> list[dict[str, Any]]:

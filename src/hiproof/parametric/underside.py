@@ -9,7 +9,7 @@ from ..compose.settle import PLAN_DIGITS, round_number
 from ..errors import InputError
 from ..model import Building, Passage, Roof, Underside
 from ..read.damage import excerpt
-from ..write.attribute_list import PASSAGE
+from ..write.attribute_list import TABLES
 from .record import list_at, measure, on_grid, polygon, refuse_other_keys, require_mapping
 
 
@@ -31,10 +31,9 @@ def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) ->
     )
 
 
-def read_passage(record: Any, where: str, z_origin: float) -> Passage:
+def read_passage(record: Any, label: str, z_origin: float) -> Passage:
     """Read a passage; its ceiling is in the world, `z_origin` the height of the frame."""
-    names = [attribute.name for attribute in PASSAGE]
-    refuse_other_keys(require_mapping(record, where), names, where)
-    outline = on_grid(polygon(record.get("outline"), f"the outline of {where}"))
-    ceiling = measure(record.get("ceiling"), f"the ceiling of {where}")
+    refuse_other_keys(require_mapping(record, label), TABLES["passage"].names, label)
+    outline = on_grid(polygon(record.get("outline"), f"the outline of {label}"))
+    ceiling = measure(record.get("ceiling"), f"the ceiling of {label}")
     return Passage(outline, round_number(ceiling, PLAN_DIGITS) - z_origin)

@@ -6,10 +6,10 @@ A new shape is a row of data/shapes.toml; every test covers it.
 from ..errors import SettingsError
 from . import cone, onion, shed, vault
 from .contract import Primitive
-from .table import ROWS, make_shape
+from .table import SHAPE_ROWS, make_shape
 
 # shapes whose planes are counted, by their row
-COUNTED = {
+COUNTED_SHAPES = {
     "shed": shed.SHED,
     "cone": cone.CONE,
     "broach": cone.BROACH,
@@ -20,8 +20,8 @@ COUNTED = {
     "onion": onion.ONION,
 }
 CATALOGUE: dict[str, Primitive] = {
-    name: COUNTED.get(name) or make_shape(name)
-    for name, row in ROWS.items()
+    name: COUNTED_SHAPES.get(name) or make_shape(name)
+    for name, row in SHAPE_ROWS.items()
     if "variant_of" not in row
 }
 ROUND = ("cone", "broach", "hexagonal_spire", "dome", "onion")  # over a round or many-sided plan

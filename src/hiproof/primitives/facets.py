@@ -30,9 +30,12 @@ NUMERICAL_ZERO = 1e-12  # A smaller share is none.
 def with_facets(
     make: Callable[[int], Primitive], side_counts: tuple[int, ...] = SIDE_COUNTS, **changes: Any
 ) -> Primitive:
-    """Return a round shape that has a variant for each number of sides, one of which is fitted."""
-    first, *others = map(make, side_counts)
-    return replace(first, more=tuple(replace(other, starts=()) for other in others), **changes)
+    """Return a round shape with a variant for each number of sides.
+
+    The first of them is fitted, and the others follow from its size.
+    """
+    first, *rest = map(make, side_counts)
+    return replace(first, more=tuple(replace(shape, starts=()) for shape in rest), **changes)
 
 
 def count_sides(diameter: float, most: int = max(SIDE_COUNTS)) -> int:

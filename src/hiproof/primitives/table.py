@@ -1,4 +1,4 @@
-"""Make roof shapes of the rows of data/shapes.toml, where their columns are explained."""
+"""Make roof shapes of the rows of data/shapes.toml, which explains its columns."""
 
 from __future__ import annotations
 
@@ -36,28 +36,30 @@ LIMITS = {
     "steepest": SLOPE_MAX,
 }
 BASICS: dict[str, Any] = {"__builtins__": {}, "min": min, "max": max, "pi": math.pi}
-TABLE = resources.files("hiproof") / "data" / "shapes.toml"
-ROWS: dict[str, dict[str, Any]] = tomllib.loads(TABLE.read_text(encoding="utf-8"))
+SHAPES_FILE = resources.files("hiproof") / "data" / "shapes.toml"
+SHAPE_ROWS: dict[str, dict[str, Any]] = tomllib.loads(SHAPES_FILE.read_text(encoding="utf-8"))
 
 
 @cache
 def compile_text(text: str) -> CodeType:
-    return compile(f"({text})", TABLE.name, "eval")
+    return compile(f"({text})", SHAPES_FILE.name, "eval")
 
 
-def evaluate(text: str, names: Mapping[str, Any], where: Mapping[str, str] | None = None) -> Any:
-    """Return the value of an expression, with the values `where` names before.
+def evaluate(
+    text: str, names: Mapping[str, Any], definitions: Mapping[str, str] | None = None
+) -> Any:
+    """Return the value of an expression, with the values of `definitions` named.
 
     Raises KeyError for a name that has no value.
 
     >>> evaluate("height / v, 0.0", {"height": 3.0}, {"v": "4.0 / 2"})
     (1.5, 0.0)
     """
-    known = {**BASICS, **names}
+    values = {**BASICS, **names}
     try:
-        for name, part in (where or {}).items():
-            known[name] = eval(compile_text(part), known)
-        return eval(compile_text(text), known)
+        for name, part in (definitions or {}).items():
+            values[name] = eval(compile_text(part), values)
+        return eval(compile_text(text), values)
     except NameError as error:
         raise KeyError(error.name) from error
 
@@ -67,7 +69,7 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
 
     `constants`, such as a number of teeth, have a name in the row's expressions.
     """
-    row, constants = ROWS[key], constants or {}
+    row, constants = SHAPE_ROWS[key], constants or {}
     symbols = {**FORMULAS, **constants}
     measures = {"width": 2 * V, "length": 2 * U} | {
         name: formula(evaluate(text, symbols)) for name, text in row.get("measures", {}).items()
@@ -95,14 +97,14 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
 
     def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
         chances = {
-            "uniform": lambda low, high: float(rng.uniform(low, high)),
-            "slope": lambda low, high: draw_slope(rng, low, high),
-            "integers": lambda low, high: float(rng.integers(low, high)),
+            "uniform": lambda start, end: float(rng.uniform(start, end)),
+            "slope": lambda start, end: draw_slope(rng, start, end),
+            "integers": lambda start, end: float(rng.integers(start, end)),
             "random": rng.random,
         }
         return choose_sizes(row["draw"], {"width": width, **chances})
 
-    own: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "name": row.get("variant_of", key),
         "citygml_code": row["codes"][0],
         "adv_code": row["codes"][1],
@@ -116,20 +118,20 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
         "bounds": evaluate(row.get("bounds", ""), LIMITS),
         "starts": read_starts(row.get("starts", []), symbols),
         "signed": tuple(row.get("signed", ())),
-        "more": tuple(make_shape(k) for k, r in ROWS.items() if r.get("variant_of") == key),
+        "more": tuple(make_shape(k) for k, r in SHAPE_ROWS.items() if r.get("variant_of") == key),
     }
     if "planes" in row:
-        own["planes"] = evaluate(row["planes"], symbols)
-        own["faces"] = tuple(map(tuple, row["faces"]))
+        fields["planes"] = evaluate(row["planes"], symbols)
+        fields["faces"] = tuple(map(tuple, row["faces"]))
     if "vote" in row:
         vote: Any = {n: tuple(v) if isinstance(v, list) else v for n, v in row["vote"].items()}
-        own["vote"] = Vote(**vote)
+        fields["vote"] = Vote(**vote)
     if "canonical" in row:
-        own["canonical"] = lambda theta: turn_where(row["canonical"], theta)
+        fields["canonical"] = lambda theta: turn_where(row["canonical"], theta)
     if "member" in row:
-        own["read_member"] = lambda member: evaluate(row["member"], name_member(member))
-    own |= {name: row[name] for name in ("legend", "half_turn_symmetric") if name in row}
-    return Primitive(**own | changes)
+        fields["read_member"] = lambda member: evaluate(row["member"], name_member(member))
+    fields |= {name: row[name] for name in ("legend", "half_turn_symmetric") if name in row}
+    return Primitive(**fields | changes)
 
 
 def read_starts(rows: list[dict[str, Any]], symbols: dict[str, Any]) -> tuple[DerivedStart, ...]:
@@ -147,7 +149,7 @@ def read_starts(rows: list[dict[str, Any]], symbols: dict[str, Any]) -> tuple[De
 
 
 def turn_where(rule: Mapping[str, Any], theta: np.ndarray) -> np.ndarray:
-    """Return the same surface with its axes turned where the rule holds for theta (9,)."""
+    """Return the surface of theta (9,), its axes turned where the rule holds."""
     names = dict(zip(SYMBOLS, theta[HALF_WIDTH:].tolist(), strict=True))
     if not evaluate(rule["when"], names, rule.get("where")):
         return theta

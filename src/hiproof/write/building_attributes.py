@@ -44,7 +44,7 @@ def building_attributes(
     Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what
     we computed wins. Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose
     coordinates are in other `units`, which `hiproof_units` then says. What each is stands in
-    attribute_list.py.
+    data/attributes.toml.
     """
     input_attributes = {
         plain_text(name): plain(value) for name, value in building.attributes.items()

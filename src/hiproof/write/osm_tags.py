@@ -13,14 +13,14 @@ import numpy as np
 from ..model import ROOF, Building
 from ..model.roof_figures import RoofFigures, find_ground_height
 from ..primitives.catalogue import CATALOGUE
-from .attribute_list import OSM
+from .attribute_list import TABLES
 from .values import round_value
 
 ONE_ENDED = ("side_hip", "side_half_hip")
 
 
 def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
-    """Return the tags by name, in the order of OSM.
+    """Return the tags by name, in the order of their table.
 
     None what cannot be told or, of a flat roof, has no meaning.
 
@@ -34,7 +34,7 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     ('gabled', 27)
     """
     if figures is None or not building.parts:
-        return {tag.name: None for tag in OSM}
+        return dict.fromkeys(TABLES["osm"].names)
     main = building.model.main
     roof = [i for i, face in enumerate(building.solid.faces) if face.kind == ROOF]
     visible = [i for i in roof if building.solid.faces[i].part == main] or roof
@@ -52,7 +52,7 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
         figures.face_slope_deg[largest],
         figures.h_max - ground,
     )
-    return {tag.name: format_number(value) for tag, value in zip(OSM, values, strict=True)}
+    return dict(zip(TABLES["osm"].names, map(format_number, values), strict=True))
 
 
 def osm_shape(name: str) -> str | None:

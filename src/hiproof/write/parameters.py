@@ -11,15 +11,16 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 import shapely
 
-from ..model import Building, Eaves, Installation, Model, Part
+from ..model import Building, Installation, Model, Part
 from ..model.roof_figures import RoofFigures
+from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
@@ -116,87 +117,78 @@ def parameters_line(building: Building) -> bytes:
 def building_record(building: Building) -> dict[str, Any]:
     """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
-    change = {} if building.change is None else {"change": building.change}
-    surveys: dict[str, Any] = {}
-    if building.epochs_used:
-        names = list(building.epochs_used)
-        surveys = {"survey_date": building.survey_date, "epochs_used": names}
-    further = {} if building.built is None else further_record(building.built)
-    return {
+    record = {
         "id": plain_text(building.id),
         "status": building.status.code,
         "quality": None if building.grade is None else building.grade.code,
         "detail": building.detail or building.status.value,
         "type": building.type,
-        "origin": None if roof is None else numbers(roof.frame.origin),
+        "origin": None if roof is None else roof.frame.origin,
         "parts": [part_record(part) for part in building.parts],
-        "outline": outline_record(building.footprint if roof is None else roof.outline),
+        "outline": building.footprint if roof is None else roof.outline,
         "shift": [float(value) for value in building.shift],
-        "z_ground": number(building.z_ground),
+        "z_ground": building.z_ground,
         "ground_source": building.ground_source or None,
-        "terrain_line": [places(line) for line in building.terrain_intersection],
-        **further,
+        "terrain_line": building.terrain_intersection,
+        **({} if building.built is None else list_further_values(building.built)),
         "attributes": {
             plain_text(name): plain(value) for name, value in building.attributes.items()
         },
         "points": int(quality.points),
         "residuals": {
-            name: number(getattr(quality, name))
+            name: getattr(quality, name)
             for name in ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
         },
-        "density": number(quality.density),
-        "nodata_share": number(quality.nodata_share),
-        "unexplained_area_m2": number(quality.unexplained_area_m2),
-        "objective": number(building.objective),
-        "recognised": by_name(building.recognised),
-        "types": by_name(building.types),
-        **surveys,
-        **change,
+        "density": quality.density,
+        "nodata_share": quality.nodata_share,
+        "unexplained_area_m2": quality.unexplained_area_m2,
+        "objective": building.objective,
+        "recognised": building.recognised,
+        "types": building.types,
     }
+    if building.epochs_used:
+        record["survey_date"] = building.survey_date
+        record["epochs_used"] = list(building.epochs_used)
+    if building.change is not None:
+        record["change"] = building.change
+    return make_record("building", record)
 
 
-def further_record(model: Model) -> dict[str, Any]:
+def list_further_values(model: Model) -> dict[str, Any]:
     """Return what a building has beside its roof; nothing where it is as usual."""
-    record: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     if model.installations:
-        record["installations"] = [installation_record(item) for item in model.installations]
+        values["installations"] = [installation_record(item) for item in model.installations]
     if model.underside.terrain:
-        record["walls"] = "terrain"
+        values["walls"] = "terrain"
     if model.underside.passages:
         z_origin = float(model.roof.frame.origin[2])
-        record["passages"] = [
-            {
-                "outline": outline_record(passage.outline),
-                "ceiling": number(passage.ceiling + z_origin),
-            }
+        values["passages"] = [
+            make_record(
+                "passage", {"outline": passage.outline, "ceiling": passage.ceiling + z_origin}
+            )
             for passage in model.underside.passages
         ]
     if model.eaves is not None:
-        record |= eaves_record(model.eaves)
-    return record
-
-
-def eaves_record(eaves: Eaves) -> dict[str, Any]:
-    overhangs = [
-        {"edge": item.edge, "length": number(item.length), "sigma": number(item.sigma)}
-        for item in eaves.overhangs
-    ]
-    return {
-        "overhangs": overhangs,
-        "roof_thickness": number(eaves.thickness),
-        "footprint_kind": eaves.footprint_kind,
-    }
+        overhangs = map(dataclasses.asdict, model.eaves.overhangs)
+        values["overhangs"] = [make_record("overhang", item) for item in overhangs]
+        values["roof_thickness"] = model.eaves.thickness
+        values["footprint_kind"] = model.eaves.footprint_kind
+    return values
 
 
 def installation_record(installation: Installation) -> dict[str, Any]:
-    return {
-        "type": installation.type,
-        "parameters": {
-            name: number(getattr(installation, name)) for name in ("length", "width", "height")
+    return make_record(
+        "installation",
+        {
+            "type": installation.type,
+            "parameters": {
+                name: getattr(installation, name) for name in ("length", "width", "height")
+            },
+            "position": installation.position,
+            "rotation": math.degrees(installation.kappa),
         },
-        "position": numbers(installation.position),
-        "rotation": number(math.degrees(installation.kappa)),
-    }
+    )
 
 
 def part_record(part: Part) -> dict[str, Any]:
@@ -205,13 +197,25 @@ def part_record(part: Part) -> dict[str, Any]:
         ("rotation" if n == "kappa" else n): (math.degrees(s) if n == "kappa" else s)
         for n, s in part.sigma.items()
     }
+    return make_record(
+        "part",
+        {
+            "type": part.type,
+            "parameters": part.parameters,
+            "position": part.translation,
+            "rotation": math.degrees(part.kappa),
+            "sigma": sigma,
+            "outlines": part.outlines,
+        },
+    )
+
+
+def make_record(table: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Return values as the object of a table, each written by its declared type."""
     return {
-        "type": part.type,
-        "parameters": by_name(part.parameters),
-        "position": numbers(part.translation),
-        "rotation": number(math.degrees(part.kappa)),
-        "sigma": by_name(sigma),
-        "outlines": [outline_record(outline) for outline in part.outlines],
+        name: WRITERS[type](values[name]) if type in WRITERS else values[name]
+        for name, _, _, _, type in TABLES[table].attributes
+        if name in values
     }
 
 
@@ -247,3 +251,18 @@ def places(xyz: np.ndarray) -> list[list[float | None]]:
 
 def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float | None]:
     return [number(value, digits) for value in values]
+
+
+def optional_numbers(values: np.ndarray | None) -> list[float | None] | None:
+    return None if values is None else numbers(values)
+
+
+WRITERS: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("number", "number?", "length"), number),
+    **dict.fromkeys(("place", "place?"), optional_numbers),
+    **dict.fromkeys(("polygon", "polygon?"), outline_record),
+    **dict.fromkeys(("numbers", "parameters", "box", "shares", "figures"), by_name),
+    "polygon[]": lambda outlines: [outline_record(outline) for outline in outlines],
+    "place[][]": lambda lines: [places(line) for line in lines],
+}
+"""How values of a type are written; all others are as they are."""

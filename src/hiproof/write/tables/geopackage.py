@@ -18,7 +18,7 @@ from typing import Any
 from ...errors import OutputError
 from ...model import Building
 from ...model.roof_figures import RoofFigures
-from ..attribute_list import HIPROOF, OSM, PREFIX, ROOFER
+from ..attribute_list import PREFIX, TABLES
 from ..building_attributes import building_attributes, measure_figures
 from ..files import atomic, scratch
 from ..fragments import Fragment, Sheet
@@ -69,7 +69,7 @@ def attributes_with_a_column() -> int:
 
     They stand beside hiproof's own.
     """
-    return MOST_COLUMNS - len(ROOFER) - len(HIPROOF) - len(OSM) - 1
+    return MOST_COLUMNS - sum(len(TABLES[name].names) for name in ("roofer", "hiproof", "osm")) - 1
 
 
 class AttributesWriter(BuildingWriter):

@@ -18,7 +18,7 @@ from ...frames import METRES, Units
 from ...model import ROOF, Building, Face, Part
 from ...model.roof_figures import RoofFigures
 from ...primitives.cants import CANTED, MEASURES, list_cants
-from ..attribute_list import HISTORY_LAYER, SHAPE
+from ..attribute_list import SHAPE, TABLES
 from ..surfaces import number_surfaces
 from ..values import metres, plain_text, round_value
 
@@ -109,7 +109,7 @@ def history_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     rows = []
     for model in (building.change or {}).get("history", ()):
         shell, *holes = model["outline"]
-        values = {a.name: model.get(a.name) for a in HISTORY_LAYER}
+        values = {name: model.get(name) for name in TABLES["history"].names}
         values |= {"successor": plain_text(building.id), "parts": len(model["parts"])}
         rows.append((encode_geometry(shapely.Polygon(shell, holes), units), values))
     return tuple(rows)

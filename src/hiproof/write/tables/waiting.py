@@ -10,19 +10,10 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import Any, BinaryIO
 
-from ..attribute_list import (
-    HIPROOF,
-    HISTORY_LAYER,
-    OSM,
-    OWN,
-    PARTS_LAYER,
-    ROOFER,
-    SURFACES_LAYER,
-)
+from ..attribute_list import OWN, TABLES
 from .rows import Row
 
 HISTORY = "history"  # a table that only runs have in which models ended
-DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER, HISTORY: HISTORY_LAYER}
 BATCH_ROWS = 1000  # rows handed on at once: the overhead is a call's, the memory a row's
 
 
@@ -34,7 +25,9 @@ class WaitingRows:
 
     def __init__(self, layer: str, file: BinaryIO) -> None:
         self.layer, self.file, self.count = layer, file, 0
-        self.found: dict[str, set[type]] = {a.name: set() for a in DECLARED.get(layer, ())}
+        self.found: dict[str, set[type]] = {
+            name: set() for name in (TABLES[layer].names if layer in TABLES else ())
+        }
 
     def put(self, line: bytes) -> None:
         """Store a building's rows, as a line of `Rows.to_text`."""
@@ -54,14 +47,13 @@ class WaitingRows:
 
         Of more than `limit`, the last of the input's own are left out.
         """
+        names = [self.layer] if self.layer in TABLES else ["roofer", "hiproof", "osm"]
+        prefixes = {"roofer": prefix, "hiproof": OWN}
         declared = {
-            start + a.name: a.kind
-            for start, table in ((prefix, ROOFER), (OWN, HIPROOF), ("", OSM))
-            for a in table
+            prefixes.get(name, "") + a.name: a.kind
+            for name in names
+            for a in TABLES[name].attributes
         }
-        declared = (
-            {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
-        )
         kinds = {
             name: column_kind(result, declared.get(name, "text"))
             for name, result in self.found.items()

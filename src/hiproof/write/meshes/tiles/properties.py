@@ -14,16 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...attribute_list import (
-    ENRICHED,
-    ENRICHED_3DBAG,
-    ENRICHED_SUN,
-    HIPROOF,
-    OSM,
-    OWN,
-    PREFIX,
-    ROOFER,
-)
+from ...attribute_list import TABLES
 from ...naming import UniqueNames
 from ..glb import GlbDocument
 
@@ -31,23 +22,16 @@ EXTENSION = "EXT_structural_metadata"
 CLASS = "building"
 NO_NUMBER = -9999.0  # stands for what is not known, as GDAL's files use it; no attribute has it
 WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is told as text
-DESCRIBED_TABLES = (
-    (PREFIX, ROOFER),
-    (OWN, HIPROOF),
-    ("", OSM),
-    (OWN, ENRICHED),
-    ("", ENRICHED_3DBAG),
-    (OWN, ENRICHED_SUN),
-)
+DESCRIBED_TABLES = ("roofer", "hiproof", "osm", "enriched", "enriched_3dbag", "enriched_sun")
 DESCRIPTIONS = {
     "id": "the building's id",
     "type": "roof type of the part that shows the largest area",
     "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see "
     "docs/parameters.md)",
 } | {
-    prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
-    for prefix, table in DESCRIBED_TABLES
-    for a in table
+    table.prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
+    for table in map(TABLES.__getitem__, DESCRIBED_TABLES)
+    for a in table.attributes
 }
 
 
