@@ -195,6 +195,50 @@ def test_ifc_in_feet_names_its_unit(run, tmp_path):
     assert "IFCMAPCONVERSIONSCALED" in text and "IFCCONVERSIONBASEDUNIT" in text
 
 
+def read_global_ids(path):
+    """Return the GlobalIds of an IFC file: those of buildings by name, and all."""
+    model = reader("ifcopenshell").open(path)
+    by_name = {building.Name: building.GlobalId for building in model.by_type("IfcBuilding")}
+    return by_name, {item.GlobalId for item in model.by_type("IfcRoot")}
+
+
+def write_town(folder, lines, **changes):
+    """Write a parameters.jsonl of the records in `lines`, moved or in another CRS."""
+    head, *buildings = lines
+    folder.mkdir()
+    for building in buildings:
+        x, y, z = building.get("origin") or (0.0, 0.0, 0.0)
+        building["origin"] = [x + changes.get("east", 0.0), y, z]
+    head = {**head, **({"crs": changes["crs"]} if "crs" in changes else {})}
+    text = "".join(json.dumps(line) + "\n" for line in [head, *buildings])
+    (folder / "parameters.jsonl").write_text(text)
+    return folder / "parameters.jsonl"
+
+
+def read_lines(run):
+    return [json.loads(line) for line in (run / "parameters.jsonl").read_text().splitlines()]
+
+
+@pytest.mark.parametrize("gone", range(3))
+def test_global_ids_stay_when_another_building_leaves(gone, run, outputs, tmp_path):
+    ids, _ = read_global_ids(outputs("ifc"))
+    lines = read_lines(run)
+    name = [line["id"] for line in lines[1:] if line["id"] in ids][gone]
+    rest = write_town(tmp_path / "a", [line for line in lines if line.get("id") != name])
+    convert(rest, tmp_path / "a.ifc")
+    found, _ = read_global_ids(tmp_path / "a.ifc")
+    assert found == {id: ids[id] for id in ids if id != name}
+
+
+@pytest.mark.parametrize("changes", [{"east": 25_000.0}, {"crs": "EPSG:25831"}])
+def test_two_towns_share_no_global_id(changes, run, outputs, tmp_path):
+    convert(write_town(tmp_path / "a", read_lines(run), **changes), tmp_path / "a.ifc")
+    (names, all_ids), (others, other_ids) = (
+        read_global_ids(path) for path in (outputs("ifc"), tmp_path / "a.ifc")
+    )
+    assert set(names) == set(others) and not all_ids & other_ids
+
+
 def test_the_same_run_makes_the_same_ifc(run, outputs, tmp_path):
     convert(run, tmp_path / "again.ifc") if outputs("ifc") else None
     assert (tmp_path / "again.ifc").read_bytes() == outputs("ifc").read_bytes()

@@ -20,12 +20,15 @@ from ...extras import import_extra
 from ...frames import Units
 from ...model import Face
 from ..colours import srgb
+from ..naming import UniqueNames
 from .viewed import Look, ViewedModel, merge_values
 
 IFC_SCHEMA = "IFC4X3"
 PROPERTY_SET = "hiproof"
-# of names made of ids, so that the same building has the same one in every file
+# of GlobalIds, which follow from ids and places: the same building has the same one in every file
 NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
+# Sides (m) of squares of the plan, within which an id names one building, and a file one town.
+BUILDING_SQUARE_M, TOWN_SQUARE_M = 1_000.0, 10_000.0
 FIXED_TIME = "2000-01-01T00:00:00"  # in place of the clock's, for files that do not depend on it
 PRECISION_M = 1e-4  # of coordinates, as all formats have them
 
@@ -40,10 +43,10 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     """
     from ..files import atomic_file
 
-    model = IfcModel(import_extra("ifcopenshell", "ifc", "IFC"))
+    model = IfcModel(import_extra("ifcopenshell", "ifc", "IFC"), crs)
     for building in buildings:
         model.add(building)
-    model.finish(crs)
+    model.finish()
     with atomic_file(path) as file:
         file.write(model.file.to_string().encode())
     return len(model.buildings)
@@ -52,8 +55,10 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 class IfcModel:
     """A growing IFC file: a project with a site, and its buildings."""
 
-    def __init__(self, ifcopenshell: Any) -> None:
-        self.guid = ifcopenshell.guid
+    def __init__(self, ifcopenshell: Any, crs: str | None) -> None:
+        self.guid, self.crs = ifcopenshell.guid, crs
+        self.crs_name = "" if crs is None else crs_name(crs)
+        self.keys = UniqueNames()
         self.file = ifcopenshell.file(schema=IFC_SCHEMA)
         self.file.header.file_name.time_stamp = FIXED_TIME
         self.file.header.file_name.originating_system = "hiproof"
@@ -92,7 +97,8 @@ class IfcModel:
         """Add a building with its body and its properties."""
         if self.origin is None:
             self.origin = np.floor(model.solid.vertices.min(axis=0))
-        key = f"{len(self.buildings)} {model.id}"
+        middle = (model.solid.vertices.min(axis=0) + model.solid.vertices.max(axis=0)) / 2
+        key = self.keys.take(f"{model.id} {self.name_square(middle, BUILDING_SQUARE_M)}")
         shape = self.make(
             "IfcShapeRepresentation",
             ContextOfItems=self.body,
@@ -171,7 +177,12 @@ class IfcModel:
         kind = IFC_VALUES.get(type(value), "IfcText")
         return self.make(kind, value if type(value) in IFC_VALUES else json.dumps(value))
 
-    def finish(self, crs: str | None) -> None:
+    def name_square(self, place: np.ndarray, side_m: float) -> str:
+        """Return the CRS and the square of the plan that a place (3,) lies in."""
+        x, y = np.floor(place[:2] / side_m).astype(int).tolist()
+        return f"{self.crs_name} {x} {y}"
+
+    def finish(self) -> None:
         """Add what holds the buildings: project, site, units and the place of the origin."""
         metre, square, cube, radian = (
             self.make("IfcSIUnit", UnitType=kind, Name=name)
@@ -183,24 +194,24 @@ class IfcModel:
             )
         )
         units = self.make("IfcUnitAssignment", Units=[metre, square, cube, radian])
+        town = self.name_square(np.zeros(3) if self.origin is None else self.origin, TOWN_SQUARE_M)
         project = self.make_rooted(
             "IfcProject",
-            "",
+            town,
             Name="hiproof",
             RepresentationContexts=[self.context],
             UnitsInContext=units,
         )
-        site = self.make_rooted("IfcSite", "", ObjectPlacement=self.placement)
-        self.add_parts(project, [site])
+        site = self.make_rooted("IfcSite", town, ObjectPlacement=self.placement)
+        self.add_parts(project, [site], town)
         if self.buildings:
-            self.add_parts(site, self.buildings)
-        if crs is not None:
-            self.place_in_crs(crs, metre)
+            self.add_parts(site, self.buildings, town)
+        if self.crs is not None:
+            self.place_in_crs(self.crs, metre)
 
-    def add_parts(self, whole: Any, parts: list[Any]) -> None:
-        self.make_rooted(
-            "IfcRelAggregates", whole.is_a(), RelatingObject=whole, RelatedObjects=parts
-        )
+    def add_parts(self, whole: Any, parts: list[Any], town: str) -> None:
+        key = f"{whole.is_a()} {town}"
+        self.make_rooted("IfcRelAggregates", key, RelatingObject=whole, RelatedObjects=parts)
 
     def place_in_crs(self, crs: str, metre: Any) -> None:
         """Say where the origin lies in the CRS, in its own units."""
