@@ -3,6 +3,8 @@ the start gives.
 """
 
 import dataclasses
+import itertools
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -10,6 +12,9 @@ import shapely
 
 import planted
 from hiproof.city import run as city_run
+from hiproof.city.folder import resume
+from hiproof.city.folder.ledger import Ledger
+from hiproof.city.plan import overrides
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.city.work import solve
@@ -108,6 +113,64 @@ def test_a_run_killed_while_it_does_what_changed_goes_on(town, solved_ids, monke
             run(changed)
     solved_ids.clear()
     assert reconstruct_area(request).buildings == 4 and solved_ids == ["house-1"]
+
+
+class Killed(BaseException):
+    """The main process is killed."""
+
+
+@contextmanager
+def killed_at(step, monkeypatch):
+    """Kill the run at its step of that number: a transaction or a file, begun or just done."""
+    steps = itertools.count()
+
+    def count():
+        if next(steps) == step:
+            raise Killed
+
+    def slow(original):
+        @contextmanager
+        def stepped(*args, **options):
+            count()
+            with original(*args, **options) as value:
+                yield value
+                count()
+            count()
+
+        return stepped
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Ledger, "transact", slow(Ledger.transact))
+        patch.setattr(resume, "atomic", slow(resume.atomic))
+        patch.setattr(overrides, "atomic", slow(overrides.atomic))
+        patch.setattr(solve, "atomic_file", slow(solve.atomic_file))
+        yield
+
+
+@pytest.mark.parametrize("step", range(20))
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_run_killed_at_any_step_of_a_change_ends_as_one_from_the_start(
+    step, town, tmp_path, monkeypatch
+):
+    """With or without a way back to the first footprints before the run goes on."""
+    houses, request, run = town
+    first, second, *_ = houses
+    swapped = {**houses, first: houses[second], second: houses[first]}
+    settings = Settings.from_dict({"city": {"models": "both"}})
+    request = dataclasses.replace(request, out=tmp_path / "tiles", settings=settings)
+    run(houses, out=request.out, settings=settings)
+    for footprints in (swapped, houses, swapped):
+        with killed_at(step, monkeypatch), suppress(Killed):
+            run(footprints, out=request.out, settings=settings)
+    reconstruct_area(request)
+    fresh = dataclasses.replace(request, out=tmp_path / "fresh")
+    reconstruct_area(fresh)
+    assert records(request.out) == records(fresh.out)
+    models, expected = (
+        {file.name: file.read_bytes() for file in (out / "models").iterdir()}
+        for out in (request.out, fresh.out)
+    )
+    assert models == expected
 
 
 def test_models_by_work_tile_follow_changed_footprints(town, solved_ids, tmp_path):

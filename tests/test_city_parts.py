@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.folder.ledger import Ledger, Outcome, Task
+from hiproof.city.folder.ledger import Ledger, Outcome
 from hiproof.city.plan.work_plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.work import quarantine
 from hiproof.city.work.executors import InProcess
@@ -150,13 +150,13 @@ def test_lowest_points_do_not_depend_on_how_they_are_cut():
 def test_the_ledger_remembers_after_being_closed(tmp_path):
     path = tmp_path / "ledger.sqlite"
     ledger = Ledger(path)
-    ledger.add_tasks([Task("solve:a", "solve", 2), Task("solve:b", "solve", 1)])
+    ledger.settle([(0, "a", b"0"), (1, "a", b"1"), (2, "b", b"2")], [])
+    ledger.put_tasks(0, {"a": 2, "b": 1})
     ledger.finish(
         "solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.01)]
     )
     ledger.close()
     reopened = Ledger(path)
-    reopened.add_tasks([Task("solve:a", "solve", 2)])
     assert reopened.open_tasks("solve") == ["solve:b"]
     assert reopened.counts("status") == {"modelled": 1}
     reader = Ledger(path, read_only=True)

@@ -342,7 +342,7 @@ def test_no_module_that_runs_cities_knows_pickle():
     home = Path(hiproof.__file__).parent
     for room in ("city", "write", "read"):
         assert [
-            file.name for file in (home / room).glob("*.py") if "import pickle" in file.read_text()
+            file.name for file in (home / room).rglob("*.py") if "import pickle" in file.read_text()
         ] == []
 
 

@@ -5,15 +5,13 @@ Each step resumes where an earlier run stopped.
 
 from __future__ import annotations
 
-import functools
 import json
-import logging
 import shutil
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,26 +27,25 @@ from ..masking import mask, masked_values
 from ..progress import show_in_notebook
 from ..read.decoded import forget_points, hold_points
 from ..stages.recognise import asks_network, fits_one
-from ..status import Doubt, Status
+from ..status import Doubt
 from ..write.files import atomic
 from ..write.head import FileHead
 from .folder.ledger import Failure, Ledger
 from .folder.lock import hold_folder
 from .folder.resume import open_ledger, open_state, resume_or_plan
-from .merge.join import merge, output_files
+from .merge.join import TEXTS_FOLDER, merge, output_files
 from .merge.outputs import claims
 from .plan.checks import refuse_unusable
 from .plan.from_cloud import Progress
 from .plan.from_overture import choose_footprints, read_source
-from .plan.overrides import REDO, load_redo
+from .plan.overrides import REDO
 from .plan.prepare import make_plan
 from .plan.work_plan import WorkPlan
 from .request import Request
-from .work import solved
 from .work.bundle_folders import find_bundle_folder, remove_bundles
 from .work.cores import as_many_as_pay
-from .work.executors import Arguments, Executor, Outcome, make_executor
-from .work.quarantine import is_loss, run_isolated, solve_in_quarantine
+from .work.executors import make_executor
+from .work.queue import Queue
 from .work.tasks import (
     MAIN_JOB,
     ONE_PRIMITIVE,
@@ -57,8 +54,6 @@ from .work.tasks import (
     solve_tile,
     sort_cloud,
 )
-
-MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 
 
 @dataclass(frozen=True)
@@ -146,22 +141,22 @@ def reconstruct_in_folder(
         with hold_points():  # for the step that sorts them
             plan = resume_or_plan(request, state, ledger, progress, steps.make_plan)
         if request.processes is None and not request.scheduler:
-            executor = make_executor(count_processes(request, plan, state, ledger))
+            executor = make_executor(count_processes(request, ledger))
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
             executor.prepare(list_compiled_pieces(request))
         clock.lap("prepare")
-        arguments = functools.partial(task_arguments, request, state)
-        work_off(ledger, executor, "sort", steps.sort_cloud, arguments, progress)
+        queue = Queue(plan, state, ledger, executor, request.clouds, request.terrain, progress)
+        queue.work_off("sort", steps.sort_cloud)
         forget_points()
         refuse_without_points(plan, ledger)
         clock.lap("sort")
         if ledger.open_tasks("solve"):
             steps.before(plan, executor, progress)
-        work_off(ledger, executor, "solve", steps.solve_tile, arguments, progress)
+        queue.work_off("solve", steps.solve_tile)
         clock.lap("solve")
         if ledger.get("merged") != "yes":
-            merge(plan, steps.make_head(plan), state, Path(request.out), progress)
+            merge(plan, steps.make_head(plan), state, ledger, progress)
         remove_bundles(Path(request.out), ledger.failed_ids())
         summary = summarise(request, plan, ledger, clock)
         LOGGER.info(
@@ -173,7 +168,7 @@ def reconstruct_in_folder(
         write_run_record(request, plan, summary)
         if ledger.get("merged") != "yes":
             ledger.claim(claims(output_files(plan, Path(request.out)), Path(request.out)))
-        clean(state)
+        clean(state, ledger)
         return summary
     except sqlite3.OperationalError as error:
         raise OutputError(
@@ -188,13 +183,10 @@ def reconstruct_in_folder(
         ledger.close()
 
 
-def count_processes(request: Request, plan: WorkPlan, state: Path, ledger: Ledger) -> int:
+def count_processes(request: Request, ledger: Ledger) -> int:
     """Return as many processes as pay for the buildings left to do."""
-    remainder, redo = (
-        [name.partition(":")[2] for name in ledger.open_tasks("solve")],
-        load_redo(state),
-    )
-    buildings = sum(len(redo.get(tile, plan.tiles[tile])) for tile in remainder)
+    remainder = ledger.open_buildings()
+    buildings = sum(map(len, remainder.values()))
     return as_many_as_pay(buildings, len(remainder), request.footprints is not None)
 
 
@@ -216,161 +208,6 @@ class Clock:
     def lap(self, step: str) -> None:
         current = time.perf_counter()
         self.seconds[step], self.start = round(current - self.start, 3), current
-
-
-def work_off(
-    ledger: Ledger,
-    executor: Executor,
-    kind: str,
-    function: Callable[..., Any],
-    arguments: Callable[[str], Arguments],
-    progress: Progress,
-) -> None:
-    """Run all open tasks of a kind.
-
-    One whose process dies is tried again, and after MOST_LOSSES alone.
-
-    `arguments` are those of `function` by the name of a task.
-    """
-    sizes = {
-        task.name: task.buildings if kind == "solve" else 1
-        for task in ledger.tasks()
-        if task.kind == kind
-    }
-    tally = Tally(kind, sum(sizes.values()), progress)
-    while names := ledger.open_tasks(kind):
-        tally.reach(tally.total - sum(sizes[name] for name in names))
-        suspects = [name for name in names if ledger.losses(name) >= MOST_LOSSES]
-        for name in suspects:
-            run_task_isolated(ledger, executor, kind, name, function, arguments(name))
-        tasks = iterate_started(
-            ledger, [name for name in names if name not in set(suspects)], arguments
-        )
-        for task, result, error in tally.listen(executor.run(function, tasks)):
-            name = f"{kind}:{task[1]}"
-            if is_loss(error):
-                ledger.lose(name)
-                LOGGER.warning(
-                    "%s was lost (%s) and is tried again", name, error or "out of memory"
-                )
-                continue
-            record(ledger, kind, name, result, error)
-            tally.reach(tally.ended + sizes[name])
-
-
-class Tally:
-    """How much is done of a kind of tasks.
-
-    That is what the tasks that ended hold, and the buildings counted since.
-    """
-
-    def __init__(self, kind: str, total: int, progress: Progress):
-        self.kind, self.total, self.progress = kind, total, progress
-        self.ended = self.counted = 0
-
-    def reach(self, ended: int) -> None:
-        """Say that tasks with so many buildings have ended."""
-        self.ended, self.counted = ended, max(self.counted, ended)
-        self.progress(self.kind, min(self.counted, self.total), self.total)
-
-    def count(self, number: int) -> None:
-        """Say that so many more buildings are solved, of tasks that go on."""
-        self.counted += number
-        self.progress(self.kind, min(self.counted, self.total), self.total)
-
-    def listen(self, outcomes: Iterator[Outcome]) -> Iterator[Outcome]:
-        """Yield the outcomes of tasks, and count the buildings that are solved meanwhile."""
-        solved.listener = self.count
-        try:
-            yield from outcomes
-        finally:
-            solved.listener = solved.ignore
-
-
-def iterate_started(
-    ledger: Ledger, names: list[str], arguments: Callable[[str], Arguments]
-) -> Iterator[Arguments]:
-    """Yield the tasks' arguments, and record each as running.
-
-    That happens when an executor takes it.
-    """
-    for name in names:
-        ledger.start(name)
-        yield arguments(name)
-
-
-def task_arguments(request: Request, state: Path, name: str) -> Arguments:
-    """Return the arguments of a task.
-
-    They are the run's folder, the number or name of what it works on, and the address that it
-    reads.
-    """
-    kind, key = name.split(":", 1)
-    folder = str(state.absolute())
-    if kind == "sort":
-        return folder, int(key), absolute(request.clouds[int(key)])
-    return folder, key, request.terrain and absolute(request.terrain)
-
-
-def absolute(name: str) -> str:
-    """Return a path that means the same to a worker started elsewhere.
-
-    Addresses stay as they are.
-    """
-    return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
-
-
-def record(ledger: Ledger, kind: str, name: str, result: Any, error: Exception | None) -> None:
-    """Enter a finished task.
-
-    Only unreadable point files may fail; any other error ends the run with what is done kept.
-    """
-    if error is None:
-        if kind == "sort":
-            ledger.finish(name, "done", json.dumps(result))
-        else:
-            ledger.finish(name, "done", "", result)
-            for outcome in result:
-                level = (
-                    logging.ERROR if outcome.status == Status.INTERNAL_ERROR.code else logging.DEBUG
-                )
-                LOGGER.log(level, "building %s: %s", outcome.id, outcome.detail)
-        LOGGER.info(
-            "%s is done: %s",
-            name,
-            count_things(len(result), "building") if kind == "solve" else result,
-        )
-    elif kind == "sort" and isinstance(error, InputError):
-        ledger.finish(name, "failed", str(error))
-        LOGGER.error("a point file could not be read: %s", error)
-    else:
-        raise error
-
-
-def run_task_isolated(
-    ledger: Ledger,
-    executor: Executor,
-    kind: str,
-    name: str,
-    function: Callable[..., Any],
-    task: Arguments,
-) -> None:
-    """Run a task whose process kept dying in a process of its own.
-
-    See quarantine.py.
-    """
-    LOGGER.warning(
-        "%s was lost %s and is now tried alone", name, count_things(ledger.losses(name), "time")
-    )
-    with closing(executor.isolate()) as single:
-        result, error = (solve_in_quarantine if kind == "solve" else run_isolated)(
-            single, function, task
-        )
-    if is_loss(error):
-        died = "the process died each time it read this file; not enough memory, or a damaged file"
-        ledger.finish(name, "failed", died)
-    else:
-        record(ledger, kind, name, result, error)
 
 
 def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
@@ -480,7 +317,7 @@ def save_run_record(path: Path, record: dict[str, Any]) -> None:
         )
 
 
-def clean(state: Path) -> None:
+def clean(state: Path, ledger: Ledger) -> None:
     """Remove what a finished run no longer needs.
 
     The ledger and the plan stay for `status` and for a repeated call, the texts of the buildings
@@ -488,3 +325,7 @@ def clean(state: Path) -> None:
     """
     shutil.rmtree(state / "points", ignore_errors=True)
     (state / REDO).unlink(missing_ok=True)
+    known = ledger.text_files()
+    for file in (state / TEXTS_FOLDER).iterdir():
+        if file.name not in known:
+            file.unlink(missing_ok=True)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..city.plan.work_plan import WorkPlan
-from ..city.run import absolute
+from ..city.work.queue import make_absolute
 from ..city.work.solve import pass_over_failure
 from ..errors import InputError
 from ..evaluate.inputs import RunSurvey
@@ -90,7 +90,7 @@ def sort_earlier(surveys: tuple[RunSurvey, ...], folder: Path, executor: Any) ->
     save_shifts(folder, {survey.name: survey.shift for survey in surveys})
     names = tuple(survey.name for survey in surveys for _ in survey.clouds)
     clouds = (cloud for survey in surveys for cloud in survey.clouds)
-    tasks = ((str(folder.absolute()), i, absolute(cloud)) for i, cloud in enumerate(clouds))
+    tasks = ((str(folder.absolute()), i, make_absolute(cloud)) for i, cloud in enumerate(clouds))
     for task, _, error in executor.run(functools.partial(sort_earlier_cloud, names), tasks):
         if error is not None:
             raise InputError(

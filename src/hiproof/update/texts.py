@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import __version__
 from ..city.folder.resume import STATE_FOLDER
-from ..city.merge.join import tile_parts
+from ..city.merge.join import list_text_files
 from ..city.plan.work_plan import PLAN_FILE, WorkPlan
 from ..errors import HiproofError
 from ..evaluate.run import run_record
@@ -69,10 +69,9 @@ def load_texts(state: str, tile: str, head: FileHead) -> dict[bytes, Fragments]:
     There are none where they are lost, or where those of the first building are no longer what is
     made of it: then the code is another.
     """
-    if not state or not tile_parts(Path(state), tile).is_file():
-        return {}
+    files = list_text_files(Path(state), tile) if state else []
     try:
-        texts = {part[LINES].text: part for part in load_fragments(tile_parts(Path(state), tile))}
+        texts = {part[LINES].text: part for file in files for part in load_fragments(file)}
         line, first = next(iter(texts.items()))
         building = build(json.loads(line), head.compose)
         names = building.id, gml_name(building.id)

@@ -12,7 +12,8 @@ from __future__ import annotations
 import os
 import sqlite3
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,9 +27,9 @@ create table if not exists task (
     state text default 'open',
     losses integer default 0, message text default '', finished real);
 create table if not exists building (
-    position integer primary key, id text, task text, status text, quality text, type text,
-    detail text, share real, seconds real);
-create table if not exists override (position integer primary key, digest text);
+    position integer primary key, tile text, digest blob, id text, status text, quality text,
+    type text, detail text, share real, seconds real, file text, number integer);
+create index if not exists building_tile on building (tile);
 create table if not exists output (name text primary key, bytes integer, digest text);
 """
 
@@ -46,9 +47,10 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A row of the buildings.
+    """What came of a building: the outcome, the quality, the cost, and where its texts are.
 
-    It has the `position` in the plan, the outcome, the quality, and the cost.
+    It has the `position` in the plan. The texts are number `number` of `file`, in the folder of
+    texts.
     """
 
     position: int
@@ -59,6 +61,8 @@ class Outcome(NamedTuple):
     detail: str
     share: float | None
     seconds: float
+    file: str = ""
+    number: int = 0
 
 
 class Failure(NamedTuple):
@@ -66,6 +70,14 @@ class Failure(NamedTuple):
 
     id: str
     detail: str
+
+
+class Settled(NamedTuple):
+    """How many buildings stay as they are, are gone or changed, and are to be solved."""
+
+    kept: int
+    gone: int
+    remainder: int
 
 
 class Claim(NamedTuple):
@@ -90,12 +102,14 @@ def read_only_address(path: Path) -> str:
     return "?mode=ro&immutable=1" if at_rest and not os.access(path.parent, os.W_OK) else "?mode=ro"
 
 
-LEDGER_TABLES = ("run", "task", "building", "override", "output")
+COLUMNS = ", ".join(Outcome._fields)
+OUTCOME = COLUMNS.partition(", ")[2]  # all but the position
 
 
 class Ledger:
     """The run's memory at `path`.
 
+    It has a row for each building of the plan, without a status as long as it is to be solved.
     States of a task: open, running, done, failed (its input cannot be used).
 
     `losses` counts how often the process died that worked on the task. sqlite3's errors pass
@@ -122,67 +136,93 @@ class Ledger:
         row = self.database.execute("select value from run where key = ?", (key,)).fetchone()
         return row[0] if row else None
 
+    @contextmanager
+    def transact(self) -> Iterator[None]:
+        """Make all changes of the block, or none."""
+        self.database.execute("begin")
+        try:
+            yield
+        except BaseException:
+            self.database.execute("rollback")
+            raise
+        self.database.execute("commit")
+
     def claim(self, files: list[Claim]) -> None:
         """Enter all files written, and with them that the run is finished."""
-        self.database.execute("begin")
-        self.database.executemany("insert or replace into output values (?, ?, ?)", files)
-        self.set(merged="yes")
-        self.database.execute("commit")
+        with self.transact():
+            self.database.executemany("insert or replace into output values (?, ?, ?)", files)
+            self.set(merged="yes")
 
     def claims(self) -> list[Claim]:
-        return list(
-            map(
-                Claim._make,
-                self.database.execute("select name, bytes, digest from output order by name"),
-            )
-        )
+        sql = "select name, bytes, digest from output order by name"
+        return list(map(Claim._make, self.database.execute(sql)))
 
-    def overrides(self) -> dict[int, str]:
-        """Return digests of the overrides with which buildings were made.
+    def settle(
+        self, planned: Iterable[tuple[int, str, bytes]], lost: Iterable[str]
+    ) -> Settled | None:
+        """Put the ledger on a plan: what is known of a building stays with its digest.
 
-        They are by position.
+        The rows of the plan have the position, the work tile and the digest of a building. What is
+        known only by files that are `lost` is forgotten. Returns None where nothing is another.
         """
-        return dict(self.database.execute("select position, digest from override"))
+        run = self.database.execute
 
-    def set_overrides(self, digests: dict[int, str]) -> None:
-        self.database.execute("begin")
-        self.put_overrides(digests)
-        self.database.execute("commit")
+        def count(rows: str) -> int:
+            return int(run(f"select count(*) from {rows}").fetchone()[0])
 
-    def put_overrides(self, digests: dict[int, str]) -> None:
-        self.database.execute("delete from override")
-        self.database.executemany("insert into override values (?, ?)", list(digests.items()))
-
-    def open_again(self, solved: list[str], digests: dict[int, str]) -> None:
-        """Open the tasks `solved` and the reading of all point files.
-
-        Overrides of buildings now have the `digests`.
-        """
-        self.database.execute("begin")
-        self.database.executemany(
-            "update task set state = 'open' where name = ?", [(name,) for name in solved]
+        run("create temp table planned (position integer primary key, tile text, digest blob)")
+        self.database.executemany("insert into planned values (?, ?, ?)", planned)
+        before, total = count("building"), count("planned")
+        self.database.executemany("delete from building where file = ?", [(file,) for file in lost])
+        same = count("planned join building using (position, tile, digest)")
+        run(
+            "create temp table known as select planned.position, planned.tile, planned.digest, "
+            f"{OUTCOME} from planned left join building using (digest)"
         )
-        self.database.execute("update task set state = 'open' where kind = 'sort'")
-        self.put_overrides(digests)
-        self.set(merged="no")
-        self.database.execute("commit")
+        kept = count("known where status is not null")
+        if not before == same == total:
+            run("delete from building")
+            run("insert into building select * from known")
+        run("drop table known")
+        run("drop table planned")
+        return None if before == same == total else Settled(kept, before - kept, total - kept)
 
     def forget(self) -> None:
         """Drop all that is known of a run."""
-        for table in LEDGER_TABLES:
+        for table in ("run", "task", "building", "output"):
             self.database.execute(f"delete from {table}")
 
-    def add_tasks(self, tasks: list[Task]) -> None:
-        """Enter open tasks of a kind, in the order of the plan.
+    def put_tasks(self, clouds: int, tiles: dict[str, int]) -> None:
+        """Enter the tasks that sort so many point files, and solve tiles of so many buildings.
 
-        Those that exist already stay.
+        Where buildings wait for their points, all files are read again.
         """
-        self.database.execute("begin")
+        run, remainder = self.database.execute, self.open_buildings()
+        run("delete from task where kind = 'solve' or ?", (bool(remainder),))
         sql = "insert or ignore into task (name, kind, position, buildings) values (?, ?, ?, ?)"
-        self.database.executemany(
-            sql, [(t.name, t.kind, i, t.buildings) for i, t in enumerate(tasks)]
-        )
-        self.database.execute("commit")
+        rows = [(f"sort:{i}", "sort", i, 0) for i in range(clouds)]
+        rows += [(f"solve:{tile}", "solve", i, n) for i, (tile, n) in enumerate(tiles.items())]
+        self.database.executemany(sql, rows)
+        for tile in tiles.keys() - remainder.keys():
+            self.finish(f"solve:{tile}", "done")
+
+    def open_buildings(self) -> dict[str, list[int]]:
+        """Return the buildings to solve by work tile."""
+        sql = "select tile, position from building where status is null order by position"
+        result: dict[str, list[int]] = {}
+        for tile, position in self.database.execute(sql):
+            result.setdefault(tile, []).append(position)
+        return result
+
+    def texts(self, tile: str) -> list[tuple[str, int]]:
+        """Return where the texts of a tile's buildings are: files, and numbers there."""
+        sql = "select file, number from building where tile = ? order by position"
+        return self.database.execute(sql, (tile,)).fetchall()
+
+    def text_files(self) -> list[str]:
+        """Return the files with texts of solved buildings."""
+        sql = "select distinct file from building where status is not null"
+        return [file for (file,) in self.database.execute(sql)]
 
     def open_tasks(self, kind: str) -> list[str]:
         """Return names of the tasks still to do, the largest first.
@@ -210,7 +250,7 @@ class Ledger:
         It was lost with it. Raises sqlite3.DatabaseError for the ledger of another version.
         """
         columns = {name for _, name, *_ in self.database.execute("pragma table_info(building)")}
-        if columns != {*Outcome._fields, "task"}:
+        if columns != {*Outcome._fields, "tile", "digest"}:
             raise sqlite3.DatabaseError("the columns of another version")
         self.database.execute(
             "update task set state = 'open', losses = losses + 1 where state = 'running'"
@@ -230,54 +270,23 @@ class Ledger:
         )
 
     def losses(self, name: str) -> int:
-        return self.database.execute("select losses from task where name = ?", (name,)).fetchone()[
-            0
-        ]
+        sql = "select losses from task where name = ?"
+        return self.database.execute(sql, (name,)).fetchone()[0]
 
     def finish(
         self, name: str, state: str, message: str = "", outcomes: Iterable[Outcome] = ()
     ) -> None:
         """Close a task together with the rows of its buildings."""
-        self.database.execute("begin")
         sql = "update task set state = ?, message = ?, finished = ? where name = ?"
         self.database.execute(sql, (state, message, time.time(), name))
-        self.put_outcomes(name, outcomes)
-        self.database.execute("commit")
-
-    def begin_again(
-        self, tasks: list[Task], outcomes: dict[int, Outcome], overrides: dict[int, str]
-    ) -> None:
-        """Enter the tasks of another plan, and what is known of its buildings.
-
-        That is by position.
-        """
-        self.database.execute("begin")
-        sql = (
-            "insert into task (name, kind, position, buildings, state, message, finished) values "
-            "(?, ?, ?, ?, ?, ?, ?)"
-        )
-        positions = (
-            (t.name, t.kind, i, t.buildings, t.state, t.message, t.finished or time.time())
-            for i, t in enumerate(tasks)
-        )
-        self.database.executemany(sql, positions)
-        self.put_outcomes("", outcomes.values())
-        self.put_overrides(overrides)
-        self.set(merged="no")
-        self.database.execute("commit")
-
-    def put_outcomes(self, task: str, outcomes: Iterable[Outcome]) -> None:
-        rows = [(position, id, task, *remainder) for position, id, *remainder in outcomes]
-        self.database.executemany(
-            "insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows
-        )
+        sql = f"update building set ({OUTCOME}) = ({', '.join('?' * 9)}) where position = ?"
+        rows = [(*outcome, position) for position, *outcome in outcomes]
+        self.database.executemany(sql, rows)
 
     def outcomes(self) -> dict[int, Outcome]:
         """Return the outcomes of the buildings that were solved, by position."""
-        sql = f"select {', '.join(Outcome._fields)} from building"
-        return {
-            outcome.position: outcome for outcome in map(Outcome._make, self.database.execute(sql))
-        }
+        sql = f"select {COLUMNS} from building where status is not null"
+        return {row[0]: Outcome._make(row) for row in self.database.execute(sql)}
 
     def tasks(self) -> list[Task]:
         sql = f"select {', '.join(Task._fields)} from task order by kind, position"
@@ -304,7 +313,9 @@ class Ledger:
 
     def overview(self) -> Overview:
         """Count the buildings modelled so far, how well, and what needs attention."""
-        rows = self.database.execute("select status, quality, detail, share from building")
+        rows = self.database.execute(
+            "select status, quality, detail, share from building where status is not null"
+        )
         return Overview.of(map(BuildingOutcome._make, rows))
 
     def failed_ids(self) -> list[str]:

@@ -9,10 +9,10 @@ import json
 import secrets
 import shutil
 import sqlite3
-import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from ... import __version__
 from ...errors import OutputError, OutputWarning
@@ -20,17 +20,17 @@ from ...formats import FORMATS
 from ...log import LOGGER, count_things
 from ...masking import masked_values
 from ...write.files import atomic
-from ..merge.join import remove_tiles, tile_parts, whole_files
+from ..merge.join import TEXTS_FOLDER, remove_tiles, whole_files, write_tile
 from ..merge.outputs import broken_claims
 from ..plan.from_cloud import Progress
-from ..plan.overrides import REDO, settle_overrides
+from ..plan.overrides import REDO, keep_overrides, save_redo
 from ..plan.prepare import make_plan
 from ..plan.work_plan import PLAN_FILE, WorkPlan
 from ..request import Request
 from ..work import noted
 from ..work.bundle_folders import remove_bundles
-from .changed import take_over
-from .ledger import Ledger, Task
+from .digests import list_buildings
+from .ledger import Ledger
 from .marks import compute_mark, describe_inputs, describe_selection, find_changed_files
 
 STATE_FOLDER = ".hiproof"  # in the output folder: the run's own folder
@@ -46,7 +46,7 @@ def open_state(out: Path) -> Path:
     state = Path(out) / STATE_FOLDER
     try:
         state.mkdir(parents=True, exist_ok=True)
-        (state / "tiles").mkdir(exist_ok=True)
+        (state / TEXTS_FOLDER).mkdir(exist_ok=True)
         (state / "points").mkdir(exist_ok=True)
     except OSError as error:
         raise OutputError(
@@ -92,28 +92,36 @@ def resume_or_plan(
 ) -> WorkPlan:
     """Return the plan of an earlier run of the same request, or a new one.
 
-    The earlier one holds where its files stand as it left them. Where the footprints changed since,
-    the new one takes over what is known of the others.
+    The earlier one holds where its files stand as it left them. What is known of buildings stays
+    where footprints or overrides changed since, and the others are to be solved.
     """
-    new_items = False
-    plan = None if request.restart else plan_to_go_on(request, state, ledger)
-    if plan is None or ledger.get("choice") != compute_mark(
-        describe_selection(request), ledger.get("salt") or ""
-    ):
-        old, plan = plan, plan_maker(request, progress)
-        new_items = old is None or not take_over(plan, old, state, ledger)
-        if new_items:
-            begin(plan, request, state, ledger)
-        enter(request, ledger)
-    settle_overrides(request.overrides, plan, state, ledger, is_new=new_items)
-    if ledger.open_tasks("solve") and not any((state / "points").iterdir()):
+    goes_on = not request.restart and may_go_on(request, ledger)
+    chosen = compute_mark(describe_selection(request), ledger.get("salt") or "")
+    is_planned = goes_on and ledger.get("choice") == chosen
+    plan = WorkPlan.load(state / PLAN_FILE) if goes_on else None
+    if plan is not None:
+        refuse_other_operations(request.out, plan)
+    if plan is None or not is_planned:
+        plan = plan_maker(request, progress)
+        if not goes_on:
+            remove_unrequested(plan, Path(request.out), ledger)
+            forget(state, ledger)
+        ledger.set(choice="")  # killed from here on, the next call plans again
+        with atomic(state / PLAN_FILE) as temporary:
+            plan.save(Path(temporary))
+    overrides = keep_overrides(request.overrides, plan, state)
+    settle(request, plan, overrides, state, ledger, is_planned)
+    open_buildings = ledger.open_buildings()
+    is_partial = sum(map(len, open_buildings.values())) < len(plan.jobs)
+    save_redo(state, open_buildings if is_partial else {})
+    if open_buildings and not any((state / "points").iterdir()):
         # somebody made room: without points, the buildings that are left would come out as ones
         # that have none
         ledger.sort_again()
     LOGGER.info(
         "version %s %s in %s: %s in %s",
         __version__,
-        "begins" if new_items else "goes on",
+        "goes on" if goes_on else "begins",
         request.out,
         count_things(len(plan.jobs), "building"),
         count_things(len(plan.tiles), "work tile"),
@@ -121,32 +129,59 @@ def resume_or_plan(
     return plan
 
 
-def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | None:
-    """Return the plan of the run in the folder that may resume, or None.
+def may_go_on(request: Request, ledger: Ledger) -> bool:
+    """Return whether the run in the folder is one of these inputs, and stands.
 
     Raises OutputError for another's.
     """
     inputs = describe_inputs(request)
-    if ledger.get("mark") is None or not (is_of(inputs, ledger) or is_begun(ledger)):
-        return None
-    refuse_other_inputs(request.out, inputs, ledger)
-    if not stands(request.out, ledger):
-        return None
-    plan = WorkPlan.load(state / PLAN_FILE)
-    refuse_other_operations(request.out, plan)
-    return plan if ledger.get("merged") != "yes" or has_parts(plan, state) else None
+    is_of = ledger.get("mark") == compute_mark(inputs, ledger.get("salt") or "")
+    # a run that ended before any task was done, by a wrong setting, is nothing to keep
+    is_begun = any(task.state == "done" for task in ledger.tasks())
+    if ledger.get("mark") is None or not (is_of or is_begun):
+        return False
+    if not is_of:
+        refuse_other_inputs(request.out, inputs, ledger)
+    return stands(request.out, ledger)
 
 
-def begin(plan: WorkPlan, request: Request, state: Path, ledger: Ledger) -> None:
-    """Put the run on `plan`, with nothing done yet."""
-    remove_unrequested(plan, Path(request.out), ledger)
-    forget(state, ledger)
-    with atomic(state / PLAN_FILE) as temporary:
-        plan.save(Path(temporary))
-    ledger.add_tasks([Task(f"sort:{i}", "sort", 0) for i in range(len(request.clouds))])
-    ledger.add_tasks(
-        [Task(f"solve:{tile}", "solve", len(members)) for tile, members in plan.tiles.items()]
-    )
+def settle(
+    request: Request,
+    plan: WorkPlan,
+    overrides: dict[int, dict[str, Any]],
+    state: Path,
+    ledger: Ledger,
+    is_planned: bool,
+) -> None:
+    """Put the ledger on a plan, in one transaction: a run that is killed knows all or nothing.
+
+    Models of work tiles that are whole are written again where the tiles are new ones.
+    """
+    lost = [file for file in ledger.text_files() if not (state / TEXTS_FOLDER / file).exists()]
+    with ledger.transact():
+        settled = ledger.settle(list_buildings(plan, overrides), lost)
+        if settled is None and is_planned:
+            return
+        remainder = ledger.open_buildings()
+        ledger.put_tasks(
+            len(request.clouds), {tile: len(members) for tile, members in plan.tiles.items()}
+        )
+        if not is_planned:
+            remove_tiles(state.parent)
+            for tile in plan.tiles.keys() - remainder.keys():
+                write_tile(plan, state, tile, ledger.texts(tile))
+        enter(request, ledger)
+    if remainder:
+        shutil.rmtree(state / "points", ignore_errors=True)
+        (state / "points").mkdir()
+    if settled is None or not settled.kept:
+        return
+    if not is_planned:
+        text = "the footprints changed: buildings kept: %d, gone or changed: %d, done now: %d"
+        LOGGER.warning(text, *settled)
+    elif not lost:
+        count = count_things(settled.remainder, "building")
+        LOGGER.info("%s with another override than before to be redone", count)
 
 
 def enter(request: Request, ledger: Ledger) -> None:
@@ -157,29 +192,11 @@ def enter(request: Request, ledger: Ledger) -> None:
         "mark": compute_mark(inputs, salt),
         "choice": compute_mark(describe_selection(request), salt),
     }
-    ledger.set(inputs=text, salt=salt, started=str(time.time()), **marks)
-
-
-def is_of(inputs: dict, ledger: Ledger) -> bool:
-    """Return whether the run in the folder is that of these inputs."""
-    return ledger.get("mark") == compute_mark(inputs, ledger.get("salt") or "")
-
-
-def is_begun(ledger: Ledger) -> bool:
-    """Return whether any task is done.
-
-    A run that ended before, by a wrong setting, is nothing to keep.
-    """
-    return any(task.state == "done" for task in ledger.tasks())
+    ledger.set(inputs=text, salt=salt, merged="no", **marks)
 
 
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
-    """Raise OutputError where the folder holds a run of another request.
-
-    The error names what differs.
-    """
-    if is_of(inputs, ledger):
-        return
+    """Raise OutputError for a run of another request, which names what differs."""
     old_inputs, new_inputs = (
         json.loads(ledger.get("inputs") or "{}"),
         json.loads(json.dumps(masked_values(inputs), default=str)),
@@ -228,11 +245,6 @@ def stands(out: Path, ledger: Ledger) -> bool:
     return not broken
 
 
-def has_parts(plan: WorkPlan, state: Path) -> bool:
-    """Return whether the texts of all work tiles still exist."""
-    return all(tile_parts(state, tile).exists() for tile in plan.tiles)
-
-
 def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
     """Remove files that an earlier run wrote and this one will not.
 
@@ -253,6 +265,6 @@ def forget(state: Path, ledger: Ledger) -> None:
     remove_bundles(state.parent)
     ledger.forget()
     (state / REDO).unlink(missing_ok=True)
-    for name in ("tiles", "points", noted.NOTED_FOLDER):
+    for name in (TEXTS_FOLDER, "points", noted.NOTED_FOLDER):
         shutil.rmtree(state / name, ignore_errors=True)
         (state / name).mkdir()

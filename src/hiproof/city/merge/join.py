@@ -5,8 +5,9 @@ It goes in plan order, with one tile in memory at a time.
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from ...formats import (
@@ -19,8 +20,10 @@ from ...formats import (
 from ...write.fragments import Fragments, load_fragments
 from ...write.head import FileHead
 from ...write.run_files import join_fragments
+from ..folder.ledger import Ledger
 from ..plan.work_plan import WorkPlan
 
+TEXTS_FOLDER = "tiles"  # of the run's own folder: the texts of solved buildings, ready to be joined
 ENDINGS = "|".join(re.escape(format.tile_ending) for format in OF_TILES.values())
 TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: unfinished
 
@@ -29,31 +32,50 @@ def merge(
     plan: WorkPlan,
     head: FileHead,
     state: Path,
-    out: Path,
+    ledger: Ledger,
     progress: Callable[[str, int, int], None],
 ) -> None:
     """Write the files of the run, which begin by `head`, each whole or not at all.
 
     What a killed merge left unfinished is removed.
     """
+    out = state.parent
     for name in (format.file for format in FORMATS.values() if format.fragment):
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
-    join_fragments(whole_files(plan, out), iterate_fragments(plan, state, progress), head)
+
+    def iterate_fragments() -> Iterator[Fragments]:
+        for number, tile in enumerate(plan.tiles):
+            progress("merge", number, len(plan.tiles))
+            yield from load_texts(state, ledger.texts(tile))
+
+    join_fragments(whole_files(plan, out), iterate_fragments(), head)
 
 
-def iterate_fragments(
-    plan: WorkPlan, state: Path, progress: Callable[[str, int, int], None]
-) -> Iterator[Fragments]:
-    for number, tile in enumerate(plan.tiles):
-        progress("merge", number, len(plan.tiles))
-        yield from load_fragments(tile_parts(state, tile))
+def load_texts(state: Path, places: Iterable[tuple[str, int]]) -> Iterator[Fragments]:
+    """Load the texts of buildings, of which files and numbers there are known."""
+    loaded = functools.lru_cache(maxsize=8)(
+        lambda file: list(load_fragments(state / TEXTS_FOLDER / file))
+    )
+    for file, number in places:
+        yield loaded(file)[number]
 
 
-def tile_parts(state: Path, tile: str) -> Path:
-    """Return where the buildings of a work tile wait to be joined."""
-    return state / "tiles" / f"{tile}.npz"
+def list_text_files(state: Path, tile: str) -> list[Path]:
+    """Return the files in which texts of a work tile's buildings wait, the latest last."""
+    return sorted((state / TEXTS_FOLDER).glob(f"{tile}.*.npz"), key=number_text_file)
+
+
+def name_text_file(state: Path, tile: str) -> Path:
+    """Return a file for further texts of a work tile's buildings: no other is written again."""
+    files = list_text_files(state, tile)
+    number = number_text_file(files[-1]) + 1 if files else 0
+    return state / TEXTS_FOLDER / f"{tile}.{number}.npz"
+
+
+def number_text_file(file: Path) -> int:
+    return int(file.name.split(".")[1])
 
 
 def output_files(plan: WorkPlan, out: Path) -> list[Path]:
@@ -80,12 +102,13 @@ def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
     return list_requested_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
-def write_tile(plan: WorkPlan, out: Path, tile: str, parts: list[Fragments]) -> None:
-    """Write the models of a work tile into the folder of tiles.
+def write_tile(plan: WorkPlan, state: Path, tile: str, places: Iterable[tuple[str, int]]) -> None:
+    """Write the models of a work tile whose texts are at these places.
 
     That is done where the settings ask for it.
     """
-    join_fragments(tile_files(plan, out, tile), parts, plan.head)
+    if files := tile_files(plan, state.parent, tile):
+        join_fragments(files, load_texts(state, places), plan.head)
 
 
 def remove_tiles(out: Path, pattern: str = "*") -> None:

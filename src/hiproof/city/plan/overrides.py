@@ -6,25 +6,22 @@ A run with others redoes those buildings alone.
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import InputError, InputWarning, OutputError
-from ...log import LOGGER, count_things
+from ...errors import InputError, InputWarning
+from ...log import count_things
 from ...masking import mask
 from ...read.attribute_columns import make_known_condition, restore_declared_types
 from ...read.footprints import attribute_rows
 from ...read.numbers import SkippedValues
 from ...settings import ReadSettings
 from ...write.files import atomic
-from ..folder.ledger import Ledger
-from ..merge.join import tile_parts
 from .table_values import select_possible
 from .work_plan import Job, WorkPlan
 
@@ -36,53 +33,18 @@ TABLE_ENDINGS = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
 MOST_SHOWN_IDS = 5  # ids in a sentence; more would hide what is said
 
 
-def settle_overrides(
-    path: str | None, plan: WorkPlan, state: Path, ledger: Ledger, is_new: bool
-) -> None:
-    """Keep the overrides at `path` for the workers.
+def keep_overrides(path: str | None, plan: WorkPlan, state: Path) -> dict[int, dict[str, Any]]:
+    """Keep the overrides at `path` for the workers, and return them by building.
 
-    Of a run that is not `is_new`, the tiles are opened of buildings whose override is another than
-    before. Raises InputError for a file that cannot be read or contradicts itself.
+    Raises InputError for a file that cannot be read or contradicts itself.
     """
     records = match_overrides(dict(read_overrides(path)) if path else {}, plan)
-    digests = {index: digest_override(record) for index, record in records.items()}
     with atomic(state / OVERRIDES_FILE) as temporary:
         Path(temporary).write_text(
             "".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())),
             encoding="utf-8",
         )
-    stored = ledger.overrides()
-    changed = {index for index in digests | stored if digests.get(index) != stored.get(index)}
-    if is_new or not changed:
-        ledger.set_overrides(digests)
-        return
-    redo = tiles_to_redo(changed, plan, state, ledger)
-    with atomic(state / REDO) as temporary:
-        Path(temporary).write_text(json.dumps(redo), encoding="utf-8")
-    LOGGER.info(
-        "%s with another override than before to be redone", count_things(len(changed), "building")
-    )
-    ledger.open_again([f"solve:{tile}" for tile in redo], digests)
-
-
-def tiles_to_redo(
-    changed: set[int], plan: WorkPlan, state: Path, ledger: Ledger
-) -> dict[str, list[int]]:
-    """Return the buildings to solve, by tile.
-
-    They are those `changed`, what a killed run left to redo, and all of a tile not solved yet.
-    """
-    finished = {task.name for task in ledger.tasks() if task.state == "done"}
-    remainder, redo = load_redo(state), {}
-    for tile, members in plan.tiles.items():
-        overlap = changed.intersection(members)
-        if not tile_parts(state, tile).exists():
-            overlap = set(members)
-        elif f"solve:{tile}" not in finished:
-            overlap |= set(remainder.get(tile, members))
-        if overlap:
-            redo[tile] = sorted(overlap)
-    return redo
+    return records
 
 
 def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -288,26 +250,16 @@ def column_override(
     return {key: value for key, value in result.items() if (key, value) != ("leave_out", False)}
 
 
-def digest_override(record: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()
+def save_redo(state: Path, redo: Mapping[str, Sequence[int]]) -> None:
+    """Name the buildings to solve by tile for the workers; none for all of them."""
+    with atomic(state / REDO) as temporary:
+        Path(temporary).write_text(json.dumps(redo), encoding="utf-8")
 
 
 def load_redo(state: Path) -> dict[str, list[int]]:
-    """Load the buildings to redo by tile.
-
-    It is empty where whole tiles are to be solved.
-
-    Raises OutputError for a damaged file.
-    """
-    try:
-        return json.loads((state / REDO).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return {}
-    except ValueError as error:
-        raise OutputError(
-            f"expected the buildings to redo in {state / REDO}, got: {error}; begin anew with "
-            "--restart"
-        ) from error
+    """Load the buildings to solve by tile, empty where whole tiles are to be solved."""
+    path = state / REDO
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
 def load_overrides(state: Path) -> dict[int, Override]:

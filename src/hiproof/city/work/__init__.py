@@ -13,6 +13,7 @@ other_classes what the points of other classes say of a building
 bundle_folders  the folders of bundles: their names, and which of them stay
 bundles       the input of buildings that hiproof failed on, kept to be sent and run again
 repro         such a building solved again
+queue         the open tasks, worked off by an executor
 executors     where tasks run: this process, processes, a Dask cluster
 processes     the second of these
 workers       how worker processes begin and end

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from ..plan.overrides import load_redo
 from ..plan.work_plan import load_plan
 from .tasks import WorkerLost
 
@@ -50,7 +51,7 @@ def solve_in_quarantine(
     if not is_loss(error):
         return result, error
     folder, tile, _ = task
-    members = load_plan(Path(folder)).tiles[tile]
+    members = load_redo(Path(folder)).get(tile) or load_plan(Path(folder)).tiles[tile]
 
     def is_deadly(index: int) -> bool:
         selected_members = tuple(i for i in members if i != index)

@@ -38,10 +38,10 @@ from ...stages.points import distinct
 from ...stages.remarks import add_remark
 from ...status import Doubt, Status
 from ...write.files import atomic_file
-from ...write.fragments import Fragments, load_fragments, save_fragments
+from ...write.fragments import Fragments, save_fragments
 from ...write.run_files import fragments
 from ..folder.ledger import Outcome
-from ..merge.join import tile_parts, write_tile
+from ..merge.join import name_text_file
 from ..plan.outlines import row_outline
 from ..plan.overrides import load_overrides, load_redo
 from ..plan.work_plan import OVERHANG_REACH_M, Job, WorkPlan, load_plan, make_job, neighbourhood
@@ -354,16 +354,12 @@ def solve_buildings(
     keep: KeepFailure,
     avoid: tuple[int, ...],
 ) -> list[Outcome]:
-    """Solve the buildings of `tile` one by one, and write its part file.
+    """Solve the buildings of `tile` that are to be solved, and write a file of their texts.
 
     `keep` is called with those to `avoid`.
     """
-    selection = kept_parts(root, tile, plan)
     parts, rows = [], []
-    for index in plan.tiles[tile]:
-        if index in selection:
-            parts.append(selection[index])
-            continue
+    for index in load_redo(root).get(tile, plan.tiles[tile]):
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
             building, part = record_failure(plan, job, DIED)
@@ -373,27 +369,15 @@ def solve_buildings(
         parts.append(part)
         rows.append(make_outcome(index, building, time.perf_counter() - start))
         count_building()
-    write_tile(plan, root.parent, tile, parts)
-    with atomic_file(tile_parts(root, tile)) as file:
-        save_fragments(file, parts)
-    return rows
+    file = name_text_file(root, tile)
+    with atomic_file(file) as stream:
+        save_fragments(stream, parts)
+    return [row._replace(file=file.name, number=number) for number, row in enumerate(rows)]
 
 
 def open_terrain(plan: WorkPlan, path: str | None) -> RasterTerrain | None:
     """Return the terrain model of a run, opened once a thread."""
     return terrain_model(path, plan.crs_wkt, plan.units, threading.get_ident())
-
-
-def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
-    """Return the texts of buildings that need not be made again, by number.
-
-    They are all of a tile but those whose override changed.
-    """
-    redo = load_redo(root).get(tile)
-    if redo is None or set(redo) == set(plan.tiles[tile]):
-        return {}
-    texts = zip(plan.tiles[tile], load_fragments(tile_parts(root, tile)), strict=True)
-    return {index: part for index, part in texts if index not in redo}
 
 
 @functools.lru_cache(maxsize=32)
