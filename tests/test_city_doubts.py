@@ -2,12 +2,14 @@
 a CRS whose metres are none.
 """
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pyproj
 import pytest
 import rasterio
+import shapely
 from rasterio.transform import from_origin
 
 from hiproof import read_parameters
@@ -105,6 +107,25 @@ def test_without_ground_points_the_rest_of_the_terrain_model_decides(tmp_path, c
     assert (
         row["z_ground"] == pytest.approx(40.0, abs=0.01) and "it is not used there" in row["detail"]
     )
+
+
+@pytest.mark.parametrize("void", [0.5, 2.0, 7.0, 15.0])
+def test_voids_around_buildings_have_the_ground_beside_them(tmp_path, void):
+    """The cloud holds roofs alone, as where a model's makers took the ground out."""
+    is_roof = TOWN.classification == 6
+    xyz = TOWN.xyz[is_roof] + [0, 0, 40.0 - ORIGIN[2]]
+    cloud = write_cloud(tmp_path / "cloud.laz", xyz, TOWN.classification[is_roof])
+    footprints = write_footprints(tmp_path / "footprints.geojson", TOWN.footprints)
+    (area,) = TOWN.footprints.values()
+    x, y = np.meshgrid(ORIGIN[0] - 19.5 + np.arange(80), ORIGIN[1] + 59.5 - np.arange(80))
+    heights = np.where(shapely.contains_xy(area.buffer(void), x, y), -9999.0, 40.0)
+    terrain = write_terrain(tmp_path / "dtm.tif", heights)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*has no height")
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints), terrain))
+    (row,) = read_parameters(tmp_path / "out" / "parameters.jsonl")
+    assert row["z_ground"] == pytest.approx(40.0, abs=0.01)
+    assert row["ground_source"].endswith("terrain model dtm.tif")
 
 
 @pytest.mark.parametrize("nothing", [np.nan, -9999.0])

@@ -14,16 +14,19 @@ from hiproof.city.plan.work_plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.work import quarantine
 from hiproof.city.work.executors import InProcess
 from hiproof.city.work.ground import (
+    FAR_STEP_M,
     BareAround,
     Cells,
     GroundAround,
     LowestAround,
+    ModelAround,
     ground_cells,
     lowest_in_cells,
 )
 from hiproof.city.work.processes import Processes
 from hiproof.city.work.sort import Reach
 from hiproof.city.work.tasks import WorkerLost
+from hiproof.read.terrain import TerrainChain
 from small_tasks import die_at_second_task, double, has_imported, number_function
 
 
@@ -119,6 +122,37 @@ def test_ground_heights_equal_plain_weighted_planes(share):
         assert GroundAround(cells, box).height_at(place[None]) == pytest.approx(
             [height], nan_ok=True
         )
+
+
+class VoidModel:
+    """A terrain model of a slope that has no height within a void around a box."""
+
+    source = "terrain model"
+
+    def __init__(self, box, void):
+        self.area = shapely.box(*box).buffer(void)
+
+    def height_at(self, xy):
+        return np.where(shapely.contains_xy(self.area, xy), np.nan, xy @ (0.1, -0.05))
+
+
+@pytest.mark.parametrize("void", [0.3, 2.0, 7.0, 8.5, 15.0, 30.0])
+def test_a_void_of_a_terrain_model_has_the_ground_of_the_nearest_heights(void):
+    for corner in np.random.default_rng(7).uniform(-1e6, 1e6, (5, 2)):
+        box = np.concatenate([np.floor(corner), np.ceil(corner + (12.0, 18.0))])
+        model, border = VoidModel(box, void), shapely.get_coordinates(shapely.box(*box))
+        chain = TerrainChain(
+            [model, ModelAround(model, box), ModelAround(model, box, FAR_STEP_M, is_guess=True)]
+        )
+        heights, sources = chain.heights_and_sources(border)
+        assert np.abs(heights - border @ (0.1, -0.05)).max() < 0.1 + 0.01 * void
+        assert sources == ("nearest heights of the terrain model",)
+
+
+def test_far_from_a_terrain_model_the_ground_is_unknown():
+    box = np.array([0.0, 0.0, 10.0, 10.0])
+    terrain = ModelAround(VoidModel(box, 60.0), box, FAR_STEP_M)
+    assert np.isnan(terrain.height_at(np.array([[0.0, 0.0], [10.0, 5.0]]))).all()
 
 
 def test_ground_without_points_is_unknown():

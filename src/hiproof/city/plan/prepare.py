@@ -26,6 +26,7 @@ from .outlines import MOST_ROW_M
 from .passages import add_passages
 from .table_values import check_number_columns
 from .work_plan import (
+    VOID_REACH_M,
     Job,
     WorkPlan,
     choose_file_offset,
@@ -112,11 +113,13 @@ def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> N
 def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
     """Read the terrain under the buildings before work is spent.
 
-    Damage ends the run. A line warns where no building has a height there: the ground points that
-    stand in for it would else be taken in silence.
+    Damage ends the run. A line warns where no building has a height there, or in reach of it: the
+    ground points that stand in for it would else be taken in silence.
     """
     corners = shapely.get_coordinates([job.area for job in jobs])
-    if not len(corners) or terrain.knows_any(corners):
+    boxes = shapely.bounds([job.area for job in jobs if not job.area.is_empty]).reshape(-1, 2, 2)
+    around = (boxes + np.array([[-VOID_REACH_M], [VOID_REACH_M]])).reshape(-1, 2)
+    if not len(corners) or terrain.knows_any(corners) or terrain.knows_any(around):
         return
     lies = (
         "has no height under any building"

@@ -40,6 +40,7 @@ SHIFT_M = 3.0  # that a row may be moved, as in fit/align.py
 # m around a building in which its ground is looked for: where points have the class, a street's
 # width; where it is found by shape, twice that
 GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
+VOID_REACH_M = 36.0  # from a building to the nearest heights of its terrain model
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,12 @@ import numpy as np
 from ...compiled import compiled
 from ...geometry.thin import rank_in_cells, thin_to_grid, without_repeats
 from ...read.terrain import Terrain
+from ..plan.work_plan import VOID_REACH_M
 
 # cells looked at around a position, the next where fewer than three are known; within the reach
 RINGS = (2, 5, 9)
+# side (m) of squares of a terrain model, of which the last ring reaches so far
+FAR_STEP_M = int(VOID_REACH_M) // RINGS[-1]
 SOFT_M2 = 0.25  # cells nearer than half a metre weigh about the same
 LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
 
@@ -76,6 +79,33 @@ class GroundAround:
         """
         xy, cells = np.ascontiguousarray(xy_world, float), self.cells
         return plane_heights(xy, cells.x, cells.y, cells.z, cells.low, self.box.astype(np.int64))
+
+
+class ModelAround:
+    """Terrain for one building where its terrain model has a void, as around houses.
+
+    It is that of `GroundAround` through the model's heights at the middles of squares of `step_m`,
+    which reach as many squares as cells of ground points do.
+    """
+
+    def __init__(self, model: Terrain, box: np.ndarray, step_m: int = 1, is_guess: bool = False):
+        self.model, self.box, self.step_m, self.is_guess = model, box, step_m, is_guess
+        self.source = f"nearest heights of the {model.source}"
+
+    @functools.cached_property
+    def around(self) -> GroundAround:
+        """Found when first asked for, in units of `step_m`."""
+        lower = np.floor(self.box[:2] / self.step_m) - RINGS[-1]
+        upper = np.ceil(self.box[2:] / self.step_m) + RINGS[-1]
+        x, y = np.meshgrid(*(np.arange(*sides) + 0.5 for sides in zip(lower, upper, strict=True)))
+        squares = np.column_stack([x.ravel(), y.ravel()])
+        heights = self.model.height_at(squares * self.step_m)
+        known = np.column_stack([squares, heights])[np.isfinite(heights)]
+        return GroundAround(Cells(known), np.concatenate([lower, upper]))
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Return the height (n,) at `xy_world` (n, 2), NaN far from all of the model's."""
+        return self.around.height_at(np.asarray(xy_world, float)[:, :2] / self.step_m)
 
 
 class BareAround:

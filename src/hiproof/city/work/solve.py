@@ -48,10 +48,12 @@ from ..plan.work_plan import OVERHANG_REACH_M, Job, WorkPlan, load_plan, make_jo
 from .bundles import TerrainRecorder, keep_failure
 from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, find_lone_roof, found_roof
 from .ground import (
+    FAR_STEP_M,
     BareAround,
     Cells,
     GroundAround,
     LowestAround,
+    ModelAround,
     WhereSeen,
     ground_cells,
     lowest_in_cells,
@@ -227,11 +229,10 @@ class Surroundings:
         if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):
             return TerrainChain(self.find_grounds(job))
         surroundings = self.select_points(job, BESIDE_ALL_M)
-        return TerrainChain(
-            [self.model]
-            if len(surroundings) and is_cut_out(surroundings)
-            else self.find_grounds(job)
-        )
+        if not (len(surroundings) and is_cut_out(surroundings)):
+            return TerrainChain(self.find_grounds(job))
+        own = neighbourhood(job, 0.0)
+        return TerrainChain([self.model, ModelAround(self.model, own)] if self.model else [])
 
     def find_grounds(self, job: Job) -> list[Terrain | None]:
         """Return the terrain model, ground points and ground of a building.
@@ -239,9 +240,13 @@ class Surroundings:
         They are those in the whole-metre box around it.
         """
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        result = WhereSeen(BareAround(self.low, box), lambda: self.has_points_around(job, box))
+        bare = WhereSeen(BareAround(self.low, box), lambda: self.has_points_around(job, box))
         points = GroundAround(self.ground, box)
-        return [self.model and WhereLikeGround(self.model, points), points, result]
+        if self.model is None:
+            return [points, bare]
+        model, own = WhereLikeGround(self.model, points), neighbourhood(job, 0.0)
+        far = ModelAround(model, own, FAR_STEP_M, is_guess=True)
+        return [model, points, ModelAround(model, own), bare, far]
 
     def has_points_around(self, job: Job, box: np.ndarray) -> bool:
         """Return whether anything beside the building is known.
