@@ -130,14 +130,14 @@ def killed_at(step, monkeypatch):
 
     def slow(original):
         @contextmanager
-        def stepped(*args, **options):
+        def wrap(*args, **options):
             count()
             with original(*args, **options) as value:
                 yield value
                 count()
             count()
 
-        return stepped
+        return wrap
 
     with monkeypatch.context() as patch:
         patch.setattr(Ledger, "transact", slow(Ledger.transact))

@@ -47,7 +47,7 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of a building: the outcome, the quality, the cost, and where its texts are.
+    """What came of a building, and where its texts are.
 
     It has the `position` in the plan. The texts are number `number` of `file`, in the folder of
     texts.
@@ -102,8 +102,8 @@ def read_only_address(path: Path) -> str:
     return "?mode=ro&immutable=1" if at_rest and not os.access(path.parent, os.W_OK) else "?mode=ro"
 
 
-COLUMNS = ", ".join(Outcome._fields)
-OUTCOME = COLUMNS.partition(", ")[2]  # all but the position
+OUTCOME_COLUMNS = ", ".join(Outcome._fields)
+OUTCOME = OUTCOME_COLUMNS.partition(", ")[2]  # all but the position
 
 
 class Ledger:
@@ -193,9 +193,10 @@ class Ledger:
             self.database.execute(f"delete from {table}")
 
     def put_tasks(self, clouds: int, tiles: dict[str, int]) -> None:
-        """Enter the tasks that sort so many point files, and solve tiles of so many buildings.
+        """Enter the tasks that sort point files, and those that solve tiles.
 
-        Where buildings wait for their points, all files are read again.
+        `clouds` counts the files, and `tiles` the buildings of each tile. Where buildings
+        wait for their points, all files are read again.
         """
         run, remainder = self.database.execute, self.open_buildings()
         run("delete from task where kind = 'solve' or ?", (bool(remainder),))
@@ -285,7 +286,7 @@ class Ledger:
 
     def outcomes(self) -> dict[int, Outcome]:
         """Return the outcomes of the buildings that were solved, by position."""
-        sql = f"select {COLUMNS} from building where status is not null"
+        sql = f"select {OUTCOME_COLUMNS} from building where status is not null"
         return {row[0]: Outcome._make(row) for row in self.database.execute(sql)}
 
     def tasks(self) -> list[Task]:

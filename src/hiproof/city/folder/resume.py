@@ -95,7 +95,7 @@ def resume_or_plan(
     The earlier one holds where its files stand as it left them. What is known of buildings stays
     where footprints or overrides changed since, and the others are to be solved.
     """
-    goes_on = not request.restart and may_go_on(request, ledger)
+    goes_on = not request.restart and is_resumable(request, ledger)
     chosen = compute_mark(describe_selection(request), ledger.get("salt") or "")
     is_planned = goes_on and ledger.get("choice") == chosen
     plan = WorkPlan.load(state / PLAN_FILE) if goes_on else None
@@ -129,7 +129,7 @@ def resume_or_plan(
     return plan
 
 
-def may_go_on(request: Request, ledger: Ledger) -> bool:
+def is_resumable(request: Request, ledger: Ledger) -> bool:
     """Return whether the run in the folder is one of these inputs, and stands.
 
     Raises OutputError for another's.
@@ -153,7 +153,7 @@ def settle(
     ledger: Ledger,
     is_planned: bool,
 ) -> None:
-    """Put the ledger on a plan, in one transaction: a run that is killed knows all or nothing.
+    """Put the ledger on a plan, in one transaction.
 
     Models of work tiles that are whole are written again where the tiles are new ones.
     """

@@ -63,12 +63,12 @@ def load_texts(state: Path, places: Iterable[tuple[str, int]]) -> Iterator[Fragm
 
 
 def list_text_files(state: Path, tile: str) -> list[Path]:
-    """Return the files in which texts of a work tile's buildings wait, the latest last."""
+    """Return the files with texts of a work tile's buildings, the latest last."""
     return sorted((state / TEXTS_FOLDER).glob(f"{tile}.*.npz"), key=number_text_file)
 
 
 def name_text_file(state: Path, tile: str) -> Path:
-    """Return a file for further texts of a work tile's buildings: no other is written again."""
+    """Return a new file for texts of a work tile's buildings."""
     files = list_text_files(state, tile)
     number = number_text_file(files[-1]) + 1 if files else 0
     return state / TEXTS_FOLDER / f"{tile}.{number}.npz"

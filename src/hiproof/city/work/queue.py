@@ -86,7 +86,7 @@ class Queue:
             yield self.make_arguments(name)
 
     def make_arguments(self, name: str) -> Arguments:
-        """Return the run's folder, the file or tile that a task works on, and what it reads."""
+        """Return the run's folder, the task's file or tile, and what it reads."""
         kind, key = name.split(":", 1)
         folder = str(self.state.absolute())
         if kind == "sort":

@@ -359,7 +359,7 @@ def solve_buildings(
     keep: KeepFailure,
     avoid: tuple[int, ...],
 ) -> list[Outcome]:
-    """Solve the buildings of `tile` that are to be solved, and write a file of their texts.
+    """Solve the open buildings of `tile`, and write a file of their texts.
 
     `keep` is called with those to `avoid`.
     """
