@@ -44,9 +44,9 @@ def compiled(function: Callable) -> Any:
 
 @functools.cache
 def find_dispatcher() -> Callable | None:
-    """Return the dispatcher that keeps code, or None, with a warning, if numba lacks what it needs.
+    """Return the dispatcher that keeps code, None if numba lacks what it needs.
 
-    Then functions are compiled by plain `njit`, in every process.
+    Then a warning says so, and functions are compiled by plain `njit`, in every process.
     """
     try:
         from .dispatcher import Dispatcher

@@ -1,4 +1,4 @@
-"""Functions whose code is kept on disk: the one file that uses numba beyond `njit`.
+"""Functions whose code is kept; the one file that uses numba beyond `njit`.
 
 numba links a function's code into every caller's, where LLVM optimises all of it once more. Here a
 caller of a large function refers to it by its symbol. So a function's symbol is the same in
@@ -151,7 +151,7 @@ class Dispatcher(CPUDispatcher):
         self.callees[args] = (here,) if is_large else callees
 
     def key(self, args: tuple) -> tuple:
-        """Return what code is kept for: types of arguments, system, processor and its features."""
+        """Return what code is kept for: types of arguments, and the processor."""
         return args, self.targetctx.codegen().magic_tuple()
 
     def get_call_template(self, args: tuple, kws: dict) -> tuple:
@@ -169,7 +169,7 @@ class Dispatcher(CPUDispatcher):
         return template, python_signature, args, {}
 
     def add_overload(self, result: Any) -> None:
-        """Let compiled functions alone find what was compiled, as Python needs the wrapper."""
+        """Let only compiled functions find what was compiled, which has no wrapper."""
         self.overloads[tuple(result.signature.args)] = result
 
     def compile(self, signature: Any) -> Any:
@@ -185,7 +185,7 @@ class Dispatcher(CPUDispatcher):
             return self.entries[args]
 
     def make_entry(self, args: tuple, result: Any) -> Any:
-        """Return the entry for calls from Python; its wrapper is read from disk or compiled."""
+        """Return the entry for calls from Python, with its wrapper."""
         context = self.targetctx.subtarget(enable_nrt=True)
         described, environment = result.fndesc, result.environment
         for constants, code in self.kept.read("-python", self.key(args)):

@@ -27,7 +27,7 @@ from .stamp import PYTHON, compute_stamp
 
 
 class Kept:
-    """One function's code on disk, a file for each `key`: argument types and processor."""
+    """One function's code, a file for each key of argument types and processor."""
 
     def __init__(self, function: Callable):
         file = Path(function.__code__.co_filename)
@@ -71,7 +71,7 @@ class Kept:
 
 
 def list_folders(sources: Path) -> tuple[Path, ...]:
-    """Return the folders for code of the files in the folder `sources`, the first choice first."""
+    """Return the folders for the code of sources in a folder, best first."""
     name = f"{sources.name}_{hashlib.sha256(str(sources).encode()).hexdigest()[:16]}"
     users = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.cache"
     chosen = [Path(numba.config.CACHE_DIR, name)] if numba.config.CACHE_DIR else []

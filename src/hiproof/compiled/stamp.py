@@ -87,7 +87,7 @@ def closure(file: Path) -> set[Path]:
 
 @functools.cache
 def list_imports(file: Path) -> frozenset[Path]:
-    """Return the files of the two packages that import statements at the top of `file` name."""
+    """Return the files of the two packages that imports at the top of `file` name."""
     tops, paths = {find_top_folder(file), PACKAGE}, set()
     for dots, module, names, modules in IMPORT.findall(file.read_text(encoding="utf-8")):
         for name in re.findall(r"[\w.]+", modules) or [module]:

@@ -128,7 +128,7 @@ def environment() -> dict[str, str]:
 
 
 def read_processor() -> str:
-    """Return the processor for which code is compiled: this machine's, or that numba is given."""
+    """Return the name of this machine's processor, or of the one numba is given."""
     return numba.config.CPU_NAME or get_host_cpu_name()
 
 
