@@ -42,7 +42,7 @@ from .kept import Kept, place_to_write
 from .stamp import compute_stamp
 
 LARGE = 80  # instructions; LLVM inlines fewer
-NOTHING = llvm.parse_assembly("").as_bitcode()  # what callers copy of a large function
+EMPTY_MODULE = llvm.parse_assembly("").as_bitcode()  # what callers copy of a large function
 OPTIONS = {
     "nopython": True,
     "error_model": "numpy",
@@ -103,7 +103,7 @@ class Dispatcher(CPUDispatcher):
         """Load the code for compiled callers, from disk or compiled."""
         with global_compiler_lock:
             if args not in self.overloads and not self.read(args):
-                self.compile_kept(args)
+                self.compile_code(args)
             news.ready.add(self.kept.name)
 
     def read(self, args: tuple) -> bool:
@@ -120,7 +120,7 @@ class Dispatcher(CPUDispatcher):
             return True
         return False
 
-    def compile_kept(self, args: tuple) -> None:
+    def compile_code(self, args: tuple) -> None:
         """Compile the function, and keep its code."""
         place_to_write(self.kept.folders)  # warns before it takes minutes
         news.tell()
@@ -136,7 +136,7 @@ class Dispatcher(CPUDispatcher):
         self.insert(result, is_large, callees)
         if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
             (*library, (machine_code, bitcode)), *rest = REDUCE(result._replace(type_annotation=""))
-            code = (*library, (machine_code, NOTHING if is_large else bitcode)), *rest
+            code = (*library, (machine_code, EMPTY_MODULE if is_large else bitcode)), *rest
             self.kept.write("", self.key(args), is_large, callees, code)
         news.tell()
 
