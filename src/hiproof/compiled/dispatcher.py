@@ -147,8 +147,8 @@ class Dispatcher(CPUDispatcher):
         args = tuple(result.signature.args)
         self.overloads[args] = result
         function = self.py_func
-        here = Callee(function.__module__, function.__qualname__, args)
-        self.callees[args] = (here,) if is_large else callees
+        itself = Callee(function.__module__, function.__qualname__, args)
+        self.callees[args] = (itself,) if is_large else callees
 
     def key(self, args: tuple) -> tuple:
         """Return what code is kept for: types of arguments, and the processor."""
