@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import hiproof
 from hiproof.cli.app import app
-from hiproof.cli.commands import COMMANDS
+from hiproof.cli.parameters import COMMANDS
 from hiproof.settings import Settings, toml_value
 
 PACKAGE = Path(hiproof.__file__).parent
@@ -49,7 +49,7 @@ def describe_command(name: str, command: Any) -> str:
     ]
     table = "".join(f"| {kind} | {make_cell(help)} |\n" for kind, help in rows)
     head = "| argument or option | meaning |\n| --- | --- |\n"
-    example = f"Example:\n\n    {COMMANDS[name].example}\n"
+    example = f"Example:\n\n    {COMMANDS[name]['example']}\n"
     return f"\n## hiproof {name}\n\n{command.help}\n\n{example}\n{head if rows else ''}{table}"
 
 

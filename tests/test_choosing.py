@@ -15,15 +15,14 @@ from hiproof.city.plan.work_plan import make_jobs
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
-from hiproof.cli.options import declared_settings
 from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
 from run_records import by_id
 
-OPTIONED = [option for option in declared_settings() if option.field.metadata["option"]]
 PARAMETERS = {p.name: p for p in app.commands["reconstruct"].params}
+OPTIONED = [p for p in PARAMETERS.values() if getattr(p, "setting", None)]
 HOUSES = {f"house-{i}": shapely.box(20 * i, 0, 20 * i + 10, 8) for i in range(5)}
 
 
@@ -39,17 +38,20 @@ def houses(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("option", OPTIONED, ids=[f"{o.section}.{o.field.name}" for o in OPTIONED])
-def test_an_option_tells_what_its_setting_tells(option):
-    parameter = PARAMETERS[option.parameter]
-    assert option.field.metadata["option"] in parameter.opts
-    assert option.field.metadata["help"] in parameter.help
+def test_every_option_of_a_setting_is_there_and_tells_what_the_setting_tells():
+    declared = [
+        field.metadata["option"]
+        for section in dataclasses.fields(Settings)
+        for field in dataclasses.fields(section.default_factory)
+        if field.metadata["option"]
+    ]
+    assert [option.opts[0] for option in OPTIONED] == declared
+    for option in OPTIONED:
+        assert option.setting[1].metadata["help"] in option.help
 
 
 def test_options_and_settings_are_told_once():
-    own_parameters = {p.name for p in PARAMETERS.values()} - {
-        option.parameter for option in OPTIONED
-    }
+    own_parameters = set(PARAMETERS) - {option.name for option in OPTIONED}
     assert own_parameters.isdisjoint(
         field.name
         for section in dataclasses.fields(Settings)

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from hiproof import progress
 from hiproof.cli.app import app
 from hiproof.cli.command import choose_level
-from hiproof.cli.commands import COMMANDS, FIRST_OPTIONS
+from hiproof.cli.parameters import COMMANDS
 from hiproof.compiled import news
 from hiproof.errors import SettingsError
 from hiproof.log import Level, start
@@ -50,17 +50,18 @@ def test_the_help_imports_no_package_that_computes():
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_of_a_command_ends_with_an_example_that_can_be_run(name):
-    program, command, *arguments = shlex.split(COMMANDS[name].example.partition(" > ")[0])
+    example = COMMANDS[name]["example"]
+    program, command, *arguments = shlex.split(example.partition(" > ")[0])
     assert (program, command) == ("hiproof", name)
     text = invoke(name, "--help", env={"COLUMNS": "200"}).output.rstrip()
-    assert text.endswith(f"Example:\n  {COMMANDS[name].example}")
+    assert text.endswith(f"Example:\n  {example}")
     COMMAND_LINE[name].make_context(name, arguments)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_the_help_holds_every_word_of_its_texts(name):
     """Brackets, backticks and stars are text, and nothing is cut to fit a column."""
-    flag = "--help-all" if COMMANDS[name].first_options else "--help"
+    flag = "--help-all" if "first" in COMMANDS[name] else "--help"
     shown = "".join(invoke(name, flag, env={"COLUMNS": "80"}).output.split())
     command = COMMAND_LINE[name]
     texts = [command.help, *(param.help for param in command.params)]
@@ -81,7 +82,7 @@ def test_a_command_shows_that_it_works_before_it_imports_what_computes(name):
 def test_reconstruct_shows_ten_options_first_and_all_on_request():
     first = list_options(invoke("reconstruct", "--help").output)
     every = list_options(invoke("reconstruct", "--help-all", env={"COLUMNS": "200"}).output)
-    shown = {"--" + name.replace("_", "-") for name in FIRST_OPTIONS}
+    shown = {"--" + name.replace("_", "-") for name in COMMANDS["reconstruct"]["first"]}
     assert len(shown - {"--help-all"}) == 10
     assert first - {"--help"} == shown
     assert {opt for param in COMMAND_LINE["reconstruct"].params for opt in param.opts} - {

@@ -27,9 +27,9 @@ from sample_models import SOLIDS, write_sample_run
 
 MODELS = "buildings.city.jsonl"
 COMMANDS = {
-    "convert to glb": lambda folder: convert(folder, None, FormatName.glb),
-    "convert to obj": lambda folder: convert(folder, None, FormatName.obj),
-    "report": lambda folder: report(folder, None, None, None, None),
+    "convert to glb": lambda folder: convert(folder, format=FormatName.glb),
+    "convert to obj": lambda folder: convert(folder, format=FormatName.obj),
+    "report": lambda folder: report(folder),
 }
 WRITTEN = {
     "convert to glb": "buildings.glb",

@@ -167,5 +167,5 @@ def test_a_roof_type_that_looks_like_markup_is_shown_as_it_is(tmp_path, capsys):
     marked = change(lines, *attributes, by=lambda known: known | {"hiproof_roof_type": "[/red]"})
     (tmp_path / "buildings.city.jsonl").write_bytes(marked)
     (tmp_path / "points.xyz").write_text("85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n")
-    evaluate(tmp_path, [str(tmp_path / "points.xyz")], None, None, None, None)
+    evaluate(tmp_path, [str(tmp_path / "points.xyz")])
     assert "[/red]" in capsys.readouterr().out

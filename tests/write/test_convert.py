@@ -59,7 +59,7 @@ def outputs(run, tmp_path_factory):
         path = folder / FORMATS[name].file
         if not path.exists():
             given = {"geoid_height": 43.2} if name == "3dtiles" else {}
-            convert(run, path, find_format(name), **given)
+            convert(run, path, format=find_format(name), **given)
         return path
 
     return write
@@ -92,7 +92,7 @@ def test_the_suffix_chooses_the_format(run, tmp_path):
 
 def test_a_file_of_the_run_is_not_replaced_without_a_name(run):
     with pytest.raises(InputError, match=r"buildings\.gml is there already"):
-        convert(run, None, find_format("citygml2"))
+        convert(run, format=find_format("citygml2"))
 
 
 @pytest.mark.parametrize("name", ["cityjson", "cityjsonseq"])

@@ -9,7 +9,6 @@ import functools
 import textwrap
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import groupby
 from typing import Any
 
@@ -18,18 +17,20 @@ import click
 from .. import __version__
 from ..early import INTERRUPTED
 from ..masking import mask
-from .command import Command, with_log_options, write_example, write_parameters
-from .commands import COMMANDS
-from .parameters import HeadedOption, list_parameters
+from .command import Command, make_command, make_print_option, write_example, write_parameters
+from .parameters import COMMANDS
 
 LONGEST_COMPLAINT = 500
 """Characters of a complaint about wrong usage: a few lines of a terminal."""
 
 
+import_command = functools.cache(make_command)
+
+
 class CommandTable(Mapping[str, Any]):
     """All commands by name; each is imported when it is looked up."""
 
-    def __getitem__(self, name: str) -> Any:
+    def __getitem__(self, name: str) -> Command:
         if name not in COMMANDS:
             raise KeyError(name)
         return import_command(name)
@@ -39,15 +40,6 @@ class CommandTable(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(COMMANDS)
-
-
-@functools.cache
-def import_command(name: str) -> Command:
-    """Return the command `name`, whose module and function have its name."""
-    function = with_log_options(getattr(import_module(f".{name}", __package__), name))
-    return Command(
-        name, params=list_parameters(function), callback=function, help=function.__doc__
-    ).with_entry(COMMANDS[name])
 
 
 class Commands(click.Group):
@@ -67,11 +59,11 @@ class Commands(click.Group):
         """Write the groups of commands, then the options."""
         self.format_usage(ctx, formatter)
         self.format_help_text(ctx, formatter)
-        for group, names in groupby(COMMANDS, lambda name: COMMANDS[name].group):
+        for group, names in groupby(COMMANDS, lambda name: COMMANDS[name]["group"]):
             with formatter.section(group):
-                formatter.write_dl([(name, COMMANDS[name].help) for name in names])
+                formatter.write_dl([(name, COMMANDS[name]["line"]) for name in names])
         write_parameters(formatter, "Options", self.get_params(ctx), ctx)
-        write_example(formatter, COMMANDS["reconstruct"].example)
+        write_example(formatter, "reconstruct")
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         with mask_complaints():
@@ -100,25 +92,13 @@ def mask_complaints() -> Iterator[None]:
         raise
 
 
-def print_version(context: click.Context, _: click.Parameter, is_requested: bool) -> None:
-    if is_requested and not context.resilient_parsing:
-        click.echo(f"hiproof {__version__}")
-        context.exit()
-
-
 app = Commands(
     name="hiproof",
     help="Turn airborne LiDAR point clouds into watertight, semantic, parametric LoD2 models.",
     no_args_is_help=True,
     params=[
-        HeadedOption(
-            ["--version"],
-            "Options",
-            is_flag=True,
-            is_eager=True,
-            expose_value=False,
-            callback=print_version,
-            help="print the version",
+        make_print_option(
+            "version", "print the version", lambda: click.echo(f"hiproof {__version__}")
         )
     ],
 )

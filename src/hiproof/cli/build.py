@@ -3,58 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
 from ..log import count_things
 from ..progress import show_progress
-from .options import with_settings
-from .parameters import Argument, Option
 
 
-def print_shapes(_: click.Context, __: click.Parameter, is_requested: bool) -> None:
-    if is_requested:
-        from ..primitives.catalogue import CATALOGUE
-        from ..primitives.parameters import list_parameters
+def print_shapes() -> None:
+    from ..primitives.catalogue import CATALOGUE
+    from ..primitives.parameters import list_parameters
 
-        for name in CATALOGUE:
-            click.echo(f"{name}: {', '.join(list_parameters(name))}")
-        raise click.exceptions.Exit
+    for name in CATALOGUE:
+        click.echo(f"{name}: {', '.join(list_parameters(name))}")
 
 
-def print_schema(_: click.Context, __: click.Parameter, is_requested: bool) -> None:
-    if is_requested:
-        from ..parametric.schema import schema_text
+def print_schema() -> None:
+    from ..parametric.schema import schema_text
 
-        click.echo(schema_text(), nl=False)
-        raise click.exceptions.Exit
+    click.echo(schema_text(), nl=False)
 
 
-@with_settings("write")
-def build(
-    parameters: Annotated[Path, Argument(help="the parameters.jsonl of a run, changed or not")],
-    out: Annotated[Path, Option(help="folder for the results")],
-    shapes: Annotated[
-        bool,
-        Option(
-            name="--shapes",
-            callback=print_shapes,
-            is_eager=True,
-            help="print the parameters of every roof type",
-        ),
-    ] = False,
-    schema: Annotated[
-        bool,
-        Option(
-            name="--schema",
-            callback=print_schema,
-            is_eager=True,
-            help="print the JSON schema of parameters.jsonl",
-        ),
-    ] = False,
-    changes: dict[str, dict[str, Any]] | None = None,
-) -> None:
+def build(parameters: Path, *, out: Path, changes: dict[str, dict[str, Any]] | None = None) -> None:
     """Make all files of a run again from its parameters.jsonl.
 
     Change the file with any editor or program first: the new files follow it.

@@ -7,13 +7,12 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
 from ..log import count_things
 from ..progress import Update, show_progress
-from .parameters import Argument, Option
 
 
 @dataclass
@@ -62,13 +61,7 @@ class CheckedFile:
         }
 
 
-def check(
-    files: Annotated[list[Path], Argument(help="CityJSON, CityJSONSeq or CityGML files")],
-    planarity: Annotated[
-        float, Option(low=0.0, help="largest distance of a vertex from its face's plane, m")
-    ] = 0.01,
-    as_json: Annotated[bool, Option(name="--json", help="print JSON instead of text")] = False,
-) -> None:
+def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) -> None:
     """Check that solids are valid by ISO 19107, with val3dity's codes.
 
     Exit code: 0 all solids are valid, 1 some are invalid or cannot be read, 2 unusable input.

@@ -6,22 +6,13 @@ Ground and buildings get a class.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import click
 
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 
-def classify(
-    cloud: Annotated[Path, Argument(help="LAS, LAZ or COPC file")],
-    out: Annotated[Path, Option(help="LAZ or LAS file to write")],
-    crs: Annotated[str | None, Option(help="CRS of the cloud (default: that of the file)")] = None,
-    unit: Annotated[
-        str | None, Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
-    ] = None,
-) -> None:
+def classify(cloud: Path, *, out: Path, crs: str | None = None, unit: str | None = None) -> None:
     """Find ground (class 2) and buildings (6), and write a copy with classes.
 
     hiproof finds both by the shape of the cloud. Points that had one of these classes and are

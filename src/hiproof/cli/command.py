@@ -1,6 +1,7 @@
 """What commands have in common.
 
-It is a help of the options that people need first, `--quiet` and `--verbose`.
+They are made of a function and its row in data/commands.toml. Their help shows the options that
+people need first, and all have `--quiet` and `--verbose`.
 """
 
 from __future__ import annotations
@@ -8,34 +9,32 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable
-from typing import Annotated, Any
+from importlib import import_module
+from typing import Any
 
 import click
 
 from ..early import interrupt_as_usual
 from ..errors import SettingsError
 from ..log import Level, start
-from .commands import Entry
-from .parameters import MAIN_HEADING, Option
+from .parameters import (
+    COMMANDS,
+    MAIN_HEADING,
+    HeadedOption,
+    collect_changes,
+    list_parameters,
+    list_setting_options,
+)
 
 ALL_OPTIONS = "hiproof.all_options"  # key of a context whose help shows every option
 
 
 class Command(click.Command):
-    """A command whose help shows its `first_options`.
+    """A command whose help shows the options that people need first.
 
-    `--help-all` shows every option; without `first_options` help always does. Help is plain text,
-    which needs no markup and no columns for types.
+    `--help-all` shows every option; without it the help always does. Help is plain text, which
+    needs no markup and no columns for types.
     """
-
-    first_options: tuple[str, ...] = ()
-
-    example: str = ""
-
-    def with_entry(self, entry: Entry) -> Command:
-        """Return the command with what the help shows of it beside its parameters."""
-        self.first_options, self.example = entry.first_options, entry.example
-        return self
 
     def format_arguments(self, ctx: Any, formatter: Any) -> None:
         """Write nothing: arguments come with the options, before them."""
@@ -45,23 +44,20 @@ class Command(click.Command):
             write_parameters(formatter, heading, params, ctx)
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        write_example(formatter, self.example)
+        write_example(formatter, self.name or "")
 
     def group_parameters(self, ctx: Any) -> dict[str, list[Any]]:
         """Return the parameters that the help shows, under their headings."""
-        params = self.get_params(ctx)
-        if self.first_options and not ctx.meta.get(ALL_OPTIONS):
-            order = (*self.first_options, "help")
-            first = sorted(
-                (p for p in params if p.name in order), key=lambda p: order.index(p.name)
-            )
-            arguments = [param for param in params if param.param_type_name == "argument"]
-            return {"Arguments": arguments, MAIN_HEADING: first}
+        params, first = self.get_params(ctx), COMMANDS[self.name or ""].get("first")
         groups: dict[str, list[Any]] = {"Arguments": [], MAIN_HEADING: []}
         for param in params:
             is_argument = param.param_type_name == "argument"
             heading = "Arguments" if is_argument else getattr(param, "heading", MAIN_HEADING)
             groups.setdefault(heading, []).append(param)
+        if first and not ctx.meta.get(ALL_OPTIONS):
+            by_name = {param.name: param for param in params}
+            options = [by_name[name] for name in (*first, "help") if name in by_name]
+            return {"Arguments": groups["Arguments"], MAIN_HEADING: options}
         return {heading: group for heading, group in groups.items() if group}
 
 
@@ -84,61 +80,77 @@ def make_phrase(text: str) -> str:
     return text[:1].lower() + text[1:-1] if text.endswith(".") else text
 
 
-def write_example(formatter: Any, example: str) -> None:
+def write_example(formatter: Any, command: str) -> None:
     """Write a command that can be copied: it is not wrapped."""
     with formatter.section("Example"):
-        formatter.write(f"  {example}\n")
+        formatter.write(f"  {COMMANDS[command]['example']}\n")
 
 
-def print_every_option(ctx: click.Context, _: click.Parameter, is_requested: bool) -> None:
-    """Show the whole help and end, as a callback of `--help-all`."""
-    if is_requested:
-        ctx.meta[ALL_OPTIONS] = True
-        click.echo(ctx.get_help())
-        raise click.exceptions.Exit
+def make_command(name: str) -> Command:
+    """Return the command `name`, whose module and function have its name."""
+    module, row = import_module(f".{name}", __package__), COMMANDS[name]
+    function: Callable[..., None] = getattr(module, name)
+    settings = list_setting_options(row.get("settings", ()))
 
-
-def with_log_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add `--quiet` and `--verbose` to a command.
-
-    The log starts at the level that they choose.
-    """
-    signature = inspect.signature(command, eval_str=True)
-
-    def run_command(*, quiet: bool, verbose: bool, **values: Any) -> None:
+    def run_command(quiet: bool, verbose: bool, **values: Any) -> None:
         interrupt_as_usual()
         start(choose_level(quiet, verbose))
-        command(**values)
+        if settings:
+            values["changes"] = collect_changes(settings, values)
+        function(**values)
 
-    switches = {
-        "quiet": "print only errors and requested results",
-        "verbose": "print every step and every building",
-    }
-    parameters = [
-        *signature.parameters.values(),
-        *(make_switch(name, text) for name, text in switches.items()),
+    prints = [
+        make_print_option(option, help, getattr(module, f"print_{option}"))
+        for option, help in row.get("prints", {}).items()
     ]
-    run_command.__name__, run_command.__doc__ = command.__name__, join_lines(command.__doc__ or "")
-    run_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run_command.__annotations__ = {p.name: p.annotation for p in parameters}
-    return run_command
+    if "first" in row:
+        prints.append(make_print_option("help_all", "show all options, in groups", print_full_help))
+    switches = [
+        HeadedOption([f"--{option}"], help=help, is_flag=True) for option, help in SWITCHES.items()
+    ]
+    return Command(
+        name,
+        params=[
+            *list_parameters(name, function),
+            *prints,
+            *settings,
+            *switches,
+        ],
+        callback=run_command,
+        # each paragraph is one line, which the help wraps to the terminal
+        help=re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(function) or ""),
+    )
 
 
-def join_lines(text: str) -> str:
-    """Make each paragraph of a docstring one line.
-
-    The help wraps it to the terminal.
-
-    >>> join_lines("a\\n    b\\n\\n    c")
-    'a b\\n\\nc'
-    """
-    return re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.cleandoc(text))
+SWITCHES = {
+    "quiet": "print only errors and requested results",
+    "verbose": "print every step and every building",
+}
 
 
-def make_switch(name: str, help: str) -> inspect.Parameter:
-    """Make the parameter of an option that is on or off."""
-    kind: Any = Annotated[bool, Option(help, name=f"--{name}")]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+def make_print_option(name: str, help: str, function: Callable[[], None]) -> click.Option:
+    """Return an option that prints something instead of running the command."""
+
+    def print_and_end(ctx: click.Context, _: click.Parameter, is_requested: bool) -> None:
+        if is_requested and not ctx.resilient_parsing:
+            function()
+            ctx.exit()
+
+    return HeadedOption(
+        ["--" + name.replace("_", "-")],
+        help=help,
+        is_flag=True,
+        is_eager=True,
+        expose_value=False,
+        callback=print_and_end,
+    )
+
+
+def print_full_help() -> None:
+    """Show the whole help of the command that runs."""
+    ctx = click.get_current_context()
+    ctx.meta[ALL_OPTIONS] = True
+    click.echo(ctx.get_help())
 
 
 def choose_level(quiet: bool, verbose: bool) -> Level:

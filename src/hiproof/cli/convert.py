@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
@@ -13,45 +13,18 @@ from ..formats import CONVERTED, choose_format
 from ..log import count_things
 from ..progress import Update, count_progress, show_progress
 from ..read.damage import SkippedBuildings
-from .parameters import Argument, Option
 
 FormatName = StrEnum("FormatName", {name: name for name in CONVERTED})  # type: ignore[misc]
-FORMAT_HELP = ", ".join(CONVERTED)
 DEFAULT = "glb"
 
 
 def convert(
-    source: Annotated[
-        Path,
-        Argument(
-            help="output folder of a run, or a file: parameters.jsonl, CityJSON, CityJSONSeq or "
-            "CityGML 2.0"
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        Argument(
-            help="file to write, whose suffix chooses the format (default: a file beside the "
-            "models)"
-        ),
-    ] = None,
-    format: Annotated[
-        FormatName | None,
-        Option(
-            metavar="<format>",
-            help=f"{FORMAT_HELP} (default: by the suffix of OUT, otherwise {DEFAULT})",
-        ),
-    ] = None,
-    crs: Annotated[
-        str | None, Option(help="CRS of the models (default: that of their file)")
-    ] = None,
-    geoid_height: Annotated[
-        float | None,
-        Option(
-            help="height of the geoid above the ellipsoid, m, for 3dtiles (default: that of "
-            "pyproj's grid)"
-        ),
-    ] = None,
+    source: Path,
+    out: Path | None = None,
+    *,
+    format: FormatName | None = None,
+    crs: str | None = None,
+    geoid_height: float | None = None,
 ) -> None:
     """Convert models of a run or of a file to another format.
 

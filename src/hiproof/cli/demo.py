@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
-from .parameters import Option
 
-
-def demo(
-    out: Annotated[Path, Option(help="folder for the results")] = Path("demo"),
-) -> None:
+def demo(*, out: Path = Path("demo")) -> None:
     """Model the 26 houses of a bundled, simulated neighbourhood.
 
     Every roof type occurs in it.

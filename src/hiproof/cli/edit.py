@@ -4,43 +4,20 @@ from __future__ import annotations
 
 import getpass
 from pathlib import Path
-from typing import Annotated
 
 import click
 
 from ..log import count_things
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 
 def edit(
-    folder: Annotated[Path, Argument(help="output folder of a run")],
-    who: Annotated[
-        str | None, Option(help="name to keep with each edit (default: your user name)")
-    ] = None,
-    clouds: Annotated[
-        Path | None,
-        Option(
-            is_folder=True,
-            help="folder of the run's inputs, where they were moved since",
-        ),
-    ] = None,
-    only: Annotated[
-        str | None,
-        Option(
-            help="buildings to list: doubtful, no_points, changed, failed or ids, separated by "
-            "commas (default: all)"
-        ),
-    ] = None,
-    port: Annotated[
-        int,
-        Option(
-            low=0,
-            high=65535,
-            shows_default=False,
-            help="port on this machine (default: a free one)",
-        ),
-    ] = 0,
+    folder: Path,
+    *,
+    who: str | None = None,
+    clouds: Path | None = None,
+    only: str | None = None,
+    port: int = 0,
 ) -> None:
     """Open a page on this machine to check doubtful buildings and correct them.
 

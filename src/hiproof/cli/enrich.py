@@ -4,37 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..log import Level, console_level, count_things
 from ..progress import show_progress
 from ..settings import EnrichSettings, Settings
-from .options import with_settings
-from .parameters import Argument, Option
 
 if TYPE_CHECKING:
     from ..enrich.run import Enriched
 
 
-@with_settings("enrich")
 def enrich(
-    run: Annotated[Path, Argument(help="output folder of a run, or its parameters.jsonl")],
-    out: Annotated[
-        Path | None, Option(help="folder for the results (default: enriched, in the run)")
-    ] = None,
-    terrain: Annotated[
-        str,
-        Option(help="terrain model (GeoTIFF; extra `terrain`) that shades, for --sun"),
-    ] = "",
-    jobs: Annotated[
-        int | None,
-        Option(
-            help="number of worker processes (default: up to one per core, fewer for a small run)",
-            low=1,
-        ),
-    ] = None,
+    run: Path,
+    *,
+    out: Path | None = None,
+    terrain: str = "",
+    jobs: int | None = None,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
     """Add party walls, areas, house types and the sun to the models of a run.

@@ -9,14 +9,13 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
 from ..errors import InputError, OutputError
 from ..log import count_things
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 SHOWN_FIGURES = {
     "psd_mean": "PSD",
@@ -39,28 +38,14 @@ DIFFERENCES = "ridge in m, slope in degrees, volume as a share of the reference'
 
 
 def evaluate(
-    folder: Annotated[Path, Argument(help="output folder of a run")],
-    clouds: Annotated[
-        list[str] | None,
-        Argument(help="point files to measure against (default: those of the run)"),
-    ] = None,
-    footprints: Annotated[
-        str | None,
-        Option(
-            help="building polygons (default: those of the run, otherwise the models' outlines)"
-        ),
-    ] = None,
-    layer: Annotated[
-        str | None, Option(help="layer of the footprints, where a file has several")
-    ] = None,
-    reference: Annotated[str | None, Option(help="CityJSON model to compare with")] = None,
-    out: Annotated[
-        Path | None,
-        Option(help="folder for evaluation.csv and .json (default: that of the run)"),
-    ] = None,
-    as_json: Annotated[
-        bool, Option(name="--json", help="print the figures as JSON instead of tables")
-    ] = False,
+    folder: Path,
+    clouds: list[str] | None = None,
+    *,
+    footprints: str | None = None,
+    layer: str | None = None,
+    reference: str | None = None,
+    out: Path | None = None,
+    as_json: bool = False,
 ) -> None:
     """Measure the models of a run.
 

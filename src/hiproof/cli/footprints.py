@@ -3,30 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
 from ..errors import SettingsError
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 
 def footprints(
-    clouds: Annotated[
-        list[str],
-        Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
-    ],
-    out: Annotated[Path, Option(help="GeoPackage to write")],
-    layer: Annotated[
-        str | None, Option(help="building or building_part (default: building)")
-    ] = None,
-    crs: Annotated[
-        str | None, Option(help="CRS of the clouds (default: that of their files)")
-    ] = None,
-    config: Annotated[
-        Path | None, Option(help="settings file (default: hiproof.toml next to the data)")
-    ] = None,
+    clouds: list[str],
+    *,
+    out: Path,
+    layer: str | None = None,
+    crs: str | None = None,
+    config: Path | None = None,
 ) -> None:
     """Fetch building footprints from Overture Maps (extra `parquet`).
 

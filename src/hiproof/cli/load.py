@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import click
 
@@ -11,30 +10,16 @@ from ..errors import InputError
 from ..log import count_things
 from ..progress import show_progress
 from ..read.damage import SkippedBuildings
-from .parameters import Argument, Option
 
 
 def load(
-    folder: Annotated[
-        Path, Argument(help="output folder of a run, or a file that `convert` reads")
-    ],
-    database: Annotated[
-        str, Argument(help="address of the database, such as postgresql://user@host/database")
-    ],
-    prefix: Annotated[
-        str,
-        Option(help="first part of the table names, at most 48 letters, digits and underscores"),
-    ] = "hiproof",
-    run: Annotated[
-        str | None,
-        Option(help="name of the run in the column `run` (default: the folder's name)"),
-    ] = None,
-    replace: Annotated[
-        bool, Option(name="--replace", help="replace all runs in the tables")
-    ] = False,
-    append: Annotated[
-        bool, Option(name="--append", help="add the run beside others in the tables")
-    ] = False,
+    folder: Path,
+    database: str,
+    *,
+    prefix: str = "hiproof",
+    run: str | None = None,
+    replace: bool = False,
+    append: bool = False,
 ) -> None:
     """Load the models of a run into PostGIS tables.
 

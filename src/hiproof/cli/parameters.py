@@ -1,55 +1,32 @@
-"""Parameters of commands, as the annotations of their functions declare them.
+"""Parameters of commands, made of signatures, data/commands.toml and settings.
 
-    def check(
-        files: Annotated[list[Path], Argument("files to check")],
-        as_json: Annotated[bool, Option("print JSON instead of text", name="--json")] = False,
-    ) -> None: ...
+    def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) -> None: ...
 
-The type says what the command line takes, and a parameter with a default may be left out.
+The arguments of a command are those of its function, and its options are keywords. The type says
+what the command line takes, and a parameter with a default may be left out.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Callable, Iterable
 from enum import Enum
+from importlib import resources
 from pathlib import Path
 from types import NoneType
 from typing import Any, get_args, get_origin
 
 import click
 
-MAIN_HEADING = "Options"
+from ..settings import Settings, toml_value
 
-
-@dataclass(frozen=True)
-class Argument:
-    """What is declared of an argument beside its type."""
-
-    help: str
-
-
-@dataclass(frozen=True)
-class Option:
-    """What is declared of an option beside its type.
-
-    Without a `name` it is called after its parameter, and a switch has a second name that turns it
-    off. `low` and `high` bound a number. `is_folder` means that a folder of this name has to exist.
-    The `callback` is called with the context, the parameter and its value, and before all others
-    where the option `is_eager`.
-    """
-
-    help: str
-    name: str | None = None
-    heading: str = MAIN_HEADING
-    metavar: str | None = None
-    low: float | None = None
-    high: float | None = None
-    is_folder: bool = False
-    shows_default: bool = True
-    is_eager: bool = False
-    callback: Callable[[click.Context, click.Parameter, Any], Any] | None = None
+COMMANDS: dict[str, dict[str, Any]] = tomllib.loads(
+    (resources.files("hiproof") / "data" / "commands.toml").read_text(encoding="utf-8")
+)
+SHARED_PARAMETERS = COMMANDS.pop("shared")
+MAIN_HEADING, FURTHER_HEADING = "Options", "Further options"
 
 
 class ShownArgument(click.Argument):
@@ -69,82 +46,145 @@ class ShownArgument(click.Argument):
 
 
 class HeadedOption(click.Option):
-    """An option with the heading under which the help shows it."""
+    """An option, the heading under which the help shows it, and its setting."""
 
-    def __init__(self, names: list[str], heading: str, **attributes: Any) -> None:
+    def __init__(
+        self,
+        names: list[str],
+        heading: str = MAIN_HEADING,
+        setting: tuple[str, dataclasses.Field] | None = None,
+        **attributes: Any,
+    ) -> None:
         super().__init__(names, **attributes)
-        self.heading = heading
+        self.heading, self.setting = heading, setting
 
 
-def list_parameters(function: Callable[..., None]) -> list[click.Parameter]:
-    """Return the parameters of a function as those of a command.
+def list_parameters(command: str, function: Callable[..., None]) -> list[click.Parameter]:
+    """Return the parameters of a command's function, but for `changes` of settings."""
+    rows = SHARED_PARAMETERS | COMMANDS[command].get("parameters", {})
+    parameters = inspect.signature(function, eval_str=True).parameters
+    return [
+        make_parameter(p, **(rows[name] if isinstance(rows[name], dict) else {"help": rows[name]}))
+        for name, p in parameters.items()
+        if name != "changes"
+    ]
 
-    Each of them is annotated with its type and an Argument or an Option.
-    """
-    signature = inspect.signature(function, eval_str=True)
-    return [make_parameter(parameter) for parameter in signature.parameters.values()]
 
-
-def make_parameter(parameter: inspect.Parameter) -> click.Parameter:
-    annotation, declared = get_args(parameter.annotation)
-    choices = [kind for kind in get_args(annotation) if kind is not NoneType]
-    kind = choices[0] if NoneType in get_args(annotation) else annotation
+def make_parameter(
+    parameter: inspect.Parameter,
+    help: str,
+    name: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    is_folder: bool = False,
+    further: bool = False,
+    **attributes: Any,
+) -> click.Parameter:
+    """Return the parameter of a command that a function's parameter and its row make."""
+    kind = parameter.annotation
+    kind = get_args(kind)[0] if NoneType in get_args(kind) else kind
     is_list = get_origin(kind) is list
     kind = get_args(kind)[0] if is_list else kind
-    is_required = parameter.default is inspect.Parameter.empty
-    attributes: dict[str, Any] = {
-        "type": choose_type(kind, declared),
-        "required": is_required,
-        "help": declared.help,
-    }
-    if not is_required:
+    attributes["type"] = choose_type(kind, minimum, maximum, is_folder)
+    attributes["required"] = parameter.default is inspect.Parameter.empty
+    if not attributes["required"]:
         attributes["default"] = parameter.default
-    if is_list or issubclass(kind, Enum):
-        attributes["callback"] = as_list if is_list else as_member(kind)
-    if isinstance(declared, Argument):
-        return ShownArgument([parameter.name], nargs=-1 if is_list else 1, **attributes)
-    if declared.callback:
-        attributes["callback"] = declared.callback
+    if is_list:
+        attributes["callback"] = lambda _context, _parameter, values: list(values) or None
+    elif issubclass(kind, Enum):
+        help = help.replace("{choices}", ", ".join(kind))
+        attributes["callback"] = lambda _context, _parameter, value: value and kind(value)
+    if parameter.kind is not inspect.Parameter.KEYWORD_ONLY:
+        return ShownArgument([parameter.name], help, nargs=-1 if is_list else 1, **attributes)
+    if further:
+        attributes["heading"] = FURTHER_HEADING
     return HeadedOption(
-        [parameter.name, declared.name or name_option(parameter.name, kind)],
-        declared.heading,
+        [parameter.name, name or name_option(parameter)],
+        help=help,
         multiple=is_list,
         is_flag=kind is bool,
-        is_eager=declared.is_eager,
-        metavar=declared.metavar,
-        show_default=declared.shows_default,
-        **attributes,
+        **{"show_default": True, **attributes},
     )
 
 
-def name_option(name: str, kind: type) -> str:
+def name_option(parameter: inspect.Parameter) -> str:
     """Return the name of an option, or both names of a switch.
 
-    >>> name_option("osm_tags", bool), name_option("out", Path)
-    ('--osm-tags/--no-osm-tags', '--out')
+    A switch that is off without it has one.
+
+    >>> kind = inspect.Parameter.KEYWORD_ONLY
+    >>> name_option(inspect.Parameter("osm_tags", kind, annotation=bool | None, default=None))
+    '--osm-tags/--no-osm-tags'
     """
-    words = name.replace("_", "-")
-    return f"--{words}/--no-{words}" if kind is bool else f"--{words}"
+    words = parameter.name.replace("_", "-")
+    is_switch = parameter.annotation in (bool, bool | None) and parameter.default is not False
+    return f"--{words}/--no-{words}" if is_switch else f"--{words}"
 
 
-def choose_type(kind: type, declared: Argument | Option) -> Any:
-    """Return what click takes for values of a type."""
-    option = declared if isinstance(declared, Option) else Option("")
+def choose_type(kind: type, minimum: float | None, maximum: float | None, is_folder: bool) -> Any:
+    """Return what click takes for values of a type within bounds."""
     if issubclass(kind, Path):
-        return click.Path(exists=option.is_folder, file_okay=not option.is_folder, path_type=Path)
+        return click.Path(exists=is_folder, file_okay=not is_folder, path_type=Path)
     if issubclass(kind, Enum):
         return click.Choice([member.value for member in kind])
-    if (option.low, option.high) != (None, None):
+    if (minimum, maximum) != (None, None):
         bounded: Any = click.IntRange if kind is int else click.FloatRange
-        return bounded(option.low, option.high)
+        return bounded(minimum, maximum)
     return kind
 
 
-def as_list(_: click.Context, parameter: click.Parameter, values: Any) -> list[Any] | None:
-    """Return the values of a parameter that may be repeated, None without any."""
-    return list(values) if values else None
+OPTION_TYPES: dict[Any, Any] = {
+    "bool": bool,
+    "int": int,
+    "float": float,
+    "str": str,
+    "tuple[int, ...]": list[int],
+    "tuple[float, ...]": list[float],
+    "tuple[str, ...]": str,
+}
+"""What the command line takes for a setting of a declared type: numbers one option each, texts
+joined by commas.
+"""
 
 
-def as_member(kind: type[Enum]) -> Callable[[click.Context, click.Parameter, Any], Enum | None]:
-    """Return a callback that makes a member of an enumeration of its value."""
-    return lambda context, parameter, value: None if value is None else kind(value)
+def list_setting_options(sections: Iterable[str]) -> list[click.Parameter]:
+    """Return the options of the settings in `sections`, in the order of settings.py."""
+    return [
+        make_setting_option(section, field)
+        for section in sections
+        for field in dataclasses.fields(getattr(Settings(), section))
+        if field.metadata["option"]
+    ]
+
+
+def make_setting_option(section: str, field: dataclasses.Field) -> click.Parameter:
+    """Make the option of a setting, None where it is not given."""
+    metadata = field.metadata
+    default = toml_value(field.default).strip("[]").replace('"', "")
+    meaning = (getattr(Settings(), section).__doc__ or "").partition("] ")[2]
+    parameter = inspect.Parameter(
+        metadata["option"].lstrip("-").replace("-", "_"),
+        inspect.Parameter.KEYWORD_ONLY,
+        default=None,
+        annotation=OPTION_TYPES[field.type] | None,
+    )
+    return make_parameter(
+        parameter,
+        metadata["help"] + (f" (default: {default})" if default else ""),
+        heading=f"Settings: {meaning.rstrip('.')}",
+        metavar="|".join(map(str, metadata["choices"])) or None,
+        setting=(section, field),
+    )
+
+
+def collect_changes(params: Iterable[click.Parameter], values: dict[str, Any]) -> dict[str, Any]:
+    """Take the settings that options give from `values`, by section and name."""
+    changes: dict[str, dict[str, Any]] = {}
+    for param in params:
+        section, field = getattr(param, "setting", None) or ("", None)
+        value = values.pop(param.name or "") if field else None
+        if field and value is not None:
+            several_texts = field.type == "tuple[str, ...]"
+            value = [text.strip() for text in value.split(",")] if several_texts else value
+            changes.setdefault(section, {})[field.name] = value
+    return changes

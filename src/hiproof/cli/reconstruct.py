@@ -5,124 +5,37 @@ from __future__ import annotations
 import dataclasses
 import functools
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
 from ..errors import SettingsError
 from ..log import LOGGER, console_level, start
-from ..settings import EnrichSettings, Settings
-from .command import print_every_option
+from ..settings import EnrichSettings, Settings, format_value
 from .enrich import enrich_folder, with_terrain
-from .options import parse_box, with_settings
-from .parameters import Argument, Option
 
 SETTINGS_FILE = "hiproof.toml"
-FURTHER = "Further options"  # heading of those that fewer people need
 
 
-@with_settings()
 def reconstruct(
-    out: Annotated[Path, Option(help="folder for the results")],
-    clouds: Annotated[
-        list[str] | None,
-        Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
-    ] = None,
-    epoch: Annotated[
-        list[str] | None,
-        Option(
-            help="instead of clouds, the clouds of several surveys: --epoch 2014=a/ --epoch "
-            "2020=b/; each building is made of the newest that covers it, and of others that show "
-            "the same roof",
-            heading=FURTHER,
-        ),
-    ] = None,
-    footprints: Annotated[
-        str | None,
-        Option(
-            help="building polygons: a file, an address, a PostGIS table, or overture for those of "
-            "Overture Maps (extra `parquet`); without this option hiproof finds the buildings"
-        ),
-    ] = None,
-    layer: Annotated[
-        str | None,
-        Option(help="layer of the footprints, where a file has several", heading=FURTHER),
-    ] = None,
-    where: Annotated[
-        str | None,
-        Option(help='SQL condition on the footprints, such as "year < 1950"', heading=FURTHER),
-    ] = None,
-    bbox: Annotated[
-        str | None,
-        Option(
-            help="model only buildings in this box: xmin,ymin,xmax,ymax in the coordinates of the "
-            "clouds"
-        ),
-    ] = None,
-    id_attribute: Annotated[
-        str | None, Option(help="footprint attribute that holds the buildings' ids")
-    ] = None,
-    terrain: Annotated[
-        str | None,
-        Option(
-            help="terrain model, a GeoTIFF (extra `terrain`); without it hiproof takes the "
-            "ground points of the clouds"
-        ),
-    ] = None,
-    overrides: Annotated[
-        str | None,
-        Option(
-            help="values that you know of some buildings (JSONL or a table); hiproof keeps them "
-            "and fits the rest"
-        ),
-    ] = None,
-    underpasses: Annotated[
-        str | None,
-        Option(
-            help="polygons of passages below buildings, a file or an address, with their "
-            "clearance in a column (--clearance-column)",
-            heading=FURTHER,
-        ),
-    ] = None,
-    config: Annotated[
-        Path | None,
-        Option(
-            help="settings file, see `hiproof settings` (default: hiproof.toml next to the data)",
-            heading=FURTHER,
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        Option(
-            help="number of worker processes (default: up to one per core, fewer for a small run)"
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        Option(help="address of a Dask scheduler (extra `city`)", heading=FURTHER),
-    ] = None,
-    restart: Annotated[
-        bool, Option(name="--restart", help="discard an earlier run in this folder")
-    ] = False,
-    enrich: Annotated[
-        bool,
-        Option(
-            name="--enrich",
-            help="also add party walls, house types and more, as `hiproof enrich` does",
-        ),
-    ] = False,
-    log_file: Annotated[
-        Path | None, Option(help="append the log to this file", heading=FURTHER)
-    ] = None,
-    help_all: Annotated[
-        bool,
-        Option(
-            name="--help-all",
-            is_eager=True,
-            callback=print_every_option,
-            help="show all options, in groups",
-        ),
-    ] = False,
+    clouds: list[str] | None = None,
+    *,
+    out: Path,
+    epoch: list[str] | None = None,
+    footprints: str | None = None,
+    layer: str | None = None,
+    where: str | None = None,
+    bbox: str | None = None,
+    id_attribute: str | None = None,
+    terrain: str | None = None,
+    overrides: str | None = None,
+    underpasses: str | None = None,
+    config: Path | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    restart: bool = False,
+    enrich: bool = False,
+    log_file: Path | None = None,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
     """Model the buildings of point clouds as CityGML, CityJSON, parameters and tables.
@@ -214,3 +127,25 @@ def find_settings_file(*inputs: str | None) -> Path | None:
     if result:
         LOGGER.warning("settings are those of %s; name others with --config", result[0])
     return result[0] if result else None
+
+
+def parse_box(text: str) -> tuple[float, float, float, float]:
+    """Parse the box that `--bbox` names.
+
+    Raises SettingsError for anything else than four numbers in order.
+
+    >>> parse_box("85000,446000, 85100,446050")
+    (85000.0, 446000.0, 85100.0, 446050.0)
+    """
+    try:
+        xmin, ymin, xmax, ymax = map(float, text.replace(",", " ").split())
+    except ValueError:
+        pass
+    else:
+        if xmin < xmax and ymin < ymax:
+            return xmin, ymin, xmax, ymax
+    raise SettingsError(
+        "expected --bbox as xmin,ymin,xmax,ymax with xmin < xmax and ymin < ymax, got "
+        f"{format_value(text)}; "
+        "try --bbox 85000,446000,85500,446500"
+    )

@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import click
 
 from ..errors import OutputError
 from ..log import count_things
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 
 def report(
-    folder: Annotated[Path, Argument(help="output folder of a run")],
-    clouds: Annotated[
-        list[str] | None,
-        Argument(help="point files (default: those of the run)"),
-    ] = None,
-    footprints: Annotated[
-        str | None, Option(help="building polygons (default: those of the run)")
-    ] = None,
-    layer: Annotated[str | None, Option(help="layer of the footprints")] = None,
-    out: Annotated[
-        Path | None, Option(help="file to write (default: report.html in the folder)")
-    ] = None,
+    folder: Path,
+    clouds: list[str] | None = None,
+    *,
+    footprints: str | None = None,
+    layer: str | None = None,
+    out: Path | None = None,
 ) -> None:
     """Write a self-contained HTML page about a run.
 

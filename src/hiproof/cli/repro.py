@@ -6,20 +6,13 @@ The run kept what this takes.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import click
 
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 
-def repro(
-    folder: Annotated[
-        Path, Argument(help="folder in which a run kept a failed building (OUT/failures/ID)")
-    ],
-    out: Annotated[Path, Option(help="folder for the results")],
-) -> None:
+def repro(folder: Path, *, out: Path) -> None:
     """Run a building again on which hiproof failed.
 
     The result shows whether the failure repeats or is fixed.

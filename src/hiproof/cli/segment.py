@@ -6,33 +6,20 @@ They are written with a table of types.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import click
 
 from ..progress import show_progress
-from .parameters import Argument, Option
 
 
 def segment(
-    clouds: Annotated[
-        list[Path],
-        Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)"),
-    ],
-    out: Annotated[
-        Path,
-        Option(help="LAZ file for the labelled points; the table goes beside it as CSV"),
-    ],
-    crs: Annotated[
-        str | None, Option(help="CRS of the clouds (default: that of their files)")
-    ] = None,
-    unit: Annotated[
-        str | None, Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
-    ] = None,
-    weights: Annotated[
-        str, Option(help="ONNX file with your own weights (default: those of hiproof)")
-    ] = "",
-    device: Annotated[str, Option(help="cpu or cuda")] = "cpu",
+    clouds: list[Path],
+    *,
+    out: Path,
+    crs: str | None = None,
+    unit: str | None = None,
+    weights: str = "",
+    device: str = "cpu",
 ) -> None:
     """Label every point with a roof type or not-roof (extra `network`).
 

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import click
 
 from ..errors import OutputError
 from ..settings import Settings
-from .parameters import Option
 
 
-def settings(
-    config: Annotated[Path | None, Option(help="settings file whose values to print")] = None,
-    write: Annotated[Path | None, Option(help="file to write instead of printing")] = None,
-) -> None:
+def settings(*, config: Path | None = None, write: Path | None = None) -> None:
     """Print every setting as TOML, with its default, unit, bounds and meaning.
 
     Keep the file as hiproof.toml next to your data, or pass it with `--config`.

@@ -8,12 +8,11 @@ from __future__ import annotations
 import json
 import sqlite3
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import InputError
-from .parameters import Argument, Option
 from .running import describe_overview
 
 if TYPE_CHECKING:
@@ -22,10 +21,7 @@ if TYPE_CHECKING:
 CLOSED = ("done", "failed")
 
 
-def status(
-    folder: Annotated[Path, Argument(help="output folder of a run")],
-    as_json: Annotated[bool, Option(name="--json", help="print JSON instead of text")] = False,
-) -> None:
+def status(folder: Path, *, as_json: bool = False) -> None:
     """Show the progress of a run and the state of its buildings.
 
     The run may be finished or still going on.

@@ -3,44 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import click
 
 from ..log import Level, console_level
 from ..progress import show_progress
-from .parameters import Option
 
 
 def train(
-    data: Annotated[
-        list[str],
-        Option(help="simulated, denhaag:FILE or roofn3d:FOLDER; repeat the option to mix several"),
-    ],
-    out: Annotated[
-        Path,
-        Option(
-            help="folder for weights, checkpoints, curve and model card; an interrupted training "
-            "in it is resumed"
-        ),
-    ],
-    types: Annotated[
-        str | None,
-        Option(
-            help="roof types to distinguish, such as pyramid,gable,hip (default: all in the data)"
-        ),
-    ] = None,
-    samples: Annotated[
-        int | None,
-        Option(low=1, help="total number of clouds to train on (default: 150,000)"),
-    ] = None,
-    epoch: Annotated[
-        int | None,
-        Option(low=1, help="number of clouds between two validations (default: 6,000)"),
-    ] = None,
-    seed: Annotated[int, Option(low=0, help="seed of all random numbers")] = 1,
-    device: Annotated[str, Option(help="auto, cpu or cuda")] = "auto",
-    threads: Annotated[int, Option(low=1, help="number of threads of the processor")] = 1,
+    *,
+    data: list[str],
+    out: Path,
+    types: str | None = None,
+    samples: int | None = None,
+    epoch: int | None = None,
+    seed: int = 1,
+    device: str = "auto",
+    threads: int = 1,
 ) -> None:
     """Train the network that recognises roof types (extra `train`).
 

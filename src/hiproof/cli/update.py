@@ -3,87 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..log import Level, console_level
 from ..progress import show_progress
-from .options import with_settings
-from .parameters import Argument, Option
 
 if TYPE_CHECKING:
     from ..update.epochs import Surveys
     from ..update.run import UpdateSummary
 
 
-@with_settings("read")
 def update(
-    run: Annotated[Path, Argument(help="output folder of the earlier run")],
-    clouds: Annotated[
-        list[str],
-        Argument(help="point files of the new survey, or folders of them"),
-    ],
-    out: Annotated[Path, Option(help="folder for the results")],
-    date: Annotated[
-        str,
-        Option(
-            help="day of the new survey, such as 2014-02-09 (default: from the time of its points, "
-            "or its files)"
-        ),
-    ] = "",
-    significance: Annotated[
-        float,
-        Option(help="probability with which an unchanged building may be called changed"),
-    ] = 0.001,
-    significance_over: Annotated[
-        str,
-        Option(
-            help="what the significance holds for: `buildings`, each unchanged building alone, or "
-            "`city`, the share of false alarms among all changes (Benjamini and Hochberg)"
-        ),
-    ] = "buildings",
-    refine: Annotated[
-        bool,
-        Option(
-            name="--refine",
-            help="estimate the parameters of unchanged buildings from the points of both surveys, "
-            "where that makes them surer",
-        ),
-    ] = False,
-    history: Annotated[
-        bool,
-        Option(name="--history", help="keep models that ended, in GeoPackage and PostGIS"),
-    ] = False,
-    footprints: Annotated[
-        str | None,
-        Option(
-            help="new building polygons (default: the outlines of the run); buildings keep their "
-            "ids, and say what they succeed where they were split or merged"
-        ),
-    ] = None,
-    layer: Annotated[
-        str | None, Option(help="layer of the footprints, where a file has several")
-    ] = None,
-    id_attribute: Annotated[
-        str | None, Option(help="footprint attribute that names new buildings")
-    ] = None,
-    terrain: Annotated[
-        str | None,
-        Option(help="terrain model (GeoTIFF; extra `terrain`); default: the clouds' ground points"),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        Option(
-            help="number of worker processes (default: up to one per core, fewer for a small run)"
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None, Option(help="address of a Dask scheduler (extra `city`)")
-    ] = None,
-    restart: Annotated[
-        bool, Option(name="--restart", help="discard an earlier update in this folder")
-    ] = False,
+    run: Path,
+    clouds: list[str],
+    *,
+    out: Path,
+    date: str = "",
+    significance: float = 0.001,
+    significance_over: str = "buildings",
+    refine: bool = False,
+    history: bool = False,
+    footprints: str | None = None,
+    layer: str | None = None,
+    id_attribute: str | None = None,
+    terrain: str | None = None,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    restart: bool = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
     """Bring the models of a run up to date with a new survey, and list what changed.

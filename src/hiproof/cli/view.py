@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Annotated
 
 import click
 
@@ -15,25 +14,9 @@ from ..formats import FORMATS
 from ..log import LOGGER
 from ..progress import Update, ignore_progress, show_progress
 from .convert import convert_models
-from .parameters import Argument, Option
 
 
-def view(
-    folder: Annotated[
-        Path,
-        Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote"),
-    ],
-    port: Annotated[
-        int,
-        Option(
-            low=0,
-            high=65535,
-            shows_default=False,
-            help="port on this machine (default: a free one)",
-        ),
-    ] = 0,
-    browser: Annotated[bool, Option(help="open the browser, or only print the address")] = True,
-) -> None:
+def view(folder: Path, *, port: int = 0, browser: bool = True) -> None:
     """Show the models of a run in your browser, without a network.
 
     hiproof makes 3D Tiles of them first. Click a building to see its attributes. Ctrl-C ends the

@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import click
 
 from ..progress import show_progress
-from .parameters import Option
 
 
-def warm(
-    everything: Annotated[
-        bool,
-        Option(
-            name="--all",
-            help="also compile what only some runs use: those without footprints, with --parts "
-            "one or with the network",
-        ),
-    ] = False,
-) -> None:
+def warm(*, everything: bool = False) -> None:
     """Compile for the processor of this machine, so that the first run starts at once.
 
     This takes a minute or two, once for each version.
@@ -27,5 +15,5 @@ def warm(
     from ..city.work.tasks import ALL, MAIN_JOB, make_ready
 
     with show_progress("compile"):
-        make_ready(ALL if everything else MAIN_JOB)
+        make_ready(ALL if everything else MAIN_JOB, own=True)
     click.echo("everything is compiled" if everything else "all that most runs use is compiled")
