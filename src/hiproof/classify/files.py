@@ -19,6 +19,7 @@ from ..read.pointcloud import common_crs, file_kind, refuse_implausible
 from ..read.positions import refuse_degrees
 from ..settings import Settings
 from ..write.files import atomic
+from ..write.overwriting import refuse_overwriting
 from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify
 
 LEFT_ALONE = (7, 9, 17, 18)  # classes that stay as they are: noise, water, bridges
@@ -35,11 +36,7 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
     path, out = Path(path), Path(out)
     if out.suffix.lower() not in (".laz", ".las"):
         raise OutputError(f"expected a .laz or .las file to write, got {out}; name one")
-    if out.exists() and out.samefile(path):
-        raise OutputError(
-            f"expected another file to write than the one that is read, got {out} for both; name a "
-            "new one"
-        )
+    refuse_overwriting([out], [path])
     las = read_whole(path)
     units = units_in(las, path, settings)
     classification = np.asarray(las.classification, np.uint8)

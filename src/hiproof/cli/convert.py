@@ -33,6 +33,8 @@ def convert(
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
+    from ..write.overwriting import refuse_overwriting, refuse_run_file
+
     name = format.value if format else name_format(out)
     given = {} if geoid_height is None else {"geoid_height_m": geoid_height}
     if given and name != "3dtiles":
@@ -40,6 +42,8 @@ def convert(
             f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out"
         )
     path = out or default_path(source, name)
+    refuse_overwriting([path], [source])
+    refuse_run_file(path)
     with show_progress("convert") as update:
         from ..write.files import elsewhere
 

@@ -58,7 +58,11 @@ def evaluate(
         from ..evaluate.run import evaluate_run
         from ..read.damage import SkippedBuildings
         from ..write.files import atomic_file, elsewhere
+        from ..write.overwriting import refuse_overwriting
 
+        place = Path(out or folder)
+        files = [place / f"evaluation{suffix}" for suffix in (".csv", ".json")]
+        refuse_overwriting(files, [*(clouds or ()), footprints, reference])
         left_out = SkippedBuildings()
         run = evaluate_run(folder, clouds or (), footprints, reference, layer, left_out)
     left_out.refuse_all(model.is_damaged for model in run.models)
@@ -66,13 +70,9 @@ def evaluate(
         raise InputError(
             f"expected point files to measure {folder} against, got none; name them after it"
         )
-    place = Path(out or folder)
     try:
-        for name, text in (
-            ("evaluation.csv", to_csv(run.figures)),
-            ("evaluation.json", to_json(run.figures)),
-        ):
-            with atomic_file(place / name) as file:
+        for path, text in zip(files, (to_csv(run.figures), to_json(run.figures)), strict=True):
+            with atomic_file(path) as file:
                 file.write(text.encode())
     except OutputError as error:
         raise (
@@ -83,7 +83,7 @@ def evaluate(
     else:
         print_summary(summarise(run.figures), reference is not None)
         click.echo(
-            f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: "
+            f"{files[0]}, {files[1]}: "
             f"{count_things(len(run.figures), 'building')}{left_out.describe()}"
         )
         describe_gaps(run.figures)

@@ -48,11 +48,14 @@ def fetch_footprints(
     from ..city.request import Request
     from ..read.pointcloud import expand_paths
     from ..settings import Settings
+    from ..write.overwriting import refuse_overwriting, refuse_run_file
     from .reconstruct import find_settings_file
 
     config = config or find_settings_file(*clouds)
     settings = Settings.from_toml(config) if config else Settings()
     files = tuple(map(str, expand_paths(tuple(clouds))))
+    refuse_overwriting([out], files)
+    refuse_run_file(out)
     request = Request(
         files, out, layer=layer, settings=settings.replace({"read": {"crs": crs}} if crs else {})
     )

@@ -33,8 +33,11 @@ def report(
         from ..read.damage import SkippedBuildings
         from ..update.before_after import draw_changes, evaluate_earlier
         from ..write.files import elsewhere
+        from ..write.overwriting import refuse_overwriting, refuse_run_file
 
         path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
+        refuse_overwriting([path], [*(clouds or ()), footprints])
+        refuse_run_file(path)
         run = evaluate_run(
             folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True
         )

@@ -19,6 +19,9 @@ def settings(*, config: Path | None = None, write: Path | None = None) -> None:
     if write is None:
         click.echo(text, nl=False)
         return
+    from ..write.overwriting import refuse_overwriting
+
+    refuse_overwriting([write], [config])
     try:
         write.write_text(text, encoding="utf-8")
     except OSError as error:

@@ -30,6 +30,7 @@ from ..write.cityjson.features import choose_offset
 from ..write.files import atomic, atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.head import FileHead
+from ..write.overwriting import refuse_overwriting
 from ..write.run_files import join_fragments
 from .cadastre import Cadastre, refuse_unfit, refuse_unusable
 from .energy import refuse_other_citygml
@@ -87,7 +88,10 @@ def enrich_run(
         np.savez(file, **index._asdict())
     records = Records(parameters, index)
     refuse_unfit(records, settings)
-    refuse_other_citygml(Settings(write=records.head.write, enrich=settings))
+    requested = Settings(write=records.head.write, enrich=settings)
+    refuse_other_citygml(requested)
+    inputs = [parameters, settings.weather, settings.horizon, settings.shading_terrain]
+    refuse_overwriting(list_requested_files(requested, out).values(), inputs)
     total = len(records)
     blocks = list_blocks(waiting, total)
     missing = [block for block in blocks if not block[0].is_file()]

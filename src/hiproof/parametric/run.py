@@ -21,7 +21,7 @@ import shapely
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError, is_interrupt
 from ..evaluate.run import run_record
-from ..formats import list_model_paths, list_requested_files
+from ..formats import FORMATS, list_model_paths, list_requested_files
 from ..log import LOGGER
 from ..masking import mask, masked_values
 from ..model import Building
@@ -34,6 +34,7 @@ from ..write.fragments import Fragment, Fragments
 from ..write.head import FileHead
 from ..write.json_text import dump
 from ..write.naming import FileUnits, UniqueNames, gml_name
+from ..write.overwriting import refuse_overwriting
 from ..write.run_files import fragments, join_fragments
 from ..write.values import plain_text
 from .building import build
@@ -98,6 +99,7 @@ def build_file(
     """
     path, out, built = Path(path), Path(out), Built()
     refuse_run_folder(out)
+    refuse_overwriting([out / FORMATS["parameters"].file], [path])
     with opened_parameters(path) as (head, records):
         settings = Settings(write=head.write).replace(changes or {})
         offset = head.offset if settings.write.out_crs == head.write.out_crs else None

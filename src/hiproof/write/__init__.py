@@ -23,6 +23,7 @@ Files:
 
 writer       a file is opened, given one building after another, finished
 files        files that appear whole or not at all
+overwriting  whether a file to write stands for an input or a run's own file
 head         what all files of a run have in common
 fragments    one building's texts, kept until they are joined
 described    a building with its attributes, into a file of any format

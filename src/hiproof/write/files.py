@@ -12,7 +12,11 @@ from __future__ import annotations
 import errno
 import io
 import os
+import platform
+import re
 import secrets
+import shutil
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -104,8 +108,13 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        is_special = path.exists() and not path.is_file()
     except OSError as error:
         raise output_error(path, error) from error
+    if is_special:
+        raise OutputError(
+            f"expected a file to write, got {path}, a device or a pipe; choose another name"
+        )
     hidden = hidden_name(path)
     try:
         yield hidden
@@ -171,10 +180,13 @@ def open_hidden(hidden: Path, path: Path) -> Iterator[BinaryIO]:
 
 
 def remove(path: Path) -> None:
-    """Remove a file if it can be.
+    """Remove a file or a folder if it can be.
 
     Where a file system is read-only there is none, and the error before it is the one to report.
     """
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+        return
     with suppress(OSError):
         path.unlink(missing_ok=True)
 
@@ -182,9 +194,28 @@ def remove(path: Path) -> None:
 def hidden_name(path: Path) -> Path:
     """Return a free name beside `path` that listings do not show.
 
-    It has the same suffix.
+    It has the same suffix. What killed processes left under such names is removed.
     """
-    return path.with_name(f".{path.name[:40]}-{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
+    start = f".{path.name[:40]}-{zlib.crc32(platform.node().encode()):08x}-"
+    pattern = re.compile(re.escape(start) + r"(\d+)-[0-9a-f]{8}\b")
+    with suppress(OSError), os.scandir(path.parent) as entries:
+        for entry in entries:
+            if (match := pattern.match(entry.name)) and not is_running(int(match[1])):
+                remove(Path(entry.path))
+    return path.with_name(f"{start}{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
+
+
+def is_running(process: int) -> bool:
+    """Return whether a process of this machine runs, or may run."""
+    if os.name != "posix":  # signal 0 ends processes elsewhere
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def sync(path: Path) -> None:

@@ -5,11 +5,15 @@ What is wrong is reported at once, and not after an hour.
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
 from typing import Any
 
 from ...errors import InputError, SettingsError
+from ...formats import list_requested_files
 from ...settings import Settings, format_value
 from ...stages.arguments import refuse_without_network
+from ...write.overwriting import refuse_overwriting
 
 MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
 
@@ -33,7 +37,18 @@ def refuse_unusable(request: Any) -> None:
                 f"expected footprints with {option}, got none; name them with --footprints"
             )
     refuse_settings(request.settings)
+    out = Path(request.out)
+    outputs = [*list_requested_files(request.settings, out).values(), out / "run.json"]
+    refuse_overwriting(outputs, list_inputs(request))
     refuse_missing_packages(request)
+
+
+def list_inputs(request: Any) -> list[str]:
+    """Return the files that a request names, that of overrides included."""
+    fields = [f.name for f in dataclasses.fields(request) if f.metadata.get("names") == "files"]
+    values = [getattr(request, name) for name in (*fields, "overrides")]
+    lists = (value if isinstance(value, tuple) else (value,) for value in values)
+    return [str(path) for paths in lists for path in paths if path]
 
 
 def refuse_missing_packages(request: Any) -> None:

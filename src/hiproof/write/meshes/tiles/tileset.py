@@ -9,7 +9,6 @@ that nothing is lost by the Earth's curvature; the root's transform puts that fr
 from __future__ import annotations
 
 import json
-import shutil
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -20,7 +19,7 @@ import numpy as np
 
 from .... import __version__
 from ....errors import InputError, InputWarning, OutputError
-from ...files import hidden_name, output_error, scratch
+from ...files import hidden_name, output_error, remove, scratch
 from ..viewed import ViewedModel, merge_values
 from .content import tile_glb
 from .globe import Globe, make_local_frame
@@ -244,4 +243,4 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         raise output_error(folder, error) from error
     finally:
         for remainder in (name, older):
-            shutil.rmtree(remainder, ignore_errors=True)
+            remove(remainder)

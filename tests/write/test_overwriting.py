@@ -1,0 +1,144 @@
+"""No command writes over what it reads, over a run's own files, or over a device."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from hiproof.cli.app import app
+from hiproof.errors import OutputError
+from hiproof.parametric.run import build_file
+from hiproof.write.files import atomic, hidden_name, scratch
+from sample_parameters import write_parameters_of_each_kind
+from tiny_town import make_town, write_town
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a run's files, and the clouds and footprints of another."""
+    folder = tmp_path_factory.mktemp("overwriting")
+    write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
+    build_file(folder / "given" / "parameters.jsonl", folder / "run")
+    write_town(folder, make_town(houses=1))
+    return folder
+
+
+@pytest.fixture
+def town(folder, tmp_path):
+    shutil.copytree(folder, tmp_path / "town")
+    return tmp_path / "town"
+
+
+def read_all(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+RUN_COMMANDS = {
+    "convert RUN RUN/parameters.jsonl": "a file of a run",
+    "convert RUN/parameters.jsonl RUN/parameters.jsonl": "got .* for both",
+    "convert RUN RUN/buildings.gml": "a file of a run",
+    "convert RUN RUN/buildings.city.jsonl": "a file of a run",
+    "convert RUN/buildings.gml RUN/buildings.gpkg": "a file of a run",
+    "convert RUN/buildings.gml RUN/buildings.gml": "got .* for both",
+    "convert RUN LINK --format glb": "a file of a run",
+    "convert RUN GIVEN/parameters.jsonl": "a file of a run",
+    "convert GIVEN/parameters.jsonl HARD": "got .* for both",
+    "build GIVEN/parameters.jsonl --out GIVEN": "got .* for both",
+    "build RUN/parameters.jsonl --out RUN": "got .* for both",
+    "report RUN --out RUN/run.json": "a file of a run",
+    "report RUN CLOUD --out CLOUD": "got .* for both",
+    "classify CLOUD --out CLOUD": "got .* for both",
+    "segment CLOUD --out CLOUD": "got .* for both",
+    "evaluate RUN RUN/evaluation.csv": "got .* for both",
+    "settings --config TOML --write TOML": "got .* for both",
+    "reconstruct CLOUD --footprints IN/buildings.gpkg --out IN": "got .* for both",
+    "reconstruct CLOUD --overrides IN/parameters.jsonl --out IN": "got .* for both",
+    "convert RUN FIFO --format glb": "a device or a pipe",
+    "convert RUN FIFO --format 3dtiles": "choose another name",
+    "report RUN CLOUD --out FIFO": "a device or a pipe",
+}
+
+
+@pytest.mark.parametrize("command", RUN_COMMANDS)
+def test_outputs_never_stand_for_inputs_or_files_of_a_run(command, town):
+    (town / "in").mkdir()
+    shutil.copy(town / "run" / "buildings.gpkg", town / "in")
+    shutil.copy(town / "run" / "parameters.jsonl", town / "in")
+    (town / "settings.toml").write_text("")
+    (town / "run" / "evaluation.csv").write_text("0 0 0\n")
+    (town / "link.glb").symlink_to(town / "run" / "parameters.jsonl")
+    os.link(town / "given" / "parameters.jsonl", town / "given.stl")
+    os.mkfifo(town / "pipe")
+    (cloud,) = town.glob("*.la[sz]")
+    places = {
+        "RUN": town / "run",
+        "GIVEN": town / "given",
+        "IN": town / "in",
+        "CLOUD": cloud,
+        "LINK": town / "link.glb",
+        "HARD": town / "given.stl",
+        "TOML": town / "settings.toml",
+        "FIFO": town / "pipe",
+    }
+    words = [
+        str(places[first] / rest) if (first := word.partition("/")[0]) in places else word
+        for word in command.split()
+        for rest in [word.partition("/")[2]]
+    ]
+    before = read_all(town)
+    result = CliRunner().invoke(app, words)
+    assert isinstance(result.exception, OutputError), result.output
+    assert re.search(RUN_COMMANDS[command], str(result.exception)), str(result.exception)
+    assert read_all(town) == before and (town / "pipe").is_fifo()
+
+
+def test_a_second_conversion_replaces_the_first(town):
+    for _ in range(2):
+        assert CliRunner().invoke(app, ["convert", str(town / "run")]).exit_code == 0
+        named = ["convert", str(town / "run"), str(town / "a.gml")]
+        assert CliRunner().invoke(app, named).exit_code == 0
+
+
+KILLED = """
+import os, sys
+from hiproof.write.files import {writer}
+with {writer}(sys.argv[1]) as beside:
+    beside.write_bytes(b"half") if hasattr(beside, "write_bytes") else beside.write(b"half")
+    os.kill(os.getpid(), 9)
+"""
+
+
+@pytest.mark.parametrize("writer", ["atomic", "atomic_file", "scratch"])
+def test_what_a_killed_process_left_goes_with_the_next_write(writer, tmp_path):
+    subprocess.run([sys.executable, "-c", KILLED.format(writer=writer), tmp_path / "a.glb"])
+    assert len(os.listdir(tmp_path)) == 1
+    with atomic(tmp_path / "a.glb") as beside:
+        beside.write_bytes(b"whole")
+    assert os.listdir(tmp_path) == ["a.glb"]
+
+
+def test_what_others_still_write_stays(tmp_path):
+    with scratch(tmp_path / "a.glb"), atomic(tmp_path / "a.glb") as mine:
+        mine.write_bytes(b"1")
+        names = set(os.listdir(tmp_path))
+        others = [".a.glb-00000000-1-01234567.glb", ".b.glb-x-1-01234567.glb", ".a.glb", "a.glb-1"]
+        for name in others:
+            (tmp_path / name).write_bytes(b"2")
+        hidden_name(tmp_path / "a.glb")
+        assert set(os.listdir(tmp_path)) == names | set(others)
+
+
+def test_a_killed_folder_of_tiles_goes_with_the_next(town):
+    tiles = town / "a.3dtiles"
+    gone = max(int(name) for name in os.listdir("/proc") if name.isdigit()) + 100_000
+    left = hidden_name(tiles)
+    left = left.with_name(left.name.replace(f"-{os.getpid()}-", f"-{gone}-"))
+    left.mkdir()
+    (left / "tile.glb").write_bytes(np.zeros(3).tobytes())
+    result = CliRunner().invoke(app, ["convert", str(town / "run"), str(tiles)])
+    assert result.exit_code == 0 and not left.exists()
