@@ -10,14 +10,12 @@ import math
 from collections.abc import Mapping
 from functools import cache
 
-from .algebra import Formula, U, V, q0, q1
-from .contract import Corners, Plane, Primitive
-from .facets import count_sides, find_apothem, find_sides, make_facet_planes, make_rim, with_facets
+from .contract import Primitive
+from .facets import count_sides, find_apothem, find_sides, list_facings, make_rim, with_facets
 from .table import make_shape
 
 BROACH_SIDES = 8  # Sides of the spire of most church towers that have one.
 HEXAGON_SIDES = 6  # Sides of the spires of pavilions and turrets that have neither four nor eight.
-FALL: Formula = q1 * V
 
 
 def make_pointed(name: str, sides: int, apothem: float) -> Primitive:
@@ -25,21 +23,9 @@ def make_pointed(name: str, sides: int, apothem: float) -> Primitive:
 
     `apothem` is the inner radius of its plan where its half extents are 1.
     """
-    rim = make_rim(sides, apothem)
-
-    def corners(p: Mapping[str, float]) -> Corners:
-        """Return the corners of the plan, then the apex."""
-        u, v = p["length"] / 2, p["width"] / 2
-        return [*((u * x, v * y, 0.0) for x, y in rim), (0.0, 0.0, p["height"])]
-
-    return make_shape(
-        name,
-        {"sides": sides},
-        planes=make_facet_planes(sides, apothem, FALL, q0),
-        corners=corners,
-        faces=tuple((k, (k + 1) % sides, sides) for k in range(sides)),
-        rim=rim,
-    )
+    rim, facings = make_rim(sides, apothem), list_facings(sides)
+    constants = {"sides": sides, "apothem": apothem, "rim": rim, "facings": facings}
+    return make_shape(name, constants, rim=rim)
 
 
 @cache
@@ -55,29 +41,13 @@ def make_half_cone(sides: int) -> Primitive:
     radius = apothem / math.cos(math.pi / sides)
     angles = [2.0 * math.pi * k / sides - 0.5 * math.pi for k in range(1, sides // 2)]
     arc = [(2.0 * radius * math.cos(a) - 1.0, radius * math.sin(a)) for a in angles]
-    rim = ((-1.0, -radius), *arc, (-1.0, radius))
-    steep: Formula = FALL * (1.0 / apothem)
-
-    def corners(p: Mapping[str, float]) -> Corners:
-        """Return the corners of the plan, then the apex."""
-        u, v = p["length"] / 2, p["width"] / 2
-        return [*((u * x, v * y, 0.0) for x, y in rim), (-u, 0.0, p["height"])]
-
-    def make_plane(k: int) -> Plane:
-        """Return the plane of the facet k, counted from -v to +v."""
-        angle = 2.0 * math.pi * (k + 0.5) / sides - 0.5 * math.pi
-        x, y = math.cos(angle), math.sin(angle)
-        return -(steep / U) * (0.5 * x), -(steep / V) * y, q0 - steep * (0.5 * x)
-
-    last = len(rim)
-    return make_shape(
-        "half_cone",
-        {"sides": sides},
-        planes=tuple(make_plane(k) for k in range(sides // 2)),
-        corners=corners,
-        faces=tuple((k, k + 1, last) for k in range(last - 1)),
-        rim=rim,
+    middles = [2.0 * math.pi * (k + 0.5) / sides - 0.5 * math.pi for k in range(sides // 2)]
+    rim, facings = (
+        ((-1.0, -radius), *arc, (-1.0, radius)),
+        [(math.cos(a), math.sin(a)) for a in middles],
     )
+    constants = {"sides": sides, "apothem": apothem, "rim": rim, "facings": facings}
+    return make_shape("half_cone", constants, rim=rim)
 
 
 def measure_extent(p: Mapping[str, float]) -> float:

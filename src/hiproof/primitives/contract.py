@@ -90,16 +90,6 @@ class DerivedStart:
         return theta
 
 
-def at_quarters(
-    source: str, q: tuple[Formula | float, ...], quarters: tuple[int, ...] = (0, 1, 2, 3)
-) -> tuple[DerivedStart, ...]:
-    """Return the same start in several directions.
-
-    Roofs that a half turn changes need it.
-    """
-    return tuple(DerivedStart(source, q, quarter) for quarter in quarters)
-
-
 @dataclass(frozen=True)
 class Vote:
     """Start values from a vote of the points.
@@ -413,17 +403,6 @@ def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) 
     """
     c, s = math.cos(kappa), math.sin(kappa)
     return vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + translation
-
-
-def rectangle(
-    theta_p: Mapping[str, float], lower: float = 0.0, upper: float = 0.0
-) -> list[tuple[float, float, float]]:
-    """Return the corners v1..v4 of the plan, clockwise from (+u, -v).
-
-    They lie at height `lower` on the -v side and at `upper` on the +v side.
-    """
-    u, v = theta_p["length"] / 2, theta_p["width"] / 2
-    return [(u, -v, lower), (-u, -v, lower), (-u, v, upper), (u, v, upper)]
 
 
 def turn_quarter(theta: np.ndarray) -> np.ndarray:

@@ -72,7 +72,7 @@ def find_apothem(sides: int) -> float:
     return math.sqrt(math.pi / sides / math.tan(math.pi / sides))
 
 
-def list_directions(sides: int) -> list[tuple[float, float]]:
+def list_facings(sides: int) -> list[tuple[float, float]]:
     """Return which way each of so many facets faces, the first to +u."""
     angles = [2.0 * math.pi * k / sides for k in range(sides)]
     pairs = [(math.cos(angle), math.sin(angle)) for angle in angles]
@@ -96,7 +96,7 @@ def make_facet_planes(sides: int, apothem: float, fall: Formula, top: Formula) -
     """Return one plane a side, each from `top` at the axis down by `fall` at the rim."""
     steep = fall * (1.0 / apothem)
     along, across = -(steep / U), -(steep / V)
-    return tuple((along * x, across * y, top) for x, y in list_directions(sides))
+    return tuple((along * x, across * y, top) for x, y in list_facings(sides))
 
 
 class ChordProfile(NamedTuple):

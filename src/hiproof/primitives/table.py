@@ -35,9 +35,11 @@ LIMITS = {
     "spire": (SLOPE_MIN, SPIRE_SLOPE_MAX),
     "steepest": SLOPE_MAX,
 }
-BASICS: dict[str, Any] = {"__builtins__": {}, "min": min, "max": max, "pi": math.pi}
+BASICS: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, "min": min, "max": max, "range": range}
 SHAPES_FILE = resources.files("hiproof") / "data" / "shapes.toml"
 SHAPE_ROWS: dict[str, dict[str, Any]] = tomllib.loads(SHAPES_FILE.read_text(encoding="utf-8"))
+for name, row in SHAPE_ROWS.items():
+    SHAPE_ROWS[name] = SHAPE_ROWS.get(row.get("like", ""), {}) | row
 
 
 @cache
@@ -81,7 +83,7 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
         return (v, u, *q, *[0.0] * (4 - len(q)))
 
     def corners(p: Mapping[str, float]) -> Any:
-        names = {**p, "u": p["length"] / 2, "v": p["width"] / 2}
+        names = {**p, **constants, "u": p["length"] / 2, "v": p["width"] / 2}
         return evaluate(row["corners"], names, row.get("where"))
 
     def choose_sizes(texts: Mapping[str, str], names: Mapping[str, Any]) -> dict[str, float]:
@@ -121,12 +123,14 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
         "more": tuple(make_shape(k) for k, r in SHAPE_ROWS.items() if r.get("variant_of") == key),
     }
     if "planes" in row:
-        fields["planes"] = evaluate(row["planes"], symbols)
-        fields["faces"] = tuple(map(tuple, row["faces"]))
+        faces = row["faces"]
+        faces = evaluate(faces, constants) if isinstance(faces, str) else faces
+        fields["planes"] = tuple(evaluate(row["planes"], symbols))
+        fields["faces"] = tuple(map(tuple, faces))
     if "vote" in row:
         vote: Any = {n: tuple(v) if isinstance(v, list) else v for n, v in row["vote"].items()}
         fields["vote"] = Vote(**vote)
-    if "canonical" in row:
+    if row.get("canonical"):
         fields["canonical"] = lambda theta: turn_where(row["canonical"], theta)
     if "member" in row:
         fields["read_member"] = lambda member: evaluate(row["member"], name_member(member))
