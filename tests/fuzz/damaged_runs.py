@@ -24,8 +24,6 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import click
-
 from hiproof.cli import check
 from hiproof.cli.convert import FormatName, convert
 from hiproof.cli.evaluate import evaluate
@@ -213,7 +211,7 @@ def convert_file(folder: Path) -> None:
 
 READERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
     "check": (
-        lambda folder: check.count_bad([check.check_file(folder / FILES[0], 0.01)]),
+        lambda folder: str(check.count_bad([check.check_file(folder / FILES[0], 0.01)])),
         FILES[:1],
     ),
     "convert glb": (lambda folder: convert(folder, format=FormatName.glb), FILES[1:]),
@@ -221,10 +219,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
     "convert a file": (convert_file, FILES[:1]),
     "view": (view, FILES[1:]),
     "report": (lambda folder: report(folder), FILES[::2]),
-    "evaluate": (
-        lambda folder: evaluate(folder, [str(folder / "cloud.xyz")], None, None, None, None),
-        FILES[::2],
-    ),
+    "evaluate": (lambda folder: evaluate(folder, [str(folder / "cloud.xyz")]), FILES[::2]),
     "load": (load, FILES[1:]),
     "edit": (edit, FILES[1:]),
     "build": (build, FILES[1:]),
@@ -243,19 +238,18 @@ def find_fault(read: Callable[[Path], Any], folder: Path) -> str:
     """What goes wrong when a reader reads a run, other than that it says so; empty where nothing
     does.
     """
+    code = None
     try:
         with redirect_stdout(StringIO()):
-            read(folder)
+            code = read(folder)
     except HiproofError as error:
         try:
             sentence(error)
         except (AssertionError, UnicodeError):
             return f"no sentence: {error!r:.2000}"
-    except click.exceptions.Exit as end:
-        return "" if end.exit_code == 2 else f"exit code {end.exit_code}"
     except Exception:
         return traceback.format_exc()
-    return ""
+    return f"exit code {code}" if code == 1 else ""
 
 
 def write_sound_run(folder: Path) -> Path:

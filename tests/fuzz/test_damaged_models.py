@@ -4,7 +4,6 @@ traceback or a wrong file.
 
 import re
 
-import click
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -44,8 +43,6 @@ def answer(command, *arguments):
         return command(*arguments) or 0, ""
     except HiproofError as error:
         return 2, str(error)
-    except click.exceptions.Exit as end:
-        return end.exit_code, ""
 
 
 @pytest.fixture

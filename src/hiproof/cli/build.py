@@ -25,7 +25,7 @@ def print_schema() -> None:
     click.echo(schema_text(), nl=False)
 
 
-def build(parameters: Path, *, out: Path, changes: dict[str, dict[str, Any]] | None = None) -> None:
+def build(parameters: Path, *, out: Path, changes: dict[str, dict[str, Any]] | None = None) -> int:
     """Make all files of a run again from its parameters.jsonl.
 
     Change the file with any editor or program first: the new files follow it.
@@ -50,4 +50,4 @@ def build(parameters: Path, *, out: Path, changes: dict[str, dict[str, Any]] | N
     if built.by_quality:
         click.echo("quality: " + graded_words(built.by_quality))
     click.echo("models: " + ", ".join(map(str, built.models)))
-    raise click.exceptions.Exit(built.exit_code)
+    return built.exit_code

@@ -61,7 +61,7 @@ class CheckedFile:
         }
 
 
-def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) -> None:
+def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) -> int:
     """Check that solids are valid by ISO 19107, with val3dity's codes.
 
     Exit code: 0 all solids are valid, 1 some are invalid or cannot be read, 2 unusable input.
@@ -72,7 +72,7 @@ def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) 
     if as_json:
         result = {"valid": not count_bad(checked), "files": [file.to_dict() for file in checked]}
         click.echo(json.dumps(result, indent=1))
-    raise click.exceptions.Exit(1 if count_bad(checked) else 0)
+    return 1 if count_bad(checked) else 0
 
 
 def count_bad(checked: list[CheckedFile]) -> int:

@@ -89,7 +89,7 @@ def write_example(formatter: Any, command: str) -> None:
 def make_command(name: str) -> Command:
     """Return the command `name`, whose module and function have its name."""
     module, row = import_module(f".{name}", __package__), COMMANDS[name]
-    function: Callable[..., None] = getattr(module, name)
+    function: Callable[..., int | None] = getattr(module, name)  # its exit code, 0 for None
     settings = list_setting_options(row.get("settings", ()))
 
     def run_command(quiet: bool, verbose: bool, **values: Any) -> None:
@@ -97,7 +97,7 @@ def make_command(name: str) -> Command:
         start(choose_level(quiet, verbose))
         if settings:
             values["changes"] = collect_changes(settings, values)
-        function(**values)
+        raise click.exceptions.Exit(function(**values) or 0)
 
     prints = [
         make_print_option(option, help, getattr(module, f"print_{option}"))

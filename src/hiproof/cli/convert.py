@@ -25,7 +25,7 @@ def convert(
     format: FormatName | None = None,
     crs: str | None = None,
     geoid_height: float | None = None,
-) -> None:
+) -> int:
     """Convert models of a run or of a file to another format.
 
     The models keep their attributes. Models of a run keep their roof parameters too, in formats
@@ -53,8 +53,7 @@ def convert(
             command = f"hiproof convert {source} OUT"
             raise elsewhere(error, command) if out is None else error from error
     click.echo(text)
-    if left_out.exit_code:
-        raise click.exceptions.Exit(left_out.exit_code)
+    return left_out.exit_code
 
 
 def convert_models(

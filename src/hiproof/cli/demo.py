@@ -5,17 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
 
-
-def demo(*, out: Path = Path("demo")) -> None:
+def demo(*, out: Path = Path("demo")) -> int:
     """Model the 26 houses of a bundled, simulated neighbourhood.
 
     Every roof type occurs in it.
     """
     from .running import run_request
 
-    raise click.exceptions.Exit(run_request(lambda: make_request(out)))
+    return run_request(lambda: make_request(out))
 
 
 def make_request(out: Path) -> Any:

@@ -23,7 +23,7 @@ def enrich(
     terrain: str = "",
     jobs: int | None = None,
     changes: dict[str, dict[str, Any]] | None = None,
-) -> None:
+) -> int:
     """Add party walls, areas, house types and the sun to the models of a run.
 
     The run's own files stay as they are. A second call replaces the results of the first; run the
@@ -33,7 +33,7 @@ def enrich(
     make no valid solid, or unusable input.
     """
     settings = Settings().replace(changes or {}).enrich
-    raise click.exceptions.Exit(enrich_folder(run, out, with_terrain(settings, terrain), jobs))
+    return enrich_folder(run, out, with_terrain(settings, terrain), jobs)
 
 
 def with_terrain(settings: EnrichSettings, terrain: str | None) -> EnrichSettings:

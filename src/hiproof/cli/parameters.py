@@ -59,7 +59,7 @@ class HeadedOption(click.Option):
         self.heading, self.setting = heading, setting
 
 
-def list_parameters(command: str, function: Callable[..., None]) -> list[click.Parameter]:
+def list_parameters(command: str, function: Callable[..., int | None]) -> list[click.Parameter]:
     """Return the parameters of a command's function, but for `changes` of settings."""
     rows = SHARED_PARAMETERS | COMMANDS[command].get("parameters", {})
     parameters = inspect.signature(function, eval_str=True).parameters

@@ -7,8 +7,6 @@ import functools
 from pathlib import Path
 from typing import Any
 
-import click
-
 from ..errors import SettingsError
 from ..log import LOGGER, console_level, start
 from ..settings import EnrichSettings, Settings, format_value
@@ -37,7 +35,7 @@ def reconstruct(
     enrich: bool = False,
     log_file: Path | None = None,
     changes: dict[str, dict[str, Any]] | None = None,
-) -> None:
+) -> int:
     """Model the buildings of point clouds as CityGML, CityJSON, parameters and tables.
 
     Run the same command again to resume an interrupted run.
@@ -94,7 +92,7 @@ def reconstruct(
         answers = read_settings().enrich
         answers = with_terrain(answers, terrain if answers.sun else None)
         code = enrich_folder(out, None, answers, jobs) or code
-    raise click.exceptions.Exit(code)
+    return code
 
 
 def refuse_before(settings: Settings) -> None:

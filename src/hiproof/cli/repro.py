@@ -12,7 +12,7 @@ import click
 from ..progress import show_progress
 
 
-def repro(folder: Path, *, out: Path) -> None:
+def repro(folder: Path, *, out: Path) -> int:
     """Run a building again on which hiproof failed.
 
     The result shows whether the failure repeats or is fixed.
@@ -30,4 +30,4 @@ def repro(folder: Path, *, out: Path) -> None:
         click.echo(mask(trace), err=True)
     click.echo(f"building {building.id}: {building.detail or building.status.value}")
     click.echo(f"files: {out}")
-    raise click.exceptions.Exit(1 if building.status is Status.INTERNAL_ERROR else 0)
+    return 1 if building.status is Status.INTERNAL_ERROR else 0

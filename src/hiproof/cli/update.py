@@ -33,7 +33,7 @@ def update(
     scheduler: str | None = None,
     restart: bool = False,
     changes: dict[str, dict[str, Any]] | None = None,
-) -> None:
+) -> int:
     """Bring the models of a run up to date with a new survey, and list what changed.
 
     The earlier run stays as it is. Run the same command again to resume. Exit code: 0 every
@@ -66,7 +66,7 @@ def update(
         summary = update_area(request, changes, progress)
     if console_level() is not Level.error:
         print_update(summary)
-    raise click.exceptions.Exit(summary.run.exit_code)
+    return summary.run.exit_code
 
 
 def print_update(summary: UpdateSummary) -> None:
