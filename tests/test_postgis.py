@@ -241,7 +241,7 @@ def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
     build_file(
         tmp_path / "parameters.jsonl", tmp_path / "run", changes={"write": {"out_crs": "EPSG:3857"}}
     )
-    load(tmp_path / "run", database, "map")
+    load(tmp_path / "run", database, prefix="map")
     names = ["slope_deg", "azimuth_deg", "area_m2"]
     meta, _, _, columns = pyogrio.raw.read(
         tmp_path / "run" / "buildings.gpkg", layer="roof_surfaces", columns=names
@@ -537,3 +537,20 @@ def test_models_that_ended_have_a_table_of_their_own(database, tmp_path):
         ).fetchall()
     area = shapely.Polygon(RING).area
     assert rows == [("barn", "house", "2024-05-01", 8.0, "MULTIPOLYGON", area)]
+
+
+@pytest.mark.parametrize("condition", ["", "&where=id <> 'none'"])
+def test_solids_that_were_loaded_are_footprints(database, run_of_two, condition):
+    folder, buildings = run_of_two
+    load_postgis(folder, database, "outlines", replace=True)
+    found = read_footprints(f"{database}&table=outlines_buildings&geometry=geom{condition}")
+    outlines = {f.id: f.polygon for f in found if not f.polygon.is_empty}
+    expected = {
+        building.id: shapely.transform(building.roof.outline, building.roof.frame.to_world)
+        for building in buildings
+        if building.built
+    }
+    assert outlines.keys() == expected.keys()
+    for id, outline in outlines.items():
+        assert shapely.symmetric_difference(outline, expected[id]).area < 0.05
+    assert footprint_crs(f"{database}&table=outlines_buildings&geometry=geom").to_epsg() == 7415

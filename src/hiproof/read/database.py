@@ -11,7 +11,7 @@ transaction, and can change nothing.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -95,14 +95,15 @@ class DatabaseTable:
     geometry: str
     where: str | None
 
-    def query(self, text: str) -> None:
-        """Run `text` with {g}, {n} and {t} filled in.
+    def query(self, text: str, columns: Sequence[str] = ()) -> None:
+        """Run `text` with {g}, {c} and {t} filled in.
 
-        They stand for the geometry column, its name as a value, and the table.
+        They stand for the geometry column, other `columns` and the table.
         """
         from psycopg import sql
 
-        names = {"g": sql.Identifier(self.geometry), "n": sql.Literal(self.geometry)}
+        others = sql.SQL(", ").join(sql.Identifier("t", name) for name in columns)
+        names = {"g": sql.Identifier(self.geometry), "c": others}
         # a line of its own: a comment at the condition's end must not swallow what follows it
         condition = sql.SQL(f" where {self.where}\n" if self.where else "")
         table = sql.SQL("{} t").format(sql.Identifier(*self.name.split("."))) + condition
@@ -116,14 +117,22 @@ class DatabaseTable:
         Rows are ordered by their content, so that storage does not matter.
         """
         self.query(
-            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, to_jsonb(t) - {n} as attributes from "
-            "{t} order by 2, 1"
+            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, (select to_jsonb(a) from (select {c}) "
+            "a) as attributes from {t} order by 2, 1",
+            self.list_columns(),
         )
         for ewkb, attributes in self.cursor:
             yield (
                 (decode_geometry(as_polygons(bytes(ewkb))) if ewkb is not None else None),
                 attributes,
             )
+
+    def list_columns(self) -> list[str]:
+        """Return the columns that hold no geometries, of which PostGIS makes no JSON."""
+        self.cursor.execute("select oid from pg_type where typname in ('geometry', 'geography')")
+        shapes = {oid for (oid,) in self.cursor}
+        self.query("select * from {t} limit 0")
+        return [column.name for column in self.cursor.description if column.type_code not in shapes]
 
     def srids(self) -> set[int]:
         self.query("select distinct ST_SRID({g}) from {t}")
