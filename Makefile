@@ -8,7 +8,7 @@ export OMP_NUM_THREADS := 1
 # bytecode is kept, whatever the shell says: tests start a hundred processes, and each would compile every source anew
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-train lint docs bench clean
+.PHONY: demo test test-oldest test-train lint docs bench clean
 
 $(VENV)/core: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -41,6 +41,15 @@ demo: $(VENV)/core
 test: $(VENV)/test
 	$(BIN)/python -m pytest -m "not train" -n 2 --dist loadfile
 
+# the oldest numba that pyproject.toml allows, and the newest NumPy that it takes
+$(VENV)-oldest/core: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-oldest
+	$(VENV)-oldest/bin/pip install --quiet --disable-pip-version-check 'numba==0.62.*' pytest hypothesis pytest-timeout -e .
+	touch $@
+
+test-oldest: $(VENV)-oldest/core
+	$(VENV)-oldest/bin/python -m pytest tests/test_compiled.py -k "not pieces"
+
 test-train: $(VENV)/train
 	$(BIN)/python -m pytest -m train
 
@@ -58,5 +67,5 @@ bench: $(VENV)/test
 	$(BIN)/python -m benchmarks
 
 clean:
-	rm -rf $(VENV) demo .pytest_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-oldest demo .pytest_cache .ruff_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +

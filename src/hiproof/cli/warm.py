@@ -15,5 +15,5 @@ def warm(*, everything: bool = False) -> None:
     from ..city.work.tasks import ALL, MAIN_JOB, make_ready
 
     with show_progress("compile"):
-        make_ready(ALL if everything else MAIN_JOB, own=True)
+        make_ready(ALL if everything else MAIN_JOB)
     click.echo("everything is compiled" if everything else "all that most runs use is compiled")

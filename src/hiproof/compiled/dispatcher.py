@@ -1,89 +1,210 @@
-"""Wrappers of compiled functions, compiled only when Python calls them.
+"""Functions whose code is kept; the one file that uses numba beyond `njit`.
 
-numba makes a wrapper for every function. It unpacks each array of each argument, which took a
-third of the time to compile. Most functions are only called by other compiled functions, and need
-none.
+numba links a function's code into every caller's, where LLVM optimises all of it once more. Here a
+caller of a large function refers to it by its symbol. So a function's symbol is the same in
+whatever process it was compiled, and what a function calls is loaded before it. numba also makes a
+wrapper for calls from Python, which unpacks each array of each argument. Here it is made for the
+functions that Python calls.
+
+What is used of numba, apart from names of its documentation:
+
+- `CPUDispatcher`: its methods `get_call_template` (a compiled function asks what a call returns),
+  `compile` (Python asks for what it calls) and `add_overload` are replaced;
+- of a target's context `insert_user_function` and `remove_user_function`, which say what callers
+  link; `create_cpython_wrapper` and `get_executable`, which make what Python calls;
+- of a code library `serialize_using_object_code` and `unserialize_library`;
+- `CompileResult._reduce` and `_rebuild`: what numba's own cache keeps of a function;
+- `FunctionIdentity._unique_ids`: numba numbers the functions of its own library from 1 in every
+  process, and the numbers are part of their symbols. Code of two processes would meet in a third
+  with one symbol for two functions, so each compilation starts from a random number.
 """
 
 from __future__ import annotations
 
+import itertools
+import uuid
 from collections.abc import Callable
-from typing import Any
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
-from numba.core import sigutils, typing
+from numba import types
+from numba.core import bytecode, compiler, sigutils, typing
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.cpu import CPUContext
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 
-from .kept import Kept
-from .linking import make_pipeline, without_literals
+from . import news
+from .kept import Kept, place_to_write
+from .stamp import compute_stamp
+
+LARGE = 80  # instructions; LLVM inlines fewer
+EMPTY_MODULE = llvm.parse_assembly("").as_bitcode()  # what callers copy of a large function
+OPTIONS = {
+    "nopython": True,
+    "error_model": "numpy",
+    "boundscheck": None,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+NEEDED = (  # beyond what is used below at once
+    CPUDispatcher.get_call_template,
+    CPUDispatcher.add_overload,
+    CPUContext.insert_user_function,
+    CPUContext.remove_user_function,
+    CPUContext.create_cpython_wrapper,
+    CPUContext.get_executable,
+    JITCodeLibrary.serialize_using_object_code,
+    JITCPUCodegen.unserialize_library,
+)
+REDUCE, REBUILD = compiler.CompileResult._reduce, compiler.CompileResult._rebuild
+COUNTER = bytecode.FunctionIdentity._unique_ids
+
+
+class Callee(NamedTuple):
+    """A large function that a caller's code refers to by its symbol."""
+
+    module: str
+    name: str
+    args: tuple
+
+    def load(self) -> None:
+        """Have its code in this process, from disk or compiled."""
+        getattr(import_module(self.module), self.name).load(self.args)
+
+
+CALLS: list[dict[Callee, None]] = [{}]
+"""The large functions that are called by those being compiled, the innermost last."""
+
+
+class Compiler(compiler.Compiler):
+    """numba's compiler, with symbols that hold the stamp of a function's sources."""
+
+    def define_pipelines(self) -> list:
+        identity = self.state.func_id
+        identity.unique_id = compute_stamp(Path(identity.filename))
+        identity.unique_name = f"{identity.func_qualname}${identity.unique_id}"
+        return list(super().define_pipelines())
 
 
 class Dispatcher(CPUDispatcher):
-    """numba's dispatcher of a function whose code is `kept`."""
+    """numba's dispatcher of a function whose code is kept."""
 
-    _cache: Kept
-
-    def __init__(self, function: Callable, kept: Kept, options: dict[str, Any]):
-        options = {"nopython": True, "boundscheck": None, "no_cpython_wrapper": True} | options
-        super().__init__(function, targetoptions=options, pipeline_class=make_pipeline(kept.stamp))
-        self._cache = kept
+    def __init__(self, function: Callable):
+        super().__init__(function, targetoptions=OPTIONS, pipeline_class=Compiler)
+        self.kept = Kept(function)
         self.entries: dict[tuple, Any] = {}
+        self.callees: dict[tuple, tuple[Callee, ...]] = {}
 
-    def load(self, signature: Any) -> None:
-        """Load the function's code for compiled callers, from disk or compiled."""
-        args = tuple(sigutils.normalize_signature(signature)[0])
+    def load(self, args: tuple) -> None:
+        """Load the code for compiled callers, from disk or compiled."""
         with global_compiler_lock:
-            if args in self.overloads:
-                return
-            result = self._cache.load(signature, self.targetctx)
-            if result is None:
-                super().compile(signature)
-                return
-            self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
-            self.add_overload(result)
-            self._cache_hits[signature] += 1
+            if args not in self.overloads and not self.read(args):
+                self.compile_code(args)
+            news.ready.add(self.kept.name)
+
+    def read(self, args: tuple) -> bool:
+        """Load the code from disk; return whether it was there."""
+        rtsys.initialize(self.targetctx)
+        for is_large, callees, code in self.kept.read("", self.key(args)):
+            for callee in callees:
+                callee.load()
+            try:
+                result = REBUILD(self.targetctx, *code)
+            except Exception:  # damaged inside
+                continue
+            self.insert(result, is_large, callees)
+            return True
+        return False
+
+    def compile_code(self, args: tuple) -> None:
+        """Compile the function, and keep its code."""
+        place_to_write(self.kept.folders)  # warns before it takes minutes
+        news.tell()
+        bytecode.FunctionIdentity._unique_ids = itertools.count(uuid.uuid4().int >> 80)
+        CALLS.append({})
+        try:
+            super().compile(args)
+        finally:
+            callees = tuple(CALLS.pop())
+        result = self.overloads[args]
+        is_large = count_instructions(result) >= LARGE
+        self.targetctx.remove_user_function(result.entry_point)
+        self.insert(result, is_large, callees)
+        if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
+            (*library, (machine_code, bitcode)), *rest = REDUCE(result._replace(type_annotation=""))
+            code = (*library, (machine_code, EMPTY_MODULE if is_large else bitcode)), *rest
+            self.kept.write("", self.key(args), is_large, callees, code)
+        news.tell()
+
+    def insert(self, result: Any, is_large: bool, callees: tuple[Callee, ...]) -> None:
+        """Let compiled functions call the code: by its symbol, or by copying it."""
+        libraries = [] if is_large else [result.library]
+        self.targetctx.insert_user_function(result.entry_point, result.fndesc, libraries)
+        args = tuple(result.signature.args)
+        self.overloads[args] = result
+        function = self.py_func
+        itself = Callee(function.__module__, function.__qualname__, args)
+        self.callees[args] = (itself,) if is_large else callees
+
+    def key(self, args: tuple) -> tuple:
+        """Return what code is kept for: types of arguments, and the processor."""
+        return args, self.targetctx.codegen().magic_tuple()
 
     def get_call_template(self, args: tuple, kws: dict) -> tuple:
-        """Answer numba's question, when it compiles a caller, what a call returns."""
-        python_signature, args = self._compiler.fold_argument_types(*without_literals(args, kws))
+        """Answer numba's question, when it compiles a caller, what a call returns.
+
+        Nothing is compiled apart for constants in the call.
+        """
+        args = tuple(map(types.unliteral, args))
+        kws = {name: types.unliteral(kind) for name, kind in kws.items()}
+        python_signature, args = self.fold_argument_types(args, kws)
         self.load(tuple(args))
+        CALLS[-1].update(dict.fromkeys(self.callees[tuple(args)]))
         name = self.py_func.__name__
         template = typing.make_concrete_template(name, name, self.nopython_signatures)
         return template, python_signature, args, {}
 
     def add_overload(self, result: Any) -> None:
-        """Let compiled functions call the code; Python finds it with its wrapper only."""
+        """Let only compiled functions find what was compiled, which has no wrapper."""
         self.overloads[tuple(result.signature.args)] = result
 
-    def compile(self, sig: Any) -> Any:
+    def compile(self, signature: Any) -> Any:
         """Return what Python calls for arguments of these types."""
-        args = tuple(sigutils.normalize_signature(sig)[0])
+        args = tuple(sigutils.normalize_signature(signature)[0])
         with global_compiler_lock:
             if args not in self.entries:
-                self.load(sig)
-                self.entries[args] = self.make_entry(sig, self.overloads[args])
-                self._insert([kind._code for kind in args], self.entries[args], False)
+                self.load(args)
+                result = self.overloads[args]
+                self.entries[args] = self.make_entry(args, result)
+                super().add_overload(result._replace(entry_point=self.entries[args]))
+                self.overloads[args] = result
             return self.entries[args]
 
-    def make_entry(self, signature: Any, result: Any) -> Any:
-        """Make the entry of a function for calls from Python.
-
-        Its wrapper is read from disk or compiled.
-        """
-        context = self.targetctx.subtarget(enable_nrt=self.targetoptions.get("_nrt", True))
+    def make_entry(self, args: tuple, result: Any) -> Any:
+        """Return the entry for calls from Python, with its wrapper."""
+        context = self.targetctx.subtarget(enable_nrt=True)
         described, environment = result.fndesc, result.environment
-        if wrapper := self._cache.load_wrapper(signature, context):
-            environment.consts[:], machine_code = wrapper
-            codegen = context.codegen()
-            codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(machine_code))
-            codegen._engine._defined_symbols.add(described.llvm_cpython_wrapper_name)
-            return context.get_executable(result.library, described, environment)
+        for constants, code in self.kept.read("-python", self.key(args)):
+            library = context.codegen().unserialize_library(code)
+            environment.consts[:] = constants
+            return context.get_executable(library, described, environment)
         context.refresh()
         library = context.codegen().create_library(described.llvm_cpython_wrapper_name)
         library.enable_object_caching()
         with context.push_code_library(library):
             context.create_cpython_wrapper(library, described, environment, None)
         entry = context.get_executable(library, described, environment)
-        self._cache.save_wrapper(signature, context, library, environment.consts)
+        if not library.has_dynamic_globals:
+            code = library.serialize_using_object_code()
+            self.kept.write("-python", self.key(args), environment.consts, code)
         return entry
+
+
+def count_instructions(result: Any) -> int:
+    """Count the instructions of a compiled function."""
+    function = result.library.get_function(result.fndesc.mangled_name)
+    return sum(1 for block in function.blocks for _ in block.instructions)

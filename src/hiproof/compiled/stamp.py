@@ -10,24 +10,21 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 
 IMPORT = re.compile(
-    r"^(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ "
-    r"\t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
-    re.MULTILINE,
+    r"^(?:from[ \t]+(\.*)([\w.]*)[ \t]+import[ \t]+(\([^)]*\)|.+)|import[ \t]+(.+))$", re.MULTILINE
 )
 # the same for all its patches, which run the same code
 PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
 VERSIONS = ("numba", "llvmlite", "numpy")
 HERE = Path(__file__).parent
 PACKAGE = HERE.parent
-DECIDING = ("__init__.py", "dispatcher.py", "linking.py", "references.py", "typing_memory.py")
+DECIDING = (HERE / "__init__.py", HERE / "dispatcher.py")
 
 
 @functools.cache
@@ -52,26 +49,8 @@ def count_compiled() -> int:
 
 @functools.cache
 def compiled_files() -> tuple[Path, ...]:
-    return tuple(Path(file) for file in iterate_sources(PACKAGE) if compiles(file))
-
-
-def compiles(file: str) -> bool:
-    """Return whether a source file holds a function that is compiled."""
-    with open(file, "rb") as source:
-        return b"\n@compiled" in source.read()
-
-
-def iterate_sources(folder: str | Path) -> Iterator[str]:
-    """Yield the source files in a folder and in those below it.
-
-    Folders of compiled code hold thousands of files, and are not looked into.
-    """
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.name.endswith(".py"):
-                yield entry.path
-            elif entry.name != "__pycache__" and entry.is_dir():
-                yield from iterate_sources(entry.path)
+    """Return hiproof's sources with functions that are compiled."""
+    return tuple(file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in file.read_bytes())
 
 
 def digest(files: Iterable[Path]) -> str:
@@ -79,39 +58,28 @@ def digest(files: Iterable[Path]) -> str:
 
     It depends neither on their order nor on where their package lies.
     """
-    hasher = hashlib.sha256(" ".join([PYTHON, *map(read_version, VERSIONS)]).encode())
-    for file in sorted(files, key=place_in_package):
-        hasher.update(digest_file(file))
-    return hasher.hexdigest()[:16]
+    versions = [import_module(name).__version__ for name in VERSIONS]
+    parts = [" ".join([PYTHON, *versions]).encode(), *sorted(map(digest_file, files))]
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 
 
 @functools.cache
 def digest_file(file: Path) -> bytes:
-    """Return the digests of a file's place and of its text, one after the other."""
-    return b"".join(
-        hashlib.sha256(text).digest()
-        for text in (place_in_package(file).encode(), file.read_bytes())
-    )
-
-
-@functools.cache
-def read_version(library: str) -> str:
-    return import_module(library).__version__  # its metadata take ten times as long to find
+    """Return the digest of a file's name and text."""
+    return hashlib.sha256(file.name.encode() + file.read_bytes()).digest()
 
 
 def closure(file: Path) -> set[Path]:
     """Return the file and all files to which its imports lead.
 
-    These are files within its own package and hiproof.
-
-    How code is kept changes nothing of it, so of this folder only the decorator and the linking
-    count, which no import names.
+    These are files within its own package and hiproof. How code is kept changes nothing of it, so
+    of this folder only the decorator and the dispatcher count, which no import names.
     """
     result: set[Path] = set()
-    open_ends = [file, *(HERE / name for name in DECIDING)]
+    open_ends = [file, *DECIDING]
     while open_ends:
         position = open_ends.pop()
-        if position not in result and (position.parent != HERE or position.name in DECIDING):
+        if position not in result and (position.parent != HERE or position in DECIDING):
             result.add(position)
             open_ends.extend(list_imports(position))
     return result
@@ -119,57 +87,23 @@ def closure(file: Path) -> set[Path]:
 
 @functools.cache
 def list_imports(file: Path) -> frozenset[Path]:
-    """Return the files that import statements at the top of `file` name.
-
-    These are files of the two packages.
-    """
-    statements = IMPORT.finditer(file.read_bytes().decode())
-    paths = {path for statement in statements for path in resolve_import(file, statement)}
+    """Return the files of the two packages that imports at the top of `file` name."""
+    tops, paths = {find_top_folder(file), PACKAGE}, set()
+    for dots, module, names, modules in IMPORT.findall(file.read_text(encoding="utf-8")):
+        for name in re.findall(r"[\w.]+", modules) or [module]:
+            parts = name.split(".")
+            starts = [top.parent for top in tops if top.name == parts[0]]
+            for start in [file.parents[len(dots) - 1]] if dots else starts:
+                base = start.joinpath(*parts)
+                paths |= {base, *(base / part for part in re.findall(r"\w+", names))}
     return frozenset().union(*map(find_sources, paths))
 
 
 @functools.cache
-def find_sources(path: str) -> frozenset[Path]:
+def find_sources(path: Path) -> frozenset[Path]:
     """Return the source files of the module or the package at a path without ending."""
-    sources = (f"{path}.py", os.path.join(path, "__init__.py"))
-    return frozenset(Path(source) for source in sources if os.path.isfile(source))
-
-
-def resolve_import(file: Path, statement: re.Match) -> Iterator[str]:
-    """Yield the modules and packages that one import statement may mean.
-
-    They are paths without ending.
-    """
-    if statement["modules"]:
-        for name in re.findall(r"[\w.]+", statement["modules"]):
-            parts = name.split(".")
-            yield from (
-                os.path.join(start, *parts[:n])
-                for start in starts(file, parts[0])
-                for n in range(1, len(parts) + 1)
-            )
-        return
-    parts = [part for part in statement["module"].split(".") if part]
-    dots = len(statement["dots"])
-    for start in (file.parents[dots - 1],) if dots else starts(file, parts[0]):
-        base = os.path.join(start, *parts)
-        yield base
-        # a module holds no others
-        if is_folder(base):
-            yield from (os.path.join(base, name) for name in re.findall(r"\w+", statement["names"]))
-
-
-def starts(file: Path, package: str) -> Iterator[Path]:
-    """Yield the folders in which absolute imports of `package` are looked up.
-
-    They are beside the file's own package and beside hiproof.
-    """
-    for top in {find_top_folder(file), PACKAGE}:
-        if top.name == package:
-            yield top.parent
-
-
-is_folder = functools.cache(os.path.isdir)
+    sources = path.parent / f"{path.name}.py", path / "__init__.py"
+    return frozenset(source for source in sources if source.is_file())
 
 
 @functools.cache
@@ -182,9 +116,3 @@ def find_top_folder(file: Path) -> Path:
     while (top.parent / "__init__.py").exists():
         top = top.parent
     return top
-
-
-@functools.cache
-def place_in_package(file: Path) -> str:
-    """Return the file's path from its package's folder, with forward slashes."""
-    return file.relative_to(find_top_folder(file).parent).as_posix()

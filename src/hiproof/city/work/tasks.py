@@ -63,8 +63,8 @@ def is_ready(pieces: Sequence[str]) -> bool:
     return not warm.list_missing(pieces)
 
 
-def make_ready(pieces: Sequence[str], own: bool = False) -> None:
+def make_ready(pieces: Sequence[str]) -> None:
     """Compile ahead of the work; see warm.py."""
     from . import warm
 
-    warm.make_ready(pieces, own)
+    warm.make_ready(pieces)

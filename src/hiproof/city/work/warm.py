@@ -19,23 +19,23 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...compiled import kept, news
-from ...compiled.kinds import KIND, read_processor, runs_kind
+import numba
+from llvmlite.binding import get_host_cpu_name
+
+from ...compiled import find_dispatcher, kept, news
 from ...compiled.stamp import PACKAGE, compute_common_stamp
 from ...log import LOGGER
 from .cores import cores
 
 
-def make_ready(pieces: Sequence[str], own: bool = False) -> None:
+def make_ready(pieces: Sequence[str]) -> None:
     """Compile those of the `pieces` that no run compiled before.
 
     It takes a minute or so, which `news` reports.
-
-    Code that came with hiproof for processors like this one will do, unless it is to be its `own`.
     """
-    missing = list_missing(pieces, own)
+    missing = list_missing(pieces)
     stamp, places = compute_common_stamp(), list_places()
-    folder = kept.place_to_write(places) if missing else None
+    folder = kept.place_to_write(places) if missing and find_dispatcher() else None
     # all is there, or nothing can be kept, so that every process has to compile anyway
     if folder is None:
         return
@@ -54,17 +54,16 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     news.processes = 1
 
 
-def list_missing(pieces: Sequence[str], own: bool = False) -> list[str]:
+def list_missing(pieces: Sequence[str]) -> list[str]:
     """Return those of the `pieces` that no run compiled before.
 
-    The functions of the others count as ready. See `make_ready` for `own`.
+    The functions of the others count as ready.
     """
     stamp = compute_common_stamp()
-    processors = (read_processor(), KIND)[: 1 if own else 1 + runs_kind()]
     missing = []
     for piece in pieces:
-        names = [mark(piece, stamp, processor) for processor in processors]
-        marks = [place / name for name in names for place in list_places()]
+        name = mark(piece, stamp, read_processor())
+        marks = [place / name for place in list_places()]
         if created := next(filter(Path.exists, marks), None):
             news.ready.update(created.read_text(encoding="utf-8", errors="replace").split())
         else:
@@ -74,7 +73,7 @@ def list_missing(pieces: Sequence[str], own: bool = False) -> list[str]:
 
 def list_places() -> tuple[Path, ...]:
     """Return the folders in which marks may lie."""
-    return kept.folders(make_ready, str(PACKAGE / "__init__.py"))
+    return kept.list_folders(PACKAGE)
 
 
 def keep_mark(file: Path) -> None:
@@ -123,10 +122,14 @@ def compiled_pieces(remainder: Iterator[str]) -> Iterator[str]:
 def environment() -> dict[str, str]:
     """Return the environment of a compiling process.
 
-    It has this process's places to import from, and the processor for which code is compiled.
+    It has this process's places to import from.
     """
-    path = os.pathsep.join(filter(None, sys.path))
-    return {**os.environ, "PYTHONPATH": path, "NUMBA_CPU_NAME": read_processor()}
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def read_processor() -> str:
+    """Return the name of this machine's processor, or of the one numba is given."""
+    return numba.config.CPU_NAME or get_host_cpu_name()
 
 
 def mark(piece: str, stamp: str, processor: str) -> str:

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import functools
 import gc
-import itertools
 import os
 import signal
 import sys
 import tempfile
 import threading
-import uuid
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -116,10 +114,6 @@ def begin_worker(heard: Connection, state: StartState | None, logging: tuple, co
 
     That compiled code cannot be kept, the main process has said.
     """
-    from ...compiled.linking import bytecode
-
-    # those forked from one process would number functions alike (linking.py says what comes of it)
-    bytecode.FunctionIdentity._unique_ids = itertools.count(uuid.uuid4().int >> 80)
     log.start(*logging)
     solved.begin_worker(count)
     gc.set_threshold(RARELY)

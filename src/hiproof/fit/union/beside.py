@@ -69,7 +69,7 @@ def gather_neighbour_edges(volumes, walls, neighbours, k):
     return beside
 
 
-@compiled(allocates=False)
+@compiled
 def gather_edge(volumes, walls, neighbours, k, j, edge, beside):
     """Fill `beside` with what moves of volume k need of an edge of volume j."""
     edges, samples, direction, axis = (
@@ -138,7 +138,7 @@ def fill_heights_twice(volumes, walls, neighbours, k, j, edge, m, beside):
                 )
 
 
-@compiled(allocates=False)
+@compiled
 def price_neighbour_edge(beside, j, edge, ends):
     """Compute the units of an edge of volume j where the moving volume covers `ends`."""
     edges, samples = beside.edges, beside.samples

@@ -120,7 +120,7 @@ def move_edges(volumes, scene, k, value, reach, context):
     return value
 
 
-@compiled(allocates=False)
+@compiled
 def sum_outward(volumes, scene, k, edge, gain, bare, sums):
     """Sum up what an edge of volume k gains on its way out from the opposite one.
 
@@ -183,7 +183,7 @@ def count_most_places(scene, count):
     return scene.lines.shape[2] + scene.vertices.shape[2] + 2 * SMALL_STEPS + 3 * count + 2
 
 
-@compiled(allocates=False)
+@compiled
 def list_edge_places(volumes, scene, k, edge, places):
     """Fill `places` with the places for an edge, and count them.
 
@@ -219,7 +219,7 @@ def list_edge_places(volumes, scene, k, edge, places):
     return m + 1
 
 
-@compiled(allocates=False)
+@compiled
 def is_repeated(places, q):
     """Return whether the q-th place is one of those before it."""
     for p in range(q):
@@ -228,7 +228,7 @@ def is_repeated(places, q):
     return False
 
 
-@compiled(allocates=False)
+@compiled
 def charge_edges(volumes, walls, neighbours, k, beside, charge):
     """Fill `charge` (k, 4) with the price of every edge."""
     ends = widen_rectangle(volumes, k)
@@ -240,7 +240,7 @@ def charge_edges(volumes, walls, neighbours, k, beside, charge):
                 charge[j, e] = price_neighbour_edge(beside, j, e, ends)
 
 
-@compiled(allocates=False)
+@compiled
 def charge_move(volumes, walls, neighbours, k, edge, t, trial, best, charge, beside, touched):
     """Add the price of all edges to `trial`, with edge `edge` of volume k at `t`.
 

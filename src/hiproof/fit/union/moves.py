@@ -375,7 +375,7 @@ def find_best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath
     return best, best_slope, best_offset
 
 
-@compiled(allocates=False)
+@compiled
 def sum_plane_misfit(slope, offset, z, x, own_heights, floors, first, last, dead, width):
     """Sum up the cost of the points z from `first` to `last` with a further plane.
 

@@ -379,7 +379,7 @@ def append_pair_slopes(cloud, i, j, out, m):
     return m
 
 
-@compiled(allocates=False)
+@compiled
 def bound_rows(gain, reach):
     """Fill `reach` (nu + 1,) with bounds of the sums of `gain` from each row on.
 
@@ -394,7 +394,7 @@ def bound_rows(gain, reach):
         reach[i] = reach[i + 1] + best_run
 
 
-@compiled(allocates=False)
+@compiled
 def find_best_rectangle(gain, least_sum, reach, column):
     """Find the rectangle of cells with the largest sum of `gain` above `least_sum`.
 
@@ -427,7 +427,7 @@ def find_best_rectangle(gain, least_sum, reach, column):
     return best, i0_best, i1_best, j0_best, j1_best
 
 
-@compiled(allocates=False)
+@compiled
 def fill_point_gains(cloud, planes, count, current, tau, gain):
     """Fill `gain` (n,) with the drop of cost under the min of `planes`.
 
@@ -448,7 +448,7 @@ def fill_point_gains(cloud, planes, count, current, tau, gain):
     return total
 
 
-@compiled(allocates=False)
+@compiled
 def fill_cell_gains(cloud, gain_of_point, gain):
     """Fill `gain` (nu, nv) with the sums over each cell's points.
 

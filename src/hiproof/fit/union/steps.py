@@ -73,7 +73,7 @@ def list_near(volumes, turn, moving):
     return neighbours
 
 
-@compiled(allocates=False)
+@compiled
 def enclose_volume(volumes, j, turn, direction):
     """Return the bounds of volume j, a little widened, in the axes of a direction."""
     other = int(volumes[j, DIRECTION])
@@ -90,7 +90,7 @@ def enclose_volume(volumes, j, turn, direction):
     return u - reach_u, u + reach_u, v - reach_v, v + reach_v
 
 
-@compiled(allocates=False)
+@compiled
 def price_edge(volumes, walls, k, edge, neighbours):
     """Compute the units of one visible edge of volume k.
 
@@ -124,7 +124,7 @@ def classify_step(gap):
     )
 
 
-@compiled(allocates=False)
+@compiled
 def price_whole_edge(walls, direction, axis, place, in_line, m):
     """Compute the fixed sum of an edge with `m` samples. Short ones cost less."""
     if not in_line:
@@ -144,7 +144,7 @@ def price_length(whole_price, shown_length, low_length):
     )
 
 
-@compiled(allocates=False)
+@compiled
 def locate_line(walls, direction, axis, place):
     """Return whether a line of one axis lies deep enough inside for a visible step.
 
@@ -162,7 +162,7 @@ def locate_line(walls, direction, axis, place):
     return min(place - lowest, highest - place) + off_a_node >= STEP_DEPTH_M, in_line
 
 
-@compiled(allocates=False)
+@compiled
 def place_samples(volumes, walls, k, edge):
     """Fill walls.places with an edge's samples inside the outline.
 
@@ -265,7 +265,7 @@ def meets_line(line, ends, first, last):
     )
 
 
-@compiled(allocates=False)
+@compiled
 def raise_heights(volumes, j, line, ends, is_own, places, inside, outside, n):
     """Raise the heights beside an edge at the first `n` samples to those of volume j.
 
@@ -286,7 +286,7 @@ def raise_heights(volumes, j, line, ends, is_own, places, inside, outside, n):
         outside[q] = h if is_inside & (replaces | (h > outside[q])) else outside[q]
 
 
-@compiled(allocates=False)
+@compiled
 def count_corner_ends(walls, direction, axis, place, first, last):
     """Count the ends of a line inside the outline that are at corners of it."""
     has_first = has_last = 0
