@@ -22,7 +22,6 @@ operations    which operation of PROJ lies between two of them, and how accurate
 footprints    building polygons; `read_footprints`
 attribute_columns  their attributes as they are declared
 sql           names in SQL
-plain_geopackage  features of a plain GeoPackage, without GDAL
 vector_file   features of a vector file, by GDAL
 layers        the layers of a vector file
 features      a layer's features, odd attributes as text

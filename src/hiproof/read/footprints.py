@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -34,10 +34,12 @@ from .crs import (
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
 from .operations import find_operation, warn_if_coarse
-from .plain_geopackage import Features, is_geopackage, read_plain_crs, read_plain_geopackage
 from .polygons import is_surface, simple_polygons
 from .positions import format_box, refuse_degrees
 from .remote import is_url
+
+if TYPE_CHECKING:
+    from .vector_file import Features
 
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
 """What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
@@ -122,9 +124,7 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
         from .parquet_table import parquet_crs
 
         return plan_crs(parquet_crs(path), path)
-    if is_geopackage(path) and (code := read_plain_crs(path, layer)) is not None:
-        return plan_crs(code, path)
-    from .vector_file import vector_file_crs
+    from .vector_file import vector_file_crs  # GDAL, which takes long to load
 
     return plan_crs(vector_file_crs(path, layer), path)
 
@@ -178,10 +178,7 @@ def read_file(
         from .parquet_table import read_parquet
 
         return read_parquet(path, layer, where, make_box)
-    if is_geopackage(path) and where is None and make_box(None) is None:
-        if (features := read_plain_geopackage(path, layer)) is not None:
-            return features
-    from .vector_file import read_vector_file  # GDAL, which the others do without
+    from .vector_file import read_vector_file  # GDAL, which takes long to load
 
     return read_vector_file(path, layer, where, make_box)
 

@@ -18,8 +18,10 @@ from ..errors import InputError, InputWarning
 from .attribute_columns import make_known_condition, restore_declared_types
 from .features import read_layer
 from .layers import find_source, list_layers
-from .plain_geopackage import Features
 from .wkb import decode_geometries
+
+Features = tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]
+"""Metadata (fields and crs), feature numbers, geometries and columns of a layer."""
 
 
 def read_vector_file(

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,8 +23,8 @@ from ..write.files import atomic
 from ..write.head import FileHead, UpdateHead
 from ..write.naming import plan_wkt
 from ..write.tables.geopackage import OUTLINE_GEOMETRY, write_styles
-from ..write.tables.geopackage_file import GeoPackage
 from ..write.tables.styles import Style
+from ..write.tables.vector_layer import GEOPACKAGE, write_layer
 
 CSV_FILE, GPKG_FILE = "changes.csv", "changes.gpkg"
 CHANGE_COLUMNS: dict[str, type] = {
@@ -162,25 +161,21 @@ def make_place_rows(change: FoundChange) -> list[tuple[Any, ...]]:
 
 def write_geopackage(path: Path, changes: list[FoundChange], head: FileHead) -> None:
     """Write the layers of buildings and of places, with their QGIS style."""
-    with closing(GeoPackage(path, plan_wkt(head.crs_of_files))) as file:
-        buildings = [c for c in changes if c.record["change"]["class"] != OUTSIDE_CLASS]
-        outlines, rows = [c.outline for c in buildings], [make_row(c) for c in buildings]
-        add_layer(file, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, rows, head)
-        places = [
-            shapely.union_all(
-                [polygon(rings, "an outline") for rings in place.get("outlines") or []]
-            )
-            for change in changes
-            for place in change.record["change"]["places"]
-        ]
-        rows = [row for change in changes for row in make_place_rows(change)]
-        add_layer(file, PLACES_LAYER, PLACE_COLUMNS, places, rows, head)
-        write_styles(file, CHANGE_STYLES)
-        file.finish()
+    buildings = [c for c in changes if c.record["change"]["class"] != OUTSIDE_CLASS]
+    outlines, rows = [c.outline for c in buildings], [make_row(c) for c in buildings]
+    add_layer(path, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, rows, head)
+    places = [
+        shapely.union_all([polygon(rings, "an outline") for rings in place.get("outlines") or []])
+        for change in changes
+        for place in change.record["change"]["places"]
+    ]
+    rows = [row for change in changes for row in make_place_rows(change)]
+    add_layer(path, PLACES_LAYER, PLACE_COLUMNS, places, rows, head)
+    write_styles(path, CHANGE_STYLES)
 
 
 def add_layer(
-    file: GeoPackage,
+    path: Path,
     layer: str,
     columns: dict[str, type],
     geometries: list[Any],
@@ -188,8 +183,7 @@ def add_layer(
     head: FileHead,
 ) -> None:
     """Add a layer of polygons, whose `geometries` are in world metres."""
-    file.create_table(layer, columns, OUTLINE_GEOMETRY)
-    if not rows:
-        return
     there = shapely.transform(np.array(geometries, object), head.units.table.from_metres)
-    file.insert_features(layer, 1, [None if g is None else g.wkb for g in there], rows)
+    wkb = [None if g is None else g.wkb for g in there]
+    crs = plan_wkt(head.crs_of_files)
+    write_layer(path, layer, columns, rows, wkb, crs=crs, **GEOPACKAGE, **OUTLINE_GEOMETRY)

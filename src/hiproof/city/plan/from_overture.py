@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import sqlite3
 import warnings
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +21,6 @@ from ...errors import InputError, OutputError, SettingsError
 from ...log import LOGGER, count_things
 from ...masking import masked_values
 from ...read.overture import TYPES, OvertureFootprints, is_overture, read_overture
-from ...read.plain_geopackage import is_geopackage, open_database
 from ...write.files import atomic
 from ..request import Request
 
@@ -150,17 +147,12 @@ def read_source(path: str | None) -> dict[str, Any] | None:
 
     It is None too where there is no file.
     """
-    if not path or not is_geopackage(path):
+    if not path or not path.endswith(".gpkg") or not Path(path).is_file():
         return None
-    try:
-        with closing(open_database(path)) as database:
-            texts = database.execute("select metadata from gpkg_metadata").fetchall()
-    except sqlite3.Error:
-        return None
-    from xml.etree import ElementTree
+    import pyogrio
 
     try:
-        items = (item for (text,) in texts for item in ElementTree.fromstring(text).iter("MDI"))
-        return next(json.loads(item.text or "") for item in items if item.get("key") == SOURCE)
-    except (ElementTree.ParseError, ValueError, StopIteration):
+        metadata = pyogrio.read_info(path)["dataset_metadata"] or {}
+        return dict(json.loads(metadata[SOURCE]))
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, KeyError, ValueError):
         return None

@@ -2,7 +2,7 @@
 
 rows             the rows of one building
 waiting          rows that wait until the types of columns are settled
-geopackage_file  a GeoPackage in SQLite
+vector_layer     a layer of a vector file, by GDAL
 geopackage       the GeoPackage of a run
 styles           how QGIS draws its layers
 geoparquet       GeoParquet, made of the same columns

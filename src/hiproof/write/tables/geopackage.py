@@ -10,12 +10,10 @@ the types.
 from __future__ import annotations
 
 import os
-import sqlite3
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from typing import Any
 
-from ...errors import OutputError
 from ...model import Building
 from ...model.roof_figures import RoofFigures
 from ..attribute_list import PREFIX, TABLES
@@ -25,20 +23,20 @@ from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..naming import plan_wkt
 from ..writer import BuildingWriter
-from .geopackage_file import GeometryType, GeoPackage
 from .rows import split_lines, table_rows
 from .styles import TABLE, Style, choose_styles, style_rows
+from .vector_layer import GEOPACKAGE, translate_write_errors, write_layer
 from .waiting import HISTORY, WaitingRows, column_names
 
 BUILDINGS = "buildings"
-OUTLINE_GEOMETRY, POLYGON_Z = GeometryType("MULTIPOLYGON"), GeometryType("POLYGON", has_z=True)
+OUTLINE_GEOMETRY = {"geometry_type": "MultiPolygon", "promote_to_multi": True}
 TABLE_GEOMETRIES = {
     BUILDINGS: OUTLINE_GEOMETRY,
     "parts": OUTLINE_GEOMETRY,
-    "roof_surfaces": POLYGON_Z,
+    "roof_surfaces": {"geometry_type": "Polygon Z"},
     HISTORY: OUTLINE_GEOMETRY,
 }
-"""Tables and the geometry of their rows."""
+"""Tables and the geometry of their rows, in pyogrio's terms."""
 
 # of a table in SQLite as it comes, less the number and the geometry of a row
 MOST_COLUMNS = 1998
@@ -107,42 +105,34 @@ class AttributesWriter(BuildingWriter):
             waiting.put(lines[layer])
 
     def finish(self) -> None:
-        try:
-            with closing(GeoPackage(self.hidden, self.plan_wkt)) as file:
-                columns = {}
-                for waiting in (w for w in self.waiting.values() if w.is_needed):
-                    columns[waiting.layer] = waiting.kinds(self.head.prefix, MOST_COLUMNS)
-                    write_layer(file, waiting, columns[waiting.layer])
-                write_styles(file, choose_styles(columns, self.head.sky))
-                file.finish()
-        except sqlite3.Error as error:
-            raise OutputError(
-                f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions "
-                "and the space left"
-            ) from error
+        columns = {}
+        with translate_write_errors(self.path):
+            for waiting in (w for w in self.waiting.values() if w.is_needed):
+                kinds = columns[waiting.layer] = waiting.kinds(self.head.prefix, MOST_COLUMNS)
+                names = column_names(kinds, self.reserved)
+                typed_names = dict(zip(names, kinds.values(), strict=True))
+                for number, rows in enumerate(waiting.batches()):
+                    values = [[row.get(name) for name in kinds] for _, row in rows]
+                    write_layer(
+                        self.hidden,
+                        waiting.layer,
+                        typed_names,
+                        values,
+                        [wkb for wkb, _ in rows],
+                        crs=self.plan_wkt,
+                        append=number > 0,
+                        **GEOPACKAGE,
+                        **TABLE_GEOMETRIES[waiting.layer],
+                    )
+            write_styles(self.hidden, choose_styles(columns, self.head.sky))
 
 
-def write_layer(file: GeoPackage, waiting: WaitingRows, kinds: dict[str, type]) -> None:
-    """Write the rows of a table, by columns of `kinds`."""
-    names = column_names(kinds, AttributesWriter.reserved)
-    columns = dict(zip(names, kinds.values(), strict=True))
-    file.create_table(waiting.layer, columns, TABLE_GEOMETRIES[waiting.layer])
-    first = 1
-    for rows in waiting.batches():
-        values = [
-            tuple(None if (v := row.get(name)) is None else kind(v) for name, kind in kinds.items())
-            for _, row in rows
-        ]
-        file.insert_features(waiting.layer, first, [wkb for wkb, _ in rows], values)
-        first += len(rows)
-
-
-def write_styles(file: GeoPackage, styles: Sequence[Style]) -> None:
+def write_styles(path: str | os.PathLike[str], styles: Sequence[Style]) -> None:
     """Write the table by which QGIS draws the layers."""
     rows = style_rows(styles)
     kinds: dict[str, type] = {name: bool if name == "useAsDefault" else str for name in rows[0]}
-    file.create_table(TABLE, kinds, None, key="id")
-    file.insert(TABLE, [(number, *row.values()) for number, row in enumerate(rows, 1)])
+    values = [list(row.values()) for row in rows]
+    write_layer(path, TABLE, kinds, values, driver="GPKG", layer_options={"FID": "id"})
 
 
 writer = AttributesWriter

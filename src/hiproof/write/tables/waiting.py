@@ -14,7 +14,7 @@ from ..attribute_list import OWN, TABLES
 from .rows import Row
 
 HISTORY = "history"  # a table that only runs have in which models ended
-BATCH_ROWS = 1000  # rows handed on at once: the overhead is a call's, the memory a row's
+BATCH_ROWS = 10_000  # rows handed on at once: the overhead is a call's, the memory a row's
 
 
 class WaitingRows:
