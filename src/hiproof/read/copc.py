@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import BinaryIO
 
+import laspy
 import lazrs
 import numpy as np
 
@@ -30,14 +31,17 @@ def copc_points(
     """
     nodes = find_nodes(facts, octree, box)
     chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
-    content = np.zeros(sum(points for points, _ in chunks) * facts.point_bytes, np.uint8)
+    file.seek(0)
+    form = laspy.LasHeader.read_from(file, read_evlrs=False).point_format
+    points = laspy.PackedPointRecord.zeros(int(nodes["points"].sum()), form)
     if len(nodes):
         compressed = np.frombuffer(
             b"".join(read_node_bytes(file, node) for node in nodes), np.uint8
         )
         laszip = np.frombuffer(facts.laszip, np.uint8)
-        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, SELECTION)
-    return nodes, take_fields(content, facts)
+        content, selection = points.array.view(np.uint8), SELECTION.to_lazrs()
+        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, selection)
+    return nodes, take_fields(points, facts)
 
 
 def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:

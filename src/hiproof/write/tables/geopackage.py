@@ -29,8 +29,8 @@ from .vector_layer import GEOPACKAGE, translate_write_errors, write_layer
 from .waiting import HISTORY, WaitingRows, column_names
 
 BUILDINGS = "buildings"
-OUTLINE_GEOMETRY = {"geometry_type": "MultiPolygon", "promote_to_multi": True}
-TABLE_GEOMETRIES = {
+OUTLINE_GEOMETRY: dict[str, Any] = {"geometry_type": "MultiPolygon", "promote_to_multi": True}
+TABLE_GEOMETRIES: dict[str, dict[str, Any]] = {
     BUILDINGS: OUTLINE_GEOMETRY,
     "parts": OUTLINE_GEOMETRY,
     "roof_surfaces": {"geometry_type": "Polygon Z"},
