@@ -33,7 +33,7 @@ def write_layer(
     wkb: Sequence[bytes | None] | None = None,
     **options: Any,
 ) -> None:
-    """Write or append `rows`, values by column, with geometries as WKB where they have any.
+    """Write or append `rows`, values by column, with their geometries as WKB.
 
     `columns` are names and types; `options` are pyogrio's own. Raises what pyogrio does.
     """
