@@ -36,7 +36,6 @@ import shapely
 
 from hiproof import read_parameters
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.work.workers import stop_server
 from hiproof.compose import check_solid
 from hiproof.read import read_footprints, read_header
 from hiproof.read.solids import read_solids
@@ -121,7 +120,6 @@ def run_warm(clouds: list[str], footprints: str, out: Path, jobs: int, settings:
         Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True)
     )
     wall = time.perf_counter() - started
-    stop_server()  # so that the time of workers counts
     cpu_end = measure_cpu()
     peak = (
         max(
@@ -200,16 +198,12 @@ def run_with_kills(
 
 
 def list_workers(pid: int) -> list[int]:
-    """List the worker processes of a main process, from the process table.
-
-    They are its children, or those of the process from which it has workers forked.
-    """
+    """List the worker processes of a main process, from the process table."""
     workers = []
     for child in list_children(pid):
         with suppress(OSError):
             command = Path(f"/proc/{child}/cmdline").read_bytes()
             workers += [child] if b"spawn_main" in command else []
-            workers += list_children(child) if b"forkserver" in command else []
     return workers
 
 

@@ -11,7 +11,6 @@ import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.tasks import WORK
-from hiproof.city.work.workers import stop_server
 from hiproof.errors import InputError, OutputError
 from hiproof.update import run as update_run
 from hiproof.update.request import UpdateRequest
@@ -31,7 +30,6 @@ def forked_workers():
     """
     with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
         distributed.utils.get_mp_context().set_forkserver_preload([*WORK, "distributed"])
-        stop_server()  # the next one imports these
         yield
 
 

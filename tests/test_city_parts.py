@@ -238,17 +238,6 @@ def test_workers_have_the_environment_and_the_folder_of_the_moment(tmp_path, mon
         assert (town, current) == (name, str(folder))
 
 
-def test_where_workers_cannot_be_forked_they_are_spawned(monkeypatch):
-    def refuse():
-        raise PermissionError("sockets are not allowed")
-
-    monkeypatch.setattr("multiprocessing.forkserver.ensure_running", refuse)
-    executor = Processes(1)
-    ((_, result, error),) = executor.run(double, [(2,)])
-    executor.close()
-    assert result == 4 and error is None
-
-
 def test_no_two_workers_number_functions_of_numbas_library_alike():
     """Code that both keep meets in other processes."""
     numbers = []

@@ -47,10 +47,6 @@ def reconstruct(
 
     start(console_level(), log_file)
     box = None if bbox is None else parse_box(bbox)
-    if jobs and jobs > 1 and not scheduler:
-        from ..city.work.workers import start_server
-
-        start_server()  # so that workers need not wait for imports
     if not enrich and "enrich" in (changes or {}):
         raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import RawValue
 from typing import Any
@@ -14,7 +15,7 @@ from ... import log
 from . import solved
 from .cores import limit_threads
 from .tasks import WorkerLost, import_work, is_ready, make_ready
-from .workers import begin_worker, choose_context, describe_start
+from .workers import begin_worker, start_deaf
 
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
 COUNT_S = 0.5  # seconds between looks at how many buildings the workers of this machine have solved
@@ -88,15 +89,14 @@ class Processes:
 
     def submit(self, function: Callable, task: tuple) -> Future:
         if self.pool is None:
-            context = choose_context()
+            context = get_context("spawn")
             heard, self.word = context.Pipe(duplex=False)
-            state = describe_start(context)
-            arguments: Any = (heard, state, log.worker_arguments(), self.count_solved)
+            arguments: Any = (heard, log.worker_arguments(), self.count_solved)
             self.pool = ProcessPoolExecutor(
                 self.count, mp_context=context, initializer=begin_worker, initargs=arguments
             )
         try:
-            with limit_threads():
+            with limit_threads(), start_deaf():
                 return self.pool.submit(function, *task)
         except BrokenProcessPool as error:
             lost: Future = Future()

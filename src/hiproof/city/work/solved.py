@@ -26,9 +26,3 @@ def count_building() -> None:
         listener(1)
     else:
         shared.value += 1
-
-
-def begin_worker(count: Any) -> None:
-    """Let this worker process count in memory that it shares with the main one."""
-    global shared
-    shared = count
