@@ -75,14 +75,14 @@ def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path
             "without it buildings are read"
         )
     catalogue = request.settings.read.overture_catalogue
-    found = read_overture(catalogue, compute_extent(request, headers), kind)
-    write_geopackage(found, path)
+    fetched = read_overture(catalogue, compute_extent(request, headers), kind)
+    write_geopackage(fetched, path)
     LOGGER.info(
         "%s of Overture's release %s",
-        count_things(len(found.table), "footprint"),
-        found.note["release"],
+        count_things(len(fetched.table), "footprint"),
+        fetched.note["release"],
     )
-    return found.note
+    return fetched.note
 
 
 def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.Geometry:
@@ -121,21 +121,21 @@ def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.
     return extent
 
 
-def write_geopackage(found: OvertureFootprints, path: Path) -> None:
+def write_geopackage(fetched: OvertureFootprints, path: Path) -> None:
     """Write footprints with their source; the file appears whole or not at all."""
     import pyogrio
 
     options: dict[str, Any] = {
-        "layer": found.note["type"],
+        "layer": fetched.note["type"],
         "driver": "GPKG",
         "geometry_name": "geometry",
         "geometry_type": "Unknown",
         "crs": "EPSG:4326",
-        "dataset_metadata": {SOURCE: json.dumps(masked_values(found.note))},
+        "dataset_metadata": {SOURCE: json.dumps(masked_values(fetched.note))},
     }
     with atomic(path) as beside:
         try:
-            pyogrio.raw.write_arrow(found.table, str(beside), **options)
+            pyogrio.raw.write_arrow(fetched.table, str(beside), **options)
         except RuntimeError as error:  # the base of pyogrio's own
             raise OutputError(
                 f"expected to write {path}, got: {error}; check the path and the space left"
