@@ -19,10 +19,3 @@ def die_at_second_task(x):
     if x == 2:
         os.kill(os.getpid(), signal.SIGKILL)
     return x
-
-
-def number_function():
-    """The number in the symbols of the next function of numba's own library."""
-    from numba.core.bytecode import FunctionIdentity
-
-    return FunctionIdentity.from_function(double).unique_id

@@ -27,7 +27,7 @@ from hiproof.city.work.processes import Processes
 from hiproof.city.work.sort import Reach
 from hiproof.city.work.tasks import WorkerLost
 from hiproof.read.terrain import TerrainChain
-from small_tasks import die_at_second_task, double, has_imported, number_function
+from small_tasks import die_at_second_task, double, has_imported
 
 
 def jobs_at(xy):
@@ -236,17 +236,6 @@ def test_workers_have_the_environment_and_the_folder_of_the_moment(tmp_path, mon
         ((_, current, _),) = executor.run(os.getcwd, [()])
         executor.close()
         assert (town, current) == (name, str(folder))
-
-
-def test_no_two_workers_number_functions_of_numbas_library_alike():
-    """Code that both keep meets in other processes."""
-    numbers = []
-    for _ in range(2):
-        executor = Processes(1)
-        ((_, number, _),) = executor.run(number_function, [()])
-        executor.close()
-        numbers.append(number)
-    assert abs(numbers[0] - numbers[1]) > 10**6
 
 
 def test_a_killed_worker_loses_its_tasks_but_not_the_others():

@@ -38,7 +38,6 @@ NOT_RUN = {
 OTHER_PROGRAMS = {
     "make": "installs into an environment of its own; .ci/run runs it",
     "pip": "installs packages from a registry",
-    "python": "compiles for minutes; tests/test_packaging.py builds wheels",
     "docker": "needs Docker",
     "qgis_process": "needs QGIS; tests/test_qgis.py runs the plugin's commands",
     "dask": "starts a cluster; tests/test_city_dask.py starts one",
