@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -56,17 +57,27 @@ def print_summary(summary: Summary, out: str) -> None:
     if summary.doubts:
         remarks = ", ".join(f"{doubt.told} {count:,}" for doubt, count in summary.doubts.items())
         click.echo(f"buildings by remark in hiproof_detail: {remarks}")
-    for name, reason in summary.broken_inputs:
-        click.echo(f"{click.style('not read:', fg='red')} {name}: {reason}")
-    for id, reason in summary.failures:
-        click.echo(f"{click.style('internal error:', fg='red')} building {id}: {reason}")
+    print_faults(summary)
     if summary.bundles:
         click.echo(f"please report these, with the folders of the buildings in {summary.bundles}")
     if not summary.units.are_metres:
         click.echo(f"coordinates are in {summary.units}; attributes and parameters in metres")
-    click.echo("files: " + ", ".join(map(str, summary.models)))
-    steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items())
-    click.echo(f"time: {sum(summary.seconds.values()):.1f} s ({steps})")
+    print_files(summary.models, summary.seconds)
+
+
+def print_faults(summary: Summary) -> None:
+    """Print which inputs could not be read, and which buildings failed."""
+    for name, reason in summary.broken_inputs:
+        click.echo(f"{click.style('not read:', fg='red')} {name}: {reason}")
+    for id, reason in summary.failures:
+        click.echo(f"{click.style('internal error:', fg='red')} building {id}: {reason}")
+
+
+def print_files(files: Iterable[Path], seconds: Mapping[str, float]) -> None:
+    """Print the files of a run, and how long its steps took."""
+    click.echo("files: " + ", ".join(map(str, files)))
+    steps = ", ".join(f"{step} {duration:.1f} s" for step, duration in seconds.items())
+    click.echo(f"time: {sum(seconds.values()):.1f} s ({steps})")
 
 
 def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: str) -> list[str]:

@@ -9,6 +9,7 @@ import click
 
 from ..log import Level, console_level
 from ..progress import show_progress
+from .running import print_faults, print_files
 
 if TYPE_CHECKING:
     from ..update.epochs import Surveys
@@ -92,14 +93,8 @@ def print_update(summary: UpdateSummary) -> None:
         f"{describe_significance(surveys)}; compared with the "
         + ("earlier points" if surveys.has_earlier else "earlier models alone")
     )
-    for name, reason in summary.run.broken_inputs:
-        click.echo(f"{click.style('not read:', fg='red')} {name}: {reason}")
-    for id, reason in summary.run.failures:
-        click.echo(f"{click.style('internal error:', fg='red')} building {id}: {reason}")
-    files = [*summary.run.models, *summary.files]
-    click.echo("files: " + ", ".join(map(str, files)))
-    steps = ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.run.seconds.items())
-    click.echo(f"time: {sum(summary.run.seconds.values()):.1f} s ({steps})")
+    print_faults(summary.run)
+    print_files([*summary.run.models, *summary.files], summary.run.seconds)
 
 
 def describe_significance(surveys: Surveys) -> str:

@@ -12,6 +12,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +107,7 @@ def build_file(
         built.models = list_model_paths(settings, out)
         maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))
         first = next(records, None)
-        records = iter(()) if first is None else chain_records(first, records)
+        records = iter(()) if first is None else chain([first], records)
         maker.settle_offset(first)
         join_fragments(
             list_requested_files(settings, out),
@@ -128,13 +129,6 @@ def refuse_run_folder(out: Path) -> None:
             "reconstruct`; "
             "choose another --out"
         )
-
-
-def chain_records(
-    first: dict[str, Any], remainder: Iterator[dict[str, Any]]
-) -> Iterator[dict[str, Any]]:
-    yield first
-    yield from remainder
 
 
 def make_fragments(

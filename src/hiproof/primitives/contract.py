@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import shapely
@@ -46,23 +46,6 @@ Shape = tuple[float, ...]  # V, U, q0..q3
 RECTANGLE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 Corners = Sequence[tuple[float, float, float]] | np.ndarray  # (n, 3)
 Pieces = tuple[Piece, ...]
-
-
-class Sides(Protocol):
-    """A member's planes (family.py): eave heights (m) and slopes by side.
-
-    `top` is the height (m) of a level plane.
-    """
-
-    @property
-    def half(self) -> np.ndarray: ...
-    @property
-    def eaves(self) -> np.ndarray: ...
-    @property
-    def slopes(self) -> np.ndarray: ...
-    @property
-    def top(self) -> float: ...
-    def apex(self, axis: int) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -159,7 +142,7 @@ class Primitive:
     refine: Callable[[Mapping[str, float], float], Primitive] | None = None
     rim: tuple[tuple[float, float], ...] = RECTANGLE
     draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
-    read_member: Callable[[Sides], tuple[float, ...]] | None = None
+    read_member: Callable[[Any], tuple[float, ...]] | None = None
     osm_shape: str | None = None
     legend: str = "other"
 
@@ -241,7 +224,7 @@ class Primitive:
         length, angle = width * rng.uniform(1.05, 2.2), rng.uniform(20.0, 45.0)
         return self.typical(width, length, 0.5 * width * math.tan(math.radians(angle)))
 
-    def from_member(self, member: Sides) -> tuple[float, ...]:
+    def from_member(self, member: Any) -> tuple[float, ...]:
         """Return q of the shape with the slopes of a member's front and right.
 
         Raises FitError for a shape that is of no family.

@@ -25,7 +25,6 @@ from .contract import (
     DerivedStart,
     Primitive,
     Shape,
-    Sides,
     Vote,
 )
 
@@ -165,7 +164,7 @@ def turn_where(rule: Mapping[str, Any], theta: np.ndarray) -> np.ndarray:
     return turned
 
 
-def name_member(member: Sides) -> dict[str, Any]:
+def name_member(member: Any) -> dict[str, Any]:
     """Return by name what a row may say of a member of the family."""
     names = {"v": member.half[1], "ridge": member.apex(1), "top": member.top}
     for side, slope, eave in zip(SIDES, member.slopes, member.eaves, strict=True):

@@ -93,11 +93,11 @@ def read_table(row: Mapping[str, Any], earlier: Mapping[str, AttributeTable]) ->
         for attribute in earlier[name].attributes
         if attribute.name in names
     ]
-    own = [make_attribute(name, *values) for name, values in row["attributes"].items()]
+    declared = [make_attribute(name, *values) for name, values in row["attributes"].items()]
     return AttributeTable(
         row["title"],
         row["where"],
-        (*included, *own),
+        (*included, *declared),
         row.get("prefix", ""),
         tuple(row.get("required", ())),
     )
@@ -105,7 +105,7 @@ def read_table(row: Mapping[str, Any], earlier: Mapping[str, AttributeTable]) ->
 
 def add_shape(table: AttributeTable) -> AttributeTable:
     """Return the table of parts with a column for every parameter, and its deviation."""
-    *own, cants = table.attributes
+    *columns, cants = table.attributes
     shape = [make_attribute(name, "number", *values) for name, values in SHAPE.items()]
     units = {"z_eave": "m", "rotation": "deg"} | {a.name: a.unit for a in shape}
     sigma = [
@@ -113,7 +113,7 @@ def add_shape(table: AttributeTable) -> AttributeTable:
         for name, unit in units.items()
         if name != "teeth"
     ]
-    return table._replace(attributes=(*own, *shape, cants, *sigma))
+    return table._replace(attributes=(*columns, *shape, cants, *sigma))
 
 
 TABLES: dict[str, AttributeTable] = {}
