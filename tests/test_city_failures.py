@@ -132,7 +132,8 @@ def test_an_outline_that_cannot_be_written_leaves_the_id_and_the_message(monkeyp
         if outline is not None:
             raise AttributeError("no attribute 'exterior'")
 
-    monkeypatch.setattr(parameters, "outline_record", refuse)
+    for kind in ("polygon", "polygon?"):
+        monkeypatch.setitem(parameters.WRITERS, kind, refuse)
     job = solve.Job(
         0, "a", shapely.box(0, 0, 4, 4), Footprint("a", shapely.box(0, 0, 4, 4), {"year": 1950})
     )

@@ -63,22 +63,30 @@ def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPla
     if terrain is not None and not request.footprints:
         terrain.knows_any(list_places(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
     settings = settle_classes(request.clouds, request.settings)
-    refuse_underpasses_alone(request)
+    if request.underpasses is not None and not request.footprints:
+        raise InputError(
+            "expected --footprints with --underpasses, got none; name the outlines of the "
+            "buildings above them"
+        )
     registration, operations, neighbours = None, [], ()
     if request.footprints:
         jobs, neighbours, registration = jobs_from_footprints(request, headers, frame, settings)
-        operations += footprint_operations(request, frame, jobs)
+        # a warning said where it is coarse when they were read
+        operations += list_operations(
+            mask(request.footprints), frame.footprints, frame.cloud, frame, jobs, warn=False
+        )
     else:
         jobs, settings = jobs_from_cloud(request, headers, frame.units, settings, progress)
         jobs = jobs_in_box(jobs, request, frame.units)
     if terrain is not None:
         check_terrain(terrain, jobs)
-        operations += terrain_operations(terrain, frame, jobs)
+        subject = mask(terrain.path)
+        operations += list_operations(subject, frame.crs, terrain.own_crs, frame, jobs)
     units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
     if settings.write.out_crs:
         out_crs = choose_file_crs(frame.crs, settings.write.out_crs)
         warn_files_elsewhere(jobs, out_crs, units)
-        operations += file_operations(frame, out_crs, jobs)
+        operations += list_operations("--out-crs", frame.crs, out_crs, frame, jobs)
     return WorkPlan(
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, limit_buildings_per_tile(request.settings)),
@@ -181,15 +189,6 @@ def read_headers(clouds: tuple[str, ...]) -> list:
     return [header for header in headers if header.count]
 
 
-def refuse_underpasses_alone(request: Request) -> None:
-    """Raise InputError for underpasses without footprints."""
-    if request.underpasses is not None and not request.footprints:
-        raise InputError(
-            "expected --footprints with --underpasses, got none; name the outlines of the "
-            "buildings above them"
-        )
-
-
 def jobs_from_footprints(
     request: Request, headers: list, frame: AreaFrame, settings: Settings
 ) -> tuple[tuple[Job, ...], tuple[shapely.Polygon, ...], Registration | None]:
@@ -290,76 +289,39 @@ def read_requested_footprints(
     )
 
 
-def footprint_operations(
-    request: Request, frame: AreaFrame, jobs: tuple[Job, ...]
-) -> list[Operation]:
-    """Return the operation that took footprints to the clouds' CRS.
-
-    A warning said so when they were read.
-    """
-    if frame.cloud is None or frame.footprints is None:
-        return []
-    return list_operations(
-        mask(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs
-    )
-
-
-def terrain_operations(
-    terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job, ...]
-) -> list[Operation]:
-    """Return the operation that takes places to the terrain model's CRS.
-
-    A warning says where it is coarse.
-    """
-    from ...read.operations import warn_if_coarse
-
-    if frame.crs is None or terrain.own_crs is None:
-        return []
-    result = list_operations(mask(terrain.path), frame.crs, terrain.own_crs, frame, jobs)
-    for operation in result:
-        warn_if_coarse(operation)
-    return result
-
-
-def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> list[Operation]:
-    """Return the operation that takes coordinates to the files' CRS.
-
-    A warning says where it is coarse.
-    """
-    from ...read.operations import warn_if_coarse
-
-    result = list_operations("--out-crs", frame.crs, out_crs, frame, jobs)
-    for operation in result:
-        warn_if_coarse(operation)
-    return result
-
-
 def list_operations(
-    subject: str, source: Any, target: Any, frame: AreaFrame, jobs: tuple[Job, ...]
+    subject: str,
+    source: Any,
+    target: Any,
+    frame: AreaFrame,
+    jobs: tuple[Job, ...],
+    warn: bool = True,
 ) -> list[Operation]:
     """Return the operation between two CRSs in plan, at the buildings.
 
-    There is none where both are the same.
+    There is none where both are the same or one is unknown. A warning says where it is coarse.
     """
     from ...read.crs import horizontal_crs, names_place, same_horizontal
-    from ...read.operations import find_operation
+    from ...read.operations import find_operation, warn_if_coarse
     from ...read.positions import reproject_positions
 
     boxes = shapely.bounds([job.area for job in jobs])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     if (
-        same_horizontal(source, target)
+        source is None
+        or target is None
+        or same_horizontal(source, target)
         or not len(boxes)
         or not (names_place(source) and names_place(target))
     ):
         return []
     middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
     x, y = reproject_positions(middle, frame.crs, source)[0]
-    return [
-        find_operation(
-            subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y))
-        )
-    ]
+    place = float(x), float(y)
+    operation = find_operation(subject, horizontal_crs(source), horizontal_crs(target), place)
+    if warn:
+        warn_if_coarse(operation)
+    return [operation]
 
 
 def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) -> None:

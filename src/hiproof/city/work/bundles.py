@@ -78,24 +78,27 @@ class RecordedTerrain:
 
 
 class TerrainRecorder:
-    """A terrain model that notes each look-up in `rows`."""
+    """A terrain model that notes the `places` (n, 2) where it is looked up."""
 
     def __init__(self, model: TerrainModel):
-        self.model, self.source, self.rows = model, model.source, [np.zeros((0, 4))]
+        self.model, self.source = model, model.source
+        self.places: list[np.ndarray] = []
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return the model's heights (n,) at `xy_world` (n, 2), and record them."""
-        self.note(xy_world)
+        """Return the model's heights (n,) at `xy_world` (n, 2)."""
+        self.places.append(xy_world[:, :2])
         return self.model.height_at(xy_world)
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return whether (n,) the raster holds a "no data" code at `xy_world` (n, 2)."""
-        self.note(xy_world)
+        self.places.append(xy_world[:, :2])
         return self.model.is_coded_at(xy_world)
 
-    def note(self, xy_world: np.ndarray) -> None:
-        heights, coded = self.model.height_at(xy_world), self.model.is_coded_at(xy_world)
-        self.rows.append(np.column_stack([xy_world[:, :2], heights, coded]))
+    def make_rows(self) -> np.ndarray:
+        """Make the rows (n, 4) of a `RecordedTerrain`, of all places noted."""
+        xy = np.concatenate([np.zeros((0, 2)), *self.places])
+        heights, coded = self.model.height_at(xy), self.model.is_coded_at(xy)
+        return np.unique(np.column_stack([xy, heights, coded]), axis=0)
 
 
 def keep_failure(
@@ -104,13 +107,12 @@ def keep_failure(
     plan: WorkPlan,
     job: Job,
     trace: str,
-    terrain: Callable[[], TerrainRecorder | None],
+    terrain: TerrainRecorder | None,
 ) -> None:
     """Log the traceback of a failed building and keep its bundle; failing that, warn.
 
     `root` is the run's own folder, and `load` returns the points of the building's work tile, by
-    kind. `terrain` solves the building again over a recorded terrain
-    model, and returns None without one.
+    kind. `terrain` has noted where the building looked up the terrain model, None without one.
     """
     LOGGER.info("building %s failed:\n%s", job.id, trace)
     if not plan.settings.city.keep_failures:
@@ -118,7 +120,7 @@ def keep_failure(
     try:
         folder = root.parent / FAILURES_FOLDER / folder_name(job.id)
         if folder.exists() or len(bundles_in(root.parent)) < MOST_BUNDLES:
-            save_bundle(folder, root, load(), plan, job, trace, terrain())
+            save_bundle(folder, root, load(), plan, job, trace, terrain)
             if len(bundles_in(root.parent)) > MOST_BUNDLES:  # another process was faster
                 shutil.rmtree(folder)
     except Exception as error:
@@ -148,8 +150,7 @@ def save_bundle(
         (temporary / "settings.toml").write_text(plan.settings.to_toml(), encoding="utf-8")
         (temporary / "traceback.txt").write_text(mask(trace), encoding="utf-8", errors="replace")
         if terrain is not None:
-            rows = np.unique(np.concatenate(terrain.rows), axis=0)
-            lines = [",".join(map(repr, row)) for row in rows.tolist()]
+            lines = [",".join(map(repr, row)) for row in terrain.make_rows().tolist()]
             (temporary / "terrain.csv").write_text(
                 "\n".join(["x,y,z,coded", *lines]) + "\n", encoding="utf-8"
             )

@@ -5,7 +5,6 @@ Their parts of the output files are left ready to be joined.
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import functools
 import threading
@@ -72,10 +71,8 @@ from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
 # corners that change an outline by less make the area beside it slow to draw and no truer
 COARSEST_THINNING_M = 0.05
 
-RecordTerrain: TypeAlias = Callable[[], TerrainRecorder | None]
-"""Solves a building again and records its terrain."""
-KeepFailure: TypeAlias = Callable[[Job, str, RecordTerrain], None]
-"""Keeps the input of a building that failed, with the traceback."""
+KeepFailure: TypeAlias = Callable[[Job, str, TerrainRecorder | None], None]
+"""Keeps the input of a building that failed, with the traceback and its terrain."""
 
 DIED = "the process died while it worked on this building"
 
@@ -90,7 +87,8 @@ class Surroundings:
     """
 
     def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
-        self.roof, self.noise, self.model, self.plan = points["roof"], points["noise"], model, plan
+        self.roof, self.noise, self.plan = points["roof"], points["noise"], plan
+        self.model = None if model is None else TerrainRecorder(model)
         self.points, self.grid = points, PointGrid(self.roof)
         self.shifts: dict[int, Shift] = {}
         self.latest: tuple[shapely.Polygon, np.ndarray] = shapely.Polygon(), np.zeros(0, np.int64)
@@ -368,7 +366,7 @@ def solve_buildings(
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
             building, part = record_failure(plan, job, DIED)
-            keep(job, DIED, no_terrain)
+            keep(job, DIED, None)
         else:
             building, part = solve(job)
         parts.append(part)
@@ -398,12 +396,8 @@ def terrain_model(
     return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
 
 
-def keep_nothing(job: Job, trace: str, terrain: RecordTerrain) -> None:
+def keep_nothing(job: Job, trace: str, terrain: TerrainRecorder | None) -> None:
     """Keep nothing of a building that failed."""
-
-
-def no_terrain() -> None:
-    """Record no terrain: the building must not be solved again here."""
 
 
 def solve_one(
@@ -419,9 +413,10 @@ def solve_one(
 
     `keep` is called with the traceback.
     """
-    record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
+    if surroundings.model is not None:
+        surroundings.model.places = []
     if job.error is not None:
-        keep(job, job.error.trace, no_terrain)
+        keep(job, job.error.trace, None)
         return record_failure(plan, job, job.error.detail)
 
     def solve() -> tuple[Building, Fragments]:
@@ -433,10 +428,10 @@ def solve_one(
             building = use_fallback(building, override, terrain, plan.settings)
         building, texts = fragments(building, plan.list_names(job), plan.head)
         if building.status is Status.INTERNAL_ERROR:
-            keep(job, building.detail, record_terrain)
+            keep(job, building.detail, surroundings.model)
         return building, texts
 
-    return solve_safely(plan, job, solve, keep, record_terrain)
+    return solve_safely(plan, job, solve, keep, surroundings.model)
 
 
 def solve_safely(
@@ -444,7 +439,7 @@ def solve_safely(
     job: Job,
     solve: Callable[[], tuple[Building, Fragments]],
     keep: KeepFailure,
-    record_terrain: RecordTerrain = no_terrain,
+    terrain: TerrainRecorder | None = None,
 ) -> tuple[Building, Fragments]:
     """Return what `solve` makes of a building, so that it never stops the others.
 
@@ -459,7 +454,7 @@ def solve_safely(
         raise
     except Exception as error:
         report = report_error(error)
-        keep(job, report.trace, record_terrain)
+        keep(job, report.trace, terrain)
         return record_failure(plan, job, report.detail)
 
 
@@ -503,21 +498,6 @@ def solve_by_points(
     return add_remark(
         surroundings.inspect(building, other_points, points), remark_missing_ground(building)
     )
-
-
-def recorded_terrain(
-    plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None
-) -> TerrainRecorder | None:
-    """Solve the building again, recording the terrain heights it looks up.
-
-    None without a model.
-    """
-    if surroundings.model is None:
-        return None
-    repeat = copy.copy(surroundings)
-    repeat.model = recorder = TerrainRecorder(surroundings.model)
-    solve_one(plan, job, repeat, override)
-    return recorder
 
 
 def reconstruct_job(
