@@ -117,6 +117,17 @@ def test_from_a_wrong_type_to_a_rebuilt_valid_citygml(town_files, page, folder):
     )
 
 
+def test_an_id_cannot_turn_its_line(page):
+    """U+202E turns what follows it, in programs that obey it."""
+    shown = page.evaluate(
+        """() => {
+          rows[0].id = "house-\u202e0"; showList();
+          return rows[0].button.firstChild.textContent;
+        }"""
+    )
+    assert shown.startswith("house-\\u202e0 ")
+
+
 def test_keys_go_through_the_buildings(page):
     first = page.inner_text("#title")
     for letter in "n", "p":

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import threading
+import warnings
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from hiproof.cli.convert import convert
 from hiproof.cli.evaluate import evaluate
 from hiproof.cli.report import report
 from hiproof.cli.view import open_tiles
-from hiproof.errors import HiproofError, InputError, OutputError
+from hiproof.errors import HiproofError, InputError, InputWarning, OutputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
 from hiproof.view.server import ViewHandler, make_server, render_page
 from hiproof.write import files
@@ -192,8 +193,9 @@ SUN = (
 def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
     areas = {"hiproof_flat_roof_area_m2": 20.0, "hiproof_sloped_roof_area_m2": 60.0}
     suns = [90.0 * 1000, None, 80.0 * 400]  # kWh, as a table has them
+    sky = {"hiproof_sun_sky": "clear sky"}
     models = [
-        ViewedModel(id, kind, solid, {**areas, "hiproof_roof_sun_kwh": sun}, {0: kind})
+        ViewedModel(id, kind, solid, {**areas, **sky, "hiproof_roof_sun_kwh": sun}, {0: kind})
         for (id, (kind, solid)), sun in zip(SOLIDS.items(), suns, strict=False)
     ]
     with pytest.warns(UserWarning, match="no CRS"):
@@ -204,7 +206,7 @@ def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
     assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
     say = json.loads(answer[1])
     assert not say["hidden"] and say["back"] == say["types"] != say["sun"]
-    assert "from 800 kWh/m²" in say["legend"]
+    assert "from 800 kWh/m² (clear sky)" in say["legend"]
     colours = [colour for least, colour in SUN_STOPS if least == 1100.0] + [UNKNOWN_COLOUR]
     for row, colour in enumerate(colours[: len(models)]):
         rgb = 255 * np.array(srgb(colour))
@@ -256,6 +258,10 @@ def test_a_port_that_is_taken_is_told(tiles, serving):
 
 def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys):
     write_sample_run(tmp_path)
+    with warnings.catch_warnings():  # heights over the globe matter to no picture
+        warnings.simplefilter("error", InputWarning)
+        with open_tiles(tmp_path) as folder:
+            pass
     with open_tiles(tmp_path) as folder:
         time_made = (folder / "tileset.json").stat().st_mtime_ns
     with open_tiles(tmp_path) as second:

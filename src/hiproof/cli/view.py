@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -59,10 +60,20 @@ def open_tiles(folder: Path, update: Update = ignore_progress) -> Iterator[Path]
             or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime
         ):
             try:
-                text, _ = convert_models(folder, tiles, "3dtiles", None, update)
+                text = make_tiles(folder, tiles, update)
             except OutputError as error:
                 LOGGER.warning("%s. The tiles are made in a temporary folder instead", error)
                 tiles = Path(elsewhere) / tiles.name
-                text, _ = convert_models(folder, tiles, "3dtiles", None, update)
+                text = make_tiles(folder, tiles, update)
             click.echo(text)
         yield tiles
+
+
+def make_tiles(folder: Path, tiles: Path, update: Update) -> str:
+    """Make the tiles of the run in a folder; returns the result in a line.
+
+    The page shows them about their own middle, where it matters to nobody how high the globe is.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"hiproof\.write\.meshes\.tiles")
+        return convert_models(folder, tiles, "3dtiles", None, update)[0]

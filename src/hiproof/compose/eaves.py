@@ -62,7 +62,8 @@ def make_solid(model: Model, eaves: Eaves, widths: np.ndarray) -> Solid:
         solid, findings = make_inner_solid(local, model, eaves, widths)
     if findings:
         raise CompositionError(
-            f"expected a valid solid with overhangs, got: {findings[0].message}; leave them out"
+            "expected a valid solid with overhangs, got one that is none by ISO 19107 (code "
+            f"{findings[0].code}); leave them out"
         )
     return solid.move(origin)
 

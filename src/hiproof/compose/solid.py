@@ -67,7 +67,8 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
             findings = check_solid(solid, planarity_m=options.planarity_m)
             if not findings:
                 return solid
-            failure = "; ".join(finding.message for finding in findings[:3])
+            codes = sorted({str(finding.code) for finding in findings})
+            failure = f"one that is none by ISO 19107 (code {', '.join(codes)})"
             places = list_places(solid, findings)
             parts = parts or parts_at_fault(solid, findings)
             bent += [solid] if any(finding.code == 203 for finding in findings) else []

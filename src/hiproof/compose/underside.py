@@ -65,8 +65,8 @@ def make_underside(solid: Solid, underside: Underside, options: ComposeSettings)
         if not underside.terrain:
             break
     raise CompositionError(
-        f"expected a valid solid over its terrain and passages, got: {findings[0].message}; leave "
-        "them out"
+        "expected a valid solid over its terrain and passages, got one that is none by ISO 19107 "
+        f"(code {findings[0].code}); leave them out"
     )
 
 

@@ -41,7 +41,7 @@ function showList() {
     const item = document.createElement("li"), button = document.createElement("button");
     row.item = item; row.button = button;
     row.tag = element("span", "tag");
-    const name = element("span", "name", `${row.id} ${row.type || "no model"}`);
+    const name = element("span", "name", `${plainly(row.id)} ${row.type || "no model"}`);
     button.append(name, row.tag, element("small", "", reasonOf(row)));
     button.dataset.open = row.id;
     button.addEventListener("click", () => inTurn(() => open(row.id)));
@@ -114,7 +114,7 @@ function largest(handles) {
 function show(model, home = false) {
   now.model = model;
   now.part = Math.min(now.part, Math.max((model.parts || []).length - 1, 0));
-  $("title").textContent = `${now.id}: ${model.type || "no model"}`;
+  $("title").textContent = `${plainly(now.id)}: ${model.type || "no model"}`;
   $("reasons").textContent = [...now.reasons, now.outcome].filter(Boolean).join("; ");
   const accepted = now.accepted;
   $("accepted").textContent = accepted ? `accepted by ${accepted.who || "somebody"}, ${accepted.when || "some time ago"}${accepted.note ? `: ${accepted.note}` : ""} ` : "";
@@ -130,7 +130,7 @@ function showWhole() {
   const height = now.ground ?? now.model.figures?.z_ground;
   $("ground").value = height ?? ""; $("ground").disabled = !now.model.mesh || now.left;
   $("leave-out").textContent = now.left ? "keep in" : "leave out";
-  if (now.left) $("title").textContent = `${now.id}: left out`;
+  if (now.left) $("title").textContent = `${plainly(now.id)}: left out`;
 }
 
 const FIGURES = [["share_within_20cm", "points within 0.2 m of the roof", v => `${(100 * v).toFixed(1)} %`], ["unexplained_area_m2", "unexplained area", v => `${v.toFixed(0)} m²`],

@@ -282,10 +282,14 @@ function showLegend(entries) {
   }));
 }
 
+// Text from files, in which marks of direction are shown by their codes: they would turn its line.
+const plainly = text => String(text ?? "").replace(/[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g,
+  mark => `\\u${mark.charCodeAt(0).toString(16).padStart(4, "0")}`);
+
 // A row of a table whose first cell heads the others.
 function headedRow(name, ...values) {
   const row = document.createElement("tr");
-  const cell = (kind, textContent) => Object.assign(document.createElement(kind), { textContent });
+  const cell = (kind, value) => Object.assign(document.createElement(kind), { textContent: plainly(value) });
   row.append(cell("th", name), ...values.map(value => cell("td", value)));
   row.firstChild.scope = "row";
   return row;
