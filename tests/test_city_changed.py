@@ -14,11 +14,11 @@ import planted
 from hiproof.city import run as city_run
 from hiproof.city.folder import resume
 from hiproof.city.folder.ledger import Ledger
-from hiproof.city.plan import overrides
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.city.work import solve
 from hiproof.settings import Settings
+from hiproof.write import files
 from run_records import records
 from tiny_town import make_town, write_footprints, write_town
 
@@ -142,7 +142,7 @@ def killed_at(step, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(Ledger, "transact", slow(Ledger.transact))
         patch.setattr(resume, "atomic", slow(resume.atomic))
-        patch.setattr(overrides, "atomic", slow(overrides.atomic))
+        patch.setattr(files, "atomic", slow(files.atomic))
         patch.setattr(solve, "atomic_file", slow(solve.atomic_file))
         yield
 

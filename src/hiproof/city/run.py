@@ -28,7 +28,7 @@ from ..progress import show_in_notebook
 from ..read.decoded import forget_points, hold_points
 from ..stages.recognise import asks_network, fits_one
 from ..status import Doubt
-from ..write.files import atomic
+from ..write.files import save_text
 from ..write.head import FileHead
 from .folder.ledger import Failure, Ledger
 from .folder.lock import hold_folder
@@ -42,7 +42,7 @@ from .plan.overrides import REDO
 from .plan.prepare import make_plan
 from .plan.work_plan import WorkPlan
 from .request import Request
-from .work.bundle_folders import find_bundle_folder, remove_bundles
+from .work.bundle_folders import FAILURES_FOLDER, bundles_in, remove_bundles
 from .work.cores import as_many_as_pay
 from .work.executors import make_executor
 from .work.queue import Queue
@@ -54,6 +54,15 @@ from .work.tasks import (
     solve_tile,
     sort_cloud,
 )
+
+INPUTS = (
+    *("clouds", "footprints", "layer", "id_attribute", "where"),
+    *("bbox", "terrain", "overrides"),
+)
+"""Fields of a request that run.json names."""
+
+RESULTS = ("by_status", "by_quality", "by_type", "broken_inputs", "seconds")
+"""Fields of a summary that run.json has."""
 
 
 @dataclass(frozen=True)
@@ -245,26 +254,25 @@ def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
 
 def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) -> Summary:
     clock.lap("merge")
-    failed = [task for task in ledger.tasks() if task.state == "failed"]
-    broken = tuple((request_name(task.name, request), task.message) for task in failed)
+    out, broken = Path(request.out), []
+    for task in ledger.tasks():
+        if task.state == "failed":
+            kind, _, key = task.name.partition(":")
+            name = mask(request.clouds[int(key)]) if kind == "sort" else task.name
+            broken.append((name, task.message))
     return Summary(
-        models=tuple(list_model_paths(plan.settings, Path(request.out))),
+        models=tuple(list_model_paths(plan.settings, out)),
         overview=ledger.overview(),
         by_status=ledger.counts("status"),
         by_type=ledger.counts("type"),
-        broken_inputs=broken,
+        broken_inputs=tuple(broken),
         failures=tuple(ledger.failures()),
         seconds=clock.seconds,
         units=plan.head.units.gml,
         doubts=ledger.doubts(),
-        bundles=find_bundle_folder(Path(request.out)),
+        bundles=out / FAILURES_FOLDER if bundles_in(out) else None,
         by_quality=ledger.counts("quality"),
     )
-
-
-def request_name(task: str, request: Request) -> str:
-    kind, key = task.split(":", 1)
-    return mask(request.clouds[int(key)]) if kind == "sort" else task
 
 
 def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
@@ -273,21 +281,14 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
     It is the only file of a run that knows the time.
     """
     footprints = choose_footprints(request)
+    inputs = {name: getattr(request, name) for name in INPUTS} | {"footprints": footprints}
+    if request.underpasses:
+        inputs["underpasses"] = request.underpasses
     record = {
         "hiproof": __version__,
         "settings": plan.settings.to_dict(),
-        "inputs": {
-            "clouds": list(request.clouds),
-            "footprints": footprints,
-            "layer": request.layer,
-            "id_attribute": request.id_attribute,
-            "where": request.where,
-            "bbox": request.bbox,
-            "terrain": request.terrain,
-            "overrides": request.overrides,
-            **({"underpasses": request.underpasses} if request.underpasses else {}),
-            "started_in": str(Path.cwd()),  # what is not an address or absolute is meant from there
-        },
+        # what is not an address or absolute is meant from there
+        "inputs": inputs | {"started_in": str(Path.cwd())},
         "footprints_source": read_source(footprints),
         "crs": plan.crs_wkt,
         "transformations": [operation.to_dict() for operation in plan.operations],
@@ -295,26 +296,16 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "units": plan.head.units.describe(),
         "processes": request.processes,
         "summary": summary.overview.to_dict(),
-        "by_status": summary.by_status,
-        "by_quality": summary.by_quality,
-        "by_type": summary.by_type,
-        "broken_inputs": [list(pair) for pair in summary.broken_inputs],
-        "seconds": summary.seconds,
+        **{name: getattr(summary, name) for name in RESULTS},
     }
-    save_run_record(Path(request.out) / "run.json", record)
+    save_text(Path(request.out) / "run.json", json.dumps(masked_values(record), indent=1) + "\n")
 
 
 def extend_run_record(request: Request, entries: dict[str, Any]) -> None:
     """Add entries to the run.json that a run has written."""
     path = Path(request.out) / "run.json"
-    save_run_record(path, json.loads(path.read_text(encoding="utf-8")) | entries)
-
-
-def save_run_record(path: Path, record: dict[str, Any]) -> None:
-    with atomic(path) as temporary:
-        Path(temporary).write_text(
-            json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
-        )
+    record = json.loads(path.read_text(encoding="utf-8")) | entries
+    save_text(path, json.dumps(masked_values(record), indent=1) + "\n")
 
 
 def clean(state: Path, ledger: Ledger) -> None:

@@ -27,7 +27,7 @@ from ..formats import FORMATS, list_requested_files
 from ..masking import masked_values
 from ..settings import EnrichSettings, Settings
 from ..write.cityjson.features import choose_offset
-from ..write.files import atomic, atomic_file
+from ..write.files import atomic_file, save_text
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.head import FileHead
 from ..write.overwriting import refuse_overwriting
@@ -246,5 +246,4 @@ def write_record(folder: Path, out: Path, settings: EnrichSettings, result: Enri
     asked: dict[str, Any] = {"hiproof": __version__, "buildings": result.buildings}
     asked |= {"not_enriched": len(result.failures), **dataclasses.asdict(settings)}
     record = masked_values({**run_record(folder), "enriched": asked})
-    with atomic(out / "run.json") as hidden:
-        hidden.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    save_text(out / "run.json", json.dumps(record, indent=1) + "\n")

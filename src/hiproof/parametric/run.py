@@ -30,7 +30,7 @@ from ..read.damage import finite
 from ..settings import Settings
 from ..status import Status
 from ..write.cityjson.features import choose_offset
-from ..write.files import atomic
+from ..write.files import save_text
 from ..write.fragments import Fragment, Fragments
 from ..write.head import FileHead
 from ..write.json_text import dump
@@ -215,10 +215,7 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         "by_type": dict(built.by_type),
         "not_built": [list(pair) for pair in built.not_built],
     }
-    with atomic(out / "run.json") as temporary:
-        Path(temporary).write_text(
-            json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
-        )
+    save_text(out / "run.json", json.dumps(masked_values(record), indent=1) + "\n")
 
 
 def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from ..city.work.solve import Surroundings, open_terrain, pass_over_failure, sol
 from ..city.work.sort import load_points
 from ..errors import InputError
 from ..garbage import collect_rarely
-from ..write.files import atomic
+from ..write.files import save_text
 from .best import EPOCHS_FILE, load_shifts
 from .epochs import select_roof
 from .register import SampledRoof, SurveyShift, draw_buildings, register_surveys
@@ -48,8 +48,7 @@ def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -
     def prepare(plan: WorkPlan, _: Any, __: Progress) -> None:
         shifts = register_epochs(state, plan, names, request.terrain)
         record = {name: shift.to_dict() for name, shift in shifts.items()}
-        with atomic(state / EPOCHS_FILE) as temporary:
-            Path(temporary).write_text(json.dumps(record) + "\n", encoding="utf-8")
+        save_text(state / EPOCHS_FILE, json.dumps(record) + "\n")
 
     steps = Steps(
         solve_tile=functools.partial(solve_best_tile, names),

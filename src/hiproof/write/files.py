@@ -148,6 +148,12 @@ def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
         yield file
 
 
+def save_text(path: str | os.PathLike, text: str) -> None:
+    """Write a text file, whole or not at all; see `atomic`."""
+    with atomic(path) as hidden:
+        hidden.write_text(text, encoding="utf-8")
+
+
 @contextmanager
 def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
     """Yield a temporary binary file beside `path`, gone when the block ends.

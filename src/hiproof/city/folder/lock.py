@@ -24,15 +24,9 @@ def hold_folder(state: Path) -> Iterator[None]:
 
     Raises OutputError at once where another run holds it.
     """
-    with closing(lock_folder(state)):
-        yield
-
-
-def lock_folder(state: Path) -> sqlite3.Connection:
     try:
         lock = sqlite3.connect(state / "lock.sqlite", isolation_level=None, timeout=0)
         lock.execute("begin exclusive")
-        return lock
     except sqlite3.Error as error:
         if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
             raise OutputError(
@@ -44,3 +38,5 @@ def lock_folder(state: Path) -> sqlite3.Connection:
             f"expected to lock {state}, got: {error}; choose an --out that can be written, on a "
             "drive with locks"
         ) from error
+    with closing(lock):
+        yield

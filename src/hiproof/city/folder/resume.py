@@ -19,11 +19,11 @@ from ...errors import OutputError, OutputWarning
 from ...formats import FORMATS
 from ...log import LOGGER, count_things
 from ...masking import masked_values
-from ...write.files import atomic
+from ...write.files import atomic, save_text
 from ..merge.join import TEXTS_FOLDER, remove_tiles, whole_files, write_tile
 from ..merge.outputs import broken_claims
 from ..plan.from_cloud import Progress
-from ..plan.overrides import REDO, keep_overrides, save_redo
+from ..plan.overrides import REDO, keep_overrides
 from ..plan.prepare import make_plan
 from ..plan.work_plan import PLAN_FILE, WorkPlan
 from ..request import Request
@@ -113,7 +113,7 @@ def resume_or_plan(
     settle(request, plan, overrides, state, ledger, is_planned)
     open_buildings = ledger.open_buildings()
     is_partial = sum(map(len, open_buildings.values())) < len(plan.jobs)
-    save_redo(state, open_buildings if is_partial else {})
+    save_text(state / REDO, json.dumps(open_buildings if is_partial else {}))
     if open_buildings and not any((state / "points").iterdir()):
         # somebody made room: without points, the buildings that are left would come out as ones
         # that have none

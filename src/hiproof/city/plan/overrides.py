@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import json
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from ...read.attribute_columns import make_known_condition, restore_declared_typ
 from ...read.footprints import attribute_rows
 from ...read.numbers import SkippedValues
 from ...settings import ReadSettings
-from ...write.files import atomic
+from ...write.files import save_text
 from .table_values import select_possible
 from .work_plan import Job, WorkPlan
 
@@ -39,11 +39,8 @@ def keep_overrides(path: str | None, plan: WorkPlan, state: Path) -> dict[int, d
     Raises InputError for a file that cannot be read or contradicts itself.
     """
     records = match_overrides(dict(read_overrides(path)) if path else {}, plan)
-    with atomic(state / OVERRIDES_FILE) as temporary:
-        Path(temporary).write_text(
-            "".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())),
-            encoding="utf-8",
-        )
+    lines = [json.dumps([i, record]) + "\n" for i, record in sorted(records.items())]
+    save_text(state / OVERRIDES_FILE, "".join(lines))
     return records
 
 
@@ -248,12 +245,6 @@ def column_override(
         {key: attributes[name] for name, key in names if name in attributes}, job.id, impossible
     )
     return {key: value for key, value in result.items() if (key, value) != ("leave_out", False)}
-
-
-def save_redo(state: Path, redo: Mapping[str, Sequence[int]]) -> None:
-    """Name the buildings to solve by tile for the workers; none for all of them."""
-    with atomic(state / REDO) as temporary:
-        Path(temporary).write_text(json.dumps(redo), encoding="utf-8")
 
 
 def load_redo(state: Path) -> dict[str, list[int]]:

@@ -35,7 +35,11 @@ def add_passages(
     column = request.settings.read.raised_column
     if column:
         refuse_missing_column(footprints, column, "the footprints", "the clearance")
-        footprints = tuple(raise_footprint(footprint, column) for footprint in footprints)
+        clearances = [read_clearance(f.attributes.get(column)) for f in footprints]
+        footprints = tuple(
+            f if clearance is None else replace(f, passages=((f.polygon, clearance),))
+            for f, clearance in zip(footprints, clearances, strict=True)
+        )
     if request.underpasses is None:
         return footprints
     layer = read_passages(request, frame)
@@ -44,13 +48,6 @@ def add_passages(
         replace(footprint, passages=(*footprint.passages, *select_below(footprint, layer, tree)))
         for footprint in footprints
     )
-
-
-def raise_footprint(footprint: Footprint, column: str) -> Footprint:
-    clearance = read_clearance(footprint.attributes.get(column))
-    if clearance is None:
-        return footprint
-    return replace(footprint, passages=((footprint.polygon, clearance),))
 
 
 def read_passages(request: Request, frame: AreaFrame) -> list[tuple[shapely.Polygon, float]]:

@@ -70,7 +70,13 @@ def find_registration(
     )
     tree = shapely.STRtree(polygons)
     selected_cells = [cell for cell in cells if cell in points]
-    result = register((points[cell], find_polygons(tree, cell)) for cell in selected_cells)
+
+    def find_polygons(cell: Cell) -> list[shapely.Polygon]:
+        """Return the footprints in and around a cell."""
+        near = tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M)))
+        return list(polygons[np.sort(near)])
+
+    result = register((points[cell], find_polygons(cell)) for cell in selected_cells)
     return dataclasses.replace(result, footprints=sum(number_of[cell] for cell in selected_cells))
 
 
@@ -144,13 +150,6 @@ def expand_cell(cell: Cell, around_m: float = 0.0) -> tuple[float, float, float,
 def meets(boxes: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
     """Return which of `boxes` (n, 4) meet `box`."""
     return np.all(boxes[:, :2] <= box[2:], axis=1) & np.all(boxes[:, 2:] >= box[:2], axis=1)
-
-
-def find_polygons(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
-    """Return the footprints in and around a cell."""
-    return list(
-        tree.geometries[np.sort(tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M))))]
-    )
 
 
 def points_by_cell(

@@ -38,11 +38,6 @@ def bundles_in(out: Path) -> list[Path]:
     return sorted(facts.parent for facts in (Path(out) / FAILURES_FOLDER).glob(f"[!.]*/{FACTS}"))
 
 
-def find_bundle_folder(out: Path) -> Path | None:
-    """Return the folder of the bundles of a run, None where it has none."""
-    return Path(out) / FAILURES_FOLDER if bundles_in(out) else None
-
-
 def remove_bundles(out: Path, failed_ids: Collection[str] = ()) -> None:
     """Remove all bundles but those of buildings that failed, and unfinished ones."""
     folder = Path(out) / FAILURES_FOLDER

@@ -483,7 +483,7 @@ def solve_by_points(
     if (
         not roof_points.is_seen
         and override is None
-        and not (roof_points.is_ground and keeps_empty(plan))
+        and not (roof_points.is_ground and plan.settings.reconstruct.empty_footprints == "model")
     ):
         return make_unseen_building(job, roof_points)
     points = without_repeats(roof_points.points)
@@ -563,11 +563,6 @@ def remark_missing_ground(building: Building) -> str:
         f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over "
         "ground are guesses"
     )
-
-
-def keeps_empty(plan: WorkPlan) -> bool:
-    """Return whether a footprint on which nothing stands gets a model."""
-    return plan.settings.reconstruct.empty_footprints == "model"
 
 
 def make_unseen_building(job: Job, result: FoundRoof) -> Building:

@@ -164,22 +164,19 @@ class Gatherer:
             reach = self.reach_of(tile)
             candidates = grid.candidates(reach.bounds)
             bits = reach.bits(cloud.xyz, candidates)
-            mask = bits > 0
-            candidates, bits = candidates[mask], bits[mask]
-            kind = kinds[candidates]
-            self.keep(
-                tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0)
-            )
-            self.keep(
-                tile,
-                "ground",
-                cloud.xyz.take(candidates[(kind == GROUND) & (bits & 2 > 0)], axis=0),
-            )
-            self.keep(
-                tile, "noise", cloud.xyz.take(candidates[(kind == NOISE) & (bits & 1 > 0)], axis=0)
-            )
-            lower = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
-            self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(lower, axis=0)))
+            candidates, bits = candidates[bits > 0], bits[bits > 0]
+            kind, near, around = kinds[candidates], bits & 1 > 0, bits & 2 > 0
+            for name, mask in (
+                ("roof", near & (kind == ROOF)),
+                ("ground", around & (kind == GROUND)),
+                ("noise", near & (kind == NOISE)),
+                ("low", around & np.isin(kind, self.low_kinds)),
+            ):
+                points = cloud.xyz.take(candidates[mask], axis=0)
+                points = lowest_in_cells(points) if name == "low" else points
+                if len(points):
+                    self.found.setdefault(tile, {}).setdefault(name, []).append(points)
+                    self.held += len(points)
         if self.held > HELD_POINTS:
             self.flush()
 
@@ -197,11 +194,6 @@ class Gatherer:
             kinds[list(classes)] = kind
         return kinds
 
-    def keep(self, tile: str, kind: str, points: np.ndarray) -> None:
-        if len(points):
-            self.found.setdefault(tile, {}).setdefault(kind, []).append(points)
-            self.held += len(points)
-
     def flush(self) -> None:
         """Write what is held, a file a tile.
 
@@ -214,11 +206,6 @@ class Gatherer:
                 }
                 np.savez(file, **arrays)
         self.found, self.held, self.flushes = {}, 0, self.flushes + 1
-
-    def discard(self) -> None:
-        """Remove what was written of this file."""
-        for written in self.folder.glob(f"*/{self.number}-*.npz"):
-            written.unlink(missing_ok=True)
 
 
 def sort_cloud(
@@ -237,7 +224,10 @@ def sort_cloud(
     their own.
     """
     root = Path(folder)
-    plan, reaches = load_plan(root), load_reaches(root, newest(root / PLAN_FILE, root / REDO))
+    stamps = [
+        (root / name).stat().st_mtime_ns for name in (PLAN_FILE, REDO) if (root / name).exists()
+    ]
+    plan, reaches = load_plan(root), load_reaches(root, max(stamps))
     gatherer = Gatherer(reaches, plan.settings.read, root / "points" / epoch, number)
     noted = noted_file(root, number)
     result: list[np.ndarray] = []
@@ -252,7 +242,8 @@ def sort_cloud(
     except (MemoryError, OutputError):
         raise
     except Exception as error:
-        gatherer.discard()
+        for written in gatherer.folder.glob(f"*/{number}-*.npz"):  # of this file
+            written.unlink(missing_ok=True)
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         raise as_input_error(error, address) from error
@@ -260,11 +251,6 @@ def sort_cloud(
     if result:
         save_run_boxes(noted, result, read_header(address).count)
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
-
-
-def newest(*paths: Path) -> int:
-    """Return the latest time [ns] of those files that exist."""
-    return max(path.stat().st_mtime_ns for path in paths if path.exists())
 
 
 def wanted_points(
