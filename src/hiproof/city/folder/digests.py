@@ -37,7 +37,7 @@ def digest_building(
     """
     job = plan.jobs[index]
     row = plan.outlines.row(index) if plan.moves_rows else []
-    near = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
+    neighbours = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
     inputs = [
         shared,
         job.id,
@@ -46,7 +46,7 @@ def digest_building(
         plan.list_names(job),
         [polygon.wkb_hex for polygon in row],
         encode_passages(job),
-        [polygon.wkb_hex for polygon in near],
+        [polygon.wkb_hex for polygon in neighbours],
         override,
     ]
     return make_digest(inputs)

@@ -73,8 +73,8 @@ def find_registration(
 
     def find_polygons(cell: Cell) -> list[shapely.Polygon]:
         """Return the footprints in and around a cell."""
-        near = tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M)))
-        return list(polygons[np.sort(near)])
+        indices = tree.query(shapely.box(*expand_cell(cell, CELL_MARGIN_M)))
+        return list(polygons[np.sort(indices)])
 
     result = register((points[cell], find_polygons(cell)) for cell in selected_cells)
     return dataclasses.replace(result, footprints=sum(number_of[cell] for cell in selected_cells))

@@ -165,12 +165,12 @@ class Gatherer:
             candidates = grid.candidates(reach.bounds)
             bits = reach.bits(cloud.xyz, candidates)
             candidates, bits = candidates[bits > 0], bits[bits > 0]
-            kind, near, around = kinds[candidates], bits & 1 > 0, bits & 2 > 0
+            kind, in_roof_box, in_box = kinds[candidates], bits & 1 > 0, bits & 2 > 0
             for name, mask in (
-                ("roof", near & (kind == ROOF)),
-                ("ground", around & (kind == GROUND)),
-                ("noise", near & (kind == NOISE)),
-                ("low", around & np.isin(kind, self.low_kinds)),
+                ("roof", in_roof_box & (kind == ROOF)),
+                ("ground", in_box & (kind == GROUND)),
+                ("noise", in_roof_box & (kind == NOISE)),
+                ("low", in_box & np.isin(kind, self.low_kinds)),
             ):
                 points = cloud.xyz.take(candidates[mask], axis=0)
                 points = lowest_in_cells(points) if name == "low" else points
