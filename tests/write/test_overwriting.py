@@ -58,6 +58,8 @@ RUN_COMMANDS = {
     "settings --config TOML --write TOML": "got .* for both",
     "reconstruct CLOUD --footprints IN/buildings.gpkg --out IN": "got .* for both",
     "reconstruct CLOUD --overrides IN/parameters.jsonl --out IN": "got .* for both",
+    "reconstruct CLOUD --out IN --log-file CLOUD": "got .* for both",
+    "reconstruct CLOUD --out IN --log-file RUN/parameters.jsonl": "a file of a run",
     "convert RUN FIFO --format glb": "a device or a pipe",
     "convert RUN FIFO --format 3dtiles": "choose another name",
     "report RUN CLOUD --out FIFO": "a device or a pipe",

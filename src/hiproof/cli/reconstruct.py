@@ -45,6 +45,12 @@ def reconstruct(
     """
     from .running import run_request
 
+    if log_file is not None:
+        from ..write.overwriting import refuse_overwriting, refuse_run_file
+
+        given = [*(clouds or ()), footprints, terrain, overrides, underpasses, config]
+        refuse_overwriting([log_file], given)
+        refuse_run_file(log_file)
     start(console_level(), log_file)
     box = None if bbox is None else parse_box(bbox)
     if not enrich and "enrich" in (changes or {}):
