@@ -114,6 +114,16 @@ class ReadSettings:
         "metres, such as one on columns or over a road; empty for none",
         option="--raised-column",
     )
+    shift: str = setting(
+        "auto",
+        "how far a new survey lies beside the earlier one, or of surveys (--epoch) each older one "
+        "beside the newest: auto estimates it, off takes none off, EAST,NORTH,UP gives it in "
+        "metres",
+        option="--shift",
+    )
+    largest_shift_m: float = setting(
+        1.0, "longest shift between surveys that is estimated and taken off", "m", 0.0, 100.0
+    )
     year_column: str = setting(
         "",
         "column of the footprints that holds the year of construction; of surveys (--epoch), those "

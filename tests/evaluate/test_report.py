@@ -260,3 +260,7 @@ def test_changes_of_an_update_have_a_colour_of_their_own(run):
     changes = [building["change"] for building in data["buildings"]]
     assert changes == ["gone", *[None] * (len(models) - 1)]
     assert data["colours"]["change"]["gone"] == CHANGE_COLOURS["gone"]
+    update = replace(run, models=models, record={**run.record, "update": {}})
+    changes = [b["change"] for b in report_data(update, [None] * len(models))["buildings"]]
+    assert changes == ["gone", *["unchanged"] * (len(models) - 1)]
+    assert data["colours"]["change"]["unchanged"] != data["colours"]["change"]["not_covered"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
 from hiproof.simulate.changes import CHANGES, change_building
 from hiproof.simulate.roofs import assemble, make_part
@@ -190,11 +191,11 @@ def test_the_common_shift_is_found_though_one_roof_in_five_changed(rng):
         roof = random_building(rng).roof
         raised = (0.0, 0.0, 2.0) if k % 5 == 0 else (0.0, 0.0, 0.0)
         samples.append(SampledRoof(roof, scan(rng, roof), scan(rng, roof) + shift + raised))
-    found = register_surveys(samples)
+    found = register_surveys(samples, ReadSettings())
     assert np.abs(np.array(found.xyz) - shift).max() < 0.03
     assert np.abs(found.clear_xyz - shift).max() < 0.03
     assert found.noise.roof < 0.05
 
 
 def test_without_roofs_no_shift_is_applied():
-    assert register_surveys([]).clear_xyz.tolist() == [0.0, 0.0, 0.0]
+    assert register_surveys([], ReadSettings()).clear_xyz.tolist() == [0.0, 0.0, 0.0]

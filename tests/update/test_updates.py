@@ -1,7 +1,6 @@
 """`hiproof update` on the tiny town: one house raised, one pulled down, two as they were."""
 
 import dataclasses
-import datetime
 import json
 import re
 import shutil
@@ -22,7 +21,6 @@ from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.building import build
 from hiproof.parametric.run import build_file
 from hiproof.update.change_tables import write_changes
-from hiproof.update.dates import find_survey_date
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from hiproof.write.fragments import load_fragments, save_fragments
@@ -413,27 +411,6 @@ def far_cloud(folder, xyz, classes):
 
 def other_crs(folder, xyz, classes):
     return str(write_cloud(folder / "utm.laz", xyz, classes, crs="EPSG:25832"))
-
-
-def test_a_survey_is_dated_by_its_points_its_files_or_the_user(tmp_path):
-    import laspy
-
-    xyz, classes = make_later_survey()
-    path = write_cloud(tmp_path / "a.laz", xyz[:50], classes[:50])
-    las = laspy.read(path)
-    las.header.creation_date = datetime.date(2019, 3, 4)
-    las.write(path)
-    with pytest.warns(UserWarning, match="dated 2019-03-04"):
-        assert find_survey_date((str(path),)) == "2019-03-04"
-    las.header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
-    las.gps_time = np.full(50, 7.5e7)
-    las.write(path)
-    assert find_survey_date((str(path),)) == "2014-01-29"
-    assert find_survey_date((str(path),), "2020-02-03") == "2020-02-03"
-    text = tmp_path / "a.xyz"
-    text.write_text("1 2 3\n")
-    with pytest.raises(InputError, match="--date"):
-        find_survey_date((str(text),))
 
 
 def draw_footprints(folder, outlines):

@@ -7,12 +7,14 @@ import pytest
 
 from hiproof.primitives import CATALOGUE
 from hiproof.write.colours import (
+    CHANGE_COLOURS,
     GRADE_COLOURS,
     MARK_COLOUR,
     RESIDUAL_STOPS,
     ROOF_COLOURS,
     STATUS_COLOURS,
     SUN_STOPS,
+    UNCHANGED_COLOUR,
     UNKNOWN_COLOUR,
     WALL_COLOUR,
     linear_rgb,
@@ -43,6 +45,7 @@ LEGENDS = {
     "roof types": [*ROOF_COLOURS.values(), WALL_COLOUR, MARK_COLOUR],
     "quality": [*GRADE_COLOURS.values(), UNKNOWN_COLOUR],
     "status": list(STATUS_COLOURS.values()),
+    "changes": [*CHANGE_COLOURS.values(), UNCHANGED_COLOUR],
     "residuals": [colour for _, colour in RESIDUAL_STOPS],
     "sun": [colour for _, colour in SUN_STOPS],
 }

@@ -88,7 +88,11 @@ def print_update(summary: UpdateSummary) -> None:
     lies = ", ".join(
         f"{value:+.2f} ± {sigma:.2f}" for value, sigma in zip(shift.xyz, shift.sigma, strict=True)
     )
-    click.echo(f"survey of {surveys.date}, beside the earlier one by ({lies}) m")
+    taken = ", ".join(f"{value:+.2f}" for value in shift.clear_xyz)
+    click.echo(
+        f"survey of {surveys.date}, beside the earlier one by ({lies}) m, by {shift.rests_on}; "
+        f"taken off: ({taken}) m"
+    )
     click.echo(
         f"{describe_significance(surveys)}; compared with the "
         + ("earlier points" if surveys.has_earlier else "earlier models alone")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..status import Status
+from ..status import Change, Status
 from ..write.attribute_list import OWN
 from ..write.colours import (
     CHANGE_COLOURS,
@@ -19,6 +19,7 @@ from ..write.colours import (
     NO_MODEL,
     STATUS_COLOURS,
     SURVEY_COLOURS,
+    UNCHANGED_COLOUR,
     page_colours,
 )
 from ..write.meshes.page_mesh import pack_values, solid_mesh
@@ -27,6 +28,7 @@ from .metrics import plan_outline, psd
 from .models import BuildingModel
 from .run import EvaluatedRun
 
+UNCHANGED = Change.UNCHANGED.code
 POINTS_PER_BUILDING = 150  # points drawn of a building; enough to see where a roof is wrong
 MOST_REPORT_POINTS = 600_000  # points in the page, 7 MB: what a browser still opens at once
 
@@ -44,8 +46,8 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     return {
         "buildings": buildings,
         "colours": page_colours()
-        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "change": CHANGE_COLOURS}
-        | {"surveys": SURVEY_COLOURS},
+        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "surveys": SURVEY_COLOURS}
+        | {"change": {UNCHANGED: UNCHANGED_COLOUR, **CHANGE_COLOURS}},
         "types": types,
         "mesh": mesh_data(run, types, origin),
         "points": point_data(run, origin),
@@ -72,7 +74,7 @@ def building_data(
 
     The residual is from the points given, else as the model has it.
     """
-    model, figures = run.models[index], run.figures[index]
+    model, figures, is_update = run.models[index], run.figures[index], "update" in run.record
     status = Status.__members__.get(model.status.upper())
     residual: Any = figures.quality.psd_mean
     if not np.isfinite(residual):
@@ -86,7 +88,7 @@ def building_data(
         "outcome": status.value if status else model.status,
         "residual": finite(residual),
         "sun": finite(mean_sun(model)),
-        "change": model.attributes.get(f"{OWN}change"),
+        "change": model.attributes.get(f"{OWN}change") or (UNCHANGED if is_update else None),
         "measured": {
             name: finite(value) for name, value in measured.items() if finite(value) is not None
         },

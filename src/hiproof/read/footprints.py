@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
 """What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
 
+SAME_M = 0.01  # m, within which two outlines are the same: footprints are drawn in centimetres
+
 Box = tuple[float, float, float, float]
 ID_NAMES = (
     *(
@@ -454,19 +456,18 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
     """
     ids = {footprint.id for footprint in footprints}
     in_use: set[str] = set()
-    first_by_shape: dict[bytes, str] = {}
-    result, copies, renamed = [], 0, 0
-    for footprint in footprints:
+    result: list[Footprint] = []
+    copies = renamed = 0
+    originals = find_copies(np.array([footprint.polygon for footprint in footprints]))
+    for number, footprint in enumerate(footprints):
         id, suffix = footprint.id, 2
         while id in in_use or (suffix > 2 and id in ids):
             id, suffix = f"{footprint.id}_{suffix}", suffix + 1
         renamed += id != footprint.id
         in_use.add(id)
-        shape = shapely.normalize(footprint.polygon).wkb
-        original = first_by_shape.setdefault(shape, id)
         attributes = footprint.attributes
-        if original != id and not footprint.polygon.is_empty:
-            attributes, copies = {**attributes, "copy_of": original}, copies + 1
+        if number in originals:
+            attributes, copies = {**attributes, "copy_of": result[originals[number]].id}, copies + 1
         result.append(Footprint(id, footprint.polygon, attributes))
     if renamed:
         warnings.warn(
@@ -484,6 +485,26 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
     return result
 
 
+def find_copies(polygons: np.ndarray) -> dict[int, int]:
+    """Return the first of the polygons (n,) that each copy is one of.
+
+    Copies lie within SAME_M of each other, whatever their last bits.
+
+    >>> square = shapely.box(0, 0, 9, 9)
+    >>> find_copies(np.array([square, shapely.box(1e-9, 0, 9, 9), shapely.box(0, 0, 9, 8)]))
+    {1: 0}
+    """
+    centroids = shapely.centroid(polygons)
+    pairs = shapely.STRtree(centroids).query(centroids, predicate="dwithin", distance=SAME_M)
+    second, original = pairs[:, pairs[0] > pairs[1]]
+    apart = shapely.area(shapely.symmetric_difference(polygons[second], polygons[original]))
+    is_copy = apart <= SAME_M * shapely.length(polygons[second])
+    order = np.lexsort([-original[is_copy], second[is_copy]])
+    return dict(
+        zip(second[is_copy][order].tolist(), original[is_copy][order].tolist(), strict=True)
+    )
+
+
 def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
     """Warn once of footprints that lie on larger ones.
 
@@ -492,7 +513,8 @@ def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
     polygons = np.array([footprint.polygon for footprint in footprints])
     pairs = shapely.STRtree(polygons).query(shapely.point_on_surface(polygons), predicate="within")
     pairs = pairs[:, pairs[0] != pairs[1]]
-    pairs = pairs[:, ~shapely.equals(*polygons[pairs])]  # of copies is told elsewhere
+    is_copy = np.array(["copy_of" in footprint.attributes for footprint in footprints])
+    pairs = pairs[:, ~is_copy[pairs].any(axis=0)]  # of copies is told elsewhere
     if pairs.size:
         smaller, larger = np.take_along_axis(
             pairs, np.argsort(shapely.area(polygons[pairs]), axis=0), axis=0

@@ -22,7 +22,7 @@ from ..evaluate.inputs import RunSurvey
 from ..log import LOGGER
 from ..parametric.record import read_building
 from .earlier import EarlierRun
-from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, save_shifts
+from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, compare_ground, save_shifts
 from .members import load_members
 from .outside import save_roofs_outside
 from .plan import EARLIER_FOLDER, save_earlier_plan
@@ -55,7 +55,9 @@ def prepare_surveys(
     if (state / SURVEYS_FILE).exists():
         return
     save_roofs_outside(state, plan, bool(earlier.clouds))
-    shift = register_surveys(draw_samples(state, plan, request.terrain))
+    samples = draw_samples(state, plan, request.terrain)
+    shift = register_surveys(samples, request.settings.read)
+    shift.warn(f"survey of {date}")
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
     texts = find_texts(request.run, plan)
     surveys = Surveys(
@@ -118,5 +120,7 @@ def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[S
                 if roof is None:
                     continue
                 old, new = epochs.select_roofs(job, record)
+                ground = compare_ground(epochs.find_ground(job, record), epochs.new, job)
                 to_local = roof.frame.to_local
-                yield SampledRoof(roof, None if old is None else to_local(old), to_local(new))
+                local = None if old is None else to_local(old)
+                yield SampledRoof(roof, local, to_local(new), ground)

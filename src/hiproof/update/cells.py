@@ -1,12 +1,13 @@
-"""Two surveys of one building compared in cells of a metre or less.
+"""Two surveys of one building compared in cells of half a metre to two.
 
 Each cell has the median height over the earlier roof of either survey. Their difference has
 a standard deviation that follows from the scatter of the points in the cell, from their number, and
-from how much unchanged roofs differ.
+from how much unchanged roofs differ, cell by cell and as a whole.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +17,14 @@ from ..geometry.grid import number_cells
 from ..model import Roof
 from .residuals import measure_residuals
 
-WIDE_CELL_M, FINE_CELL_M = 1.0, 0.5
-"""Side (m) of a cell: a quarter of the smallest change that is looked for (4 m2), and half of that
-where both surveys have FINE_DENSITY."""
+CELL_SIDES_M = (0.5, 1.0, 2.0)
+"""Sides (m) of cells: half and all of the square root of the smallest change that is looked for (4
+m2) and half of that, and for sparse surveys. The smallest counts in which both surveys have
+POINTS_A_CELL."""
 
-FINE_DENSITY = 6.0
-"""Points a square metre from which on a fine cell holds points in four cases of five."""
+POINTS_A_CELL = 1.5  # by chance 1 - exp(-1.5) = 78 % of the cells then hold points
+
+FEWEST_OCCUPIED = 0.1  # share of the cells that hold points in the sparsest survey
 
 INSIDE_M = 0.4
 """Points nearer to the outline (m) may be returns of walls and gutters, or lie beside the roof
@@ -50,11 +53,17 @@ class SurveyNoise:
     roof: float = 0.03
     stray: float = 0.003
 
+    @property
+    def variance(self) -> float:
+        """Variance (m2) of a cell's difference beyond what its points explain."""
+        return self.cell**2 + self.roof**2
+
 
 @dataclass(frozen=True)
 class CellComparison:
     """The cells (k, 2) of a building in which at least one survey has points.
 
+    `outline_m2` is the building's area, as far as it is known to either.
     `old` and `new` (k,) are median heights over the earlier roof, NaN without points; `n_old` and
     `n_new` the numbers of points. `sigma` (k,) is the standard deviation of `new - old`. `kept`
     (k,) is the share of the new points on the old surface, `known` that of the old points on the
@@ -64,6 +73,7 @@ class CellComparison:
     """
 
     cell_m: float
+    outline_m2: float
     cells: np.ndarray
     old: np.ndarray
     new: np.ndarray
@@ -87,6 +97,14 @@ class CellComparison:
     def is_compared(self) -> np.ndarray:
         """Whether (k,) both surveys have points in a cell."""
         return (self.n_old > 0) & (self.n_new > 0)
+
+    @property
+    def cell_m2(self) -> float:
+        """The area (m2) that a cell with new points stands for.
+
+        A cell may reach beyond the building, and another hold no points by chance.
+        """
+        return self.outline_m2 / len(self.cells) / predict_occupancy(self.n_new)
 
     @property
     def centres(self) -> np.ndarray:
@@ -118,9 +136,9 @@ def compare_points(
     inner = shrink_outline(roof.outline)
     new, r_new = select_inner(roof, inner, new)
     if old is None:
-        return compare_with_roof(new, r_new, noise, choose_cell(len(new), inner.area))
+        return compare_with_roof(new, r_new, noise, choose_cell(inner, new), roof.outline.area)
     old, r_old = select_inner(roof, inner, old)
-    cell_m = choose_cell(min(len(old), len(new)), inner.area)
+    cell_m = choose_cell(inner, old, new)
     both = np.floor(np.concatenate([old[:, :2], new[:, :2]]) / cell_m)
     cells, number = number_cells(both)
     in_old, in_new = number[: len(old)], number[len(old) :]
@@ -129,10 +147,13 @@ def compare_points(
     s_new = np.fmin(s_new, np.fmax(s_old, 2 * noise.point))  # as an unchanged roof would scatter
     with np.errstate(divide="ignore", invalid="ignore"):
         sampling = MEDIAN_VARIANCE * (s_old**2 / n_old + s_new**2 / n_new)
-    sigma = np.sqrt(np.where(np.isfinite(sampling), sampling, np.inf) + noise.cell**2)
+    sigma = np.sqrt(
+        np.where(np.isfinite(sampling), sampling, np.inf) + noise.cell**2 + noise.roof**2
+    )
     near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
     return CellComparison(
         cell_m,
+        roof.outline.area,
         cells,
         m_old,
         m_new,
@@ -149,25 +170,57 @@ def compare_points(
     )
 
 
-def choose_cell(points: int, area_m2: float) -> float:
-    """Return the side (m) of the cells for so many points over an area."""
-    return FINE_CELL_M if points >= FINE_DENSITY * area_m2 else WIDE_CELL_M
+def choose_cell(inner: shapely.Geometry, *surveys: np.ndarray) -> float:
+    """Return the side (m) of the cells for the points (n, 3) of surveys.
+
+    Points lie inside `inner`. It follows from the density of the sparsest survey, where that has
+    points.
+    """
+    wide = CELL_SIDES_M[-1]
+    all_cells = [np.unique(np.floor(xyz[:, :2] / wide), axis=0) for xyz in surveys]
+    count = len(np.unique(np.concatenate(all_cells), axis=0))
+    area = min(wide**2, inner.area / max(count, 1))  # that is inside, of a cell
+    density = min(
+        len(xyz) / max(len(cells) * area, 1e-9)
+        for xyz, cells in zip(surveys, all_cells, strict=True)
+    )
+    return next((side for side in CELL_SIDES_M if density * side**2 >= POINTS_A_CELL), wide)
+
+
+def predict_occupancy(counts: np.ndarray) -> float:
+    """Return the share of cells that hold points, from the `counts` (k,) of points.
+
+    Points fall by chance (Poisson): with m points a cell, 1 - exp(-m) of the cells hold any.
+
+    >>> [round(predict_occupancy(np.array(counts)), 3) for counts in ([0, 1, 2, 2], [9, 9])]
+    [0.676, 1.0]
+    """
+    mean = m = float(counts[counts > 0].mean())
+    for _ in range(50):
+        m = mean * -math.expm1(-m)
+    return max(-math.expm1(-m), FEWEST_OCCUPIED)
 
 
 def compare_with_roof(
-    new: np.ndarray, residuals: np.ndarray, noise: SurveyNoise, cell_m: float
+    new: np.ndarray, residuals: np.ndarray, noise: SurveyNoise, cell_m: float, area_m2: float
 ) -> CellComparison:
-    """Compare new points (n, 3) with the roof over which they have `residuals` (n,)."""
+    """Compare new points (n, 3) with the roof over which they have `residuals` (n,).
+
+    The roof covers `area_m2`.
+    """
     cells, number = number_cells(np.floor(new[:, :2] / cell_m))
     median, scatter, count = summarise_cells(number, residuals, len(cells), noise.point)
     zero = np.zeros(len(cells))
-    sigma = np.sqrt(MEDIAN_VARIANCE * scatter**2 / np.maximum(count, 1) + noise.cell**2)
+    sigma = np.sqrt(
+        MEDIAN_VARIANCE * scatter**2 / np.maximum(count, 1) + noise.cell**2 + noise.roof**2
+    )
     near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
     kept = compute_share_near(number, residuals, zero, near)
     none = np.zeros(0, np.int64), np.zeros(0)
     one = np.ones_like(count)
     return CellComparison(
         cell_m,
+        min(area_m2, len(cells) * cell_m**2),
         cells,
         zero,
         median,

@@ -72,6 +72,7 @@ class ChangedCells:
 def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> list[ChangedCells]:
     """Return the clusters of a building, the largest first.
 
+    Cells that one survey left empty by chance do not part a cluster.
     `stray` is the share of cells that contradict an unchanged roof.
     """
     c = comparison
@@ -79,12 +80,12 @@ def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> lis
     cells = int(c.is_compared.sum())
     result = []
     for sign in (1.0, -1.0):
-        chosen = np.flatnonzero(is_other & (sign * c.difference > 0))
-        if not len(chosen):
-            continue
-        labels = label_components(len(chosen), link_neighbours(c.cells[chosen]))
-        for label in range(labels.max() + 1):
-            result.append(describe_cluster(c, chosen[labels == label], cells, stray))
+        is_chosen = is_other & (sign * c.difference > 0)
+        linked = np.flatnonzero(is_chosen | ~c.is_compared)
+        labels = label_components(len(linked), link_neighbours(c.cells[linked]))
+        for label in np.unique(labels[is_chosen[linked]]):
+            members = linked[labels == label]
+            result.append(describe_cluster(c, members[is_chosen[members]], cells, stray))
     return sorted(result, key=lambda cluster: (-len(cluster.members), cluster.members[0]))
 
 
@@ -140,10 +141,11 @@ def describe_cluster(
 ) -> ChangedCells:
     """Return the cluster of cells `members` (m,) among so many `cells` of a building."""
     d, s = comparison.difference[members], comparison.sigma[members]
-    points = select_points(comparison, members, float(np.median(d)))
+    chosen = find_points(comparison, members, float(np.median(d)))
+    points, numbers = comparison.points[chosen], comparison.number[chosen]
     return ChangedCells(
         members,
-        len(points) / max(len(comparison.points), 1) * measure_area(comparison),
+        float((1 / comparison.n_new[numbers]).sum()) * comparison.cell_m2,
         compute_chance(len(members), float((np.abs(d) / s).min()), cells, stray),
         float(np.median(d)),
         float(np.sqrt(MEDIAN_VARIANCE * np.mean(s**2) / len(members))),
@@ -151,8 +153,8 @@ def describe_cluster(
     )
 
 
-def select_points(comparison: CellComparison, members: np.ndarray, difference: float) -> np.ndarray:
-    """Return the new points (m, 3) of a cluster.
+def find_points(comparison: CellComparison, members: np.ndarray, difference: float) -> np.ndarray:
+    """Return whether (n,) each of the new points belongs to a cluster.
 
     Those of the cells around it are among them where they lie nearer to its height over the earlier
     roof, by `difference`, than to that roof: a cell at its edge holds points of both.
@@ -162,12 +164,7 @@ def select_points(comparison: CellComparison, members: np.ndarray, difference: f
     box = np.flatnonzero(((c.cells >= low) & (c.cells <= high)).all(axis=1))
     apart = np.abs(c.cells[box, None] - c.cells[members][None]).max(axis=2).min(axis=1)
     around = np.isin(c.number, box[apart <= 1]) & (np.abs(c.over / difference - 1) < 0.5)
-    return c.points[np.isin(c.number, members) | around]
-
-
-def measure_area(comparison: CellComparison) -> float:
-    """Return the area (m2) of the cells that hold new points."""
-    return float((comparison.n_new > 0).sum()) * comparison.cell_m**2
+    return np.asarray(np.isin(c.number, members) | around)
 
 
 def is_strip(points: np.ndarray) -> bool:

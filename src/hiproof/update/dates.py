@@ -1,6 +1,7 @@
 """The date of a survey.
 
-It is named, or comes from the time of points, or from a file's header.
+It is named, or comes from the time of points, or from a file's header. Only days on which a survey
+can have been made are used.
 """
 
 from __future__ import annotations
@@ -18,20 +19,35 @@ from ..read.remote import is_url
 
 GPS_EPOCH = datetime.datetime(1980, 1, 6)  # when GPS time begins
 ADJUSTED_S = 1e9  # seconds that adjusted standard GPS time leaves out
+WEEK_S = 7 * 86400.0
+"""Times (s) up to this are seconds of a GPS week, whatever the header says: nothing tells which."""
+
+FIRST_DAY = datetime.date(1990, 1, 1)  # before airborne laser scanning; clocks not set say 1980
 LAS_HEAD_BYTES = 94  # of a LAS file, up to the date
 FIRST_POINTS = 1000  # whose time tells the day of a file
 
 
-def find_survey_date(clouds: tuple[str, ...], named: str = "") -> str:
+def find_survey_date(clouds: tuple[str, ...], named: str = "", earlier: str = "") -> str:
     """Return the date of a survey as 2014-02-09: the latest of its files.
 
-    Raises InputError where `named` is no date, or where nothing tells one.
+    `earlier` is the date of the survey before, or its year, "" where it is unknown. Raises
+    InputError where `named` is no date, where nothing tells one, or where it is before `earlier`.
     """
-    if named:
-        return read_date(named)
-    timed = [date for date in map(date_by_points, clouds) if date]
+    date = read_date(named) if named else read_survey_date(clouds)
+    if date[: len(earlier)] < earlier:
+        raise InputError(
+            f"expected a survey no older than that of the run, {earlier}, got {mask(clouds[0])} "
+            f"of {date}; update a run of the older survey with the newer one, or name the day of "
+            "the survey with --date"
+        )
+    return date
+
+
+def read_survey_date(clouds: tuple[str, ...]) -> str:
+    """Return the date of a survey by its points, else by the headers of its files."""
+    timed = date_by_points(clouds)
     if timed:
-        return max(timed).isoformat()
+        return timed
     headed = [date for date in map(date_by_header, clouds) if date]
     if not headed:
         raise InputError(
@@ -40,21 +56,29 @@ def find_survey_date(clouds: tuple[str, ...], named: str = "") -> str:
         )
     date = max(headed).isoformat()
     warnings.warn(
-        f"{mask(clouds[0])}: holds no time of its points; the survey is dated {date}, when the "
-        "file was written; name the day of the survey with --date",
+        f"{mask(clouds[0])}: holds no time of its points that can be used; the survey is dated "
+        f"{date}, when the file was written; name the day of the survey with --date",
         InputWarning,
     )
     return date
 
 
 def read_date(text: str) -> str:
-    """Return a date in its usual form. Raises InputError for anything else."""
+    """Return a date in its usual form. Raises InputError for anything else.
+
+    One in the future is used with a warning, for surveys that are planned or simulated.
+    """
     try:
-        return datetime.date.fromisoformat(text).isoformat()
+        date = datetime.date.fromisoformat(text)
     except ValueError as error:
         raise InputError(
             f"expected a date as --date 2014-02-09, got {text!r:.40}; write year, month and day"
         ) from error
+    if date < FIRST_DAY:
+        raise InputError(f"expected a survey from 1990 on, got {date}; check --date")
+    if date > datetime.date.today():
+        warnings.warn(f"the survey of {date} is dated in the future; check --date", InputWarning)
+    return date.isoformat()
 
 
 def date_by_header(path: str) -> datetime.date | None:
@@ -63,15 +87,22 @@ def date_by_header(path: str) -> datetime.date | None:
     if head is None:
         return None
     day, year = struct.unpack_from("<HH", head, 90)
-    if not (1 <= day <= 366 and year >= 1980):
+    if not (1 <= day <= 366 and FIRST_DAY.year <= year <= datetime.date.today().year):
         return None
-    return datetime.date(year, 1, 1) + datetime.timedelta(days=day - 1)
+    date = datetime.date(year, 1, 1) + datetime.timedelta(days=day - 1)
+    return date if date <= datetime.date.today() else None
 
 
-def date_by_points(path: str) -> datetime.date | None:
+def date_by_points(clouds: tuple[str, ...]) -> str:
+    """Return the last day on which points of LAS files were measured, "" for none."""
+    timed = [date for date in map(date_by_first_points, clouds) if date]
+    return max(timed).isoformat() if timed else ""
+
+
+def date_by_first_points(path: str) -> datetime.date | None:
     """Return the last day on which the first points of a LAS file were measured.
 
-    None where their times are not adjusted standard GPS time.
+    None where their times are no adjusted standard GPS time, or later than their file.
     """
     head = read_head(path)
     if head is None or not struct.unpack_from("<H", head, 6)[0] & 1:
@@ -84,9 +115,16 @@ def date_by_points(path: str) -> datetime.date | None:
             times = np.asarray([] if points is None else points["gps_time"], float)
     except (OSError, ValueError, laspy.errors.LaspyException):
         return None  # the step that sorts points says what is wrong
-    if not len(times) or not times.any():
+    latest = last_second(date_by_header(path) or datetime.date.today())
+    times = times[(times >= last_second(FIRST_DAY)) & (times <= latest) & (times != 0.0)]
+    if not len(times) or 0.0 <= times.min() <= times.max() <= WEEK_S:
         return None
     return (GPS_EPOCH + datetime.timedelta(seconds=float(times.max()) + ADJUSTED_S)).date()
+
+
+def last_second(date: datetime.date) -> float:
+    """Return the end of a day, wherever it is, in adjusted standard GPS time (s)."""
+    return float((date - GPS_EPOCH.date()).days + 2) * 86400.0 - ADJUSTED_S
 
 
 def read_head(path: str) -> bytes | None:

@@ -14,12 +14,12 @@ from typing import Any
 from ..errors import HiproofError, InputError, InputWarning
 from ..evaluate.inputs import RunSurvey, found_inputs
 from ..evaluate.run import run_record
-from ..fit.registration import Registration
 from ..formats import FORMATS
 from ..parametric.file import opened_parameters
 from ..parametric.record import refuse_other_kinds
 from ..settings import ReadSettings, Settings
 from ..write.head import FileHead
+from .dates import date_by_points
 
 RUN_PARAMETERS = FORMATS["parameters"].file
 
@@ -30,17 +30,17 @@ class EarlierRun:
 
     Its head and settings come with them.
 
-    `footprint_shift` (m) is how far the run moved all footprints. `surveys` are those that the run
-    was made of, the newest first, empty where not all of their clouds exist. `overrides` is the
-    file of its overrides.
+    `surveys` are those that the run was made of, the newest first, empty where not all of their
+    clouds exist. `overrides` is the file of its overrides, and `date` the day or year of its newest
+    survey, "" where nothing tells.
     """
 
     head: FileHead
     records: tuple[dict[str, Any], ...]
     settings: Settings
     surveys: tuple[RunSurvey, ...]
-    footprint_shift: tuple[float, float] = (0.0, 0.0)
     overrides: str | None = None
+    date: str = ""
 
     @property
     def clouds(self) -> tuple[str, ...]:
@@ -85,8 +85,14 @@ def read_earlier(folder: Path) -> EarlierRun:
             "its models alone; changes that the models leave out are not told from their errors",
             InputWarning,
         )
-    shift = find_footprint_shift(record)
-    return EarlierRun(head, records, settings, surveys, shift, find_overrides(folder, record))
+    overrides, date = find_overrides(folder, record), find_run_date(record, inputs.clouds)
+    return EarlierRun(head, records, settings, surveys, overrides, date)
+
+
+def find_run_date(record: dict[str, Any], clouds: tuple[str, ...]) -> str:
+    """Return the day or year of the newest survey of a run, "" where nothing tells."""
+    named = str((record.get("update") or {}).get("survey_date") or "")
+    return named or max(record.get("epochs") or [""]) or date_by_points(clouds)
 
 
 def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:
@@ -99,15 +105,6 @@ def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:
             InputWarning,
         )
     return found
-
-
-def find_footprint_shift(record: dict[str, Any]) -> tuple[float, float]:
-    """Return how far (m) a run, or the first run before updates, moved all footprints."""
-    registration, update = record.get("registration"), record.get("update") or {}
-    if registration:
-        return Registration.from_dict(registration).shift
-    x, y = update.get("footprint_shift", (0.0, 0.0))
-    return float(x), float(y)
 
 
 def refuse_damaged(record: dict[str, Any], path: Path) -> None:
@@ -124,9 +121,9 @@ def refuse_damaged(record: dict[str, Any], path: Path) -> None:
 def choose_read_settings(settings: Settings) -> Settings:
     """Return settings to read new clouds.
 
-    Their classes need not be those of the earlier ones.
+    Their classes and their shift need not be those of the earlier ones.
     """
     usual = ReadSettings()
-    names = ("building_classes", "ground_classes", "roofs")
+    names = ("building_classes", "ground_classes", "roofs", "shift")
     read = dataclasses.replace(settings.read, **{name: getattr(usual, name) for name in names})
     return dataclasses.replace(settings, read=read)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
 from dataclasses import dataclass
@@ -13,10 +14,14 @@ import shapely
 
 from ..city.plan.work_plan import Job, load_plan, neighbourhood
 from ..city.work.found import FoundRoof
+from ..city.work.ground import BareAround
+from ..city.work.other_classes import find_bare_cells
 from ..city.work.solve import Surroundings, open_terrain
 from ..city.work.sort import load_points
 from ..city.work.surveys import SurveyPoints
 from ..geometry.thin import without_repeats
+from ..parametric.record import read_terrain_lines
+from ..read.terrain import TerrainChain
 from .plan import EARLIER_FOLDER
 from .register import SurveyShift
 from .request import EACH_BUILDING, SIGNIFICANCE
@@ -90,6 +95,15 @@ class Epochs:
         old = None if self.old is None else select_roof(self.old.choose(record), job).points
         return old, select_roof(self.new, job).points
 
+    def find_ground(self, job: Job, record: dict[str, Any]) -> np.ndarray:
+        """Return the earlier ground (n, 3) around a building.
+
+        Without the earlier points it is where the model meets the terrain.
+        """
+        if self.old is None:
+            return np.concatenate([np.zeros((0, 3)), *read_terrain_lines(record)])
+        return find_ground(self.old.choose(record), job)
+
 
 def load_earlier(folder: Path, tile: str) -> SurveyPoints | None:
     """Return the points of the earlier surveys, None where there are none."""
@@ -101,19 +115,19 @@ def load_earlier(folder: Path, tile: str) -> SurveyPoints | None:
 
 
 def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:
-    """Return the points (n, 3) of a roof and of bare ground in its outline, each once."""
+    """Return the points (n, 3) of a roof and of bare ground in its outline, each once.
+
+    All points of bare ground count, as all of the roof do: where one of both were thinned, what is
+    lost would weigh less than what is there.
+    """
     roof = select_roof(surroundings, job)
-    if not (len(roof.ground) or has_ground(surroundings, job)):
-        return roof.points
-    bare = surroundings.bare(job, roof, surroundings.select_other_points(job))
-    bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
-    return np.concatenate([roof.points, bare])
-
-
-def has_ground(surroundings: Surroundings, job: Job) -> bool:
-    """Return whether points of the ground class lie in a building's outline."""
-    ground = surroundings.ground.inside(neighbourhood(job, 0.0))
-    return bool(shapely.intersects_xy(job.area, ground[:, 0], ground[:, 1]).any())
+    grid = surroundings.ground_grid
+    bare = without_repeats(grid.xy.take(grid.inside(job.area), axis=0))
+    by_class = surroundings.select_other_points(job) if len(bare) else None
+    if by_class is not None:
+        bare = find_bare_cells(dataclasses.replace(by_class, ground=bare))
+    by_shape = roof.ground[shapely.intersects_xy(job.area, *roof.ground[:, :2].T)]
+    return np.concatenate([roof.points, by_shape, bare])
 
 
 def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:
@@ -125,3 +139,24 @@ def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:
     points = without_repeats(found.points)
     inside = shapely.intersects_xy(job.area, points[:, 0], points[:, 1])
     return dataclasses.replace(found, points=points[inside])
+
+
+def find_ground(surroundings: Surroundings, job: Job) -> np.ndarray:
+    """Return the ground (n, 3) around a building, at most one point a cell of a metre."""
+    box = neighbourhood(job, surroundings.plan.terrain_reach_m)
+    points = surroundings.ground.inside(box)
+    if not len(points):
+        points = BareAround(surroundings.low, box).bare.cells.inside(box)
+    return points[~shapely.intersects_xy(job.area, points[:, 0], points[:, 1])]
+
+
+def compare_ground(ground: np.ndarray, new: Surroundings, job: Job) -> np.ndarray:
+    """Return places (m, 3) of the ground, and how much higher it lies now.
+
+    `ground` (n, 3) is the earlier one. The terrain model of an update is that of no survey, so it
+    does not count.
+    """
+    by_points = copy.copy(new)
+    by_points.model = None
+    rise = TerrainChain(by_points.find_grounds(job)).height_at(ground) - ground[:, 2]
+    return np.column_stack([ground[:, :2], rise])[np.isfinite(rise)]

@@ -1,8 +1,8 @@
 """Which earlier building each of new footprints is.
 
 Outlines that overlap are linked. A pair that is linked to nothing else is one building, which keeps
-its id. Of more, some were split, others merged: new buildings with predecessors. Only where several
-stand on both sides do pairs of nearly the same outline stay one building each.
+its id, and so is a pair of nearly the same outline. Of the others, some were split, some merged:
+new buildings with predecessors.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ PAIR_SHARE = 0.7
 
 SAME_OUTLINE = 0.9
 """Intersection over union from which on an outline was drawn again rather than changed."""
+
+SHARE_DIGITS = 6  # of these shares: the last bits decide nothing
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,15 @@ def link_outlines(
     common = shapely.area(shapely.intersection(first[i], second[j]))
     areas = shapely.area(first)[i], shapely.area(second)[j]
     linked = (common >= LINKED_SHARE * np.minimum(*areas)) & (common >= LINKED_M2)
-    shares = common / np.maximum(areas[0] + areas[1] - common, 1e-9)
+    shares = np.round(common / np.maximum(areas[0] + areas[1] - common, 1e-9), SHARE_DIGITS)
     order = np.lexsort([j[linked], i[linked]])
     return np.stack([i[linked][order], j[linked][order]]), shares[linked][order]
+
+
+def compute_overlap(first: shapely.Geometry, second: shapely.Geometry) -> float:
+    """Return the intersection over union of two outlines."""
+    common = shapely.intersection(first, second).area
+    return float(common / max(first.area + second.area - common, 1e-9))
 
 
 def group_members(labels: np.ndarray) -> dict[int, list[int]]:
@@ -86,10 +94,11 @@ def match_group(
     pairs: dict[int, int] = {}
     if len(before) == len(after) == 1:
         pairs[after[0]] = before[0]
-    elif min(len(before), len(after)) > 1:
+    else:
+        least = PAIR_SHARE if min(len(before), len(after)) > 1 else SAME_OUTLINE
         ranked = sorted((-share_of.get((i, j), 0.0), i, j) for i in before for j in after)
         for share, i, j in ranked:
-            if -share >= PAIR_SHARE and j not in pairs and i not in pairs.values():
+            if -share >= least and j not in pairs and i not in pairs.values():
                 pairs[j] = i
     result = []
     for j in after:

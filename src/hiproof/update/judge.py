@@ -14,11 +14,11 @@ import numpy as np
 
 from ..model import Roof
 from ..status import Change
-from .cells import CellComparison, SurveyNoise, compare_points
+from .cells import CellComparison, SurveyNoise, compare_points, predict_occupancy
 from .clusters import ChangedCells, find_clusters
 
 COVERED = 0.5
-"""Share of the earlier cells that the new survey has to cover, for a building to be judged."""
+"""Share of a building that the new survey has to cover, for the building to be judged."""
 
 FEWEST_COMPARED = 4
 """Cells that have to be compared, below which chance decides."""
@@ -96,15 +96,18 @@ def judge_building(
 
 
 def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
-    """Return whether too little of the earlier roof has new points."""
-    earlier = comparison.n_old > 0
-    compared = int(comparison.is_compared.sum())
-    area = compared * comparison.cell_m**2
-    without_old = (comparison.old == 0).all() and (comparison.known == 0).all()
-    share = area / roof.outline.area if without_old else compared / max(int(earlier.sum()), 1)
-    return (
-        compared < FEWEST_COMPARED or share < COVERED / 2 or (share < COVERED and not without_old)
-    )
+    """Return whether too little of the earlier roof has new points.
+
+    Cells that hold none because the survey is sparse are covered.
+    """
+    c = comparison
+    compared, earlier = int(c.is_compared.sum()), int((c.n_old > 0).sum())
+    if compared < FEWEST_COMPARED:
+        return True
+    without_old = (c.old == 0).all() and (c.known == 0).all()
+    share = compared * c.cell_m**2 / roof.outline.area if without_old else compared / earlier
+    share /= predict_occupancy(c.n_new)
+    return bool(share < (COVERED / 2 if without_old else COVERED))
 
 
 def is_gone(comparison: CellComparison, roof: Roof, z_ground: float) -> bool:

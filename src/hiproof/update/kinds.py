@@ -206,7 +206,7 @@ def describe_place(
     c = sides.cells
     d, s = c.difference[inside], c.sigma[inside]
     sigma = math.hypot(sides.sigma_m, math.sqrt(MEDIAN_VARIANCE * np.mean(s**2) / len(d)))
-    area = len(d) * c.cell_m**2
+    area = len(d) * c.cell_m2
     return Difference(
         kind, float(np.median(d)), sigma, area, draw_cells(c, np.flatnonzero(inside)), pair
     )

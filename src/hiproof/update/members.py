@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,14 +14,18 @@ import shapely
 
 from ..city.plan.frame import AreaFrame
 from ..city.plan.prepare import read_requested_footprints
+from ..city.plan.registration import register_footprints
 from ..city.plan.work_plan import Job, make_job
+from ..errors import InputWarning
+from ..masking import mask
 from ..model import Footprint
 from ..parametric.record import polygon, read_outline, read_shift
 from ..parametric.underside import read_passage
+from ..settings import Settings
 from ..write.files import atomic
 from ..write.json_text import dump
 from .earlier import EarlierRun
-from .identity import Successor, match_outlines
+from .identity import SAME_OUTLINE, Successor, compute_overlap, match_outlines
 from .request import UpdateRequest
 
 EARLIER_FILE = "earlier.jsonl"
@@ -81,20 +86,33 @@ def read_passages(record: dict[str, Any]) -> tuple[tuple[shapely.Polygon, float]
 
 
 def make_members(
-    request: UpdateRequest, earlier: EarlierRun, frame: AreaFrame
+    request: UpdateRequest,
+    earlier: EarlierRun,
+    frame: AreaFrame,
+    headers: list,
+    settings: Settings,
 ) -> tuple[UpdateMember, ...]:
     """Return the buildings of an update.
 
     Without new footprints they are the earlier ones. With them these come first, and then what
-    they replace nothing of.
+    they replace nothing of. New footprints are registered to the new roofs: how far the earlier
+    ones were moved says nothing of them.
     """
     kept = [keep_member(record) for record in earlier.records]
     if not request.footprints:
         return tuple(kept)
     footprints = read_requested_footprints(request, frame, where=None, bbox=None)
-    shift = earlier.footprint_shift
+    footprints = leave_out_copies(footprints, request.footprints)
+    registration = register_footprints(
+        footprints, headers, frame.units, settings, request.footprints
+    )
+    shift = registration.shift if registration else (0.0, 0.0)
     drawn = [shapely.transform(f.polygon, lambda xy: xy + shift) for f in footprints]
     successors = match_outlines([member.outline for member in kept], drawn)
+    successors = [
+        dataclasses.replace(s, is_same_outline=s.is_same_outline or is_known(kept, s, footprint))
+        for s, footprint in zip(successors, footprints, strict=True)
+    ]
     used = {s.earlier for s in successors} | {i for s in successors for i in s.predecessors}
     others = [member for i, member in enumerate(kept) if i not in used]
     names = {member.id for member in others} | {
@@ -108,6 +126,27 @@ def make_members(
         result.append(dataclasses.replace(member, ended=tuple(filter(None, ended))))
         names.add(member.id)
     return (*result, *others)
+
+
+def leave_out_copies(footprints: tuple[Footprint, ...], path: str) -> tuple[Footprint, ...]:
+    """Return footprints without copies of others: these are the same buildings."""
+    result = tuple(f for f in footprints if "copy_of" not in f.attributes)
+    if len(result) < len(footprints):
+        warnings.warn(
+            f"{mask(path)}: {len(footprints) - len(result)} copies of other footprints are left "
+            "out; they are the same buildings",
+            InputWarning,
+        )
+    return result
+
+
+def is_known(kept: list[UpdateMember], successor: Successor, footprint: Footprint) -> bool:
+    """Return whether a footprint is the earlier building's, before it was moved."""
+    if successor.earlier < 0:
+        return False
+    member = kept[successor.earlier]
+    outline = shapely.transform(member.outline, lambda xy: xy - member.shift)
+    return compute_overlap(outline, footprint.polygon) >= SAME_OUTLINE
 
 
 def keep_member(record: dict[str, Any]) -> UpdateMember:

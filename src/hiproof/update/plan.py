@@ -46,11 +46,13 @@ def make_update_plan(request: UpdateRequest, earlier: EarlierRun, state: Path) -
     settings = adopt_crs(request.settings, headers, earlier, request)
     frame = settle_frame(dataclasses.replace(request, settings=settings), headers)
     refuse_other_crs(frame, earlier, request)
-    members = make_members(request, earlier, frame)
+    settings = settle_classes(request.clouds, settings)
+    members = make_members(request, earlier, frame, headers, settings)
     jobs = tuple(member.make_job(index) for index, member in enumerate(members))
     save_members(state, members)
     refuse_elsewhere(jobs, frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)), request)
-    settings = settle_classes(request.clouds, settings).replace({"reconstruct": {"align": "off"}})
+    if not request.footprints:  # earlier outlines lie on their roofs
+        settings = settings.replace({"reconstruct": {"align": "off"}})
     offset = earlier.head.offset
     return WorkPlan(
         jobs=jobs,

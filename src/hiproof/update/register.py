@@ -1,13 +1,18 @@
 """The common shift between two surveys, and how much unchanged roofs differ.
 
-New points lie over the earlier roofs by dz - a dx - b dy, where (a, b) is the roof's slope and (dx,
-dy, dz) the shift. A robust least squares over a sample of buildings tells it; whole buildings that
-changed are outliers. A hash of places draws the sample: it does not depend on tiles.
+What cannot have grown comes first: the median height of the new ground over the earlier one. New
+points lie over the earlier roofs by dz - a dx - b dy, where (a, b) is the roof's slope and (dx, dy,
+dz) the shift. A robust least squares over a sample of buildings estimates it, beginning at the
+ground's height, so roofs that changed are outliers however many they are. A shift that ground and
+roofs do not share, or that few roofs carry, is not taken off. A hash of places draws the sample: it
+does not depend on tiles.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -17,7 +22,9 @@ import shapely
 
 from ..city.plan.registration import SAMPLE_CELL_M, hash_cell
 from ..city.plan.work_plan import WorkPlan
+from ..errors import InputWarning, SettingsError
 from ..model import Roof
+from ..settings import ReadSettings
 from .cells import SurveyNoise, compare_points, select_inner, shrink_outline
 from .clusters import flag_cells
 from .residuals import find_slopes, measure_residuals
@@ -32,16 +39,34 @@ PRIOR_M = 0.2
 """Standard deviation (m) of the horizontal shift before any roof is seen; flat roofs tell none."""
 
 ROOF_ERROR_M = 0.05
-"""Standard deviation (m) of what points say of a building: that of two strips."""
+"""Standard deviation (m) of what points say of a building, or of the ground: that of two strips."""
 
 CLEAR_SIGMAS = 3.0
 """A shift smaller than so many of its standard deviations is not applied."""
 
-FEWEST_ROOFS = 8
-"""Roofs from which on their noise is estimated rather than assumed."""
+SAME_HEIGHT_M = 0.1
+"""Roofs and ground may lie so far apart (m) between surveys, by grass that was higher or ground
+points that were chosen otherwise."""
 
-CHANGED_SHARE = 0.3
-"""Share of the roofs that may have changed: those with the most stray cells do not count."""
+CARRIED_BESIDE_GROUND, CARRIED_ALONE = 0.1, 2 / 3
+"""Least share of the roofs' area that has to lie where a shift puts it: where the ground shows the
+same shift, and where there is no ground."""
+
+HELD_WEIGHT = 1e9  # weight (1/m2) of a height that is not to move
+
+FEWEST_ROOFS = 8
+"""Roofs from which on their noise is estimated rather than assumed, and carry a shift alone."""
+
+FEWEST_TILT_PLACES = 6
+"""Places with ground from which on a tilt is looked for: a plane takes three."""
+
+LEAST_TILT_M, TILT_SIGMAS = 0.1, 5.0
+"""Least height (m) by which a tilt raises one end of the area over the other, and least number of
+its standard deviations."""
+
+CHANGED_SHARE, MOST_STRAY = 0.3, 0.02
+"""Share of the roofs that may have changed: those with the most stray cells do not count. Where
+more have, the share of stray cells is bounded: seven times that of usual roofs."""
 
 LEAST_M = 0.02
 """Least noise (m): coordinates come in centimetres."""
@@ -54,33 +79,47 @@ ENOUGH_ROOFS = 60
 class SampledRoof(NamedTuple):
     """A building's earlier roof, with points (n, 3) of both surveys.
 
-    Points are in the roof's frame, `old` is None where unknown.
+    Points are in the roof's frame, `old` is None where unknown. `ground` (m, 3) are places around
+    it in the world, and how much higher the new ground lies there.
     """
 
     roof: Roof
     old: np.ndarray | None
     new: np.ndarray
+    ground: np.ndarray = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
 class SurveyShift:
     """How far (x, y, z in m) the new survey lies beside the earlier one.
 
-    `sigma` has the standard deviations.
-
-    `roofs` tell of it, and `noise` is what is left between unchanged ones.
+    `sigma` has the standard deviations. `agreeing` of so many `roofs` lie where the shift puts
+    them, and the ground at so many `places` shows it, by `ground` (m). `tilt` (m) is how much
+    higher one end of the area lies than the other. With a `doubt`, a sentence, the shift is not
+    applied. `noise` is what is left between unchanged roofs.
     """
 
     xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sigma: tuple[float, float, float] = (PRIOR_M, PRIOR_M, ROOF_ERROR_M)
     roofs: int = 0
+    agreeing: int = 0
+    places: int = 0
+    ground: float = 0.0
+    tilt: float = 0.0
+    doubt: str = ""
     noise: SurveyNoise = field(default_factory=SurveyNoise)
 
     @property
     def clear_xyz(self) -> np.ndarray:
         """What (3,) is taken off the new points: the shift where it is clear."""
         xyz, sigma = np.array(self.xyz), np.array(self.sigma)
-        return np.where(np.abs(xyz) > CLEAR_SIGMAS * sigma, xyz, 0.0)
+        return np.where((np.abs(xyz) > CLEAR_SIGMAS * sigma) & (not self.doubt), xyz, 0.0)
+
+    @property
+    def rests_on(self) -> str:
+        """What the shift rests on, in words."""
+        roofs = f"{self.agreeing} of {self.roofs} sampled roofs"
+        return f"the ground at {self.places} places and {roofs}" if self.places else roofs
 
     def to_dict(self) -> dict[str, Any]:
         """Return the shift for JSON."""
@@ -89,10 +128,56 @@ class SurveyShift:
     @staticmethod
     def from_dict(record: dict[str, Any]) -> SurveyShift:
         """Read what `to_dict` gave."""
-        noise = SurveyNoise(**record["noise"])
-        return SurveyShift(
-            tuple(record["xyz"]), tuple(record["sigma"]), int(record["roofs"]), noise
+        names = [item.name for item in dataclasses.fields(SurveyShift)]
+        values = {name: record[name] for name in names}
+        for name in ("xyz", "sigma"):
+            values[name] = tuple(values[name])
+        return SurveyShift(**values | {"noise": SurveyNoise(**values["noise"])})
+
+    def warn(self, name: str) -> None:
+        """Warn (InputWarning) of what the shift of the survey `name` does not explain."""
+        if self.doubt:
+            warnings.warn(
+                f"{name}: {self.doubt}; no shift is taken off. If the survey is shifted, pass it "
+                "with --shift EAST,NORTH,UP",
+                InputWarning,
+            )
+        elif 2 * self.agreeing < self.roofs and self.places:
+            warnings.warn(
+                f"{name}: {self.roofs - self.agreeing} of {self.roofs} sampled roofs lie elsewhere "
+                "than the ground between the surveys, so they count as changed; if the ground is "
+                "wrong, pass the shift of the survey with --shift EAST,NORTH,UP",
+                InputWarning,
+            )
+        if self.tilt:
+            warnings.warn(
+                f"{name}: the surveys are tilted to each other, by {self.tilt:.2f} m from one end "
+                "to the other. No tilt is taken off, so smaller changes of height are not found; "
+                "correct the heights of the strips for these",
+                InputWarning,
+            )
+
+
+def read_shift(text: str) -> tuple[float, float, float] | None:
+    """Return the shift that a user gives, None where it is to be estimated.
+
+    Raises SettingsError for anything else.
+
+    >>> read_shift("auto"), read_shift("off"), read_shift("0.1,-0.2,43")
+    (None, (0.0, 0.0, 0.0), (0.1, -0.2, 43.0))
+    """
+    if text in ("auto", "off"):
+        return None if text == "auto" else (0.0, 0.0, 0.0)
+    try:
+        x, y, z = map(float, text.split(","))
+    except ValueError:
+        x = y = z = math.nan
+    if not all(map(math.isfinite, (x, y, z))):
+        raise SettingsError(
+            f"expected --shift auto, off or three numbers such as 0.1,-0.2,0.05, got {text!r:.40}; "
+            "they are metres to the east, to the north and up"
         )
+    return x, y, z
 
 
 def draw_buildings(plan: WorkPlan) -> set[int]:
@@ -109,18 +194,115 @@ def draw_buildings(plan: WorkPlan) -> set[int]:
     return {jobs[k].index for k in order[:ENOUGH_ROOFS]}
 
 
-def register_surveys(samples: Iterable[SampledRoof]) -> SurveyShift:
-    """Estimate the shift of the new points of `samples` from the earlier ones."""
-    samples = list(samples)
-    rows = [row for row in map(make_rows, samples) if len(row[0])]
-    if not rows:
-        return SurveyShift()
-    shift, sigma = solve_shift(rows)
-    found = SurveyShift(
-        tuple(np.round(shift, 4).tolist()), tuple(np.round(sigma, 4).tolist()), len(rows)
+def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> SurveyShift:
+    """Estimate the shift of the new points of `samples` from the earlier ones.
+
+    `read` may fix it, and bounds it.
+    """
+    samples, fixed = list(samples), read_shift(read.shift)
+    pairs = [(sample, make_rows(sample)) for sample in samples]
+    pairs = [(sample, row) for sample, row in pairs if len(row[0])]
+    if not pairs:
+        return SurveyShift() if fixed is None else SurveyShift(fixed, (0.0, 0.0, 0.0))
+    rows = [rows for _, rows in pairs]
+    ground = measure_ground(samples)
+    heights = [float(np.median(residuals)) for _, residuals in rows]
+    start = float(np.median(ground[:, 2])) if len(ground) else float(np.median(heights))
+    shift, sigma = (
+        solve_shift(rows, start, bool(len(ground)))
+        if fixed is None
+        else (np.array(fixed), np.zeros(3))
     )
-    moved = [s._replace(new=s.new - found.clear_xyz) for s in samples]
-    return dataclasses.replace(found, noise=measure_noise(moved))
+    offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
+    is_agreeing = np.abs(offsets) < SHIFT_SCALES_M[-1]
+    result = SurveyShift(
+        tuple(np.round(shift, 4).tolist()),
+        tuple(np.round(sigma, 4).tolist()),
+        len(rows),
+        int(is_agreeing.sum()),
+        len(ground),
+        round(start, 4) if len(ground) else 0.0,
+        measure_tilt(ground if len(ground) else place_roofs(pairs, offsets)[is_agreeing]),
+    )
+    areas = np.array([sample.roof.outline.area for sample, _ in pairs])
+    if fixed is None:
+        share = float(areas[is_agreeing].sum() / areas.sum())
+        doubt = find_doubt(result, share, float(np.median(heights)), read.largest_shift_m)
+        result = dataclasses.replace(result, doubt=doubt)
+    moved = [sample._replace(new=sample.new - result.clear_xyz) for sample, _ in pairs]
+    offsets = offsets + shift[2] - result.clear_xyz[2]
+    unchanged = [
+        s for s, value in zip(moved, offsets, strict=True) if abs(value) < SHIFT_SCALES_M[-1]
+    ]
+    noise = measure_noise(unchanged)
+    tilted = max(noise.roof, round(result.tilt / math.sqrt(12), 4))  # of evenly spread places
+    return dataclasses.replace(result, noise=dataclasses.replace(noise, roof=tilted))
+
+
+def measure_ground(samples: list[SampledRoof]) -> np.ndarray:
+    """Return places (n, 3), and how much higher the new ground lies there."""
+    places = [np.median(s.ground, axis=0) for s in samples if len(s.ground)]
+    return np.array(places).reshape(-1, 3)
+
+
+def place_roofs(pairs: list[tuple[SampledRoof, Any]], off: np.ndarray) -> np.ndarray:
+    """Return places (n, 3) of roofs that lie `off` (n,) from where a shift puts them."""
+    origins = np.array([sample.roof.frame.origin[:2] for sample, _ in pairs])
+    return np.column_stack([origins, off])
+
+
+def measure_tilt(places: np.ndarray) -> float:
+    """Return by how much (m) heights at `places` (n, 3) rise across them.
+
+    It is 0 where that is unclear.
+
+    >>> x, y = np.meshgrid(np.arange(5) * 50.0, np.arange(5) * 50.0)
+    >>> measure_tilt(np.column_stack([x.ravel(), y.ravel(), 0.002 * x.ravel()]))
+    0.4
+    """
+    if len(places) < FEWEST_TILT_PLACES:
+        return 0.0
+    xy, z = places[:, :2] - places[:, :2].mean(axis=0), places[:, 2]
+    design, weight = np.column_stack([xy, np.ones(len(xy))]), np.ones(len(xy))
+    for _ in range(10):
+        normal = design.T @ (weight[:, None] * design)
+        if np.linalg.cond(normal) > 1e12:
+            return 0.0  # in a line
+        plane = np.linalg.solve(normal, design.T @ (weight * z))
+        misfit = z - design @ plane
+        scatter = max(1.4826 * float(np.median(np.abs(misfit))), LEAST_M / 2)
+        weight = np.maximum(1 - (misfit / (4 * scatter)) ** 2, 0.0) ** 2
+    rise = float(np.ptp(xy @ plane[:2]))
+    covariance = scatter**2 * np.linalg.inv(normal)[:2, :2]
+    sigmas = math.sqrt(plane[:2] @ np.linalg.solve(covariance, plane[:2]))
+    return round(rise, 4) if rise > LEAST_TILT_M and sigmas > TILT_SIGMAS else 0.0
+
+
+def find_doubt(estimate: SurveyShift, share: float, roofs_m: float, largest_m: float) -> str:
+    """Return why a shift is not to be taken off, "" where nothing speaks against it.
+
+    `share` of the roofs' area lies where the shift puts it, `roofs_m` is the roofs' median height.
+    """
+    z, lies = estimate.xyz[2], f"({', '.join(f'{value:+.2f}' for value in estimate.xyz)}) m"
+    is_shared = share >= CARRIED_BESIDE_GROUND and abs(z - estimate.ground) <= SAME_HEIGHT_M
+    if estimate.places and not is_shared:
+        return (
+            f"expected ground and roofs to lie alike between the surveys, got the ground "
+            f"{estimate.ground:+.2f} m higher, and the roofs {roofs_m if share < 0.5 else z:+.2f} m"
+        )
+    if not estimate.clear_xyz.any():
+        return ""
+    if max(map(abs, estimate.xyz)) > largest_m:
+        return (
+            f"expected surveys within {largest_m:g} m of each other (read.largest_shift_m), got "
+            f"{lies} by {estimate.rests_on}"
+        )
+    if not estimate.places and (estimate.agreeing < FEWEST_ROOFS or share < CARRIED_ALONE):
+        return (
+            f"expected a shift that most of {FEWEST_ROOFS} roofs or more show where there is no "
+            f"ground, got {lies} by {estimate.rests_on}"
+        )
+    return ""
 
 
 def make_rows(sample: SampledRoof) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +310,7 @@ def make_rows(sample: SampledRoof) -> tuple[np.ndarray, np.ndarray]:
 
     What the earlier roof itself is off its own points is taken off.
     """
-    roof, old, new = sample
+    roof, old, new, _ = sample
     inner = shrink_outline(roof.outline)
     points, residuals = select_inner(roof, inner, new)
     if old is not None:
@@ -141,16 +323,21 @@ def make_rows(sample: SampledRoof) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([-slopes, np.ones(len(slopes))])[known], residuals[known]
 
 
-def solve_shift(rows: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def solve_shift(
+    rows: list[tuple[np.ndarray, np.ndarray]], start_m: float, has_ground: bool
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the shift (3,) and its standard deviations from the rows of buildings.
 
     Every building has the weight of one observation of ROOF_ERROR_M; errors of its points go
-    together, so the variance is that between buildings (a sandwich estimate).
+    together, so the variance is that between buildings (a sandwich estimate). The height begins at
+    `start_m`. That of the ground is one more observation, and is held in the coarse steps.
     """
-    prior = np.diag([PRIOR_M**-2, PRIOR_M**-2, 0.0])
-    heights = [float(np.median(residuals)) for _, residuals in rows]
-    shift = np.array([0.0, 0.0, float(np.median(heights))])
+    shift = np.array([0.0, 0.0, start_m])
+    if has_ground:
+        rows = [*rows, (np.array([[0.0, 0.0, 1.0]]), np.array([start_m]))]
     for scale in (*SHIFT_SCALES_M, *SHIFT_SCALES_M[-1:] * 2):
+        is_held = has_ground and scale > SHIFT_SCALES_M[-1]
+        prior = np.diag([PRIOR_M**-2, PRIOR_M**-2, HELD_WEIGHT if is_held else 0.0])
         normal, right, gradients = prior.copy(), np.zeros(3), []
         for design, residuals in rows:
             misfit = residuals - design @ shift
@@ -159,7 +346,7 @@ def solve_shift(rows: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, 
             normal += design.T @ (weight[:, None] * design)
             gradients.append(design.T @ (weight * misfit))
             right += gradients[-1]
-        right -= prior @ shift
+        right -= prior @ (shift - [0.0, 0.0, start_m])
         inverse = np.linalg.inv(normal + 1e-9 * np.eye(3))
         shift = shift + inverse @ right
     between = np.array(gradients).T @ np.array(gradients) + prior
@@ -177,11 +364,11 @@ def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
         return usual
     scatter, differences, middles, strays = [], [], [], []
     for sample in samples:
-        c = compare_points(*sample, usual)
+        c = compare_points(sample.roof, sample.old, sample.new, usual)
         compared = c.is_compared
         if compared.sum() < 4:
             continue
-        d, expected = c.difference[compared], c.sigma[compared] ** 2 - usual.cell**2
+        d, expected = c.difference[compared], c.sigma[compared] ** 2 - usual.variance
         middles.append(float(np.median(d)))
         differences.append((d - middles[-1]) ** 2 / 0.455 - expected)
         strays.append(float(flag_cells(c).sum() / compared.sum()))
@@ -194,7 +381,8 @@ def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
     usual_strays = np.sort(strays)[: max(1, round((1 - CHANGED_SHARE) * len(strays)))]
     values = {"point": point, "cell": cell, "roof": max(middle, LEAST_M)}
     rounded = {name: round(max(float(v), LEAST_M), 4) for name, v in values.items()}
-    return SurveyNoise(**rounded, stray=round(float(np.mean(usual_strays)), 5))
+    stray = min(float(np.mean(usual_strays)), MOST_STRAY)
+    return SurveyNoise(**rounded, stray=round(stray, 5))
 
 
 def measure_scatter(points: np.ndarray, number: np.ndarray, roof: Roof) -> float:

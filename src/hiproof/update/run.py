@@ -22,7 +22,7 @@ from ..write.head import FileHead, UpdateHead
 from .before import prepare_surveys, remove_earlier_points
 from .change_tables import write_changes
 from .dates import find_survey_date
-from .earlier import EarlierRun, choose_read_settings, read_earlier
+from .earlier import choose_read_settings, read_earlier
 from .epochs import SURVEYS_FILE, Surveys
 from .outside import CELLS_FOLDER, load_roofs_outside
 from .plan import make_update_plan
@@ -72,7 +72,7 @@ def update_area(
             "surveys, got none; restore them where run.json names them, or leave out --refine"
         )
     settings = choose_read_settings(earlier.settings).replace(changes or {})
-    date = find_survey_date(request.clouds, request.date)
+    date = find_survey_date(request.clouds, request.date, earlier.date)
     request = dataclasses.replace(
         request, settings=settings, date=date, overrides=request.overrides or earlier.overrides
     )
@@ -96,7 +96,7 @@ def update_area(
     with hold_folder(state), collect_rarely():
         summary = reconstruct_in_folder(request, state, progress, steps)
         remove_earlier_points(state)
-        return report_changes(request, earlier, state, summary)
+        return report_changes(request, state, summary)
 
 
 def refuse_same_folder(request: UpdateRequest) -> None:
@@ -108,9 +108,7 @@ def refuse_same_folder(request: UpdateRequest) -> None:
         )
 
 
-def report_changes(
-    request: UpdateRequest, earlier: EarlierRun, state: Path, summary: Summary
-) -> UpdateSummary:
+def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> UpdateSummary:
     """Write the tables of changes and complete run.json."""
     surveys, out = Surveys.load(state / SURVEYS_FILE), Path(request.out)
     found, files = write_changes(out)
@@ -130,17 +128,16 @@ def report_changes(
         dict(sorted(Counter(roof["kind"] for roof in outside).items())),
         files,
     )
-    add_to_record(request, earlier, result)
+    add_to_record(request, result)
     return result
 
 
-def add_to_record(request: UpdateRequest, earlier: EarlierRun, result: UpdateSummary) -> None:
+def add_to_record(request: UpdateRequest, result: UpdateSummary) -> None:
     """Add what is peculiar to an update to run.json."""
     surveys = result.surveys
     entries = {
         "run": str(request.run),
         "survey_date": surveys.date,
-        "footprint_shift": list(earlier.footprint_shift),
         "significance": surveys.significance,
         "significance_over": surveys.over,
         "largest_chance": surveys.largest_chance,

@@ -26,7 +26,7 @@ from ..errors import InputError
 from ..garbage import collect_rarely
 from ..write.files import save_text
 from .best import EPOCHS_FILE, load_shifts
-from .epochs import select_roof
+from .epochs import compare_ground, find_ground, select_roof
 from .register import SampledRoof, SurveyShift, draw_buildings, register_surveys
 from .tile import solve_best_tile, sort_epoch
 
@@ -46,7 +46,7 @@ def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -
     names = tuple(sorted(set(request.epochs), reverse=True))
 
     def prepare(plan: WorkPlan, _: Any, __: Progress) -> None:
-        shifts = register_epochs(state, plan, names, request.terrain)
+        shifts = register_epochs(state, plan, names, request)
         record = {name: shift.to_dict() for name, shift in shifts.items()}
         save_text(state / EPOCHS_FILE, json.dumps(record) + "\n")
 
@@ -62,14 +62,18 @@ def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -
 
 
 def register_epochs(
-    state: Path, plan: WorkPlan, names: tuple[str, ...], terrain: str | None
+    state: Path, plan: WorkPlan, names: tuple[str, ...], request: Request
 ) -> dict[str, SurveyShift]:
     """Return how far each survey but the newest lies beside that one."""
     samples: dict[str, list[SampledRoof]] = {name: [] for name in names[1:]}
-    for roofs in draw_roofs(state, plan, names, terrain):
+    for roofs in draw_roofs(state, plan, names, request.terrain):
         for name, sample in roofs.items():
             samples[name].append(sample)
-    return {name: register_surveys(found) for name, found in samples.items()}
+    read = request.settings.read
+    shifts = {name: register_surveys(found, read) for name, found in samples.items()}
+    for name, shift in shifts.items():
+        shift.warn(f"survey {name}")
+    return shifts
 
 
 def draw_roofs(
@@ -92,8 +96,14 @@ def draw_roofs(
                 points = {
                     name: to_local(select_roof(view, job).points) for name, view in views.items()
                 }
+                ground = find_ground(views[names[0]], job)
                 yield {
-                    name: SampledRoof(building.roof, points[names[0]], points[name])
+                    name: SampledRoof(
+                        building.roof,
+                        points[names[0]],
+                        points[name],
+                        compare_ground(ground, views[name], job),
+                    )
                     for name in names[1:]
                 }
 

@@ -58,6 +58,8 @@ BEGINNING = (Change.CHANGED, Change.NEW)  # the roof as it is begins with the su
 TESTED = (Change.CHANGED, Change.UNCHANGED, Change.UNCERTAIN, Change.GONE)
 """Classes of buildings that were tested; others have too few points."""
 
+SHIFT_DIGITS = 3  # of footprints: millimetres
+
 BARE_SHARE = 0.5
 """Share of an outline that has to lie bare before, for a building to be built since."""
 
@@ -180,10 +182,16 @@ class Updater:
         return refine_building(earlier, old, new, self.surveys.date)
 
     def reconstruct(self, job: Job, member: UpdateMember) -> Building:
-        """Return a building made of the new points and its override."""
-        override = self.overrides.get(job.index)
-        new, _ = solve_one(self.plan, job, self.epochs.new, override, self.keep)
-        return dataclasses.replace(new, shift=member.shift)
+        """Return a building made of the new points and its override.
+
+        Where its outline is new, that is moved onto its roof, as in every run.
+        """
+        override, new = self.overrides.get(job.index), self.epochs.new
+        if member.is_same_outline:
+            new = new.without_moving()
+        building, _ = solve_one(self.plan, job, new, override, self.keep)
+        x, y = np.add(member.shift, building.shift).round(SHIFT_DIGITS).tolist()
+        return dataclasses.replace(building, shift=(x, y))
 
     def follow_verdict(
         self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
@@ -207,10 +215,12 @@ class Updater:
             places = self.name_places(earlier, moved, verdict)
             return self.mark(moved, verdict, places, member, list(range(len(moved.parts))))
         new = self.reconstruct(job, member)
+        z_ground = earlier.z_ground - frame.origin[2]
         if new.built is None or not explains(
-            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict
+            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, z_ground
         ):
-            return self.mark(earlier, verdict, self.name_places(earlier, None, verdict), member)
+            verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
+            return self.mark(earlier, verdict, record_places(name_doubts(verdict), frame), member)
         points = select_roof(self.epochs.new, job).points
         result, lineage = continue_parts(earlier, new, self.near_m, points)
         places = self.name_places(earlier, result, verdict)

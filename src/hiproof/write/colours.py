@@ -38,6 +38,7 @@ CHANGE_COLOURS = {
     "not_covered": "#b5b5b5",
     "outside": "#66aaee",
 }
+UNCHANGED_COLOUR = "#ffffff"  # beside those, in pages that show all buildings
 SURVEY_COLOURS = {"before": "#05429b", "after": "#b84f0c"}  # points of an update's two surveys
 NO_MODEL = "no model"
 STATUS_COLOURS = {

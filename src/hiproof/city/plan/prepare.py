@@ -199,7 +199,7 @@ def jobs_from_footprints(
     """
     from .frame import plan_bounds
     from .overlap import check_overlap
-    from .registration import find_registration, is_registered, warn_if_moved
+    from .registration import register_footprints
 
     footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
     check_number_columns(footprints, settings.read)
@@ -212,15 +212,10 @@ def jobs_from_footprints(
         check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
     is_part = settings.read.by_class and (request.where or request.bbox)
     data_set = all_footprints(request, frame, headers) if is_part else footprints
-    registration = (
-        find_registration(data_set, headers, frame.units, settings)
-        if is_registered(settings)
-        else None
+    registration = register_footprints(
+        data_set, headers, frame.units, settings, str(request.footprints)
     )
-    shift = (0.0, 0.0)
-    if registration is not None:
-        warn_if_moved(registration, str(request.footprints))
-        shift = registration.shift
+    shift = registration.shift if registration else (0.0, 0.0)
     areas = [
         make_job(0, footprint, shift).area for footprint in select_neighbours(footprints, data_set)
     ]

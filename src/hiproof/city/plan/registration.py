@@ -43,12 +43,22 @@ CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
 Cell = tuple[int, int]
 
 
-def is_registered(settings: Settings) -> bool:
-    """Return whether footprints of a run with these settings are registered.
+def register_footprints(
+    footprints: tuple[Footprint, ...],
+    headers: list[PointFileHeader],
+    units: Units,
+    settings: Settings,
+    path: str,
+) -> Registration | None:
+    """Estimate the common shift of footprints; warn where it is clear.
 
-    They are where classes mark roof points.
+    `path` is that of their file. None where it is not looked for: it is where classes mark roofs.
     """
-    return settings.reconstruct.align != "off" and settings.read.by_class
+    if settings.reconstruct.align == "off" or not settings.read.by_class:
+        return None
+    registration = find_registration(footprints, headers, units, settings)
+    warn_if_moved(registration, path)
+    return registration
 
 
 def find_registration(

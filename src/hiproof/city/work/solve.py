@@ -5,6 +5,7 @@ Their parts of the output files are left ready to be joined.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import threading
@@ -109,9 +110,20 @@ class Surroundings:
         return ground_cells(self.points["ground"])
 
     @functools.cached_property
+    def ground_grid(self) -> PointGrid:
+        """All ground points by place."""
+        return PointGrid(self.points["ground"])
+
+    @functools.cached_property
     def low(self) -> Cells:
         """The lowest points of other classes by cell."""
         return Cells(lowest_in_cells(self.points["low"]))
+
+    def without_moving(self) -> Surroundings:
+        """Return the same surroundings, where footprints stay in place."""
+        result = copy.copy(self)
+        result.plan = dataclasses.replace(self.plan, settings=self.settings)
+        return result
 
     def find_row_shift(self, job: Job) -> Shift:
         """Return the shift of a job's area from its roof, that of its whole row."""

@@ -1,0 +1,130 @@
+"""Parts of houses that were pulled down, at any density, and models that stay for better ones."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+from run_records import by_id
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+
+KEPT = {"house-0": 0.55, "house-2": 0.75, "house-3": 0.45}  # share of the length that stays
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The folder of a run over the tiny town."""
+    folder, town = tmp_path_factory.mktemp("run"), make_town(density=8.0)
+    cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
+    outlines = write_footprints(folder / "outlines.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
+    return folder / "models"
+
+
+def update(run, out, town, **options):
+    cloud = str(write_cloud(out.with_suffix(".laz"), town.xyz, town.classification))
+    parameters = str(run / "parameters.jsonl")
+    request = UpdateRequest((cloud,), out, run=run, run_parameters=parameters, date="2024-05-01")
+    update_area(dataclasses.replace(request, **options))
+    return by_id(out)
+
+
+def lay_bare(town, id, kept):
+    """Pull down the eastern end of a house; return its area."""
+    x0, y0, x1, y1 = town.footprints[id].bounds
+    end = shapely.box(x0 + kept * (x1 - x0), y0, x1, y1)
+    gone = shapely.intersects_xy(end, *town.xyz[:, :2].T)
+    rng = np.random.default_rng(3)
+    town.xyz[gone, 2] = ORIGIN[2] + 0.01 * (town.xyz[gone, 0] - ORIGIN[0])
+    town.xyz[gone, 2] += rng.normal(0, 0.03, gone.sum())
+    town.classification[gone] = 2
+    return end.area
+
+
+def take_kind(row):
+    change = row.get("change")
+    return "unchanged" if change is None else (change["places"] or [{"kind": None}])[0]["kind"]
+
+
+@pytest.mark.parametrize("density", [2.0, 4.0, 12.0, 24.0])
+def test_what_lies_bare_is_lost_at_any_density(run, density, tmp_path):
+    town = make_town(seed=7, density=density)
+    areas = {id: lay_bare(town, id, kept) for id, kept in KEPT.items()}
+    before, after = by_id(run), update(run, tmp_path / "out", town)
+    kinds = {id: take_kind(row) for id, row in after.items()}
+    assert kinds == {"house-1": "unchanged"} | dict.fromkeys(KEPT, "part_removed")
+    for id, area in areas.items():
+        place = after[id]["change"]["places"][0]
+        assert place["area"] == pytest.approx(area, rel=0.2 if density > 2 else 0.3), id
+        assert after[id]["change"]["class"] == "changed"
+        outlines = [
+            shapely.Polygon(row["parts"][0]["outlines"][0][0]) for row in (before[id], after[id])
+        ]
+        assert outlines[0].area - outlines[1].area == pytest.approx(area, rel=0.25), id
+
+
+@pytest.mark.parametrize("density", [0.5, 0.7, 1.0, 1.5])
+def test_a_sparse_survey_covers_what_it_covers(run, density, tmp_path):
+    town = make_town(seed=8, density=density)
+    lay_bare(town, "house-2", 0.0)
+    up = shapely.intersects_xy(town.footprints["house-1"], *town.xyz[:, :2].T)
+    town.xyz[up & (town.classification == 6), 2] += 2.0
+    west = town.xyz[:, 0] < ORIGIN[0] + 90.0
+    town = dataclasses.replace(town, xyz=town.xyz[west], classification=town.classification[west])
+    after = update(run, tmp_path / "out", town)
+    classes = {
+        id: (row.get("change") or {"class": "unchanged"})["class"] for id, row in after.items()
+    }
+    assert classes == {
+        "house-0": "unchanged",
+        "house-1": "changed",
+        "house-2": "gone",
+        "house-3": "not_covered",
+    }
+
+
+def test_a_model_stays_where_a_crown_hides_its_roof(run, tmp_path):
+    """The crown is smooth, in the class of buildings: on its points no roof is better."""
+    town = make_town(seed=7, density=12.0)
+    x0, _, x1, _ = town.footprints["house-1"].bounds
+    x, y, z = town.xyz.T
+    inside = shapely.intersects_xy(town.footprints["house-1"], x, y) & (x > x0 + 0.3 * (x1 - x0))
+    rng = np.random.default_rng(4)
+    waves = np.sin(1.7 * x[inside]) + np.cos(1.3 * y[inside])
+    town.xyz[inside, 2] = z[inside].max() + 3.0 + 1.5 * waves + rng.normal(0, 0.3, inside.sum())
+    before, after = by_id(run)["house-1"], update(run, tmp_path / "out", town)["house-1"]
+    assert after["change"]["class"] == "uncertain"
+    assert after["parts"] == before["parts"]
+
+
+def test_most_houses_may_grow_while_the_survey_is_shifted(run, tmp_path):
+    town = make_town(seed=7)
+    for id in ("house-0", "house-1", "house-3"):
+        up = shapely.intersects_xy(town.footprints[id], *town.xyz[:, :2].T)
+        town.xyz[up & (town.classification == 6), 2] += 2.8
+    town.xyz[:, 2] += 0.3
+    with pytest.warns(UserWarning, match="3 of 4 sampled roofs lie elsewhere than the ground"):
+        after = update(run, tmp_path / "out", town)
+    raised = dict.fromkeys(("house-0", "house-1", "house-3"), "roof_raised")
+    assert {id: take_kind(row) for id, row in after.items()} == {"house-2": "unchanged"} | raised
+    for id in raised:
+        place = after[id]["change"]["places"][0]
+        assert place["difference"] == pytest.approx(2.8, abs=0.05)
+
+
+def test_copies_of_an_outline_are_the_same_building(run, tmp_path):
+    town, outlines = make_town(seed=7), {}
+    for id, outline in town.footprints.items():
+        outlines[id] = outline
+        outlines[f"copy of {id}"] = shapely.transform(outline, lambda xy: xy + 1e-9)
+    path = str(write_footprints(tmp_path / "copies.gpkg", outlines))
+    with pytest.warns(UserWarning, match="4 copies of other footprints are left out"):
+        after = update(run, tmp_path / "out", town, footprints=path, id_attribute="id")
+    assert {id: take_kind(row) for id, row in after.items()} == dict.fromkeys(
+        town.footprints, "unchanged"
+    )

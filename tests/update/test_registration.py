@@ -1,0 +1,129 @@
+"""Two surveys registered to each other: by the ground first, and by roofs that agree with it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hiproof import SettingsError
+from hiproof.frames import LocalFrame
+from hiproof.settings import ReadSettings
+from hiproof.simulate import random_building
+from hiproof.update.register import SampledRoof, SurveyShift, read_shift, register_surveys
+
+READ = ReadSettings()
+SIDE_M = 190.0
+
+
+def scan(rng, roof, density=8.0):
+    """Points over a roof, with the noise of a scanner."""
+    x0, y0, x1, y1 = roof.outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
+    z = roof.height_at(xy)
+    return np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))])[np.isfinite(z)]
+
+
+def draw_samples(seed, rises, shift=(0.0, 0.0, 0.0), has_ground=True, tilt=0.0):
+    """Roofs that rose by `rises`, in surveys that lie beside each other by `shift`."""
+    rng, samples = np.random.default_rng(seed), []
+    for rise in rises:
+        place = rng.uniform(0, SIDE_M, 2)
+        roof = random_building(rng).roof
+        roof = dataclasses.replace(roof, frame=LocalFrame(np.array([*place, 0.0])))
+        leaning = tilt * place[0] / SIDE_M
+        new = scan(rng, roof) + shift + np.array([0.0, 0.0, rise + leaning])
+        around = place + rng.uniform(-15, 15, (80 * has_ground, 2))
+        dz = shift[2] + leaning + rng.normal(0, 0.04, len(around))
+        samples.append(SampledRoof(roof, scan(rng, roof), new, np.column_stack([around, dz])))
+    return samples
+
+
+def draw_rises(seed, count, share):
+    rng = np.random.default_rng(seed)
+    return np.where(np.arange(count) < round(share * count), rng.uniform(0.4, 3.2, count), 0.0)
+
+
+@pytest.mark.parametrize("shift_z", [0.0, 0.3, -0.6])
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.6, 0.75])
+@pytest.mark.parametrize("seed", range(3))
+def test_however_many_houses_grow_the_shift_is_that_of_the_ground(seed, share, shift_z):
+    shift = (0.1, -0.15, shift_z)
+    found = register_surveys(draw_samples(seed, draw_rises(seed, 20, share), shift), READ)
+    assert not found.doubt
+    assert found.clear_xyz[2] == pytest.approx(shift_z, abs=0.03)
+    assert np.abs(np.array(found.xyz) - shift).max() < 0.06
+    assert (found.roofs, found.agreeing, found.places) == (20, 20 - round(20 * share), 20)
+    assert found.noise.roof < 0.05
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("rise", [3.0, 0.4])
+def test_a_change_of_all_houses_is_no_shift(count, rise):
+    found = register_surveys(draw_samples(1, [rise] * count), READ)
+    assert found.clear_xyz[2] == 0.0
+    assert "expected ground and roofs to lie alike" in found.doubt
+
+
+def test_a_shift_that_no_roof_shares_with_the_ground_is_not_taken_off():
+    with pytest.warns(UserWarning, match=r"the ground \+0\.30 m higher.*--shift"):
+        found = register_surveys(draw_samples(1, [2.0] * 4, (0.0, 0.0, 0.3)), READ)
+        found.warn("survey of 2024-05-01")
+    assert found.clear_xyz.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_where_most_roofs_lie_elsewhere_than_the_ground_a_warning_says_so():
+    found = register_surveys(draw_samples(2, draw_rises(2, 10, 0.6)), READ)
+    with pytest.warns(UserWarning, match="6 of 10 sampled roofs lie elsewhere than the ground"):
+        found.warn("survey of 2024-05-01")
+
+
+@pytest.mark.parametrize(
+    ("rises", "is_applied"),
+    [([0.5] * 12, True), ([0.5] * 3, False), ([0.9] * 7 + [0.0] * 5, False)],
+)
+def test_without_ground_most_of_many_roofs_have_to_carry_a_shift(rises, is_applied):
+    found = register_surveys(draw_samples(3, rises, has_ground=False), READ)
+    assert bool(found.clear_xyz.any()) is is_applied
+    assert bool(found.doubt) is not is_applied
+
+
+def test_a_shift_beyond_the_bound_is_not_taken_off():
+    samples = draw_samples(4, [0.0] * 10, (0.0, 0.0, 1.6))
+    found = register_surveys(samples, READ)
+    assert "within 1 m of each other (read.largest_shift_m)" in found.doubt
+    assert not found.clear_xyz.any()
+    found = register_surveys(samples, dataclasses.replace(READ, largest_shift_m=2.0))
+    assert found.clear_xyz[2] == pytest.approx(1.6, abs=0.03)
+
+
+@pytest.mark.parametrize(("text", "shift"), [("off", (0, 0, 0)), ("0,0.1,2.5", (0, 0.1, 2.5))])
+def test_a_shift_that_is_given_is_taken_off_as_it_is(text, shift):
+    read = dataclasses.replace(READ, shift=text)
+    for samples in (draw_samples(5, [0.0] * 9, (0.2, 0.0, 0.3)), []):
+        found = register_surveys(samples, read)
+        assert found.clear_xyz.tolist() == list(shift)
+        assert SurveyShift.from_dict(found.to_dict()) == found
+
+
+@pytest.mark.parametrize("text", ["", "on", "1,2", "1,2,nan", "1;2;3"])
+def test_a_shift_that_is_none_is_refused(text):
+    with pytest.raises(SettingsError, match="three numbers such as"):
+        read_shift(text)
+
+
+@pytest.mark.parametrize("has_ground", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tilt_is_seen_and_counts_as_noise(seed, has_ground):
+    level = register_surveys(draw_samples(seed, [0.0] * 36, has_ground=has_ground), READ)
+    assert level.tilt == 0.0
+    samples = draw_samples(seed, [0.0] * 36, has_ground=has_ground, tilt=0.3)
+    tilted = register_surveys(samples, READ)
+    assert tilted.tilt == pytest.approx(0.3, abs=0.06)
+    assert tilted.noise.roof > 0.07
+    with pytest.warns(UserWarning, match="surveys are tilted to each other, by 0.[23]"):
+        tilted.warn("survey of 2024-05-01")
+
+
+def test_what_a_shift_rests_on_is_said():
+    found = register_surveys(draw_samples(6, draw_rises(6, 10, 0.3)), READ)
+    assert found.rests_on == "the ground at 10 places and 7 of 10 sampled roofs"
