@@ -303,7 +303,6 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
-    monkeypatch.setattr("hiproof.read.decoded.MOST_HELD_POINTS", 0)  # as a larger file
     town = make_town()
     along = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz[along], town.classification[along])

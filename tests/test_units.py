@@ -282,7 +282,6 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
-    monkeypatch.setattr("hiproof.read.decoded.MOST_HELD_POINTS", 0)  # as larger files
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
     xyz, classes, origin = (
         FEET.from_metres(TOWN.xyz[along]),

@@ -25,7 +25,6 @@ from ..garbage import collect_rarely
 from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
 from ..progress import show_in_notebook
-from ..read.decoded import forget_points, hold_points
 from ..stages.recognise import asks_network, fits_one
 from ..status import Doubt
 from ..write.files import save_text
@@ -147,8 +146,7 @@ def reconstruct_in_folder(
     try:
         if ledger.get("merged") != "yes":
             executor.start()
-        with hold_points():  # for the step that sorts them
-            plan = resume_or_plan(request, state, ledger, progress, steps.make_plan)
+        plan = resume_or_plan(request, state, ledger, progress, steps.make_plan)
         if request.processes is None and not request.scheduler:
             executor = make_executor(count_processes(request, ledger))
         clock.lap("plan")
@@ -157,7 +155,6 @@ def reconstruct_in_folder(
         clock.lap("prepare")
         queue = Queue(plan, state, ledger, executor, request.clouds, request.terrain, progress)
         queue.work_off("sort", steps.sort_cloud)
-        forget_points()
         refuse_without_points(plan, ledger)
         clock.lap("sort")
         if ledger.open_tasks("solve"):
@@ -185,7 +182,6 @@ def reconstruct_in_folder(
             "command then goes on"
         ) from error
     finally:
-        forget_points()
         executor.close()
         with suppress(sqlite3.Error):
             ledger.interrupt()

@@ -3,12 +3,11 @@
 pointcloud    points of any kind of file, in chunks; `read_points`
 remote        files by address
 las           LAS, LAZ and COPC, checked against what their headers say
-las_points    the points of such a file, decoded by lazrs
+las_points    the points of such a file, decoded by laspy
 las_header    whether what such a file says of itself is possible
 geokeys       the reference system of its GeoTIFF keys
 las_crs       the one that its records define
 copc          nodes of a COPC file that meet a box
-decoded       decoded points, held until a file is read again
 runs          where the points of a file lie, run by run
 lax           LAStools' index beside a file
 ply           PLY files

@@ -14,9 +14,8 @@ import laspy
 import lazrs
 import numpy as np
 
-from .decoded import Decoded
 from .las_header import LasFacts, Octree
-from .las_points import SELECTION, take_fields
+from .las_points import SELECTION, Decoded, take_fields
 from .plausible import Implausible
 
 Box = tuple[float, float, float, float]

@@ -19,9 +19,8 @@ import numpy as np
 from ..errors import InputError, InputWarning
 from ..log import count_things
 from .copc import check_nodes, copc_points
-from .decoded import Decoded, decode_or_release, note_places
 from .las_header import LasFacts, check_all_points, check_points, read_facts
-from .las_points import read_points
+from .las_points import Decoded, read_points
 from .plausible import Implausible
 from .remote import is_url, open_binary
 from .runs import compute_run_boxes
@@ -93,16 +92,11 @@ def las_chunks(
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
         return
-    facts, lower, upper, left_out = (
-        read_checked_facts(path),
-        np.full(3, np.inf),
-        np.full(3, -np.inf),
-        0,
-    )
-    if noted is None and runs is None:
-        noted = note_places(path)
-    with translate_errors(path):
-        for points in decode_runs(path, chunk_points, facts, runs):
+    facts, left_out = read_checked_facts(path), 0
+    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
+    parts = [(0, facts.count)] if runs is None else runs.tolist()
+    with translate_errors(path), open_binary(path) as file:
+        for points in read_points(file, facts, parts, chunk_points):
             xyz = points.xyz
             lowest, highest = check_points(xyz, facts)
             lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
@@ -114,30 +108,6 @@ def las_chunks(
         if runs is None and facts.count:
             check_all_points(lower, upper, facts)
     log_withheld(left_out, path)
-
-
-def decode_runs(
-    path: str | Path, chunk_points: int, facts: LasFacts, runs: np.ndarray | None
-) -> Iterator[Decoded]:
-    """Yield the decoded points of the `runs` (k, 2), or of a whole file.
-
-    A whole file need not be decoded twice (decoded.py).
-    """
-    if runs is not None:
-        return decode(path, chunk_points, facts, runs.tolist())
-    whole = decode(path, chunk_points, facts, [(0, facts.count)])
-    return decode_or_release(path, chunk_points, facts.count, whole)
-
-
-def decode(
-    path: str | Path, chunk_points: int, facts: LasFacts, runs: list[tuple[int, int]]
-) -> Iterator[Decoded]:
-    """Yield the decoded `runs` of points, [first, end).
-
-    Each holds at most `chunk_points` points, and none is empty.
-    """
-    with open_binary(path) as file:
-        yield from read_points(file, facts, runs, chunk_points)
 
 
 def is_copc(path: str | Path) -> bool:

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import laspy
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
-from .decoded import Decoded
 from .las_header import LasFacts
 
 SELECTION = (
@@ -23,6 +22,14 @@ SELECTION = (
     | DecompressionSelection.FLAGS
 )
 """What is decompressed of points of formats 6 to 10; older formats come whole."""
+
+
+class Decoded(NamedTuple):
+    """Decoded points: coordinates (n, 3), classes (n,), and whether each is withheld (n,)."""
+
+    xyz: np.ndarray
+    classes: np.ndarray
+    is_withheld: np.ndarray
 
 
 def read_points(
@@ -51,6 +58,6 @@ def read_points(
 
 def take_fields(points: laspy.PackedPointRecord, facts: LasFacts) -> Decoded:
     """Take from the records of points what hiproof needs."""
-    steps = np.column_stack([points.X, points.Y, points.Z])
+    xyz = np.column_stack([points.X, points.Y, points.Z]) * facts.scales + facts.offsets
     classes = np.array(points.classification, np.uint8)
-    return Decoded(steps, classes, np.array(points.withheld, bool), facts.scales, facts.offsets)
+    return Decoded(xyz, classes, np.array(points.withheld, bool))

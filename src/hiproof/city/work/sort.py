@@ -26,7 +26,6 @@ from ...frames import Units
 from ...geometry.cell_kernel import mask_at
 from ...geometry.point_grid import PointGrid
 from ...model import PointCloud
-from ...read.decoded import is_held, take_places
 from ...read.las import is_copc
 from ...read.lax import read_lax
 from ...read.pointcloud import as_input_error, file_kind, iter_points, read_header
@@ -231,8 +230,6 @@ def sort_cloud(
     gatherer = Gatherer(reaches, plan.settings.read, root / "points" / epoch, number)
     noted = noted_file(root, number)
     result: list[np.ndarray] = []
-    if places := take_places(address):
-        save_run_boxes(noted, places, read_header(address).count)
     try:
         is_whole = watch is not None
         for cloud in wanted_points(address, reaches, plan.units, noted, result, is_whole):
@@ -279,7 +276,7 @@ def wanted_points(
     if is_copc(path):
         return points_by_squares(path, reaches, units)
     index = read_lax(path) or load_run_boxes(noted, header.count)
-    if index is None or is_held(path):
+    if index is None:
         return iter_points(path, units=units, noted=result)
     boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
     return iter_points(path, runs=index.find_runs(boxes), units=units)
