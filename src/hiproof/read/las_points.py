@@ -25,7 +25,7 @@ SELECTION = (
 
 
 class Decoded(NamedTuple):
-    """Decoded points: coordinates (n, 3), classes (n,), and whether each is withheld (n,)."""
+    """Coordinates (n, 3), classes (n,), and whether a point is withheld (n,)."""
 
     xyz: np.ndarray
     classes: np.ndarray

@@ -183,7 +183,7 @@ def add_layer(
     head: FileHead,
 ) -> None:
     """Add a layer of polygons, whose `geometries` are in world metres."""
-    there = shapely.transform(np.array(geometries, object), head.units.table.from_metres)
-    wkb = [None if g is None else g.wkb for g in there]
+    outlines = shapely.transform(np.array(geometries, object), head.units.table.from_metres)
+    wkb = [None if g is None else g.wkb for g in outlines]
     crs = plan_wkt(head.crs_of_files)
     write_layer(path, layer, columns, rows, wkb, crs=crs, **GEOPACKAGE, **OUTLINE_GEOMETRY)

@@ -41,7 +41,7 @@ def write_layer(
 
     pyogrio.set_gdal_config_options(CONFIGURATION)
     values = list(zip(*rows, strict=True)) or [()] * len(columns)
-    data = [make_column(of, kind) for of, kind in zip(values, columns.values(), strict=True)]
+    data = [make_column(*pair) for pair in zip(values, columns.values(), strict=True)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # on a file's hidden name, and on an unknown CRS
         pyogrio.raw.write(
