@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -196,13 +197,20 @@ def clip_plan(
         raise InputError(
             f"expected width and length, or outlines, of {label}, got neither; give the rectangle"
         )
-    u, v = 0.5 * parameters["length"], 0.5 * parameters["width"]
+    half = 0.5 * np.array([parameters["length"], parameters["width"]])
+    rim = np.array(CATALOGUE[kind].variant(parameters).rim) * half
+    return clip(place_plan(rim, position, kappa), outline)
+
+
+def place_plan(uv: np.ndarray, position: np.ndarray, kappa: float) -> shapely.Polygon:
+    """Return the polygon of corners (n, 2) along and across a part, about the origin."""
     c, s = math.cos(kappa), math.sin(kappa)
-    rim = CATALOGUE[kind].variant(parameters).rim
-    corners = np.array(rim) * (u, v) @ np.array([[c, s], [-s, c]]) + position[:2]
-    covered = shapely.intersection(
-        shapely.Polygon(corners), repair_polygons(outline), grid_size=1e-4
-    )
+    return shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
+
+
+def clip(area: shapely.Polygon, outline: shapely.Polygon) -> list[shapely.Polygon]:
+    """Return the polygons that an area covers of an outline."""
+    covered = shapely.intersection(area, repair_polygons(outline), grid_size=1e-4)
     return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
 
 
@@ -213,35 +221,22 @@ def by_teeth(
     kappa: float,
 ) -> list[shapely.Polygon]:
     """Return the outlines of a saw-tooth, cut between teeth."""
-    teeth, width = round(parameters["teeth"]), parameters["width"]
-    c, s = math.cos(kappa), math.sin(kappa)
-    edges = width * (np.arange(teeth + 1) / teeth - 0.5)
+    teeth, across = round(parameters["teeth"]), (-math.sin(kappa), math.cos(kappa))
+    edges = parameters["width"] * (np.arange(teeth + 1) / teeth - 0.5)
     edges[[0, -1]] = -FAR_M, FAR_M
     cut = []
     for outline in outlines:
-        v = (shapely.get_coordinates(outline) - position[:2]) @ (-s, c)
-        teeth_parts = [
-            k
-            for k in range(teeth)
-            if v.max() > edges[k] + SLACK_M and v.min() < edges[k + 1] - SLACK_M
+        v = (shapely.get_coordinates(outline) - position[:2]) @ across
+        strips = [
+            np.array([(-FAR_M, start), (FAR_M, start), (FAR_M, end), (-FAR_M, end)])
+            for start, end in pairwise(edges)
+            if v.max() > start + SLACK_M and v.min() < end - SLACK_M
         ]
-        if len(teeth_parts) < 2:
+        if len(strips) < 2:
             cut.append(outline)
             continue
-        for k in teeth_parts:
-            uv = np.array(
-                [
-                    (-FAR_M, edges[k]),
-                    (FAR_M, edges[k]),
-                    (FAR_M, edges[k + 1]),
-                    (-FAR_M, edges[k + 1]),
-                ]
-            )
-            strip = shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
-            result = shapely.get_parts(
-                shapely.intersection(strip, repair_polygons(outline), grid_size=1e-4)
-            )
-            cut += [g for g in result if g.geom_type == "Polygon"]
+        for strip in strips:
+            cut += clip(place_plan(strip, position, kappa), outline)
     return cut
 
 
