@@ -38,8 +38,8 @@ class Status(Enum):
 class Grade(Enum):
     """How good a model is, told from its points (evaluate/verdict.py)."""
 
-    GOOD = "the roof follows its points"
-    FAIR = "some of its points do not fit the roof"
+    GOOD = "the roof looks right over its points"
+    FAIR = "a part of the roof does not fit its points"
     POOR = "look at the building before you use it"
 
     @property
@@ -59,6 +59,7 @@ class Doubt(Enum):
     POINTS_ABOVE = "above the model"
     POINTS_BELOW = "below the model"
     UNSUPPORTED = "stand on hardly any point"
+    OTHER_SLOPE = "its points rise another way than the model"
     GROUND_ABOVE_EAVES = "m above its eaves"
     TERRAIN_UNLIKE_GROUND_POINTS = "the ground points around it"
     TERRAIN_WITHOUT_HEIGHTS = "holds values that are no heights"

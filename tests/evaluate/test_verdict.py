@@ -136,6 +136,38 @@ def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
     assert any(reason.endswith("m below the model") for reason in verdict.reasons)
 
 
+@pytest.mark.parametrize("side_m", [10.0, 30.0, 100.0])
+@pytest.mark.parametrize("off_m", [-2.0, 1.0, 2.5])
+def test_a_place_of_several_square_metres_off_the_roof_is_never_good(side_m, off_m):
+    """However large the building is."""
+    outline, good = shapely.box(0, 0, side_m, side_m), []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        xy = rng.uniform(0, side_m, (int(4 * side_m**2), 2))
+        middle = rng.uniform(3.0, side_m - 3.0, 2)
+        is_off = (abs(xy - middle) < 1.75).all(axis=1)
+        points = np.column_stack([xy, 6.0 + is_off * off_m + rng.normal(0, 0.05, len(xy))])
+        good.append(judge_model(block(6.0, outline), points).grade is Grade.GOOD)
+    assert not any(good)
+
+
+def test_points_off_along_the_outline_alone_do_not_count():
+    """Gutters and what stands beside the walls give a few there, on old houses many."""
+    rng = np.random.default_rng(6)
+    points = on_block(1200)
+    points[(points[:, 1] < 0.5) & (rng.random(1200) < 0.8), 2] -= 1.5
+    assert judge_model(block(), points).grade is Grade.GOOD
+
+
+@pytest.mark.parametrize("side_m", [12.0, 120.0])
+def test_a_gentle_slope_under_a_level_roof_is_not_good(side_m):
+    outline = shapely.box(0, 0, side_m, side_m)
+    xy = np.random.default_rng(7).uniform(0, side_m, (int(4 * side_m**2), 2))
+    points = np.column_stack([xy, 6.0 + 0.3 * (xy[:, 0] / side_m - 0.5)])
+    verdict = judge_model(block(6.0, outline), points)
+    assert verdict.grade is Grade.FAIR and "rise another way" in verdict.reasons[0]
+
+
 def test_half_a_building_without_points_is_poor_and_a_tenth_is_not():
     points = on_block(800)
     assert judge_model(block(), points[points[:, 0] < 6.0]).grade is Grade.POOR
