@@ -96,6 +96,4 @@ def reconstruct(
     building = open_passages(building, base, given)
     building = add_installations(building, points, settings)
     building = add_overhangs(building, surroundings, neighbours, settings)
-    for text in (of_footprint, site.remark):
-        building = add_remark(building, text)
-    return building
+    return add_remark(building, of_footprint, site.remark)

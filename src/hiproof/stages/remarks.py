@@ -8,15 +8,12 @@ from ..model import Building
 from ..status import Doubt
 
 
-def add_remark(building: Building, remark: str) -> Building:
-    """Add a remark to a building's detail."""
-    return (
-        dataclasses.replace(
-            building, detail=f"{building.detail or building.status.value}; {remark}"
-        )
-        if remark
-        else building
-    )
+def add_remark(building: Building, *remarks: str) -> Building:
+    """Add remarks to a building's detail; empty ones are none."""
+    if not any(remarks):
+        return building
+    detail = "; ".join(filter(None, (building.detail or building.status.value, *remarks)))
+    return dataclasses.replace(building, detail=detail)
 
 
 def without_doubt(detail: str, doubt: Doubt) -> str:

@@ -334,8 +334,7 @@ class Surroundings:
                 dataclasses.replace(building, detail=missing_points) if missing_points else building
             )
         return add_remark(
-            add_remark(building, remark_other_classes(points, roof)),
-            ground_under_roof(points, roof),
+            building, remark_other_classes(points, roof), ground_under_roof(points, roof)
         )
 
 
@@ -501,53 +500,30 @@ def solve_by_points(
     points = without_repeats(roof_points.points)
     in_use = thin_to_count(points, plan.settings.city.max_points_a_building)
     other_points = surroundings.select_other_points(job)
-    bare = surroundings.bare(job, roof_points, other_points)
-    building = reconstruct_job(job, points, in_use, bare, surroundings, override)
-    if len(in_use) < len(points):
-        building = add_full_density(building, len(in_use), len(points))
-    building = add_remark(add_remark(building, moved), roof_points.remark)
-    building = add_remark(building, surroundings.remark_terrain(job))
-    return add_remark(
-        surroundings.inspect(building, other_points, points), remark_missing_ground(building)
-    )
-
-
-def reconstruct_job(
-    job: Job,
-    points: np.ndarray,
-    used_points: np.ndarray,
-    bare: np.ndarray,
-    surroundings: Surroundings,
-    override: Override | None,
-) -> Building:
-    """Reconstruct a building from `used_points`, or by its override.
-
-    It is fitted to these and judged by all `points` (n, 3), noise over it included.
-
-    `bare` (m, 3) are points of bare ground inside its area.
-    """
     arguments = (
-        used_points,
+        in_use,
         job.footprint,
         surroundings.choose_terrain(job),
         surroundings.settings,
         job.id,
-        bare,
+        surroundings.bare(job, roof_points, other_points),
     )
     neighbours = surroundings.select_neighbours(job)
     if override is not None:
-        return overridden(override, *arguments, neighbours)
-    unused = np.concatenate(
-        [find_thinned_out(points, used_points), surroundings.select_noise(job, points)]
+        building = overridden(override, *arguments, neighbours)
+    else:
+        unused = surroundings.select_noise(job, points)
+        if len(in_use) < len(points):
+            thinned_out = points[~np.isin(hashes(points), hashes(in_use))]
+            unused = np.concatenate([thinned_out, unused])
+        building = reconstruct(*arguments, unused=unused, neighbours=neighbours)
+    if len(in_use) < len(points):
+        building = add_full_density(building, len(in_use), len(points))
+    terrain = surroundings.remark_terrain(job)
+    building = add_remark(building, moved, roof_points.remark, terrain)
+    return add_remark(
+        surroundings.inspect(building, other_points, points), remark_missing_ground(building)
     )
-    return reconstruct(*arguments, unused=unused, neighbours=neighbours)
-
-
-def find_thinned_out(points: np.ndarray, used_points: np.ndarray) -> np.ndarray:
-    """Return the `points` (n, 3), each once, not among `used_points` (m, 3)."""
-    if len(used_points) == len(points):
-        return points[:0]
-    return points[~np.isin(hashes(points), hashes(used_points))]
 
 
 def add_full_density(building: Building, in_use: int, count: int) -> Building:
