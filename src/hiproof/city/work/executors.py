@@ -26,7 +26,7 @@ from ...compiled import news
 from ...compiled.stamp import count_compiled
 from ...errors import InputError, OutputError, is_interrupt
 from ...extras import import_extra
-from .tasks import WorkerLost, make_ready
+from .tasks import TaskOutcome, WorkerLost, make_ready
 
 if TYPE_CHECKING:
     from .processes import Processes
@@ -34,12 +34,6 @@ if TYPE_CHECKING:
 CONNECT_S = 20  # seconds for an answer of the scheduler
 # seconds without a worker until a run gives up; seconds between looks at what is done
 WORKERLESS_S, POLL_S = 300, 5
-
-
-Arguments: TypeAlias = tuple[Any, ...]
-"""Arguments of a task's function."""
-Outcome: TypeAlias = tuple[Arguments, Any, Exception | None]
-"""Arguments, result and error of a task."""
 
 
 class InProcess:
@@ -51,9 +45,7 @@ class InProcess:
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
 
-    def run(
-        self, function: Callable, tasks: Iterable[tuple]
-    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
         for task in tasks:
             try:
                 yield task, function(*task), None
@@ -109,9 +101,7 @@ class Dask:
         finally:
             patience.cancel()
 
-    def run(
-        self, function: Callable, tasks: Iterable[tuple]
-    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
         waiting = iter(tasks)
         running: dict[Any, tuple] = {}
         ends: SimpleQueue = SimpleQueue()

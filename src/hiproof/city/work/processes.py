@@ -14,7 +14,7 @@ from typing import Any
 from ... import log
 from . import solved
 from .cores import limit_threads
-from .tasks import WorkerLost, import_work, is_ready, make_ready
+from .tasks import TaskOutcome, WorkerLost, import_work, is_ready, make_ready
 from .workers import begin_worker, start_deaf
 
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
@@ -48,37 +48,35 @@ class Processes:
         if answer.exception() or not answer.result():
             make_ready(pieces)
 
-    def run(
-        self, function: Callable, tasks: Iterable[tuple]
-    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
+        waiting = iter(tasks)
+        running: dict[Future, tuple] = {}
         try:
-            yield from self.outcomes(function, tasks)
+            while True:
+                # two tasks a worker in the queue: enough to keep it busy, few enough to lose little
+                # when one dies
+                while len(running) < 2 * self.count and (task := next(waiting, None)) is not None:
+                    running[self.submit(function, task)] = task
+                if not running:
+                    return
+                finished, _ = wait(running, timeout=COUNT_S, return_when=FIRST_COMPLETED)
+                self.tell_count()
+                if any(isinstance(future.exception(), BrokenProcessPool) for future in finished):
+                    # a worker died and the pool with it: what finished is handed back, the rest is
+                    # lost, and a new pool is started
+                    finished, _ = wait(running)
+                    self.close()
+                for future in finished:
+                    error: Any = future.exception()
+                    result = None if error else future.result()
+                    if isinstance(error, BrokenProcessPool):
+                        error = WorkerLost("a worker process died")
+                    yield running.pop(future), result, error
         # Ctrl-C, most of all: nobody waits any more for what the workers are at
         except BaseException:
             if self.word is not None:
                 self.word.close()
             raise
-
-    def outcomes(
-        self, function: Callable, tasks: Iterable[tuple]
-    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        waiting = iter(tasks)
-        running: dict[Future, tuple] = {}
-        while True:
-            # two tasks a worker in the queue: enough to keep it busy, few enough to lose little
-            # when one dies
-            while len(running) < 2 * self.count and (task := next(waiting, None)) is not None:
-                running[self.submit(function, task)] = task
-            if not running:
-                return
-            finished, _ = wait(running, timeout=COUNT_S, return_when=FIRST_COMPLETED)
-            self.tell_count()
-            if any(isinstance(future.exception(), BrokenProcessPool) for future in finished):
-                yield from self.bury(running)
-                continue
-            for future in finished:
-                error: Any = future.exception()
-                yield running.pop(future), None if error else future.result(), error
 
     def tell_count(self) -> None:
         """Tell the listener how many more buildings the workers have solved."""
@@ -102,23 +100,6 @@ class Processes:
             lost: Future = Future()
             lost.set_exception(error)
             return lost
-
-    def bury(self, running: dict[Future, tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        """Hand back what finished, and report the rest as lost.
-
-        A worker died and the pool with it; a new pool is started.
-        """
-        wait(running)
-        self.close()
-        for future, task in list(running.items()):
-            error: Any = future.exception()
-            lost = isinstance(error, BrokenProcessPool)
-            yield (
-                task,
-                None if error else future.result(),
-                WorkerLost("a worker process died") if lost else error,
-            )
-        running.clear()
 
     def isolate(self) -> Processes:
         return Processes(1)

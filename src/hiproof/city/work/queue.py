@@ -17,8 +17,9 @@ from ..merge.join import write_tile
 from ..plan.from_cloud import Progress
 from ..plan.work_plan import WorkPlan
 from . import solved
-from .executors import Arguments, Executor
+from .executors import Executor
 from .quarantine import is_loss, run_isolated, solve_in_quarantine
+from .tasks import Arguments
 
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
+from typing import Any, TypeAlias
 
 from ..folder.ledger import Outcome
 
@@ -28,6 +29,12 @@ ALL = (*WITHOUT_FOOTPRINTS, *RECOGNISING)
 
 WORK = ("hiproof.city.work.sort", "hiproof.city.work.solve", "hiproof.fit.union")
 """Modules that a worker needs."""
+
+
+Arguments: TypeAlias = tuple[Any, ...]
+"""Arguments of a task's function."""
+TaskOutcome: TypeAlias = tuple[Arguments, Any, Exception | None]
+"""Arguments, result and error of a task."""
 
 
 class WorkerLost(Exception):
