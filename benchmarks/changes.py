@@ -4,6 +4,7 @@ usage: python -m benchmarks.changes [--seeds 100 101] [--count 100] [--densities
                                     [--share 0.2] [--keep FOLDER] [--verbose]
        python -m benchmarks.changes --refine [--seeds 100 101] [--count 100]
        python -m benchmarks.changes --cost --count 500 [--seeds 100]
+       python -m benchmarks.changes --scenes [--seeds 100] [--verbose]
 
 One building in five (--share) changes, by each kind in turn, and the same number of others get
 something that is no change: leaves over the roof in class 6, a crane, scaffolding, or no points on
@@ -18,6 +19,9 @@ the first survey: flight lines have a common error in height, which is measured 
 
 With --cost, 2 % of the buildings change, and three rounds print the CPU time of an update over that
 of a run, both in this process.
+
+With --scenes, small scenes of change_scenes.py: more than half of the houses change, one house
+stands alone, sides are lost at 2 to 24 points/m2, surveys are shifted with and without change.
 
 Seeds 0 to 9 are for choosing constants, 100 to 109 for reporting.
 """
@@ -53,6 +57,7 @@ from hiproof.update.refine import REFINED
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import UpdateSummary, update_area
 
+from .change_scenes import run_scenes
 from .compounds import compare_parts
 from .kept_parts import count_kept, describe_kept
 
@@ -373,11 +378,15 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder in which cities and models stay")
     parser.add_argument("--cost", action="store_true", help="measure the cost of an update alone")
     parser.add_argument("--refine", action="store_true", help="measure refined buildings alone")
+    parser.add_argument("--scenes", action="store_true", help="run small scenes alone")
     parser.add_argument("--verbose", action="store_true", help="list every building that is wrong")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.keep or Path(scratch)
         d = tuple(given.densities)
+        if given.scenes:
+            run_scenes(folder, given.seeds, given.verbose)
+            return
         if given.cost:
             measure_cost(folder / "cost", given.seeds[0], given.count, d)
             return

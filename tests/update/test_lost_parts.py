@@ -68,6 +68,17 @@ def test_what_lies_bare_is_lost_at_any_density(run, density, tmp_path):
         assert outlines[0].area - outlines[1].area == pytest.approx(area, rel=0.25), id
 
 
+def test_a_corner_that_lies_bare_is_reported_whatever_the_model_becomes(run, tmp_path):
+    town = make_town(seed=7, density=8.0)
+    x0, y0, _, _ = town.footprints["house-1"].bounds
+    corner = shapely.Polygon([(x0, y0), (x0 + 6.0, y0), (x0, y0 + 5.0)])
+    gone = shapely.intersects_xy(corner, *town.xyz[:, :2].T)
+    town.xyz[gone, 2] = ORIGIN[2] + 0.01 * (town.xyz[gone, 0] - ORIGIN[0])
+    town.classification[gone] = 2
+    kinds = {id: take_kind(row) for id, row in update(run, tmp_path / "out", town).items()}
+    assert kinds == dict.fromkeys(town.footprints, "unchanged") | {"house-1": "part_removed"}
+
+
 @pytest.mark.parametrize("density", [0.5, 0.7, 1.0, 1.5])
 def test_a_sparse_survey_covers_what_it_covers(run, density, tmp_path):
     town = make_town(seed=8, density=density)

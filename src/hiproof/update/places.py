@@ -24,8 +24,9 @@ from .residuals import measure_residuals
 DIFFERENCE_DIGITS = 4  # of differences: tenths of a millimetre
 PLACE_DIGITS = 3  # of the outlines of places: millimetres
 
-BETTER = 0.5
-"""Share of the earlier roof's distance from contradicting points that a new roof may keep."""
+BETTER_SHARE = 1 / 3
+"""Least share of the contradicting points that a new roof has to explain. Where a side was lost,
+less than all of it is cut out of the outline, so that some ground lies under the new roof, too."""
 
 NEAR_M, WELL_SHARE = 0.2, 0.6
 """Distance (m) from a roof within which it explains a point, and least share of the points that a
@@ -35,17 +36,17 @@ new roof has to explain: of usual roofs nine in ten are."""
 def explains(new: Roof, old: Roof, verdict: ChangeVerdict, z_ground: float) -> bool:
     """Return whether the new roof explains the new points better, and well.
 
-    It has to lie much nearer to the points that contradict the earlier one. Both roofs are in one
-    frame, in which the ground has the height `z_ground`.
+    It has to explain points that contradict the earlier one. Both roofs are in one frame, in which
+    the ground has the height `z_ground`.
     """
     c = verdict.comparison
     if c is None:
         return False
     members = [cluster.members for cluster in verdict.clusters]
     chosen = np.isin(c.number, np.concatenate(members)) if members else c.number >= 0
-    from_new, from_old = (measure_distances(roof, c.points, z_ground) for roof in (new, old))
-    most = min(BETTER * float(np.median(from_old[chosen])), NEAR_M)
-    return bool(np.median(from_new[chosen]) < most and np.mean(from_new <= NEAR_M) >= WELL_SHARE)
+    is_near = [measure_distances(roof, c.points, z_ground) <= NEAR_M for roof in (new, old)]
+    share, share_before = (float(np.mean(near[chosen])) for near in is_near)
+    return share >= max(BETTER_SHARE, share_before) and float(np.mean(is_near[0])) >= WELL_SHARE
 
 
 def measure_distances(roof: Roof, points: np.ndarray, z_ground: float) -> np.ndarray:

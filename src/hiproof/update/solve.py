@@ -219,6 +219,9 @@ class Updater:
         if new.built is None or not explains(
             move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, z_ground
         ):
+            places = self.name_places(earlier, None, verdict)
+            if {place["kind"] for place in places} == {ChangeKind.PART_REMOVED.code}:
+                return self.mark(earlier, verdict, places, member)  # no pulse passes a roof
             verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
             return self.mark(earlier, verdict, record_places(name_doubts(verdict), frame), member)
         points = select_roof(self.epochs.new, job).points

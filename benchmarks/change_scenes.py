@@ -1,0 +1,190 @@
+"""Small scenes surveyed twice, in which registration and lost parts are put to the test.
+
+usage: python -m benchmarks.changes --scenes [--seeds 100] [--verbose]
+
+Single roofs of random shape stand on a slope, one in a square of 34 m. Houses that rise do so by
+0.4 to 3.2 m; houses that lose a side keep 45 to 80 % of their length, and the ground lies bare
+there. The second survey is shifted as a whole. A scene has 24 houses, or one.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import shapely
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.simulate import random_building
+from hiproof.simulate.roofs import SimBuilding
+from hiproof.simulate.scanner import Scan
+from hiproof.simulate.scene import SOURCES
+from hiproof.simulate.survey import write_laz
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+
+PITCH_M, CORNER, SLOPE = 34.0, np.array([85000.0, 446000.0]), np.array([0.01, -0.015])
+NOISE_M, HORIZONTAL_NOISE_M = 0.03, 0.05
+RISES_M, KEPT = (0.4, 3.2), (0.45, 0.8)
+GROUND, ROOF = SOURCES.index("ground"), SOURCES.index("roof")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What happens between two surveys: shares of houses that rise, and that lose a side."""
+
+    name: str
+    raised: float = 0.0
+    cut: float = 0.0
+    shift_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    densities: tuple[float, float] = (8.0, 8.0)
+    houses: int = 24
+
+
+SHIFTED = (0.16, -0.12, 0.4)
+SCENES = (
+    Scene("nothing changes"),
+    Scene("nothing changes, shifted", shift_m=SHIFTED),
+    Scene("one house, nothing changes, shifted", shift_m=SHIFTED, houses=1),
+    Scene("one house, raised", raised=1.0, houses=1),
+    Scene("one house, a side lost, shifted", cut=1.0, shift_m=SHIFTED, houses=1),
+    Scene("60 % raised", raised=0.6),
+    Scene("60 % raised, shifted", raised=0.6, shift_m=SHIFTED),
+    Scene("60 % raised, shifted down", raised=0.6, shift_m=(0.0, 0.1, -0.7)),
+    Scene("all raised", raised=1.0),
+    Scene("60 % lose a side, shifted", cut=0.6, shift_m=SHIFTED),
+    Scene("30 % raised, 30 % lose a side", raised=0.3, cut=0.3),
+    *(
+        Scene(f"30 % lose a side, {a:g} then {b:g} points/m2", cut=0.3, densities=(a, b))
+        for a, b in ((2, 2), (4, 4), (8, 8), (12, 12), (24, 24), (4, 24), (24, 2))
+    ),
+)
+
+
+@dataclass(frozen=True)
+class House:
+    """A building at its place, what it rises by, and the part of its plan that lies bare."""
+
+    id: str
+    place: np.ndarray
+    building: SimBuilding
+    rise_m: float
+    bare: shapely.Geometry
+
+    @property
+    def kind(self) -> str:
+        return "part_removed" if not self.bare.is_empty else "roof_raised" if self.rise_m else ""
+
+
+def draw_houses(scene: Scene, seed: int) -> list[House]:
+    """Draw the houses of a scene, of which the first rise and the next lose a side."""
+    rng, side = np.random.default_rng([seed, SCENES.index(scene)]), int(np.sqrt(scene.houses)) + 1
+    raised, cut = round(scene.raised * scene.houses), round(scene.cut * scene.houses)
+    result = []
+    for k in range(scene.houses):
+        place = CORNER + PITCH_M * (np.array(divmod(k, side)) + 0.5)
+        building = random_building(rng)
+        building = draw_low(rng, building)
+        x0, y0, x1, y1 = building.roof.outline.bounds
+        west = x0 + rng.uniform(*KEPT) * (x1 - x0)
+        is_cut = raised <= k < raised + cut
+        bare = shapely.box(west, y0, x1, y1) if is_cut else shapely.Polygon()
+        rise = rng.uniform(*RISES_M) if k < raised else 0.0
+        result.append(House(f"house-{k}", place, building, rise, bare))
+    return result
+
+
+def draw_low(rng: np.random.Generator, building: SimBuilding) -> SimBuilding:
+    """Return the building, or another that fits a square of the scene."""
+    while max(np.ptp(np.reshape(building.roof.outline.bounds, (2, 2)), axis=0)) > PITCH_M - 8:
+        building = random_building(rng)
+    return building
+
+
+def scan_houses(
+    houses: list[House], density: float, rng: np.random.Generator, is_later: bool
+) -> Scan:
+    """Scan all houses and the ground between them."""
+    low = np.min([house.place for house in houses], axis=0) - PITCH_M / 2
+    high = np.max([house.place for house in houses], axis=0) + PITCH_M / 2
+    xy = rng.uniform(low, high, (rng.poisson(density * float(np.prod(high - low))), 2))
+    z, source = (xy - CORNER) @ SLOPE, np.full(len(xy), GROUND)
+    for house in houses:
+        near = np.flatnonzero((np.abs(xy - house.place) < PITCH_M / 2).all(axis=1))
+        local = xy[near] - house.place
+        heights = house.building.roof.height_at(local)
+        is_roof = np.isfinite(heights)
+        if is_later:
+            is_roof &= ~shapely.intersects_xy(house.bare, *local.T)
+            heights = heights + house.rise_m
+        base = (house.place - CORNER) @ SLOPE
+        z[near[is_roof]], source[near[is_roof]] = base + heights[is_roof], ROOF
+    noise = rng.normal(0, [HORIZONTAL_NOISE_M, HORIZONTAL_NOISE_M, NOISE_M], (len(xy), 3))
+    return Scan(np.column_stack([xy, z]) + noise, np.zeros(len(xy), int), source)
+
+
+def write_outlines(path: Path, houses: list[House]) -> None:
+    """Write the outlines of houses before the change."""
+    outlines = [
+        shapely.transform(house.building.roof.outline, lambda xy, p=house.place: xy + p)
+        for house in houses
+    ]
+    ids = np.array([house.id for house in houses], object)
+    wkb = shapely.to_wkb(np.array(outlines, object))
+    pyogrio.raw.write(path, wkb, [ids], ["id"], geometry_type="Polygon", crs="EPSG:28992")
+
+
+def run_scene(scene: Scene, folder: Path, seed: int, is_verbose: bool) -> Counter[str]:
+    """Run and update a scene; return counts of changes, hits, right kinds and alarms."""
+    folder.mkdir(parents=True, exist_ok=True)
+    houses, rng = draw_houses(scene, seed), np.random.default_rng(seed + 1)
+    write_outlines(folder / "footprints.gpkg", houses)
+    for name, density in zip(("first", "second"), scene.densities, strict=True):
+        cloud = scan_houses(houses, density, rng, name == "second")
+        cloud = cloud.move(np.array(scene.shift_m)) if name == "second" else cloud
+        write_laz(folder / f"{name}.laz", iter([cloud]), np.array([*CORNER, 0.0]))
+    run = Request(
+        (str(folder / "first.laz"),),
+        folder / "models",
+        str(folder / "footprints.gpkg"),
+        id_attribute="id",
+    )
+    reconstruct_area(run, lambda *_: None)
+    request = UpdateRequest((str(folder / "second.laz"),), folder / "updated", date="2024-05-01")
+    parameters = str(folder / "models" / "parameters.jsonl")
+    summary = update_area(
+        dataclasses.replace(request, run=folder / "models", run_parameters=parameters)
+    )
+    with (folder / "updated" / "changes.csv").open() as table:
+        rows = {row["id"]: row for row in csv.DictReader(table)}
+    counts = Counter(houses=len(houses))
+    for house in houses:
+        row = rows.get(house.id, {"class": "unchanged", "kind": ""})
+        is_found = row["class"] in ("changed", "gone", "new")
+        counts["changed" if house.kind else "alarms"] += bool(house.kind) or is_found
+        counts["hits"] += bool(house.kind) and is_found
+        counts["right"] += bool(house.kind) and row["kind"] == house.kind
+        if is_verbose and (is_found != bool(house.kind) or house.kind != row["kind"]):
+            print(f"    {house.id} {house.building.type}: {house.kind or 'nothing'} -> {row}")
+    print(f"{scene.name}: {dict(counts)}, taken off {summary.surveys.shift.clear_xyz.tolist()}")
+    return counts
+
+
+def run_scenes(folder: Path, seeds: list[int], is_verbose: bool) -> None:
+    """Run all scenes; print a line each, and recall and precision of all."""
+    total: Counter[str] = Counter()
+    for seed in seeds:
+        for number, scene in enumerate(SCENES):
+            total += run_scene(scene, folder / f"scene_{seed}_{number}", seed, is_verbose)
+    print(
+        f"{total['changed']} changes of {total['houses']} houses: recall "
+        f"{total['hits'] / total['changed']:.3f}, precision "
+        f"{total['hits'] / max(total['hits'] + total['alarms'], 1):.3f}, kind right "
+        f"{total['right'] / max(total['hits'], 1):.3f}, {total['alarms']} untouched houses reported"
+    )
