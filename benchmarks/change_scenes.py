@@ -1,4 +1,4 @@
-"""Small scenes surveyed twice, in which registration and lost parts are put to the test.
+"""Small scenes surveyed twice, to test registration and lost parts.
 
 usage: python -m benchmarks.changes --scenes [--seeds 100] [--verbose]
 
@@ -36,8 +36,8 @@ GROUND, ROOF = SOURCES.index("ground"), SOURCES.index("roof")
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What happens between two surveys: shares of houses that rise, and that lose a side."""
+class ChangeScene:
+    """Shares of houses that rise or lose a side, and how the surveys lie."""
 
     name: str
     raised: float = 0.0
@@ -49,19 +49,19 @@ class Scene:
 
 SHIFTED = (0.16, -0.12, 0.4)
 SCENES = (
-    Scene("nothing changes"),
-    Scene("nothing changes, shifted", shift_m=SHIFTED),
-    Scene("one house, nothing changes, shifted", shift_m=SHIFTED, houses=1),
-    Scene("one house, raised", raised=1.0, houses=1),
-    Scene("one house, a side lost, shifted", cut=1.0, shift_m=SHIFTED, houses=1),
-    Scene("60 % raised", raised=0.6),
-    Scene("60 % raised, shifted", raised=0.6, shift_m=SHIFTED),
-    Scene("60 % raised, shifted down", raised=0.6, shift_m=(0.0, 0.1, -0.7)),
-    Scene("all raised", raised=1.0),
-    Scene("60 % lose a side, shifted", cut=0.6, shift_m=SHIFTED),
-    Scene("30 % raised, 30 % lose a side", raised=0.3, cut=0.3),
+    ChangeScene("nothing changes"),
+    ChangeScene("nothing changes, shifted", shift_m=SHIFTED),
+    ChangeScene("one house, nothing changes, shifted", shift_m=SHIFTED, houses=1),
+    ChangeScene("one house, raised", raised=1.0, houses=1),
+    ChangeScene("one house, a side lost, shifted", cut=1.0, shift_m=SHIFTED, houses=1),
+    ChangeScene("60 % raised", raised=0.6),
+    ChangeScene("60 % raised, shifted", raised=0.6, shift_m=SHIFTED),
+    ChangeScene("60 % raised, shifted down", raised=0.6, shift_m=(0.0, 0.1, -0.7)),
+    ChangeScene("all raised", raised=1.0),
+    ChangeScene("60 % lose a side, shifted", cut=0.6, shift_m=SHIFTED),
+    ChangeScene("30 % raised, 30 % lose a side", raised=0.3, cut=0.3),
     *(
-        Scene(f"30 % lose a side, {a:g} then {b:g} points/m2", cut=0.3, densities=(a, b))
+        ChangeScene(f"30 % lose a side, {a:g} then {b:g} points/m2", cut=0.3, densities=(a, b))
         for a, b in ((2, 2), (4, 4), (8, 8), (12, 12), (24, 24), (4, 24), (24, 2))
     ),
 )
@@ -69,7 +69,7 @@ SCENES = (
 
 @dataclass(frozen=True)
 class House:
-    """A building at its place, what it rises by, and the part of its plan that lies bare."""
+    """A building at its place, its rise, and what of its plan lies bare."""
 
     id: str
     place: np.ndarray
@@ -82,7 +82,7 @@ class House:
         return "part_removed" if not self.bare.is_empty else "roof_raised" if self.rise_m else ""
 
 
-def draw_houses(scene: Scene, seed: int) -> list[House]:
+def draw_houses(scene: ChangeScene, seed: int) -> list[House]:
     """Draw the houses of a scene, of which the first rise and the next lose a side."""
     rng, side = np.random.default_rng([seed, SCENES.index(scene)]), int(np.sqrt(scene.houses)) + 1
     raised, cut = round(scene.raised * scene.houses), round(scene.cut * scene.houses)
@@ -90,7 +90,7 @@ def draw_houses(scene: Scene, seed: int) -> list[House]:
     for k in range(scene.houses):
         place = CORNER + PITCH_M * (np.array(divmod(k, side)) + 0.5)
         building = random_building(rng)
-        building = draw_low(rng, building)
+        building = draw_small(rng, building)
         x0, y0, x1, y1 = building.roof.outline.bounds
         west = x0 + rng.uniform(*KEPT) * (x1 - x0)
         is_cut = raised <= k < raised + cut
@@ -100,7 +100,7 @@ def draw_houses(scene: Scene, seed: int) -> list[House]:
     return result
 
 
-def draw_low(rng: np.random.Generator, building: SimBuilding) -> SimBuilding:
+def draw_small(rng: np.random.Generator, building: SimBuilding) -> SimBuilding:
     """Return the building, or another that fits a square of the scene."""
     while max(np.ptp(np.reshape(building.roof.outline.bounds, (2, 2)), axis=0)) > PITCH_M - 8:
         building = random_building(rng)
@@ -140,7 +140,7 @@ def write_outlines(path: Path, houses: list[House]) -> None:
     pyogrio.raw.write(path, wkb, [ids], ["id"], geometry_type="Polygon", crs="EPSG:28992")
 
 
-def run_scene(scene: Scene, folder: Path, seed: int, is_verbose: bool) -> Counter[str]:
+def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> Counter[str]:
     """Run and update a scene; return counts of changes, hits, right kinds and alarms."""
     folder.mkdir(parents=True, exist_ok=True)
     houses, rng = draw_houses(scene, seed), np.random.default_rng(seed + 1)
