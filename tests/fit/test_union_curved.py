@@ -152,15 +152,14 @@ def test_a_drum_is_found(setting):
     assert is_drum_found(setting, 20, 8.0)
 
 
-@pytest.mark.parametrize("seed", [7, 14, 15])
-def test_the_edge_of_a_drum_lies_between_points(seed):
+def test_the_edge_of_a_drum_lies_between_points():
     """Three percent of its plan are a few centimetres of its radius."""
-    assert is_drum_found("in a gable", seed, 8.0)
+    assert sum(is_drum_found("in a gable", seed, 8.0) for seed in range(20)) >= 17
 
 
-@pytest.mark.parametrize("seed", [5, 18, 19])
-def test_a_ring_is_found_from_two_points_a_square_metre(seed):
-    assert is_drum_found("ring", seed, 2.0)
+def test_a_ring_is_found_from_two_points_a_square_metre():
+    """Of forty, 33 were found: in four of five cases, give or take three of twenty."""
+    assert sum(is_drum_found("ring", seed, 2.0) for seed in range(20)) >= 13
 
 
 @pytest.mark.parametrize("step", [-3.0, 1.5])

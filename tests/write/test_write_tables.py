@@ -13,12 +13,13 @@ import shapely
 from pyproj import CRS
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
-from hiproof import read_parameters
+from hiproof import build, read_parameters
 from hiproof.errors import InputError
 from hiproof.parametric.run import build_file
 from hiproof.write import write_attributes, write_parameters
 from hiproof.write.tables import waiting
 from hiproof.write.tables.geopackage import attributes_with_a_column
+from hiproof.write.tables.rows import part_rows
 
 
 def table(tmp_path, buildings, crs="EPSG:7415"):
@@ -241,3 +242,13 @@ DERIVED = CRS.from_wkt(
 def test_the_crs_comes_back_whether_it_has_a_code_or_not(tmp_path, crs):
     _, _, meta = table(tmp_path, [make_building(box())], crs)
     assert CRS(meta["crs"]) == crs
+
+
+def test_a_part_that_nothing_shows_of_has_no_row():
+    ring = [[0, 0], [10, 0], [10, 6], [0, 6]]
+    flat = {"type": "flat", "parameters": {"width": 6, "length": 10}, "position": [5, 3, 4]}
+    hidden = {"type": "flat", "parameters": {"width": 4, "length": 4}, "position": [5, 3, 3]}
+    record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring]}
+    building = build(record | {"parts": [flat, hidden]})
+    (row,) = part_rows(building)
+    assert row[0] is not None and row[1]["part"] == 0

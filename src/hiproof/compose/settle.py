@@ -10,7 +10,7 @@ Planes then follow from the rounded parameters.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 import shapely
 
 from ..errors import FitError
+from ..geometry.rings import repair_polygons
 from ..model import Building, Part, Piece, Quality, Roof
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import compute_planes
@@ -44,11 +45,15 @@ def settled_part(part: Part) -> Part:
     parameters = {name: round_number(value) for name, value in part.parameters.items()}
     kappa = math.radians(round_number(math.degrees(part.kappa)))
     translation = np.array([round_number(value) for value in part.translation])
-    outlines = [rounded_outline(outline) for outline in part.outlines]
+    outlines = settle_outlines(part.outlines)
     try:
         pieces = make_pieces(part.type, parameters, kappa, translation, outlines)
     except (FitError, KeyError):  # a shape of somebody's own, which parameters do not make
-        pieces = tuple(Piece(rounded_outline(p.outline), p.planes) for p in part.pieces)
+        pieces = tuple(
+            Piece(polygon, p.planes)
+            for p in part.pieces
+            for polygon in settle_outlines([p.outline])
+        )
     return Part(part.type, pieces, parameters, kappa, translation, settled_sigma(part.sigma))
 
 
@@ -106,16 +111,28 @@ def rounded_outline(polygon: shapely.Polygon) -> shapely.Polygon:
     return shapely.transform(polygon, lambda xy: np.round(xy, PLAN_DIGITS) + 0.0)
 
 
+def settle_outlines(outlines: Sequence[shapely.Polygon]) -> list[shapely.Polygon]:
+    """Round outlines to valid polygons.
+
+    One that would cross itself becomes those of which it is made. One without an area goes, unless
+    all are such.
+    """
+    valid: list[shapely.Polygon] = []
+    for outline in outlines:
+        polygons = [rounded_outline(outline)]
+        if not polygons[0].is_valid:
+            on_grid = shapely.set_precision(repair_polygons(outline), 10.0**-PLAN_DIGITS)
+            polygons = [rounded_outline(polygon) for polygon in shapely.get_parts(on_grid)]
+        valid += [polygon for polygon in polygons if polygon.area > 0.0]
+    return valid or [rounded_outline(outline) for outline in outlines]
+
+
 def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
     """Round the outline.
 
     Where that makes it cross itself, it is the largest valid polygon on the same grid.
     """
-    result = rounded_outline(outline)
-    if result.is_valid:
-        return result
-    on_grid = shapely.get_parts(shapely.set_precision(outline, 10.0**-PLAN_DIGITS))
-    return rounded_outline(max(on_grid, key=lambda polygon: polygon.area, default=outline))
+    return max(settle_outlines([outline]), key=lambda polygon: polygon.area)
 
 
 def round_building(building: Building) -> Building:

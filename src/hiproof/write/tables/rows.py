@@ -116,12 +116,14 @@ def history_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """Return a row a part.
+    """Return a row a part that shows.
 
     It has where the part shows, its type, every parameter and its standard deviation.
     """
     rows = []
     for number, visible in enumerate(building.compute_visible_areas()):
+        if visible.is_empty:
+            continue
         values = {"building_id": plain_text(building.id), **part_values(building, number, visible)}
         rows.append((encode_geometry(visible, units), values))
     return tuple(rows)
