@@ -42,7 +42,8 @@ solids        solids of CityJSON and CityGML as they stand
 roofn3d       the RoofN3D data set
 
 Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is
-said by `errors.InputWarning`. The names below are imported when first used: GDAL costs a third of a
+said by `errors.InputWarning`. docs/libraries.md says why code stands here beside laspy and pyogrio.
+The names below are imported when first used: GDAL costs a third of a
 second.
 """
 
