@@ -105,6 +105,10 @@ class PlanFrame:
         shifted = xyz_local - self.origin
         return np.column_stack([shifted[:, :2] @ self.rotation.T, shifted[:, 2]])
 
+    def uv_plan(self, xy_local: np.ndarray) -> np.ndarray:
+        """Convert (n, 2) local coordinates to (n, 2) plan coordinates."""
+        return (xy_local - self.origin[:2]) @ self.rotation.T
+
     def xy_local(self, uv: np.ndarray) -> np.ndarray:
         """Convert (n, 2) plan coordinates back to local x, y."""
         return uv @ self.rotation + self.origin[:2]

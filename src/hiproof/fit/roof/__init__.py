@@ -1,0 +1,133 @@
+"""Fit the roof of a building: one state, one price, one loop.
+
+A roof is four small tables (lines, unknowns, planes, volumes) that share what is equal. Its price
+is the misfit of every point and what its exact drawing costs. Moves propose, `accept` judges.
+
+tables      the state
+prices      the table of prices
+draw        compiled: the exact plan of a roof, its corners and low steps
+price       compiled: the price of a roof in a box, and the fit of its unknowns
+moves       compiled: moves of a roof, which propose and do not judge
+accept      compiled: the one place that judges, and the loop
+site        what a roof has to explain: points, cells, the outline and its lines
+start       the tables of the volumes that the search found
+deviations  compiled: how well points determine unknowns and sides
+regions     which polygons each volume roofs
+names       from volumes to named parts of the family of roof shapes
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from ...errors import FitError
+from ...model import Part, as_xyz
+from ...read.plausible import is_plausible
+from ...settings import Settings
+from ..union import measure_unexplained_share, restrict_type, select_largest_polygon
+from ..union.clamp import clamp_parts
+from ..union.curved import fit_curved_shapes
+from ..union.fit import BuildingFit
+from ..union.larger import combine_parts
+from ..union.objective import is_base_visible
+from ..union.outline import draw_outline
+from ..union.own import fit_custom_shapes
+from ..union.plan import Plan, lay_out_plan
+from ..union.regions import exclude_parts
+from ..union.scene import Scene
+from ..union.search import find_volumes
+from ..union.shown import keep_visible
+from ..union.sides import choose_sides
+from ..union.unite import gather_ends
+from .accept import improve
+from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
+from .draw import draw_all, make_drawing
+from .names import cut_sides, find_axes, name_part, read_planes, read_sides
+from .price import Site
+from .prices import compute_unit
+from .regions import list_places
+from .site import make_site
+from .start import make_roof
+from .tables import Tables, make_tables_like
+
+__all__ = ["BuildingFit", "fit_building"]
+
+
+def fit_building(
+    points_local: np.ndarray,
+    outline: shapely.Polygon | None = None,
+    settings: Settings | None = None,
+) -> BuildingFit:
+    """Fit the roof of one building to `points_local` (n, 3) over `outline`.
+
+    Both are in metres of one local frame. Without an outline, it is estimated from the points. With
+    one, points outside it do not count. Where `settings.fit.types` names types, all parts have one
+    of these types or are flat.
+
+    Raises FitError if nothing can be fitted: if no points lie inside the outline, if it has no
+    area, or if the points span no area. Raises InputError for points of another shape.
+
+    >>> x, y = np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4))
+    >>> z = np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)
+    >>> roof = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    >>> fit = fit_building(roof, shapely.box(0, 0, 12, 7))
+    >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
+    (['flat', 'gable'], 0.0)
+    """
+    settings = settings or Settings()
+    points_local = as_xyz(points_local)
+    points_local = points_local[is_plausible(points_local)]
+    outline = draw_outline(points_local) if outline is None else outline
+    outline = select_largest_polygon(outline)
+    plan = lay_out_plan(points_local, outline)
+    if len(plan.cloud.u) == 0:
+        raise FitError(
+            "expected roof points inside the outline, got none; "
+            "add a cloud that covers the building"
+        )
+    types = settings.fit.types
+    volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
+    plan_outline = shapely.transform(outline, plan.frame.uv_plan)
+    site = make_site(scene, plan_outline, compute_unit(plan.density, settings.compound))
+    roof = draw_volumes(volumes, outline, plan, scene, site)
+    visible = keep_visible(read_parts(roof, site, plan_outline, plan, types), plan, scene)
+    parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
+    parts = fit_curved_shapes(parts, plan.points, outline, settings)
+    parts = [restrict_type(part, types, points_local) for part in parts]
+    z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
+    parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
+    if exclude_parts(parts, visible):  # new ones may hide others
+        parts = keep_visible(parts, plan, scene, widest_m2=0.0)
+    unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
+    return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
+
+
+def draw_volumes(
+    volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, site: Site
+) -> Tables:
+    """Return the tables of the search's volumes along walls, improved until no move saves."""
+    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
+    roof = make_roof(volumes, sides, scene.turn, is_base_visible(volumes, scene))
+    improve(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
+    return roof
+
+
+def read_parts(
+    roof: Tables, site: Site, outline: shapely.Polygon, plan: Plan, types: tuple[str, ...]
+) -> list[Part]:
+    """Name what each volume roofs of an `outline` in the plan's coordinates."""
+    covariance, is_anchored = estimate_covariance(roof, site), find_anchored(roof, site)
+    inner, outer, parts = make_tables_like(roof), make_tables_like(roof), []
+    for k, polygons, is_cut in list_places(roof, draw_all(roof, site), outline):
+        axes = find_axes(roof, k)
+        anchored = is_anchored[np.abs(roof.sides[k]) - 1]
+        sigmas = estimate_side_sigmas(roof, inner, outer, site, k, anchored)
+        sides = read_sides(roof, k, axes, anchored, sigmas)
+        if is_cut:
+            sides = cut_sides(sides, shapely.get_coordinates(polygons) @ axes.T)
+        planes = read_planes(roof, k, axes)
+        parts.append(name_part(planes, sides, axes, polygons, covariance, plan.frame, types))
+    return parts

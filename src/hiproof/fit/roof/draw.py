@@ -1,0 +1,520 @@
+"""Draw a roof exactly: the visible part of each plane, as convex fragments.
+
+What a volume hides of another's plane is one convex polygon, because the lowest of its planes is
+higher than that plane just where all of them are. So a roof is drawn by cutting convex polygons out
+of convex polygons, and its corners are the places where a plane covers neither half a turn nor a
+whole one.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numpy as np
+
+from ...compiled import compiled
+from .tables import FAR_M, MOST_PLANES, N_SIDES, ONE_PLANE, VOLUMES, Tables
+
+MOST_CORNERS = 40  # Most corners of a fragment.
+MOST_FRAGMENTS = 4000  # Most fragments of what is drawn at once.
+MOST_PIECES = 200  # Most fragments of one plane in one piece of the outline.
+ON_LINE_M = 1e-9  # Distance (m) from a line of a place on it.
+LEAST_M2 = 1e-4  # Area (m2) of the smallest fragment.
+ONE_PLACE_M = 0.01  # Corners nearer than this (m) are one.
+STRAIGHT_RAD = 0.0175  # Angle (rad): a corner turns by more than a degree.
+ONE_LEVEL_M = 0.03  # Corners of one place whose heights differ less (m) are one.
+MOST_AT_PLACE = 64  # Most planes that meet in one place.
+LOW_STEP_M = 0.5  # Steps lower than this (m) cost by the metre.
+SEEN_STEP_M = 0.05  # Lower steps (m) are within what two strips differ by.
+SHARED_M = 0.1  # Shortest stretch (m) of border that two fragments share.
+STEP_SAMPLE_M = 0.5  # Distance (m) of the places in which the height of a step is measured.
+BESIDE_M = 0.01  # Distance (m) from an edge in which the roof beside it is measured.
+
+Drawing = namedtuple("Drawing", "count rings sizes owners numbers boxes pieces todo done")
+"""Room for fragments: `rings` (f, MOST_CORNERS, 2) of `sizes` (f,) corners, each visible of the
+volume and plane in `owners` (f, 2). `count` (1,) are in use. Equal planes have one of `numbers`
+(v, MOST_PLANES). `boxes` (f, 4) are the extents of the fragments, the rest is scratch.
+"""
+
+
+def make_drawing(volumes: int) -> Drawing:
+    """Return room for the drawing of so many volumes."""
+    return Drawing(
+        np.zeros(1, np.int64),
+        np.zeros((MOST_FRAGMENTS, MOST_CORNERS, 2)),
+        np.zeros(MOST_FRAGMENTS, np.int64),
+        np.zeros((MOST_FRAGMENTS, 2), np.int64),
+        np.zeros((volumes, MOST_PLANES), np.int64),
+        np.zeros((MOST_FRAGMENTS, 4)),
+        np.zeros((4, MOST_CORNERS, 2)),
+        make_pieces(),
+        make_pieces(),
+    )
+
+
+def make_pieces() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return room for rings, their sizes, and the volume before which nothing hides each."""
+    return (
+        np.zeros((MOST_PIECES, MOST_CORNERS, 2)),
+        np.zeros(MOST_PIECES, np.int64),
+        np.zeros(MOST_PIECES, np.int64),
+    )
+
+
+@compiled
+def cut(ring, size, a, b, c, out):
+    """Keep of a convex ring what has a x + b y + c >= 0. Returns the number of corners in `out`."""
+    count = 0
+    x0, y0 = ring[size - 1, 0], ring[size - 1, 1]
+    d0 = a * x0 + b * y0 + c
+    for i in range(size):
+        x1, y1 = ring[i, 0], ring[i, 1]
+        d1 = a * x1 + b * y1 + c
+        if (d0 > ON_LINE_M and d1 < -ON_LINE_M) or (d0 < -ON_LINE_M and d1 > ON_LINE_M):
+            if count < MOST_CORNERS:
+                t = d0 / (d0 - d1)
+                out[count, 0], out[count, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                count += 1
+        if d1 >= -ON_LINE_M and count < MOST_CORNERS:
+            out[count, 0], out[count, 1] = x1, y1
+            count += 1
+        x0, y0, d0 = x1, y1, d1
+    return count if count >= 3 else 0
+
+
+@compiled
+def measure_area(ring, size):
+    total, x0, y0 = 0.0, ring[size - 1, 0], ring[size - 1, 1]
+    for i in range(size):
+        total += x0 * ring[i, 1] - ring[i, 0] * y0
+        x0, y0 = ring[i, 0], ring[i, 1]
+    return 0.5 * total
+
+
+@compiled
+def copy_ring(ring, size, out):
+    for i in range(size):
+        out[i, 0], out[i, 1] = ring[i, 0], ring[i, 1]
+
+
+@compiled
+def measure_box(ring, size):
+    """Return the least and greatest x and y of a ring."""
+    x0, x1, y0, y1 = FAR_M, -FAR_M, FAR_M, -FAR_M
+    for i in range(size):
+        x0, x1 = min(x0, ring[i, 0]), max(x1, ring[i, 0])
+        y0, y1 = min(y0, ring[i, 1]), max(y1, ring[i, 1])
+    return x0, x1, y0, y1
+
+
+@compiled
+def meets(box, x0, x1, y0, y1):
+    """Return whether a box reaches into another."""
+    return box[0] < x1 and box[1] > x0 and box[2] < y1 and box[3] > y0
+
+
+@compiled
+def number_planes(roof, view, numbers):
+    """Give equal planes of the volumes in `view` one number."""
+    for m in range(len(view)):
+        k = view[m]
+        for p in range(roof.n_planes[k]):
+            numbers[k, p] = k * MOST_PLANES + p
+            is_new = True
+            for n in range(m + 1):
+                j = view[n]
+                for q in range(roof.n_planes[j] if j != k else p):
+                    if (
+                        abs(roof.planes[j, q, 0] - roof.planes[k, p, 0]) < ONE_PLANE
+                        and abs(roof.planes[j, q, 1] - roof.planes[k, p, 1]) < ONE_PLANE
+                        and abs(roof.planes[j, q, 2] - roof.planes[k, p, 2]) < ONE_PLANE
+                    ):
+                        numbers[k, p] = numbers[j, q]
+                        is_new = False
+                        break
+                if not is_new:
+                    break
+
+
+@compiled
+def hidden_half(roof, numbers, j, p, k, h):
+    """Return the half plane h of what volume k hides of plane p of volume j.
+
+    The first four are its sides, the others where its planes are higher. Of equal planes the first
+    volume's is visible.
+    """
+    if h < N_SIDES:
+        return roof.half_planes[k, h, 0], roof.half_planes[k, h, 1], roof.half_planes[k, h, 2]
+    q = h - N_SIDES
+    if numbers[k, q] == numbers[j, p]:
+        return 0.0, 0.0, 1.0 if k < j else -1.0
+    return (
+        roof.planes[k, q, 0] - roof.planes[j, p, 0],
+        roof.planes[k, q, 1] - roof.planes[j, p, 1],
+        roof.planes[k, q, 2] - roof.planes[j, p, 2],
+    )
+
+
+@compiled
+def add_piece(pieces, count, ring, size, floor):
+    """Add a ring to pieces if it is large enough. Returns how many there are."""
+    if size == 0 or count >= MOST_PIECES or measure_area(ring, size) < LEAST_M2:
+        return count
+    copy_ring(ring, size, pieces[0][count])
+    pieces[1][count], pieces[2][count] = size, floor
+    return count + 1
+
+
+@compiled
+def subtract(roof, numbers, j, p, k, halves, source, target, count, rest, other):
+    """Cut pieces along the first `halves` half planes of what volume k hides of plane p of j.
+
+    What is inside of all is hidden, and left out, unless `halves` are k's sides alone and k came
+    before j: then nothing that came before k hides it. Returns how many pieces `target` has.
+    """
+    rings, sizes, floors, kept = source[0], source[1], source[2], 0
+    for t in range(count):
+        size, left = sizes[t], 0
+        x0, x1, y0, y1 = measure_box(rings[t], size)
+        if k >= floors[t] and meets(roof.boxes[k], x0 + 1e-6, x1 - 1e-6, y0 + 1e-6, y1 - 1e-6):
+            copy_ring(rings[t], size, rest)
+            left = size
+            for h in range(halves):
+                a, b, c = hidden_half(roof, numbers, j, p, k, h)
+                left = cut(rest, left, a, b, c, other)
+                if left == 0:
+                    break
+                copy_ring(other, left, rest)
+        if left == 0 or measure_area(rest, left) < LEAST_M2:
+            kept = add_piece(target, kept, rings[t], size, floors[t])
+            continue
+        if halves == N_SIDES and k < j:
+            kept = add_piece(target, kept, rest, left, k)
+        copy_ring(rings[t], size, rest)
+        left = size
+        for h in range(halves):
+            a, b, c = hidden_half(roof, numbers, j, p, k, h)
+            kept = add_piece(target, kept, other, cut(rest, left, -a, -b, -c, other), floors[t])
+            left = cut(rest, left, a, b, c, other)
+            if left == 0:
+                break
+            copy_ring(other, left, rest)
+    return kept
+
+
+@compiled
+def draw_plane(roof, drawing, view, j, p, part, size):
+    """Add the visible fragments of plane p of volume j in a convex part of the outline."""
+    numbers, pieces = drawing.numbers, drawing.pieces
+    plan, other = pieces[0], pieces[1]
+    copy_ring(part, size, plan)
+    for q in range(roof.n_planes[j]):
+        if q != p:
+            if numbers[j, q] == numbers[j, p]:
+                if q < p:
+                    return
+                continue
+            a = roof.planes[j, q, 0] - roof.planes[j, p, 0]
+            b = roof.planes[j, q, 1] - roof.planes[j, p, 1]
+            size = cut(plan, size, a, b, roof.planes[j, q, 2] - roof.planes[j, p, 2], other)
+            if size == 0:
+                return
+            copy_ring(other, size, plan)
+    if measure_area(plan, size) < LEAST_M2:
+        return
+    source, target = drawing.todo, drawing.done
+    rest = pieces[2]
+    count = add_piece(source, 0, plan, size, j if roof.replaces[j] else 0)
+    x0, x1, y0, y1 = measure_box(plan, size)
+    for turn in range(2):  # first, what came before a volume that replaces can no longer hide
+        for m in range(len(view)):
+            k = view[m]
+            hides_all = roof.replaces[k] and k > j
+            if k == j or not meets(roof.boxes[k], x0, x1, y0, y1):
+                continue
+            if turn == 0 and not (roof.replaces[k] and k < j):
+                continue
+            halves = N_SIDES + (0 if turn == 0 or hides_all else roof.n_planes[k])
+            count = subtract(roof, numbers, j, p, k, halves, source, target, count, rest, pieces[3])
+            source, target = target, source
+            if count == 0:
+                return
+    for t in range(count):
+        f = drawing.count[0]
+        if f < MOST_FRAGMENTS:
+            copy_ring(source[0][t], source[1][t], drawing.rings[f])
+            drawing.sizes[f] = source[1][t]
+            drawing.owners[f, 0], drawing.owners[f, 1] = j, p
+            low_x, high_x, low_y, high_y = measure_box(source[0][t], source[1][t])
+            drawing.boxes[f, 0], drawing.boxes[f, 1] = low_x - ONE_PLACE_M, high_x + ONE_PLACE_M
+            drawing.boxes[f, 2], drawing.boxes[f, 3] = low_y - ONE_PLACE_M, high_y + ONE_PLACE_M
+            drawing.count[0] = f + 1
+
+
+@compiled
+def draw(roof, drawing, view, site, box):
+    """Draw the volumes of `view` (m,) in the parts of the outline that reach into a `box` (4,)."""
+    drawing.count[0] = 0
+    number_planes(roof, view, drawing.numbers)
+    plan, other = np.empty((MOST_CORNERS, 2)), np.empty((MOST_CORNERS, 2))
+    for part in range(len(site.part_sizes)):
+        bounds = site.part_boxes[part]
+        if not meets(box, bounds[0], bounds[1], bounds[2], bounds[3]):
+            continue
+        for m in range(len(view)):
+            j = view[m]
+            if not meets(roof.boxes[j], bounds[0], bounds[1], bounds[2], bounds[3]):
+                continue
+            size = site.part_sizes[part]
+            copy_ring(site.parts[part], size, plan)
+            for s in range(N_SIDES):
+                half = roof.half_planes[j, s]
+                size = cut(plan, size, half[0], half[1], half[2], other)
+                if size == 0:
+                    break
+                copy_ring(other, size, plan)
+            if size == 0 or measure_area(plan, size) < LEAST_M2:
+                continue
+            for p in range(roof.n_planes[j]):
+                draw_plane(roof, drawing, view, j, p, plan, size)
+
+
+def draw_all(roof: Tables, site) -> Drawing:
+    """Return the drawing of a whole roof."""
+    drawing = make_drawing(len(roof.sides))
+    everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
+    draw(roof, drawing, np.arange(roof.counts[VOLUMES]), site, everywhere)
+    return drawing
+
+
+@compiled
+def measure_cover(ring, size, x, y):
+    """Return the angle (rad) that a convex ring covers around a place."""
+    near = -1
+    for i in range(size):
+        if abs(ring[i, 0] - x) < ONE_PLACE_M and abs(ring[i, 1] - y) < ONE_PLACE_M:
+            near = i
+            break
+    if near < 0:
+        return measure_cover_beside(ring, size, x, y)
+    before, after = near, near
+    for _ in range(size):
+        before = before - 1 if before > 0 else size - 1
+        if abs(ring[before, 0] - x) >= ONE_PLACE_M or abs(ring[before, 1] - y) >= ONE_PLACE_M:
+            break
+    for _ in range(size):
+        after = after + 1 if after + 1 < size else 0
+        if abs(ring[after, 0] - x) >= ONE_PLACE_M or abs(ring[after, 1] - y) >= ONE_PLACE_M:
+            break
+    ux, uy = ring[before, 0] - x, ring[before, 1] - y
+    vx, vy = ring[after, 0] - x, ring[after, 1] - y
+    return abs(np.arctan2(vx * uy - vy * ux, ux * vx + uy * vy))
+
+
+@compiled
+def measure_cover_beside(ring, size, x, y):
+    """Return a whole turn inside a ring, half a turn on its edge, and 0 outside."""
+    x0, y0 = ring[size - 1, 0], ring[size - 1, 1]
+    cover = 2.0 * np.pi
+    for i in range(size):
+        x1, y1 = ring[i, 0], ring[i, 1]
+        ex, ey = x1 - x0, y1 - y0
+        length = np.sqrt(ex * ex + ey * ey)
+        if length > ON_LINE_M:
+            depth = (ex * (y - y0) - ey * (x - x0)) / length
+            if depth < -ONE_PLACE_M:
+                return 0.0
+            if depth < ONE_PLACE_M:
+                cover = np.pi
+        x0, y0 = x1, y1
+    return cover
+
+
+@compiled
+def list_places(drawing, box):
+    """Return the distinct places (n,), (n,) in a `box` where fragments have corners."""
+    total = 0
+    for f in range(drawing.count[0]):
+        total += drawing.sizes[f]
+    xs, ys, count = np.empty(total), np.empty(total), 0
+    for f in range(drawing.count[0]):
+        for i in range(drawing.sizes[f]):
+            x, y = drawing.rings[f, i, 0], drawing.rings[f, i, 1]
+            if box[0] < x < box[1] and box[2] < y < box[3]:
+                xs[count], ys[count] = x, y
+                count += 1
+    xs, ys = xs[:count], ys[:count]
+    order, is_used, kept = np.argsort(xs), np.zeros(count, np.bool_), 0
+    out_x, out_y = np.empty(count), np.empty(count)
+    for s in range(count):
+        i = order[s]
+        if is_used[i]:
+            continue
+        t = s
+        while t < count and xs[order[t]] < xs[i] + ONE_PLACE_M:
+            if abs(ys[order[t]] - ys[i]) < ONE_PLACE_M:
+                is_used[order[t]] = True
+            t += 1
+        out_x[kept], out_y[kept] = xs[i], ys[i]
+        kept += 1
+    return out_x[:kept], out_y[:kept]
+
+
+@compiled
+def count_corners(roof, drawing, box):
+    """Count the corners of a drawn roof in a `box` (4,), at all levels."""
+    xs, ys = list_places(drawing, box)
+    planes, covers = np.empty(MOST_AT_PLACE, np.int64), np.empty(MOST_AT_PLACE)
+    heights, levels = np.empty(MOST_AT_PLACE), np.empty(MOST_AT_PLACE)
+    total = 0
+    for i in range(len(xs)):
+        x, y, met = xs[i], ys[i], 0
+        for f in range(drawing.count[0]):
+            if not (
+                drawing.boxes[f, 0] <= x <= drawing.boxes[f, 1]
+                and drawing.boxes[f, 2] <= y <= drawing.boxes[f, 3]
+            ):
+                continue
+            cover = measure_cover(drawing.rings[f], drawing.sizes[f], x, y)
+            if cover == 0.0:
+                continue
+            k, p = drawing.owners[f, 0], drawing.owners[f, 1]
+            number, place = drawing.numbers[k, p], 0
+            while place < met and planes[place] != number:
+                place += 1
+            if place < met:
+                covers[place] += cover
+            elif met < MOST_AT_PLACE:
+                planes[met], covers[met] = number, cover
+                row = roof.planes[k, p]
+                heights[met] = row[0] * x + row[1] * y + row[2]
+                met += 1
+        count = 0
+        for place in range(met):
+            turn = covers[place] % np.pi
+            if min(turn, np.pi - turn) < STRAIGHT_RAD:
+                continue
+            is_new = True
+            for level in range(count):
+                is_new = is_new and abs(levels[level] - heights[place]) >= ONE_LEVEL_M
+            if is_new:
+                levels[count] = heights[place]
+                count += 1
+        total += count
+    return total
+
+
+@compiled
+def compute_height(roof, view, x, y, reach):
+    """Return the height of the roof over a place, the volume and the plane; -inf where none is.
+
+    Sides reach so far (m) beyond themselves.
+    """
+    height, volume, plane = -np.inf, -1, -1
+    boxes, halves, rows = roof.boxes, roof.half_planes, roof.planes
+    for m in range(len(view)):
+        k = view[m]
+        if x < boxes[k, 0] - reach or x > boxes[k, 1] + reach:
+            continue
+        if y < boxes[k, 2] - reach or y > boxes[k, 3] + reach:
+            continue
+        is_inside = True
+        for s in range(N_SIDES):
+            is_inside &= halves[k, s, 0] * x + halves[k, s, 1] * y + halves[k, s, 2] >= -reach
+        if not is_inside:
+            continue
+        lowest, lowest_plane = np.inf, -1
+        for p in range(roof.n_planes[k]):
+            z = rows[k, p, 0] * x + rows[k, p, 1] * y + rows[k, p, 2]
+            if z < lowest:
+                lowest, lowest_plane = z, p
+        if roof.replaces[k] or lowest > height:
+            height, volume, plane = lowest, k, lowest_plane
+    return height, volume, plane
+
+
+@compiled
+def measure_low_steps(roof, drawing, view, box):
+    """Return the length (m) of low steps in a `box`."""
+    total = 0.0
+    for f in range(drawing.count[0]):
+        size, row = drawing.sizes[f], roof.planes[drawing.owners[f, 0], drawing.owners[f, 1]]
+        x0, y0 = drawing.rings[f, size - 1, 0], drawing.rings[f, size - 1, 1]
+        for i in range(size):
+            x1, y1 = drawing.rings[f, i, 0], drawing.rings[f, i, 1]
+            ex, ey = x1 - x0, y1 - y0
+            length = np.sqrt(ex * ex + ey * ey)
+            if length > 2.0 * ONE_PLACE_M:
+                samples = max(1, int(length / STEP_SAMPLE_M))
+                for q in range(samples):
+                    t = (q + 0.5) / samples
+                    x, y = (
+                        x0 + t * ex + BESIDE_M * ey / length,
+                        y0 + t * ey - BESIDE_M * ex / length,
+                    )
+                    if box[0] < x < box[1] and box[2] < y < box[3]:
+                        height, _, _ = compute_height(roof, view, x, y, 0.0)
+                        step = row[0] * x + row[1] * y + row[2] - height
+                        if SEEN_STEP_M < step < LOW_STEP_M:
+                            total += length / samples
+            x0, y0 = x1, y1
+    return total
+
+
+@compiled
+def join_fragments(roof, drawing):
+    """Return for each fragment (f,) the first one that no step keeps apart from it."""
+    count = drawing.count[0]
+    first = np.arange(count)
+    for f in range(count):
+        box = drawing.boxes[f]
+        for g in range(f + 1, count):
+            if first[f] == first[g] or not meets(drawing.boxes[g], box[0], box[1], box[2], box[3]):
+                continue
+            if are_continuous(roof, drawing, f, g):
+                old, new = max(first[f], first[g]), min(first[f], first[g])
+                for h in range(count):
+                    if first[h] == old:
+                        first[h] = new
+    return first
+
+
+@compiled
+def are_continuous(roof, drawing, f, g):
+    """Return whether two fragments share a stretch of border on which they are at one height."""
+    row = roof.planes[drawing.owners[f, 0], drawing.owners[f, 1]]
+    other = roof.planes[drawing.owners[g, 0], drawing.owners[g, 1]]
+    ring, size = drawing.rings[f], drawing.sizes[f]
+    x0, y0 = ring[size - 1, 0], ring[size - 1, 1]
+    for i in range(size):
+        x1, y1 = ring[i, 0], ring[i, 1]
+        length = np.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+        if length > SHARED_M:
+            a, b = (x1 - x0) / length, (y1 - y0) / length
+            low, high = find_overlap(drawing.rings[g], drawing.sizes[g], x0, y0, a, b, length)
+            if high - low > SHARED_M:
+                t = 0.5 * (low + high)
+                x, y = x0 + t * a, y0 + t * b
+                step = row[0] * x + row[1] * y + row[2] - other[0] * x - other[1] * y - other[2]
+                if abs(step) < SEEN_STEP_M:
+                    return True
+        x0, y0 = x1, y1
+    return False
+
+
+@compiled
+def find_overlap(ring, size, x, y, a, b, length):
+    """Return the stretch of a segment from x, y along a, b that an edge of a ring covers."""
+    u, v = ring[size - 1, 0], ring[size - 1, 1]
+    for i in range(size):
+        p, q = ring[i, 0], ring[i, 1]
+        if (
+            abs(a * (v - y) - b * (u - x)) < ONE_PLACE_M
+            and abs(a * (q - y) - b * (p - x)) < ONE_PLACE_M
+        ):
+            s, t = a * (u - x) + b * (v - y), a * (p - x) + b * (q - y)
+            low, high = max(min(s, t), 0.0), min(max(s, t), length)
+            if high - low > SHARED_M:
+                return low, high
+        u, v = p, q
+    return 0.0, 0.0

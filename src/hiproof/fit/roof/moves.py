@@ -1,0 +1,506 @@
+"""Propose moves of a roof, and apply one. Nothing here judges.
+
+A move is a row (kind, a, b, c, d) of numbers. `list_moves` writes those that concern volumes in
+question, `apply_move` changes a roof by one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .draw import meets
+from .tables import (
+    LINES,
+    MOST_PLANES,
+    N_SIDES,
+    NO_NUMBER,
+    UNKNOWNS,
+    VOLUMES,
+    add_line,
+    add_plane,
+    add_unknown,
+    drop_plane,
+    measure_middle,
+    place_volume,
+    read_line,
+)
+
+(
+    LEAVE_OUT,  # volume a
+    LEAVE_PLANE,  # plane b of volume a
+    SHARE,  # unknown b becomes a
+    TO_OUTLINE,  # side b of volume a on line c of the outline
+    TO_LINE,  # side b of volume a on line c of the roof
+    RUN_ON,  # side b of volume a, by step c
+    MERGE,  # volume b into a, whose planes then face as c says (0: as they do), with b's if d
+    FACE,  # planes of volume a face as b says
+    TURN,  # volume a replaces instead of joining, or joins
+    GIVE,  # volume a a plane from its side b, with the slope c and the height d of others
+    GIVE_WALL,  # volume a a plane from line b of the outline, with slope c and height d of others
+    LEVEL_EAVES,  # all sloping planes of volume a rise from its sides at one height, with one slope
+    # if b, and from all walls that cut its corners off if c
+    TILT,  # the level plane b of volume a rises from its side c
+    LEVEL,  # plane b of volume a becomes level
+    ADD_BAY,  # a level volume over bay a of the outline
+) = range(15)
+MOVE_COLUMNS = 5
+# Planes face square to their sides, along the axis between two sides, or square to either.
+FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
+
+NEAR_M = 1.0  # Volumes so near each other (m) may have something in common.
+SIDE_REACH_M = 1.6  # Furthest (m) that the middle of a side moves to another line.
+ALONG_COSINE = 0.94  # Cosine of the angle between a side and the line to which it moves.
+SAME_DIRECTION = 0.97  # The same of sides of volumes that merge.
+FACING_COSINE = 0.9  # The same of a plane and the side that it faces.
+BESIDE_CORNER_M = 0.1  # Distance (m) outside a volume of the middle of a wall over its corner.
+MOST_LINES = 7  # Most lines to which a side is moved.
+RUN_ON_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
+SAME_FAR = 0.03  # The same of volumes that are not near each other.
+ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
+
+
+@compiled
+def write_move(moves, count, kind, a, b, c, d):
+    """Write one more move, if there is room. Returns the number of moves."""
+    if count < len(moves):
+        moves[count, 0], moves[count, 1], moves[count, 2] = kind, a, b
+        moves[count, 3], moves[count, 4] = c, d
+        count += 1
+    return count
+
+
+@compiled
+def is_near(roof, j, k):
+    box = roof.boxes[k]
+    return meets(roof.boxes[j], box[0] - NEAR_M, box[1] + NEAR_M, box[2] - NEAR_M, box[3] + NEAR_M)
+
+
+@compiled
+def list_moves(roof, site, asked, moves):
+    """Write the moves that concern a volume in `asked` (v,) to `moves`. Returns their number."""
+    count = 0
+    for k in range(roof.counts[VOLUMES]):
+        if not asked[k] or roof.n_planes[k] == 0:
+            continue
+        count = write_move(moves, count, LEAVE_OUT, k, 0, 0, 0)
+        for p in range(roof.n_planes[k]):
+            if roof.n_planes[k] > 1:
+                count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
+            if roof.slopes[k, p] >= 0:
+                count = write_move(moves, count, LEVEL, k, p, 0, 0)
+            elif roof.n_planes[k] == 1:
+                for s in range(N_SIDES):
+                    count = write_move(moves, count, TILT, k, p, s, 0)
+        for way in range(FACE_SIDES, FACE_SECOND + 1):
+            count = write_move(moves, count, FACE, k, way, 0, 0)
+        count = write_move(moves, count, TURN, k, 0, 0, 0)
+        count = list_side_moves(roof, site, k, moves, count)
+        count = list_new_planes(roof, site, k, moves, count)
+        cuts = 0
+        for m in range(len(site.lines)):
+            cuts += int(cuts_corner(roof, k, site.lines[m]))
+        for way in range(4 if cuts > 0 else 2):
+            count = write_move(moves, count, LEVEL_EAVES, k, way % 2, way // 2, 0)
+        for j in range(roof.counts[VOLUMES]):
+            if j != k and roof.n_planes[j] > 0 and (j < k or not asked[j]):
+                count = list_merges(roof, j, k, moves, count)
+    for bay in range(len(site.bay_heights) if count > 0 else 0):
+        count = write_move(moves, count, ADD_BAY, bay, 0, 0, 0)
+    return list_shares(roof, asked, moves, count)
+
+
+@compiled
+def list_merges(roof, j, k, moves, count):
+    if roof.replaces[j] != roof.replaces[k] or not is_near(roof, j, k):
+        return count
+    first, second, third = (
+        roof.half_planes[j, 0],
+        roof.half_planes[k, 0],
+        roof.half_planes[k, 2],
+    )
+    along = abs(first[0] * second[0] + first[1] * second[1])
+    across = abs(first[0] * third[0] + first[1] * third[1])
+    if max(along, across) >= SAME_DIRECTION:
+        for way in range(FACE_SECOND + 1):
+            count = write_move(moves, count, MERGE, j, k, way, 1)
+            count = write_move(moves, count, MERGE, k, j, way, 1)
+        if roof.n_planes[j] != roof.n_planes[k] or not has_alike(roof, j, k):
+            count = write_move(moves, count, MERGE, j, k, 0, 0)
+            count = write_move(moves, count, MERGE, k, j, 0, 0)
+    return count
+
+
+@compiled
+def list_shares(roof, asked, moves, count):
+    """Write the pairs of unknowns nearly alike, of volumes near each other, the nearest first."""
+    n = roof.counts[UNKNOWNS]
+    kinds, boxes, is_asked = np.zeros(n, np.int64), np.zeros((n, 4)), np.zeros(n, np.bool_)
+    for k in range(roof.counts[VOLUMES]):
+        for p in range(roof.n_planes[k]):
+            for kind in range(1, 3):
+                u = roof.heights[k, p] if kind == 1 else roof.slopes[k, p]
+                if u < 0:
+                    continue
+                box, other = boxes[u], roof.boxes[k]
+                if kinds[u] == 0:
+                    box[:] = other
+                box[0], box[1] = min(box[0], other[0]), max(box[1], other[1])
+                box[2], box[3] = min(box[2], other[2]), max(box[3], other[3])
+                kinds[u] = kind
+                is_asked[u] |= asked[k]
+    for a in range(n):
+        for b in range(a + 1, n):
+            if kinds[a] == 0 or kinds[a] != kinds[b] or not (is_asked[a] or is_asked[b]):
+                continue
+            gap = abs(roof.values[a] - roof.values[b])
+            box = boxes[b]
+            is_close = meets(
+                boxes[a], box[0] - NEAR_M, box[1] + NEAR_M, box[2] - NEAR_M, box[3] + NEAR_M
+            )
+            alike = ALIKE_HEIGHTS_M if kinds[a] == 1 else ALIKE_SLOPES
+            if gap < (alike if is_close else SAME_FAR):
+                count = write_move(moves, count, SHARE, a, b, 0, 0)
+    return count
+
+
+@compiled
+def list_side_moves(roof, site, k, moves, count):
+    """Write lines on which the sides of volume k may lie, the nearest first, and run-ons."""
+    near = np.empty((MOST_LINES, 3))
+    for s in range(N_SIDES):
+        x, y, length = measure_middle(roof, k, s, site.bounds)
+        if length == 0.0:
+            continue
+        half, found = roof.half_planes[k, s], 0
+        for m in range(len(site.lines)):
+            line = site.lines[m]
+            found = note_line(half, x, y, line[0], line[1], line[2], TO_OUTLINE, m + 1, near, found)
+        for j in range(roof.counts[VOLUMES]):
+            if j == k or roof.n_planes[j] == 0 or not is_near(roof, j, k):
+                continue
+            for t in range(N_SIDES):
+                line = roof.half_planes[j, t]
+                signed = roof.sides[j, t]
+                found = note_line(
+                    half, x, y, line[0], line[1], line[2], TO_LINE, signed, near, found
+                )
+        for q in range(found):
+            count = write_move(moves, count, int(near[q, 1]), k, s, int(near[q, 2]), 0)
+        for step in range(len(RUN_ON_M)):
+            count = write_move(moves, count, RUN_ON, k, s, step, 0)
+    return count
+
+
+@compiled
+def note_line(half, x, y, a, b, c, kind, number, near, found):
+    """Note a line that passes near the middle of a side, in the order of its distance."""
+    cosine = half[0] * a + half[1] * b
+    gap = a * x + b * y + c
+    if abs(cosine) < ALONG_COSINE or abs(gap) > SIDE_REACH_M:
+        return found
+    if cosine < 0.0:
+        number = -number
+    if abs(gap) < 1e-4 and abs(cosine) > 1.0 - 1e-7:
+        return found
+    for q in range(found):
+        if abs(near[q, 0] - abs(gap)) < 1e-4 and near[q, 1] == kind:
+            return found
+    place = found
+    while place > 0 and near[place - 1, 0] > abs(gap):
+        place -= 1
+    if place >= len(near):
+        return found
+    for q in range(min(found, len(near) - 1), place, -1):
+        near[q] = near[q - 1]
+    near[place, 0], near[place, 1], near[place, 2] = abs(gap), kind, number
+    return min(found + 1, len(near))
+
+
+@compiled
+def list_new_planes(roof, site, k, moves, count):
+    """Write planes over further sides of volume k, and over walls that cut its corners off."""
+    if roof.n_planes[k] >= MOST_PLANES:
+        return count
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] < 0:
+            continue
+        is_first = True
+        for q in range(p):
+            is_first &= (
+                roof.slopes[k, q] != roof.slopes[k, p] or roof.heights[k, q] != roof.heights[k, p]
+            )
+        if not is_first:
+            continue
+        for s in range(N_SIDES):
+            if not is_faced(roof, k, roof.half_planes[k, s, 0], roof.half_planes[k, s, 1]):
+                count = write_move(moves, count, GIVE, k, s, roof.slopes[k, p], roof.heights[k, p])
+        for m in range(len(site.lines)):
+            if cuts_corner(roof, k, site.lines[m]):
+                count = write_move(
+                    moves, count, GIVE_WALL, k, m, roof.slopes[k, p], roof.heights[k, p]
+                )
+    return count
+
+
+@compiled
+def cuts_corner(roof, k, line):
+    """Return whether an edge of the outline cuts a corner of volume k off, and has no plane yet."""
+    if line[5] == 0.0 or is_faced(roof, k, line[0], line[1]):
+        return False
+    for s in range(N_SIDES):
+        half = roof.half_planes[k, s]
+        if (
+            half[0] * line[3] + half[1] * line[4] + half[2] < -BESIDE_CORNER_M
+            or abs(half[0] * line[0] + half[1] * line[1]) > ALONG_COSINE
+        ):
+            return False
+    return True
+
+
+@compiled
+def is_faced(roof, k, a, b):
+    """Return whether volume k has a plane that faces square to a line."""
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] >= 0:
+            c, d, _ = read_line(roof, roof.plane_lines[k, p])
+            if a * c + b * d > FACING_COSINE:
+                return True
+    return False
+
+
+@compiled
+def apply_move(roof, move, site, changed):
+    """Change a roof by a move, and set `changed` (v,) for the volumes that it touches.
+
+    Returns whether the move is possible.
+    """
+    kind, a, b, c, d = move[0], move[1], move[2], move[3], move[4]
+    changed[:] = False
+    if kind == SHARE:
+        return share(roof, a, b, changed)
+    if kind == ADD_BAY:
+        k = add_bay(roof, site, a)
+        changed[k] = True
+        place_volume(roof, k)
+        return True
+    if roof.n_planes[a] == 0:
+        return False
+    changed[a] = True
+    if kind == LEAVE_OUT:
+        roof.n_planes[a] = 0
+    elif kind == LEAVE_PLANE:
+        if b >= roof.n_planes[a] or roof.n_planes[a] < 2:
+            return False
+        drop_plane(roof, a, b)
+    elif kind == TO_OUTLINE:
+        line, sign = site.lines[abs(c) - 1], 1.0 if c > 0 else -1.0
+        roof.sides[a, b] = add_line(roof, sign * line[0], sign * line[1], sign * line[2])
+    elif kind == TO_LINE:
+        if abs(c) > roof.counts[LINES] or roof.sides[a, b] == c:
+            return False
+        roof.sides[a, b] = c
+    elif kind == RUN_ON:
+        e, f, g = read_line(roof, roof.sides[a, b])
+        roof.sides[a, b] = add_line(roof, e, f, g + RUN_ON_M[c])
+    elif kind == MERGE:
+        if roof.n_planes[b] == 0 or not merge(roof, a, b, site, d):
+            return False
+        changed[b] = True
+        if c:
+            face_planes(roof, a, c, site)
+    elif kind == FACE:
+        if not face_planes(roof, a, b, site):
+            return False
+    elif kind == TURN:
+        roof.replaces[a] = 1 - roof.replaces[a]
+    elif kind == GIVE:
+        add_plane(roof, a, roof.sides[a, b], d, c)
+    elif kind == GIVE_WALL:
+        line = site.lines[b]
+        add_plane(roof, a, add_line(roof, line[0], line[1], line[2]), d, c)
+    elif kind == LEVEL_EAVES:
+        if not level_eaves(roof, a, b, c, site):
+            return False
+    elif kind == TILT:
+        if b >= roof.n_planes[a] or roof.slopes[a, b] >= 0:
+            return False
+        roof.heights[a, b] = add_unknown(roof, roof.values[roof.heights[a, b]])
+        roof.plane_lines[a, b], roof.slopes[a, b] = roof.sides[a, c], add_unknown(roof, 0.0)
+    elif kind == LEVEL:
+        if b >= roof.n_planes[a] or roof.slopes[a, b] < 0:
+            return False
+        x, y = find_centre(roof, a, site)
+        row = roof.planes[a, b]
+        roof.heights[a, b] = add_unknown(roof, row[0] * x + row[1] * y + row[2])
+        roof.slopes[a, b] = NO_NUMBER
+    place_volume(roof, a)
+    return True
+
+
+@compiled
+def find_centre(roof, k, site):
+    """Return the centre of volume k's box inside the outline's."""
+    box, bounds = roof.boxes[k], site.bounds
+    return (
+        0.5 * (max(box[0], bounds[0]) + min(box[1], bounds[1])),
+        0.5 * (max(box[2], bounds[2]) + min(box[3], bounds[3])),
+    )
+
+
+@compiled
+def add_bay(roof, site, bay):
+    """Add a level volume over a bay, at its height. Returns its number."""
+    k = roof.counts[VOLUMES]
+    roof.counts[VOLUMES] = k + 1
+    for s in range(N_SIDES):
+        line = site.bays[bay, s]
+        roof.sides[k, s] = add_line(roof, line[0], line[1], line[2])
+    roof.n_planes[k], roof.replaces[k] = 0, 1
+    add_plane(roof, k, roof.sides[k, 0], add_unknown(roof, site.bay_heights[bay]), NO_NUMBER)
+    return k
+
+
+@compiled
+def share(roof, a, b, changed):
+    """Let unknown `a` stand for `b`, too."""
+    n_a, n_b = 0, 0
+    for k in range(roof.counts[VOLUMES]):
+        for p in range(roof.n_planes[k]):
+            if roof.heights[k, p] == a or roof.slopes[k, p] == a:
+                n_a += 1
+                changed[k] = True
+            if roof.heights[k, p] == b:
+                roof.heights[k, p] = a
+                n_b += 1
+                changed[k] = True
+            if roof.slopes[k, p] == b:
+                roof.slopes[k, p] = a
+                n_b += 1
+                changed[k] = True
+    if n_a == 0 or n_b == 0:
+        return False
+    roof.values[a] = (n_a * roof.values[a] + n_b * roof.values[b]) / (n_a + n_b)
+    for k in range(roof.counts[VOLUMES]):
+        if changed[k]:
+            place_volume(roof, k)
+    return True
+
+
+@compiled
+def merge(roof, a, b, site, takes_planes):
+    """Draw volume a out over b, perhaps with the planes that only b has, and leave b out."""
+    for s in range(N_SIDES):
+        half, best = roof.half_planes[a, s], 0
+        for t in range(N_SIDES):
+            other = roof.half_planes[b, t]
+            if half[0] * other[0] + half[1] * other[1] > SAME_DIRECTION:
+                best = roof.sides[b, t]
+        if best == 0:
+            return False
+        x, y, length = measure_middle(roof, a, s, site.bounds)
+        e, f, g = read_line(roof, best)
+        if length > 0.0 and e * x + f * y + g > 0.0:
+            roof.sides[a, s] = best
+    for p in range(roof.n_planes[b] if takes_planes else 0):
+        if not has_alike_plane(roof, a, b, p):
+            add_plane(roof, a, roof.plane_lines[b, p], roof.heights[b, p], roof.slopes[b, p])
+    roof.n_planes[b] = 0
+    return True
+
+
+@compiled
+def has_alike_plane(roof, a, b, p):
+    """Return whether volume a has a plane that faces as plane p of volume b does."""
+    if roof.slopes[b, p] >= 0:
+        e, f, _ = read_line(roof, roof.plane_lines[b, p])
+        return is_faced(roof, a, e, f)
+    for q in range(roof.n_planes[a]):
+        if roof.slopes[a, q] < 0:
+            return True
+    return False
+
+
+@compiled
+def has_alike(roof, a, b):
+    """Return whether volume a has a plane alike for each of volume b."""
+    for p in range(roof.n_planes[b]):
+        if not has_alike_plane(roof, a, b, p):
+            return False
+    return True
+
+
+@compiled
+def face_planes(roof, k, way, site):
+    """Turn the planes of volume k to the sides that they nearly face, or to the axis between two.
+
+    A height that only this plane uses is that of the plane in the middle of the side. Returns
+    whether anything changed.
+    """
+    has_changed = False
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] < 0:
+            continue
+        c, d, _ = read_line(roof, roof.plane_lines[k, p])
+        for s in range(N_SIDES):
+            e, f, _ = read_line(roof, roof.sides[k, s])
+            x, y, length = measure_middle(roof, k, s, site.bounds)
+            if e * c + f * d <= FACING_COSINE or length == 0.0:
+                continue
+            line = roof.sides[k, s]
+            if way != FACE_SIDES:
+                g, h, _ = read_line(roof, roof.sides[k, s ^ 1])
+                if e * g + f * h > -FACING_COSINE:
+                    continue
+                if way == FACE_AXIS:
+                    norm = np.sqrt((e - g) ** 2 + (f - h) ** 2)
+                    e, f = (e - g) / norm, (f - h) / norm
+                elif (way == FACE_FIRST) == (s % 2 == 1):
+                    e, f = -g, -h
+                line = add_line(roof, e, f, -e * x - f * y)
+            if line == roof.plane_lines[k, p]:
+                continue
+            if count_users(roof, roof.heights[k, p]) == 1:
+                row = roof.planes[k, p]
+                roof.values[roof.heights[k, p]] = row[0] * x + row[1] * y + row[2]
+            roof.plane_lines[k, p] = line
+            has_changed = True
+            break
+    return has_changed
+
+
+@compiled
+def level_eaves(roof, k, one_slope, walls, site):
+    """Let all sloping planes of volume k rise from its sides at one height. Returns if any did."""
+    face_planes(roof, k, FACE_SIDES, site)
+    place_volume(roof, k)
+    height, slope, count, lowest, total = -1, -1, 0, 0.0, 0.0
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] >= 0:
+            count += 1
+            lowest += roof.values[roof.heights[k, p]]
+            total += roof.values[roof.slopes[k, p]]
+    if count == 0 or (count == 1 and walls == 0):
+        return False
+    height, slope = add_unknown(roof, lowest / count), add_unknown(roof, total / count)
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] >= 0:
+            roof.heights[k, p] = height
+            roof.slopes[k, p] = slope if one_slope else roof.slopes[k, p]
+    if walls:
+        for m in range(len(site.lines)):
+            line = site.lines[m]
+            if cuts_corner(roof, k, line):
+                signed = add_line(roof, line[0], line[1], line[2])
+                add_plane(roof, k, signed, height, slope)
+    return True
+
+
+@compiled
+def count_users(roof, u):
+    """Count the planes that use an unknown."""
+    count = 0
+    for k in range(roof.counts[VOLUMES]):
+        for p in range(roof.n_planes[k]):
+            count += int(roof.heights[k, p] == u or roof.slopes[k, p] == u)
+    return count

@@ -1,0 +1,246 @@
+"""Price a roof in a box: the misfit of its points, and the structure that is drawn there.
+
+A price is a sum over places, but for unknowns and volumes, of which each costs once. So the price
+of a change is the difference in any box that holds all that it moves.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numpy as np
+
+from ...compiled import compiled
+from .draw import compute_height, count_corners, draw, measure_low_steps, meets
+from .prices import (
+    CORNER_UNITS,
+    LOW_STEP_UNITS,
+    UNKNOWN_UNITS,
+    VOLUME_UNITS,
+)
+from .tables import UNKNOWNS, VOLUMES
+
+REACH_M = 0.03  # Points so far (m) beside a volume are over it.
+DAMPING = 0.05  # Points that hold an unknown at its value.
+
+Site = namedtuple(
+    "Site",
+    "x y z weight shade n low high dead width unit parts part_sizes part_boxes lines bays "
+    "bay_heights bounds",
+)
+"""What the roof of a building has to explain.
+
+- x, y, z, weight, shade (n + g,): points, ascending by x, then unobserved cells.
+- n: the number of points. low, high: the heights that a roof may have over cells.
+- dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
+- unit: the points that a unit of structure must explain.
+- parts (p, c, 2), part_sizes (p,), part_boxes (p, 4): convex parts of the outline.
+- lines (m, 6): lines of the outline, as `site.list_outline_lines` says.
+- bays (b, 4, 3), bay_heights (b,): sides and heights of places that a wall cuts off.
+- bounds (4,): least and greatest x and y of the outline.
+"""
+
+
+@compiled
+def compute_point_cost(z_point, z_roof, dead, width):
+    r = max(abs(z_point - z_roof) - dead, 0.0) / width
+    return min(r * r, 1.0)
+
+
+@compiled
+def compute_cell_cost(z_roof, weight, shade, low, high):
+    if z_roof < low or z_roof > high:
+        return weight
+    return shade * (z_roof - low) / (high - low)
+
+
+@compiled
+def list_view(roof, box):
+    """Return the numbers of the volumes that reach into a box."""
+    out, count = np.empty(roof.counts[VOLUMES], np.int64), 0
+    for k in range(roof.counts[VOLUMES]):
+        if roof.n_planes[k] > 0 and meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
+            out[count] = k
+            count += 1
+    return out[:count]
+
+
+@compiled
+def list_points(site, box):
+    """Return the numbers of the points and cells in a box."""
+    first = np.searchsorted(site.x[: site.n], box[0])
+    last = np.searchsorted(site.x[: site.n], box[1])
+    out, count = np.empty(last - first + len(site.x) - site.n, np.int64), 0
+    for i in range(first, last):
+        if box[2] < site.y[i] < box[3]:
+            out[count] = i
+            count += 1
+    for i in range(site.n, len(site.x)):
+        if box[0] < site.x[i] < box[1] and box[2] < site.y[i] < box[3]:
+            out[count] = i
+            count += 1
+    return out[:count]
+
+
+@compiled
+def price_misfit(roof, site, view, points):
+    """Return what the points and cells of the numbers `points` cost."""
+    total = 0.0
+    for m in range(len(points)):
+        i = points[m]
+        if i < site.n:
+            height, _, _ = compute_height(roof, view, site.x[i], site.y[i], REACH_M)
+            total += compute_point_cost(site.z[i], height, site.dead, site.width)
+        else:
+            height, _, _ = compute_height(roof, view, site.x[i], site.y[i], 0.0)
+            total += compute_cell_cost(height, site.weight[i], site.shade[i], site.low, site.high)
+    return total
+
+
+@compiled
+def price_drawing(roof, drawing, view, site, box):
+    """Return the units of the corners and low steps that are drawn in a box."""
+    draw(roof, drawing, view, site, box)
+    return CORNER_UNITS * count_corners(roof, drawing, box) + LOW_STEP_UNITS * measure_low_steps(
+        roof, drawing, view, box
+    )
+
+
+@compiled
+def price_tables(roof):
+    """Return the units of all volumes and unknowns."""
+    total, is_used = 0.0, np.zeros(roof.counts[UNKNOWNS], np.bool_)
+    for k in range(roof.counts[VOLUMES]):
+        if roof.n_planes[k] == 0:
+            continue
+        total += VOLUME_UNITS
+        for p in range(roof.n_planes[k]):
+            height, slope = roof.heights[k, p], roof.slopes[k, p]
+            if not is_used[height]:
+                is_used[height] = True
+                total += UNKNOWN_UNITS
+            if slope >= 0 and not is_used[slope]:
+                is_used[slope] = True
+                total += UNKNOWN_UNITS
+    return total
+
+
+@compiled
+def price_roof(roof, drawing, site):
+    """Return the price (points) of a roof."""
+    box = np.array([-np.inf, np.inf, -np.inf, np.inf])
+    view, points = list_view(roof, box), list_points(site, box)
+    units = price_tables(roof) + price_drawing(roof, drawing, view, site, box)
+    return price_misfit(roof, site, view, points) + site.unit * units
+
+
+@compiled
+def sum_normal_equations(roof, site, view, points, places, matrix, vector):
+    """Sum the normal equations of unknowns over the points that a roof explains.
+
+    `places` (u,) are the unknowns' rows, -1 for those that keep their value. The sums go to
+    `matrix` (m, m) and `vector` (m,). Returns the number of points and their sum of squares.
+    """
+    matrix[:], vector[:] = 0.0, 0.0
+    count, squares = 0, 0.0
+    for m in range(len(points)):
+        i = points[m]
+        if i >= site.n:
+            continue
+        height, k, p = compute_height(roof, view, site.x[i], site.y[i], REACH_M)
+        residual = site.z[i] - height
+        if k < 0 or abs(residual) > site.dead + site.width:
+            continue
+        count += 1
+        squares += residual * residual
+        first, second, d = roof.heights[k, p], roof.slopes[k, p], 0.0
+        rest = site.z[i]
+        if second >= 0:
+            line = roof.plane_lines[k, p]
+            l = abs(line) - 1
+            d = roof.lines[l, 0] * site.x[i] + roof.lines[l, 1] * site.y[i] + roof.lines[l, 2]
+            d = d if line > 0 else -d
+            if places[second] < 0:
+                rest -= roof.values[second] * d
+        if places[first] < 0:
+            rest -= roof.values[first]
+        a, b = places[first], places[second] if second >= 0 else -1
+        if a >= 0:
+            matrix[a, a] += 1.0
+            vector[a] += rest
+        if b >= 0:
+            matrix[b, b] += d * d
+            vector[b] += d * rest
+        if a >= 0 and b >= 0:
+            matrix[a, b] += d
+            matrix[b, a] += d
+    return count, squares
+
+
+@compiled
+def fit_unknowns(roof, site, view, points, places, count, rounds):
+    """Fit the unknowns that have `places` (u,) to points, and place the volumes again."""
+    if count == 0:
+        return
+    matrix, vector = np.zeros((count, count)), np.zeros(count)
+    for _ in range(rounds):
+        sum_normal_equations(roof, site, view, points, places, matrix, vector)
+        for u in range(len(places)):
+            if places[u] >= 0:
+                matrix[places[u], places[u]] += DAMPING
+                vector[places[u]] += DAMPING * roof.values[u]
+        solution = np.linalg.solve(matrix, vector)
+        for u in range(len(places)):
+            if places[u] >= 0:
+                roof.values[u] = solution[places[u]]
+        for m in range(len(view)):
+            place_all_planes(roof, view[m])
+
+
+@compiled
+def place_all_planes(roof, k):
+    """Compute the planes of volume k from its unknowns."""
+    for p in range(roof.n_planes[k]):
+        slope = roof.slopes[k, p]
+        row = roof.planes[k, p]
+        row[2] = roof.values[roof.heights[k, p]]
+        if slope < 0:
+            row[0], row[1] = 0.0, 0.0
+        else:
+            line = roof.plane_lines[k, p]
+            l, s = abs(line) - 1, roof.values[slope] if line > 0 else -roof.values[slope]
+            row[0], row[1] = s * roof.lines[l, 0], s * roof.lines[l, 1]
+            row[2] += s * roof.lines[l, 2]
+
+
+@compiled
+def list_unknowns(roof, site, box):
+    """Return rows (u,) for the unknowns of which all volumes lie inside a box, and their number.
+
+    The others get -1: they keep their value, because points outside the box hold them.
+    """
+    n_unknowns, bounds = roof.counts[UNKNOWNS], site.bounds
+    places, count = np.zeros(n_unknowns, np.int64), 0
+    is_used = np.zeros(n_unknowns, np.bool_)
+    for k in range(roof.counts[VOLUMES]):
+        if roof.n_planes[k] == 0:
+            continue
+        is_inside = (
+            max(roof.boxes[k, 0], bounds[0]) >= box[0]
+            and min(roof.boxes[k, 1], bounds[1]) <= box[1]
+            and max(roof.boxes[k, 2], bounds[2]) >= box[2]
+            and min(roof.boxes[k, 3], bounds[3]) <= box[3]
+        )
+        for p in range(roof.n_planes[k]):
+            for u in (roof.heights[k, p], roof.slopes[k, p]):
+                if u >= 0:
+                    is_used[u] = True
+                    if not is_inside:
+                        places[u] = -1
+    for u in range(n_unknowns):
+        if places[u] == 0 and is_used[u]:
+            places[u] = count
+            count += 1
+        else:
+            places[u] = -1
+    return places, count

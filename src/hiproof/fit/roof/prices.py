@@ -1,0 +1,28 @@
+"""The table of prices: what a roof costs, in points and in units of structure.
+
+    misfit of every point and unobserved cell
+    + unit * (volumes + unknowns + corners + metres of low steps)
+
+A unit is as many points as it must explain. Nothing but this table decides between two roofs.
+"""
+
+from __future__ import annotations
+
+from ..union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
+
+VOLUME_UNITS = 0.5  # A visible volume.
+UNKNOWN_UNITS = 0.45  # A height or a slope, however many planes share it.
+CORNER_UNITS = 0.5  # A corner of the drawn roof, at any level.
+LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
+
+
+def compute_unit(density: float, settings) -> float:
+    """Compute the points that one unit of structure must explain, at a density (points/m2).
+
+    They are those of an area, and never too few. Residuals of neighbouring points are not
+    independent, the less so the denser the cloud, so the area grows there. `settings` are those of
+    [compound].
+    """
+    area_m2 = settings.evidence_area_m2 * max(density / DENSE_CLOUD, 1.0) ** DENSE_GROWTH
+    points = max(settings.evidence_points, area_m2 * density)
+    return float(points) * DETAIL_FACTOR[settings.detail]

@@ -1,0 +1,185 @@
+"""Say which polygons each volume may roof: inside its sides and the outline, not replaced."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from ...geometry.rings import OVERLAY_GRID_M, with_area
+from .draw import Drawing, join_fragments
+from .tables import FAR_M, N_SIDES, VOLUMES, Tables
+
+GAP_M = 1e-3  # A gap this much wider (m) touches what lies beside it.
+LEAST_M2 = 1e-9  # Area (m2) below which a polygon is none.
+HIGHER_M = 1e-6  # A volume no more than this (m) below another is not below it.
+
+
+HIDDEN_M = 0.2  # Distance (m) by which a part reaches below what hides it.
+LEAST_PLACE_M2 = 1.0  # Area (m2) of the smallest place that is a part by itself.
+
+
+def list_places(
+    roof: Tables, drawing: Drawing, outline: shapely.Polygon
+) -> list[tuple[int, list[shapely.Polygon], bool]]:
+    """List the volumes of a drawn roof, each with the polygons that make one part.
+
+    A volume is several parts where steps keep the places apart in which it is visible. Level
+    volumes at one height that touch are one part, of the largest. The last value says whether a
+    part has other ends than its volume.
+    """
+    regions = draw_regions(roof, outline)
+    groups: dict[tuple, dict[int, list[int]]] = {}
+    first = join_fragments(roof, drawing)
+    for f in range(drawing.count[0]):
+        k, p = drawing.owners[f].tolist()
+        is_level = roof.n_planes[k] == 1 and roof.slopes[k, p] < 0
+        key = (-1, int(drawing.numbers[k, p])) if is_level else (k, 0)
+        groups.setdefault(key, {}).setdefault(int(first[f]), []).append(f)
+    places = []
+    for places_of_one in groups.values():
+        areas = {
+            g: shapely.union_all(
+                [shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in fragments],
+                grid_size=OVERLAY_GRID_M,
+            )
+            for g, fragments in places_of_one.items()
+        }
+        large = [area for area in areas.values() if area.area > LEAST_PLACE_M2]
+        owners = sorted({int(drawing.owners[f, 0]) for of in places_of_one.values() for f in of})
+        owner = max(owners, key=lambda k: sum(p.area for p in regions[k]))
+        whole = [p for k in owners for p in regions[k]]
+        if len(owners) > 1:
+            whole = list_polygons(shapely.union_all(whole, grid_size=OVERLAY_GRID_M))
+        if len(large) < 2:
+            places.append((owner, whole, len(owners) > 1))
+        else:
+            places += [(owner, p, True) for p in split_region(whole, large, outline) if p]
+    return places
+
+
+def split_region(
+    polygons: list[shapely.Polygon], places: list[shapely.Geometry], outline: shapely.Polygon
+) -> list[list[shapely.Polygon]]:
+    """Return what of the polygons belongs to each of the places in which they are visible.
+
+    A polygon around several of them is cut around each, and reaches a little below what hides it.
+    """
+    parts: list[list[shapely.Polygon]] = [[] for _ in places]
+    for polygon in polygons:
+        shared = shapely.area(shapely.intersection(polygon, places))
+        inside = np.flatnonzero(shared > 0.5 * LEAST_PLACE_M2).tolist()
+        if len(inside) < 2:
+            parts[int(np.argmax(shared))].append(polygon)
+            continue
+        for g in inside:
+            others = shapely.union_all([places[h] for h in inside if h != g])
+            reach = shapely.buffer(places[g], HIDDEN_M, join_style="mitre")
+            cut = shapely.intersection(polygon, reach, grid_size=OVERLAY_GRID_M)
+            parts[g] += list_polygons(subtract(cut, others))
+    return parts
+
+
+def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    """List the polygons of a geometry that have an area."""
+    return [
+        p for p in shapely.get_parts(geometry) if p.geom_type == "Polygon" and p.area > LEAST_M2
+    ]
+
+
+def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Polygon]]:
+    """Return, for each volume, the polygons (plan coordinates) that it may roof.
+
+    They overlap as volumes do. What a later volume replaces is cut out. A volume without sides
+    roofs only where no other is higher. A place that no volume covers goes to the one beside it.
+    """
+    quads = [draw_quad(roof, k, outline) for k in range(roof.counts[VOLUMES])]
+    regions: list[shapely.Geometry] = []
+    for k, quad in enumerate(quads):
+        if roof.replaces[k]:
+            regions = [subtract(region, quad) for region in regions]
+        regions.append(quad)
+    for k, region in enumerate(regions):
+        if is_endless(roof, k):
+            for j, quad in enumerate(quads):
+                if j != k and not is_endless(roof, j) and not is_below(roof, j, k, quad):
+                    region = subtract(region, quad)
+            regions[k] = region
+    lists = [list_polygons(region) for region in regions]
+    bare = shapely.difference(
+        outline, shapely.union_all(quads, grid_size=OVERLAY_GRID_M), grid_size=OVERLAY_GRID_M
+    )
+    for gap in list_polygons(bare):
+        give_gap(gap, lists, outline)
+    return lists
+
+
+def is_endless(roof: Tables, k: int) -> bool:
+    return bool(roof.boxes[k, 1] - roof.boxes[k, 0] >= FAR_M)
+
+
+def draw_quad(roof: Tables, k: int, outline: shapely.Polygon) -> shapely.Geometry:
+    """Return the part of an outline inside the sides of volume k."""
+    if is_endless(roof, k):
+        return outline
+    ring = [(-2 * FAR_M, -2 * FAR_M), (2 * FAR_M, -2 * FAR_M), (2 * FAR_M, 2 * FAR_M)]
+    ring.append((-2 * FAR_M, 2 * FAR_M))
+    for s in range(N_SIDES):
+        ring = clip_ring(ring, *roof.half_planes[k, s].tolist())
+    if len(ring) < 3:
+        return shapely.Polygon()
+    cut = shapely.intersection(shapely.Polygon(ring), outline, grid_size=OVERLAY_GRID_M)
+    return with_area(cut)
+
+
+def clip_ring(ring: list, a: float, b: float, c: float) -> list:
+    """Clip a convex ring to where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
+    kept = []
+    for (x0, y0), (x1, y1) in zip([ring[-1], *ring[:-1]] if ring else [], ring, strict=True):
+        d0, d1 = a * x0 + b * y0 + c, a * x1 + b * y1 + c
+        if (d0 > 0.0) != (d1 > 0.0):
+            t = d0 / (d0 - d1)
+            kept.append((x0 + t * (x1 - x0), y0 + t * (y1 - y0)))
+        if d1 > 0.0:
+            kept.append((x1, y1))
+    return kept
+
+
+def is_below(roof: Tables, j: int, k: int, quad: shapely.Geometry) -> bool:
+    """Return whether volume j is below k somewhere in its quad, and does not replace it."""
+    if roof.replaces[j] and j > k:
+        return False
+    corners = shapely.get_coordinates(quad)
+    return bool(
+        (compute_heights(roof, j, corners) < compute_heights(roof, k, corners) - HIGHER_M).any()
+    )
+
+
+def compute_heights(roof: Tables, k: int, xy: np.ndarray) -> np.ndarray:
+    """Return the heights (n,) of volume k at places (n, 2), whatever its sides."""
+    rows = roof.planes[k, : roof.n_planes[k]]
+    return (xy @ rows[:, :2].T + rows[:, 2]).min(axis=1)
+
+
+def subtract(region: shapely.Geometry, hole: shapely.Geometry) -> shapely.Geometry:
+    return with_area(shapely.difference(region, hole, grid_size=OVERLAY_GRID_M))
+
+
+def give_gap(
+    gap: shapely.Polygon, regions: list[list[shapely.Polygon]], outline: shapely.Polygon
+) -> None:
+    """Add a gap to the polygon that shares most of its border."""
+    wide = shapely.buffer(gap, GAP_M, quad_segs=1)
+    shared = [
+        (shapely.intersection(wide, polygon).area, k, q)
+        for k, polygons in enumerate(regions)
+        for q, polygon in enumerate(polygons)
+        if shapely.intersects(wide, polygon)
+    ]
+    if not shared:
+        return
+    _, k, q = max(shared)
+    merged = shapely.union_all([regions[k][q], wide], grid_size=OVERLAY_GRID_M)
+    polygons = list_polygons(
+        shapely.intersection(with_area(merged), outline, grid_size=OVERLAY_GRID_M)
+    )
+    regions[k][q : q + 1] = polygons

@@ -1,0 +1,170 @@
+"""What a roof has to explain: points, unobserved cells, and an outline with its lines."""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import shapely
+
+from .draw import MOST_CORNERS
+from .price import Site
+
+SHORTEST_EDGE_M = 0.7  # Shortest edge (m) of an outline along whose line a volume may end.
+SHORTEST_CHORD_M = 1.5  # Shortest line (m) between two corners.
+MOST_CHORD_CORNERS = 16  # Most corners of an outline with such lines.
+MOST_PART_CORNERS = MOST_CORNERS // 2  # Most corners of a convex part: cutting it adds some.
+BAY_DEPTH_M = 0.3  # Depth (m) from which on a bay is one.
+LEAST_BAY_M2, MOST_BAY_M2 = 0.3, 40.0  # Area (m2) of the smallest and largest bay.
+FEWEST_BAY_POINTS = 3  # Fewer points show no height.
+LEAST_PART_M2 = 1e-6  # Area (m2) of the smallest part.
+
+
+def make_site(scene, outline: shapely.Polygon, unit: float) -> Site:
+    """Return the site of an `outline` (plan coordinates) with the points of a scene."""
+    order = np.concatenate(
+        [np.argsort(scene.U[0, : scene.n], kind="stable"), np.arange(scene.n, len(scene.z))]
+    )
+    x, y, z, weight, shade = (
+        np.ascontiguousarray(values[order])
+        for values in (scene.U[0], scene.V[0], scene.z, scene.weight, scene.shade)
+    )
+    rings = split_convex(outline)
+    parts, sizes = np.zeros((len(rings), MOST_CORNERS, 2)), np.array([len(r) for r in rings])
+    for part, ring in zip(parts, rings, strict=True):
+        part[: len(ring)] = ring
+    boxes = np.array([[*np.sort(r[:, 0])[[0, -1]], *np.sort(r[:, 1])[[0, -1]]] for r in rings])
+    x0, y0, x1, y1 = outline.bounds
+    return Site(
+        x,
+        y,
+        z,
+        weight,
+        shade,
+        scene.n,
+        scene.low,
+        scene.high,
+        scene.dead,
+        scene.width,
+        unit,
+        parts,
+        sizes,
+        boxes,
+        list_outline_lines(outline),
+        *list_bays(outline, np.column_stack([x, y, z])[: scene.n]),
+        np.array([x0, x1, y0, y1]),
+    )
+
+
+def list_outline_lines(outline: shapely.Polygon) -> np.ndarray:
+    """List the lines (m, 6) of an outline's edges, and those between two of its corners.
+
+    They are a, b, c, x and y of the middle, and 1 for an edge, else 0.
+    """
+    segments = []
+    oriented = shapely.orient_polygons(outline)
+    for ring in (oriented.exterior, *oriented.interiors):
+        corners = shapely.get_coordinates(ring)
+        steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+        segments += [
+            (start, end)
+            for start, end, length in zip(corners, corners[1:], steps, strict=False)
+            if length >= SHORTEST_EDGE_M
+        ]
+    n_edges = len(segments)
+    corners = shapely.get_coordinates(outline.exterior)[:-1]
+    if len(corners) <= MOST_CHORD_CORNERS:
+        segments += [
+            (start, end)
+            for (i, start), (j, end) in combinations(enumerate(corners), 2)
+            if 1 < j - i < len(corners) - 1 and np.hypot(*(end - start)) >= SHORTEST_CHORD_M
+        ]
+    start, end = np.array(segments).reshape(-1, 2, 2).swapaxes(0, 1)
+    along = end - start
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    normal = np.column_stack([-along[:, 1], along[:, 0]])
+    c = -(normal * start).sum(axis=1)
+    is_edge = np.arange(len(start)) < n_edges
+    middle = 0.5 * (start + end)
+    return np.ascontiguousarray(np.column_stack([normal, c, middle, is_edge]))
+
+
+def list_bays(outline: shapely.Polygon, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """List the places that the line of a wall cuts off an outline, a bay or a corner.
+
+    Returns their four sides (b, 4, 3), and the median height (b,) of their points (n, 3).
+    """
+    ring = shapely.get_coordinates(shapely.orient_polygons(outline).exterior)
+    reach = np.hypot(*np.ptp(ring, axis=0))
+    sides, heights = [], []
+    for start, end in pairwise(ring):
+        along = (end - start) / max(np.hypot(*(end - start)), 1e-9)
+        out = np.array([along[1], -along[0]])
+        if np.hypot(*(end - start)) < SHORTEST_EDGE_M or ((ring - start) @ out).max() < BAY_DEPTH_M:
+            continue
+        beyond = shapely.Polygon(
+            [
+                start - reach * along,
+                start + reach * (out - along),
+                end + reach * (out + along),
+                end + reach * along,
+            ]
+        )
+        for bay in shapely.get_parts(shapely.intersection(outline, beyond)):
+            if bay.geom_type != "Polygon" or not LEAST_BAY_M2 < bay.area < MOST_BAY_M2:
+                continue
+            inside = shapely.contains_xy(bay, points[:, :2])
+            if inside.sum() < FEWEST_BAY_POINTS:
+                continue
+            places = shapely.get_coordinates(bay) @ along
+            sides.append(
+                [
+                    [*out, -float(out @ start)],
+                    [*-out, float(out @ start) + reach],
+                    [*along, -float(places.min())],
+                    [*-along, float(places.max())],
+                ]
+            )
+            heights.append(float(np.median(points[inside, 2])))
+    return np.array(sides).reshape(-1, 4, 3), np.array(heights)
+
+
+def split_convex(polygon: shapely.Polygon) -> list[np.ndarray]:
+    """Split a polygon into convex rings (k, 2), counter-clockwise.
+
+    Triangles are merged over their longest common edges as long as the result is convex (Hertel and
+    Mehlhorn 1983).
+    """
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
+    triangles = shapely.orient_polygons(triangles[shapely.area(triangles) > LEAST_PART_M2])
+    rings = {i: [tuple(c) for c in t.exterior.coords[:-1]] for i, t in enumerate(triangles)}
+    owner = {edge: i for i, ring in rings.items() for edge in list_edges(ring)}
+    inner = [edge for edge in owner if edge < edge[::-1] and edge[::-1] in owner]
+    for start, end in sorted(inner, key=lambda e: (-np.hypot(*np.subtract(*e)), e)):
+        first, second = owner[start, end], owner[end, start]
+        merged = merge_rings(rings[first], rings[second], start, end)
+        if first == second or len(merged) > MOST_PART_CORNERS or not is_convex(merged):
+            continue
+        rings[first] = merged
+        for edge in list_edges(rings.pop(second)):
+            owner[edge] = first
+    return [np.array(ring) for ring in rings.values()]
+
+
+def list_edges(ring: list) -> list[tuple]:
+    return list(zip(ring, [*ring[1:], ring[0]], strict=True))
+
+
+def merge_rings(ring: list, other: list, start: tuple, end: tuple) -> list:
+    """Merge two rings over their edge from `start` to `end`, which the other has reversed."""
+    i, j = ring.index(end), other.index(start)
+    first = [*ring[i:], *ring[:i]]  # from end round to start
+    second = [*other[j:], *other[:j]]  # from start round to end
+    return [*first, *second[1:-1]]
+
+
+def is_convex(ring: list) -> bool:
+    a = np.array(ring)
+    step = np.roll(a, -1, axis=0) - a
+    following = np.roll(step, -1, axis=0)
+    return bool((step[:, 0] * following[:, 1] - step[:, 1] * following[:, 0] > -1e-9).all())

@@ -1,0 +1,137 @@
+"""Laws of a roof's state, price and moves, on simulated compounds."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.fit.roof import draw_volumes, fit_building
+from hiproof.fit.roof.accept import fit_roof, make_known, try_move
+from hiproof.fit.roof.draw import compute_height, draw_all, make_drawing
+from hiproof.fit.roof.moves import MOVE_COLUMNS, list_moves
+from hiproof.fit.roof.price import price_roof
+from hiproof.fit.roof.prices import compute_unit
+from hiproof.fit.roof.site import make_site, split_convex
+from hiproof.fit.roof.start import make_roof
+from hiproof.fit.roof.tables import VOLUMES, copy_tables, make_tables_like, pack
+from hiproof.fit.union.objective import is_base_visible
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.search import find_volumes
+from hiproof.fit.union.sides import choose_sides
+from hiproof.fit.union.unite import gather_ends
+from hiproof.settings import Settings
+from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_compound, scan
+from hiproof.simulate.scene import Defects
+
+
+def scan_compound(kind, seed=0, density=3.0):
+    """Return the points (n, 3) of a simulated compound, and its outline."""
+    rng = np.random.default_rng([COMPOUND_KINDS.index(kind), seed])
+    building = random_compound(rng, kind)
+    cloud = scan(building, rng, ScanSettings(density=density, defects=Defects.none()))
+    return building.roof.frame.to_local(cloud.points[cloud.source != 2]), building.outline
+
+
+def begin_roof(kind, seed=0):
+    """Return a compound's roof as the search leaves it, its site, and its outline in the plan."""
+    points, outline = scan_compound(kind, seed)
+    settings = Settings().compound
+    plan = lay_out_plan(points, outline)
+    volumes, _, scene = find_volumes(plan, outline, settings)
+    plan_outline = shapely.transform(outline, plan.frame.uv_plan)
+    site = make_site(scene, plan_outline, compute_unit(plan.density, settings))
+    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
+    roof = make_roof(volumes, sides, scene.turn, is_base_visible(volumes, scene))
+    fit_roof(roof, site, 2)
+    return roof, site, plan_outline, (volumes, outline, plan, scene)
+
+
+def list_all_moves(roof, site):
+    moves = np.empty((5000, MOVE_COLUMNS), np.int64)
+    return moves[: list_moves(roof, site, np.ones(len(roof.sides), bool), moves)]
+
+
+def price(roof, site):
+    return price_roof(roof, make_drawing(len(roof.sides)), site)
+
+
+def try_exactly(roof, trial, move, site):
+    changed, box = np.zeros(len(roof.sides), bool), np.empty(4)
+    drawing = make_drawing(len(roof.sides))
+    return try_move(roof, trial, move, site, drawing, make_known(), changed, box, True)
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_the_price_of_a_move_in_its_box_is_the_price_from_scratch(kind):
+    roof, site, _, _ = begin_roof(kind)
+    trial, before, count = make_tables_like(roof), price(roof, site), 0
+    for move in list_all_moves(roof, site)[::3]:
+        gain = try_exactly(roof, trial, move, site)
+        if gain > 0.0:
+            # Steps are measured at places that depend on how edges are cut.
+            assert abs(before - price(trial, site) - gain) < 0.1 * site.unit, move
+            count += 1
+    assert count or kind in ("two_level", "extension")
+
+
+@pytest.mark.parametrize("kind", ["T", "dormered", "L_of_hips"])
+def test_a_move_that_was_tried_leaves_every_byte_of_the_roof(kind):
+    roof, site, _, _ = begin_roof(kind)
+    before, trial = [table.tobytes() for table in roof], make_tables_like(roof)
+    for move in list_all_moves(roof, site):
+        try_exactly(roof, trial, move, site)
+    assert [table.tobytes() for table in roof] == before
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_a_drawing_shows_at_each_place_the_plane_that_is_visible_there(kind):
+    roof, site, outline, _ = begin_roof(kind)
+    drawing, view = draw_all(roof, site), np.arange(roof.counts[VOLUMES])
+    n = drawing.count[0]
+    fragments = [shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in range(n)]
+    area = shapely.area(fragments).sum()
+    assert area <= outline.area * (1.0 + 1e-6)
+    covered = 0
+    for fragment, (k, p) in zip(fragments, drawing.owners[:n].tolist(), strict=True):
+        x, y = shapely.get_coordinates(shapely.point_on_surface(fragment))[0]
+        height, _, _ = compute_height(roof, view, x, y, 0.0)
+        assert roof.planes[k, p] @ [x, y, 1.0] == pytest.approx(height, abs=1e-6)
+        covered += 1
+    assert covered == n > 0
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_improving_a_roof_never_makes_it_dearer(kind):
+    start, site, _, search = begin_roof(kind)
+    volumes, outline, plan, scene = search
+    assert price(draw_volumes(volumes, outline, plan, scene, site), site) <= price(start, site)
+
+
+@pytest.mark.parametrize("kind", ["U", "winged_hip"])
+def test_packing_changes_no_plane(kind):
+    roof, site, _, _ = begin_roof(kind)
+    copy = make_tables_like(roof)
+    copy_tables(roof, copy)
+    pack(copy)
+    assert price(copy, site) == pytest.approx(price(roof, site))
+
+
+def test_a_polygon_is_split_into_convex_parts_that_cover_it():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 12))
+        radii = rng.uniform(4.0, 12.0, 12)
+        ring = radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+        star = shapely.Polygon(ring, [0.1 * ring[::-1]])
+        parts = [shapely.Polygon(part) for part in split_convex(star)]
+        assert shapely.union_all(parts).symmetric_difference(star).area < 1e-6
+        assert sum(part.area for part in parts) == pytest.approx(star.area)
+        assert all(part.convex_hull.area - part.area < 1e-6 for part in parts)
+
+
+@pytest.mark.parametrize("kind", ["T", "dormered"])
+def test_a_roof_does_not_depend_on_the_order_of_its_points(kind):
+    points, outline = scan_compound(kind, 1)
+    fit = fit_building(points, outline)
+    shuffled = fit_building(np.random.default_rng(3).permutation(points), outline)
+    for part, other in zip(fit.roof_parts, shuffled.roof_parts, strict=True):
+        assert (part.type, part.parameters) == (other.type, other.parameters)
