@@ -6,13 +6,13 @@ import shapely
 
 from hiproof.fit.roof import draw_volumes, fit_building
 from hiproof.fit.roof.accept import fit_roof, make_known, try_move
-from hiproof.fit.roof.draw import compute_height, draw_all, make_drawing
+from hiproof.fit.roof.draw import compute_height, draw_whole_roof, make_drawing
 from hiproof.fit.roof.moves import MOVE_COLUMNS, list_moves
 from hiproof.fit.roof.price import price_roof
 from hiproof.fit.roof.prices import compute_unit
 from hiproof.fit.roof.site import make_site, split_convex
 from hiproof.fit.roof.start import make_roof
-from hiproof.fit.roof.tables import VOLUMES, copy_tables, make_tables_like, pack
+from hiproof.fit.roof.tables import VOLUME_COUNT, copy_tables, make_tables_like, pack
 from hiproof.fit.union.objective import is_base_visible
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.search import find_volumes
@@ -85,7 +85,7 @@ def test_a_move_that_was_tried_leaves_every_byte_of_the_roof(kind):
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)
 def test_a_drawing_shows_at_each_place_the_plane_that_is_visible_there(kind):
     roof, site, outline, _ = begin_roof(kind)
-    drawing, view = draw_all(roof, site), np.arange(roof.counts[VOLUMES])
+    drawing, view = draw_whole_roof(roof, site), np.arange(roof.counts[VOLUME_COUNT])
     n = drawing.count[0]
     fragments = [shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in range(n)]
     area = shapely.area(fragments).sum()

@@ -44,7 +44,7 @@ from ..union.sides import choose_sides
 from ..union.unite import gather_ends
 from .accept import improve
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
-from .draw import draw_all, make_drawing
+from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, name_part, read_planes, read_sides
 from .price import Site
 from .prices import compute_unit
@@ -121,7 +121,7 @@ def read_parts(
     """Name what each volume roofs of an `outline` in the plan's coordinates."""
     covariance, is_anchored = estimate_covariance(roof, site), find_anchored(roof, site)
     inner, outer, parts = make_tables_like(roof), make_tables_like(roof), []
-    for k, polygons, is_cut in list_places(roof, draw_all(roof, site), outline):
+    for k, polygons, is_cut in list_places(roof, draw_whole_roof(roof, site), outline):
         axes = find_axes(roof, k)
         anchored = is_anchored[np.abs(roof.sides[k]) - 1]
         sigmas = estimate_side_sigmas(roof, inner, outer, site, k, anchored)

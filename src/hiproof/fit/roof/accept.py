@@ -19,27 +19,27 @@ from .price import (
     list_points,
     list_unknowns,
     list_view,
-    place_all_planes,
+    place_planes,
     price_drawing,
     price_misfit,
     price_tables,
 )
-from .tables import VOLUMES, copy_tables, has_room, pack
+from .tables import VOLUME_COUNT, copy_tables, has_room, pack
 
-MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corners may change.
-STEP_M = 0.5  # Boxes end at multiples of this (m), so that many moves have one box.
+CHANGE_MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corners may change.
+BOX_STEP_M = 0.5  # Boxes end at multiples of this (m), so that many moves have one box.
 FIT_ROUNDS = 2  # Rounds of fitting and choosing points again.
 LEAST_UNITS = 0.05  # What a move must save: fitting again alone saves less.
 HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay before it.
-MOST_ROUNDS = 30  # Most rounds of the loop.
+LOOP_ROUNDS = 30  # Most rounds of the loop.
 MOST_MOVES = 20_000  # Most moves in a round.
-MOST_JUDGES = 400  # Most points of a box that judge a move first. Of more, every k-th does.
+FIRST_JUDGES = 400  # Most points of a box that judge a move first. Of more, every k-th does.
 KEPT_BOXES = 32  # Boxes whose price is kept.
 
 Known = namedtuple("Known", "boxes samples sizes weights misfits units next")
 """What is known of boxes (q, 4) of the roof as it is.
 
-Of each: the points and cells that judge it first, `samples` (q, MOST_JUDGES) of `sizes` (q,), each
+Of each: the points and cells that judge it first, `samples` (q, FIRST_JUDGES) of `sizes` (q,), each
 for `weights` (q,) points, and its misfit (points, by these) and units. `next` (1,) is the place
 that is used next.
 """
@@ -50,7 +50,7 @@ def make_known():
     """Return room for what is known of boxes."""
     return Known(
         np.full((KEPT_BOXES, 4), np.nan),
-        np.zeros((KEPT_BOXES, MOST_JUDGES), np.int64),
+        np.zeros((KEPT_BOXES, FIRST_JUDGES), np.int64),
         np.zeros(KEPT_BOXES, np.int64),
         np.zeros(KEPT_BOXES),
         np.zeros(KEPT_BOXES),
@@ -63,18 +63,21 @@ def make_known():
 def measure_change(roof, trial, changed, site, box):
     """Set `box` to what the `changed` volumes take up before and after a move."""
     box[0], box[1], box[2], box[3] = np.inf, -np.inf, np.inf, -np.inf
-    for k in range(trial.counts[VOLUMES]):
+    for k in range(trial.counts[VOLUME_COUNT]):
         if not changed[k]:
             continue
-        if k < roof.counts[VOLUMES] and roof.n_planes[k] > 0:
+        if k < roof.counts[VOLUME_COUNT] and roof.n_planes[k] > 0:
             widen_box(box, roof.boxes[k])
         if trial.n_planes[k] > 0:
             widen_box(box, trial.boxes[k])
     for axis in range(2):
         low, high = 2 * axis, 2 * axis + 1
-        least = max(box[low], site.bounds[low]) - MARGIN_M
-        most = min(box[high], site.bounds[high]) + MARGIN_M
-        box[low], box[high] = np.floor(least / STEP_M) * STEP_M, np.ceil(most / STEP_M) * STEP_M
+        least = max(box[low], site.bounds[low]) - CHANGE_MARGIN_M
+        most = min(box[high], site.bounds[high]) + CHANGE_MARGIN_M
+        box[low], box[high] = (
+            np.floor(least / BOX_STEP_M) * BOX_STEP_M,
+            np.ceil(most / BOX_STEP_M) * BOX_STEP_M,
+        )
 
 
 @compiled
@@ -97,7 +100,7 @@ def know_box(roof, drawing, site, box, known):
     q = known.next[0]
     known.next[0] = (q + 1) % KEPT_BOXES
     points = list_points(site, box)
-    step = 1 + (len(points) - 1) // MOST_JUDGES
+    step = 1 + (len(points) - 1) // FIRST_JUDGES
     sample = points[::step]
     view = list_view(roof, box)
     known.boxes[q] = box
@@ -150,7 +153,7 @@ def fit_roof(roof, site, rounds):
     if price_misfit(roof, site, view, points) > misfit:
         roof.values[:] = values
         for m in range(len(view)):
-            place_all_planes(roof, view[m])
+            place_planes(roof, view[m])
 
 
 @compiled
@@ -162,7 +165,7 @@ def improve(roof, trial, site, drawing):
     touched = np.zeros(size, np.bool_)
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
     trials = 0
-    for _ in range(MOST_ROUNDS):
+    for _ in range(LOOP_ROUNDS):
         fit_roof(roof, site, FIT_ROUNDS)
         known.boxes[:] = np.nan
         count = list_moves(roof, site, asked, moves)
@@ -183,13 +186,13 @@ def improve(roof, trial, site, drawing):
             copy_tables(trial, roof)
             known.boxes[:] = np.nan
             has_improved = True
-            for k in range(roof.counts[VOLUMES]):
+            for k in range(roof.counts[VOLUME_COUNT]):
                 if roof.n_planes[k] > 0 and meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
                     touched[k] = True
         if not has_improved:
             break
         place = 0
-        for k in range(roof.counts[VOLUMES]):
+        for k in range(roof.counts[VOLUME_COUNT]):
             if roof.n_planes[k] > 0:
                 asked[place] = touched[k]
                 place += 1

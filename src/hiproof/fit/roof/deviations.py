@@ -5,32 +5,34 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..union.objective import compute_point_cost
+from ..union.sides import (
+    FEWEST_NEEDED,
+    LEAST_KNOWN,
+    LEAST_NEED,
+    MOVED_M,
+    MOVES,
+    NATS_A_POINT,
+    POINT_SIGMA_M,
+    SHOWN_M,
+)
 from .draw import compute_height
 from .price import (
-    REACH_M,
-    compute_point_cost,
+    OVER_M,
     list_points,
     list_unknowns,
     list_view,
     sum_normal_equations,
 )
-from .tables import FAR_M, LINES, N_SIDES, Tables, copy_tables
+from .tables import FAR_M, LINE_COUNT, N_SIDES, Tables, copy_tables
 
 ONE_LINE = 1e-4  # Lines whose coefficients differ less (m, radians) are one.
-LOOSE = 1e-6  # Weight (points) of an unknown that no point determines.
-MOVED_M = 1.0  # Furthest (m) that a side is moved to see how well points determine its place.
-MOVES = 50  # Steps in which it is moved each way.
-SHOWN_M = 0.5  # Distance (m) next to a side in which points need its volume, unless it is hidden.
-NATS_A_POINT = 3.0  # Log-likelihood that a point makes if it is explained.
-LEAST_NEED = 0.3  # A point that costs so much more without a volume needs it.
-FEWEST_NEEDED = 3  # Fewer such points show nothing.
-POINT_SIGMA_M = 0.03  # Standard deviation (m) of points in plan, of their swath and in their beam.
-LEAST_KNOWN = 0.05  # A place so likely at the end of the way is not determined.
+LOOSE_POINTS = 1e-6  # Weight (points) of an unknown that no point determines.
 
 
 def find_anchored(roof: Tables, site) -> np.ndarray:
     """Return which lines (l,) of a roof are lines of the outline."""
-    lines = roof.lines[: roof.counts[LINES], None]
+    lines = roof.lines[: roof.counts[LINE_COUNT], None]
     gaps = [np.abs(lines - sign * site.lines[None, :, :3]).max(axis=2) for sign in (1.0, -1.0)]
     return (np.minimum(*gaps) < ONE_LINE).any(axis=1)
 
@@ -44,7 +46,7 @@ def estimate_covariance(roof, site):
     matrix, vector = np.zeros((count, count)), np.zeros(count)
     explained, squares = sum_normal_equations(roof, site, view, points, places, matrix, vector)
     for q in range(count):
-        matrix[q, q] += LOOSE
+        matrix[q, q] += LOOSE_POINTS
     return np.linalg.inv(matrix) * (squares / max(explained - count, 1))
 
 
@@ -71,8 +73,8 @@ def estimate_side_sigmas(roof, inner, outer, site, k, anchored):
             depth = half[0] * x + half[1] * y + half[2]
             if i >= site.n or abs(depth) > MOVED_M:
                 continue
-            with_it, _, _ = compute_height(outer, view, x, y, REACH_M)
-            without, _, _ = compute_height(inner, view, x, y, REACH_M)
+            with_it, _, _ = compute_height(outer, view, x, y, OVER_M)
+            without, _, _ = compute_height(inner, view, x, y, OVER_M)
             if with_it == without:
                 continue
             gain = compute_point_cost(site.z[i], with_it, site.dead, site.width)

@@ -13,27 +13,27 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from .tables import FAR_M, MOST_PLANES, N_SIDES, ONE_PLANE, VOLUMES, Tables
+from .tables import FAR_M, N_SIDES, ONE_PLANE, VOLUME_COUNT, VOLUME_PLANES, Tables
 
-MOST_CORNERS = 40  # Most corners of a fragment.
+RING_CORNERS = 40  # Most corners of a fragment.
 MOST_FRAGMENTS = 4000  # Most fragments of what is drawn at once.
-MOST_PIECES = 200  # Most fragments of one plane in one piece of the outline.
+PIECE_ROOM = 200  # Most fragments of one plane in one piece of the outline.
 ON_LINE_M = 1e-9  # Distance (m) from a line of a place on it.
-LEAST_M2 = 1e-4  # Area (m2) of the smallest fragment.
+FRAGMENT_M2 = 1e-4  # Area (m2) of the smallest fragment.
 ONE_PLACE_M = 0.01  # Corners nearer than this (m) are one.
 STRAIGHT_RAD = 0.0175  # Angle (rad): a corner turns by more than a degree.
 ONE_LEVEL_M = 0.03  # Corners of one place whose heights differ less (m) are one.
 MOST_AT_PLACE = 64  # Most planes that meet in one place.
-LOW_STEP_M = 0.5  # Steps lower than this (m) cost by the metre.
+LOW_STEP_TOP_M = 0.5  # Steps lower than this (m) cost by the metre.
 SEEN_STEP_M = 0.05  # Lower steps (m) are within what two strips differ by.
-SHARED_M = 0.1  # Shortest stretch (m) of border that two fragments share.
+SHARED_BORDER_M = 0.1  # Shortest stretch (m) of border that two fragments share.
 STEP_SAMPLE_M = 0.5  # Distance (m) of the places in which the height of a step is measured.
-BESIDE_M = 0.01  # Distance (m) from an edge in which the roof beside it is measured.
+EDGE_OFFSET_M = 0.01  # Distance (m) from an edge in which the roof beside it is measured.
 
 Drawing = namedtuple("Drawing", "count rings sizes owners numbers boxes pieces todo done")
-"""Room for fragments: `rings` (f, MOST_CORNERS, 2) of `sizes` (f,) corners, each visible of the
+"""Room for fragments: `rings` (f, RING_CORNERS, 2) of `sizes` (f,) corners, each visible of the
 volume and plane in `owners` (f, 2). `count` (1,) are in use. Equal planes have one of `numbers`
-(v, MOST_PLANES). `boxes` (f, 4) are the extents of the fragments, the rest is scratch.
+(v, VOLUME_PLANES). `boxes` (f, 4) are the extents of the fragments, the rest is scratch.
 """
 
 
@@ -41,12 +41,12 @@ def make_drawing(volumes: int) -> Drawing:
     """Return room for the drawing of so many volumes."""
     return Drawing(
         np.zeros(1, np.int64),
-        np.zeros((MOST_FRAGMENTS, MOST_CORNERS, 2)),
+        np.zeros((MOST_FRAGMENTS, RING_CORNERS, 2)),
         np.zeros(MOST_FRAGMENTS, np.int64),
         np.zeros((MOST_FRAGMENTS, 2), np.int64),
-        np.zeros((volumes, MOST_PLANES), np.int64),
+        np.zeros((volumes, VOLUME_PLANES), np.int64),
         np.zeros((MOST_FRAGMENTS, 4)),
-        np.zeros((4, MOST_CORNERS, 2)),
+        np.zeros((4, RING_CORNERS, 2)),
         make_pieces(),
         make_pieces(),
     )
@@ -55,9 +55,9 @@ def make_drawing(volumes: int) -> Drawing:
 def make_pieces() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return room for rings, their sizes, and the volume before which nothing hides each."""
     return (
-        np.zeros((MOST_PIECES, MOST_CORNERS, 2)),
-        np.zeros(MOST_PIECES, np.int64),
-        np.zeros(MOST_PIECES, np.int64),
+        np.zeros((PIECE_ROOM, RING_CORNERS, 2)),
+        np.zeros(PIECE_ROOM, np.int64),
+        np.zeros(PIECE_ROOM, np.int64),
     )
 
 
@@ -71,11 +71,11 @@ def cut(ring, size, a, b, c, out):
         x1, y1 = ring[i, 0], ring[i, 1]
         d1 = a * x1 + b * y1 + c
         if (d0 > ON_LINE_M and d1 < -ON_LINE_M) or (d0 < -ON_LINE_M and d1 > ON_LINE_M):
-            if count < MOST_CORNERS:
+            if count < RING_CORNERS:
                 t = d0 / (d0 - d1)
                 out[count, 0], out[count, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
                 count += 1
-        if d1 >= -ON_LINE_M and count < MOST_CORNERS:
+        if d1 >= -ON_LINE_M and count < RING_CORNERS:
             out[count, 0], out[count, 1] = x1, y1
             count += 1
         x0, y0, d0 = x1, y1, d1
@@ -119,7 +119,7 @@ def number_planes(roof, view, numbers):
     for m in range(len(view)):
         k = view[m]
         for p in range(roof.n_planes[k]):
-            numbers[k, p] = k * MOST_PLANES + p
+            numbers[k, p] = k * VOLUME_PLANES + p
             is_new = True
             for n in range(m + 1):
                 j = view[n]
@@ -158,7 +158,7 @@ def hidden_half(roof, numbers, j, p, k, h):
 @compiled
 def add_piece(pieces, count, ring, size, floor):
     """Add a ring to pieces if it is large enough. Returns how many there are."""
-    if size == 0 or count >= MOST_PIECES or measure_area(ring, size) < LEAST_M2:
+    if size == 0 or count >= PIECE_ROOM or measure_area(ring, size) < FRAGMENT_M2:
         return count
     copy_ring(ring, size, pieces[0][count])
     pieces[1][count], pieces[2][count] = size, floor
@@ -185,7 +185,7 @@ def subtract(roof, numbers, j, p, k, halves, source, target, count, rest, other)
                 if left == 0:
                     break
                 copy_ring(other, left, rest)
-        if left == 0 or measure_area(rest, left) < LEAST_M2:
+        if left == 0 or measure_area(rest, left) < FRAGMENT_M2:
             kept = add_piece(target, kept, rings[t], size, floors[t])
             continue
         if halves == N_SIDES and k < j:
@@ -220,7 +220,7 @@ def draw_plane(roof, drawing, view, j, p, part, size):
             if size == 0:
                 return
             copy_ring(other, size, plan)
-    if measure_area(plan, size) < LEAST_M2:
+    if measure_area(plan, size) < FRAGMENT_M2:
         return
     source, target = drawing.todo, drawing.done
     rest = pieces[2]
@@ -256,7 +256,7 @@ def draw(roof, drawing, view, site, box):
     """Draw the volumes of `view` (m,) in the parts of the outline that reach into a `box` (4,)."""
     drawing.count[0] = 0
     number_planes(roof, view, drawing.numbers)
-    plan, other = np.empty((MOST_CORNERS, 2)), np.empty((MOST_CORNERS, 2))
+    plan, other = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2))
     for part in range(len(site.part_sizes)):
         bounds = site.part_boxes[part]
         if not meets(box, bounds[0], bounds[1], bounds[2], bounds[3]):
@@ -273,17 +273,17 @@ def draw(roof, drawing, view, site, box):
                 if size == 0:
                     break
                 copy_ring(other, size, plan)
-            if size == 0 or measure_area(plan, size) < LEAST_M2:
+            if size == 0 or measure_area(plan, size) < FRAGMENT_M2:
                 continue
             for p in range(roof.n_planes[j]):
                 draw_plane(roof, drawing, view, j, p, plan, size)
 
 
-def draw_all(roof: Tables, site) -> Drawing:
+def draw_whole_roof(roof: Tables, site) -> Drawing:
     """Return the drawing of a whole roof."""
     drawing = make_drawing(len(roof.sides))
     everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    draw(roof, drawing, np.arange(roof.counts[VOLUMES]), site, everywhere)
+    draw(roof, drawing, np.arange(roof.counts[VOLUME_COUNT]), site, everywhere)
     return drawing
 
 
@@ -449,13 +449,13 @@ def measure_low_steps(roof, drawing, view, box):
                 for q in range(samples):
                     t = (q + 0.5) / samples
                     x, y = (
-                        x0 + t * ex + BESIDE_M * ey / length,
-                        y0 + t * ey - BESIDE_M * ex / length,
+                        x0 + t * ex + EDGE_OFFSET_M * ey / length,
+                        y0 + t * ey - EDGE_OFFSET_M * ex / length,
                     )
                     if box[0] < x < box[1] and box[2] < y < box[3]:
                         height, _, _ = compute_height(roof, view, x, y, 0.0)
                         step = row[0] * x + row[1] * y + row[2] - height
-                        if SEEN_STEP_M < step < LOW_STEP_M:
+                        if SEEN_STEP_M < step < LOW_STEP_TOP_M:
                             total += length / samples
             x0, y0 = x1, y1
     return total
@@ -489,10 +489,10 @@ def are_continuous(roof, drawing, f, g):
     for i in range(size):
         x1, y1 = ring[i, 0], ring[i, 1]
         length = np.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
-        if length > SHARED_M:
+        if length > SHARED_BORDER_M:
             a, b = (x1 - x0) / length, (y1 - y0) / length
             low, high = find_overlap(drawing.rings[g], drawing.sizes[g], x0, y0, a, b, length)
-            if high - low > SHARED_M:
+            if high - low > SHARED_BORDER_M:
                 t = 0.5 * (low + high)
                 x, y = x0 + t * a, y0 + t * b
                 step = row[0] * x + row[1] * y + row[2] - other[0] * x - other[1] * y - other[2]
@@ -514,7 +514,7 @@ def find_overlap(ring, size, x, y, a, b, length):
         ):
             s, t = a * (u - x) + b * (v - y), a * (p - x) + b * (q - y)
             low, high = max(min(s, t), 0.0), min(max(s, t), length)
-            if high - low > SHARED_M:
+            if high - low > SHARED_BORDER_M:
                 return low, high
         u, v = p, q
     return 0.0, 0.0

@@ -11,12 +11,12 @@ import numpy as np
 from ...compiled import compiled
 from .draw import meets
 from .tables import (
-    LINES,
-    MOST_PLANES,
+    LINE_COUNT,
     N_SIDES,
-    NO_NUMBER,
-    UNKNOWNS,
-    VOLUMES,
+    NO_UNKNOWN,
+    UNKNOWN_COUNT,
+    VOLUME_COUNT,
+    VOLUME_PLANES,
     add_line,
     add_plane,
     add_unknown,
@@ -41,21 +41,21 @@ from .tables import (
     LEVEL_EAVES,  # all sloping planes of volume a rise from its sides at one height, with one slope
     # if b, and from all walls that cut its corners off if c
     TILT,  # the level plane b of volume a rises from its side c
-    LEVEL,  # plane b of volume a becomes level
+    MAKE_LEVEL,  # plane b of volume a becomes level
     ADD_BAY,  # a level volume over bay a of the outline
 ) = range(15)
-MOVE_COLUMNS = 5
+MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
 
-NEAR_M = 1.0  # Volumes so near each other (m) may have something in common.
-SIDE_REACH_M = 1.6  # Furthest (m) that the middle of a side moves to another line.
-ALONG_COSINE = 0.94  # Cosine of the angle between a side and the line to which it moves.
+NEIGHBOUR_M = 1.0  # Volumes so near each other (m) may have something in common.
+SIDE_MOVE_M = 1.6  # Furthest (m) that the middle of a side moves to another line.
+LINE_COSINE = 0.94  # Cosine of the angle between a side and the line to which it moves.
 SAME_DIRECTION = 0.97  # The same of sides of volumes that merge.
 FACING_COSINE = 0.9  # The same of a plane and the side that it faces.
 BESIDE_CORNER_M = 0.1  # Distance (m) outside a volume of the middle of a wall over its corner.
 MOST_LINES = 7  # Most lines to which a side is moved.
-RUN_ON_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
+RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
 ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
 
@@ -73,14 +73,20 @@ def write_move(moves, count, kind, a, b, c, d):
 @compiled
 def is_near(roof, j, k):
     box = roof.boxes[k]
-    return meets(roof.boxes[j], box[0] - NEAR_M, box[1] + NEAR_M, box[2] - NEAR_M, box[3] + NEAR_M)
+    return meets(
+        roof.boxes[j],
+        box[0] - NEIGHBOUR_M,
+        box[1] + NEIGHBOUR_M,
+        box[2] - NEIGHBOUR_M,
+        box[3] + NEIGHBOUR_M,
+    )
 
 
 @compiled
 def list_moves(roof, site, asked, moves):
     """Write the moves that concern a volume in `asked` (v,) to `moves`. Returns their number."""
     count = 0
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         if not asked[k] or roof.n_planes[k] == 0:
             continue
         count = write_move(moves, count, LEAVE_OUT, k, 0, 0, 0)
@@ -88,7 +94,7 @@ def list_moves(roof, site, asked, moves):
             if roof.n_planes[k] > 1:
                 count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
             if roof.slopes[k, p] >= 0:
-                count = write_move(moves, count, LEVEL, k, p, 0, 0)
+                count = write_move(moves, count, MAKE_LEVEL, k, p, 0, 0)
             elif roof.n_planes[k] == 1:
                 for s in range(N_SIDES):
                     count = write_move(moves, count, TILT, k, p, s, 0)
@@ -102,7 +108,7 @@ def list_moves(roof, site, asked, moves):
             cuts += int(cuts_corner(roof, k, site.lines[m]))
         for way in range(4 if cuts > 0 else 2):
             count = write_move(moves, count, LEVEL_EAVES, k, way % 2, way // 2, 0)
-        for j in range(roof.counts[VOLUMES]):
+        for j in range(roof.counts[VOLUME_COUNT]):
             if j != k and roof.n_planes[j] > 0 and (j < k or not asked[j]):
                 count = list_merges(roof, j, k, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
@@ -134,9 +140,9 @@ def list_merges(roof, j, k, moves, count):
 @compiled
 def list_shares(roof, asked, moves, count):
     """Write the pairs of unknowns nearly alike, of volumes near each other, the nearest first."""
-    n = roof.counts[UNKNOWNS]
+    n = roof.counts[UNKNOWN_COUNT]
     kinds, boxes, is_asked = np.zeros(n, np.int64), np.zeros((n, 4)), np.zeros(n, np.bool_)
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         for p in range(roof.n_planes[k]):
             for kind in range(1, 3):
                 u = roof.heights[k, p] if kind == 1 else roof.slopes[k, p]
@@ -156,7 +162,11 @@ def list_shares(roof, asked, moves, count):
             gap = abs(roof.values[a] - roof.values[b])
             box = boxes[b]
             is_close = meets(
-                boxes[a], box[0] - NEAR_M, box[1] + NEAR_M, box[2] - NEAR_M, box[3] + NEAR_M
+                boxes[a],
+                box[0] - NEIGHBOUR_M,
+                box[1] + NEIGHBOUR_M,
+                box[2] - NEIGHBOUR_M,
+                box[3] + NEIGHBOUR_M,
             )
             alike = ALIKE_HEIGHTS_M if kinds[a] == 1 else ALIKE_SLOPES
             if gap < (alike if is_close else SAME_FAR):
@@ -176,7 +186,7 @@ def list_side_moves(roof, site, k, moves, count):
         for m in range(len(site.lines)):
             line = site.lines[m]
             found = note_line(half, x, y, line[0], line[1], line[2], TO_OUTLINE, m + 1, near, found)
-        for j in range(roof.counts[VOLUMES]):
+        for j in range(roof.counts[VOLUME_COUNT]):
             if j == k or roof.n_planes[j] == 0 or not is_near(roof, j, k):
                 continue
             for t in range(N_SIDES):
@@ -187,7 +197,7 @@ def list_side_moves(roof, site, k, moves, count):
                 )
         for q in range(found):
             count = write_move(moves, count, int(near[q, 1]), k, s, int(near[q, 2]), 0)
-        for step in range(len(RUN_ON_M)):
+        for step in range(len(RUN_ON_STEPS_M)):
             count = write_move(moves, count, RUN_ON, k, s, step, 0)
     return count
 
@@ -197,7 +207,7 @@ def note_line(half, x, y, a, b, c, kind, number, near, found):
     """Note a line that passes near the middle of a side, in the order of its distance."""
     cosine = half[0] * a + half[1] * b
     gap = a * x + b * y + c
-    if abs(cosine) < ALONG_COSINE or abs(gap) > SIDE_REACH_M:
+    if abs(cosine) < LINE_COSINE or abs(gap) > SIDE_MOVE_M:
         return found
     if cosine < 0.0:
         number = -number
@@ -220,7 +230,7 @@ def note_line(half, x, y, a, b, c, kind, number, near, found):
 @compiled
 def list_new_planes(roof, site, k, moves, count):
     """Write planes over further sides of volume k, and over walls that cut its corners off."""
-    if roof.n_planes[k] >= MOST_PLANES:
+    if roof.n_planes[k] >= VOLUME_PLANES:
         return count
     for p in range(roof.n_planes[k]):
         if roof.slopes[k, p] < 0:
@@ -252,7 +262,7 @@ def cuts_corner(roof, k, line):
         half = roof.half_planes[k, s]
         if (
             half[0] * line[3] + half[1] * line[4] + half[2] < -BESIDE_CORNER_M
-            or abs(half[0] * line[0] + half[1] * line[1]) > ALONG_COSINE
+            or abs(half[0] * line[0] + half[1] * line[1]) > LINE_COSINE
         ):
             return False
     return True
@@ -297,12 +307,12 @@ def apply_move(roof, move, site, changed):
         line, sign = site.lines[abs(c) - 1], 1.0 if c > 0 else -1.0
         roof.sides[a, b] = add_line(roof, sign * line[0], sign * line[1], sign * line[2])
     elif kind == TO_LINE:
-        if abs(c) > roof.counts[LINES] or roof.sides[a, b] == c:
+        if abs(c) > roof.counts[LINE_COUNT] or roof.sides[a, b] == c:
             return False
         roof.sides[a, b] = c
     elif kind == RUN_ON:
         e, f, g = read_line(roof, roof.sides[a, b])
-        roof.sides[a, b] = add_line(roof, e, f, g + RUN_ON_M[c])
+        roof.sides[a, b] = add_line(roof, e, f, g + RUN_ON_STEPS_M[c])
     elif kind == MERGE:
         if roof.n_planes[b] == 0 or not merge(roof, a, b, site, d):
             return False
@@ -327,13 +337,13 @@ def apply_move(roof, move, site, changed):
             return False
         roof.heights[a, b] = add_unknown(roof, roof.values[roof.heights[a, b]])
         roof.plane_lines[a, b], roof.slopes[a, b] = roof.sides[a, c], add_unknown(roof, 0.0)
-    elif kind == LEVEL:
+    elif kind == MAKE_LEVEL:
         if b >= roof.n_planes[a] or roof.slopes[a, b] < 0:
             return False
         x, y = find_centre(roof, a, site)
         row = roof.planes[a, b]
         roof.heights[a, b] = add_unknown(roof, row[0] * x + row[1] * y + row[2])
-        roof.slopes[a, b] = NO_NUMBER
+        roof.slopes[a, b] = NO_UNKNOWN
     place_volume(roof, a)
     return True
 
@@ -351,13 +361,13 @@ def find_centre(roof, k, site):
 @compiled
 def add_bay(roof, site, bay):
     """Add a level volume over a bay, at its height. Returns its number."""
-    k = roof.counts[VOLUMES]
-    roof.counts[VOLUMES] = k + 1
+    k = roof.counts[VOLUME_COUNT]
+    roof.counts[VOLUME_COUNT] = k + 1
     for s in range(N_SIDES):
         line = site.bays[bay, s]
         roof.sides[k, s] = add_line(roof, line[0], line[1], line[2])
     roof.n_planes[k], roof.replaces[k] = 0, 1
-    add_plane(roof, k, roof.sides[k, 0], add_unknown(roof, site.bay_heights[bay]), NO_NUMBER)
+    add_plane(roof, k, roof.sides[k, 0], add_unknown(roof, site.bay_heights[bay]), NO_UNKNOWN)
     return k
 
 
@@ -365,7 +375,7 @@ def add_bay(roof, site, bay):
 def share(roof, a, b, changed):
     """Let unknown `a` stand for `b`, too."""
     n_a, n_b = 0, 0
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         for p in range(roof.n_planes[k]):
             if roof.heights[k, p] == a or roof.slopes[k, p] == a:
                 n_a += 1
@@ -381,7 +391,7 @@ def share(roof, a, b, changed):
     if n_a == 0 or n_b == 0:
         return False
     roof.values[a] = (n_a * roof.values[a] + n_b * roof.values[b]) / (n_a + n_b)
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         if changed[k]:
             place_volume(roof, k)
     return True
@@ -500,7 +510,7 @@ def level_eaves(roof, k, one_slope, walls, site):
 def count_users(roof, u):
     """Count the planes that use an unknown."""
     count = 0
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         for p in range(roof.n_planes[k]):
             count += int(roof.heights[k, p] == u or roof.slopes[k, p] == u)
     return count

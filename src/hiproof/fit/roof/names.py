@@ -9,47 +9,37 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
+from ...frames import PlanFrame
 from ...model import Part
-from ...primitives.family import AXIS, SIGN, Member, name_among
+from ...primitives.family import name_among
+from ..union.finish import OutlineWall
+from ..union.names import (
+    GIVEN_M,
+    RAISED,
+    REGISTERED_PLAN_M,
+    STRAIGHT,
+    find_visible_planes,
+    list_moved_ends,
+    measure_common_lean,
+    measure_rectangle,
+    regularise,
+    turn_planes,
+    turn_side,
+    vary_member,
+)
 from ..union.sides import Side
-from .tables import N_SIDES, UNKNOWNS, Tables, read_line
+from ..union.volumes import LEVEL
+from .tables import N_SIDES, UNKNOWN_COUNT, Tables, read_line
 
-LEVEL = N_SIDES  # Place of the level plane after those of the four sides.
-EACH = np.arange(N_SIDES)
-FACING_COSINE = 0.9  # Cosine of the angle up to which a plane faces one of four axes.
-LEVEL_EAVE_M = 0.5  # An eave that would be level with its side so little (m) further out is level.
-# Share of the half of its rectangle by which a hidden side may move to where its eave is level.
-HIDDEN_SHARE = 0.8
-APEX_M = 0.15  # A hip whose pairs of sides meet at heights so near each other (m) is a pyramid.
-STRAIGHT = 1e-9  # Directions (rad) that differ less are numerically the same.
-GIVEN_M = 1e-3  # A rectangle's end further (m) from its side lies on the outline that cuts it off.
-# Standard deviation (m) of a swath's place in plan, which no point of a building determines: roofs
-# lie so far beside their outline.
-REGISTERED_PLAN_M = 0.03
-# Standard deviation (m) of a swath's height, which no point of a building determines.
-REGISTERED_M = 0.01
-RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # A plane (3, 1) changed by the latter.
-PROBE_M = 0.01  # Distance (m) that an end is moved to see which parameters depend on it.
-
-
-class OutlineWall(NamedTuple):
-    """A wall over which a plane rises, in a volume's axes.
-
-    `facing` is the way that it faces outwards (rad), and `offset` how far out that way from the
-    origin it lies (m).
-    """
-
-    facing: float
-    offset: float
+FACED = 0.9  # Cosine of the angle up to which a plane faces one of four axes.
 
 
 @dataclass(frozen=True)
-class Planes:
+class PlaceRows:
     """A volume's planes by place: left, right, front, back, top, over each of `walls`.
 
     `rows` (k, 3) are a, b, c of z = a u + b v + c, NaN where it has none. They are `design`
@@ -71,15 +61,15 @@ def find_axes(roof: Tables, k: int) -> np.ndarray:
     return np.array([[c, s], [-s, c]])
 
 
-def read_planes(roof: Tables, k: int, axes: np.ndarray) -> Planes:
+def read_planes(roof: Tables, k: int, axes: np.ndarray) -> PlaceRows:
     """Return the planes of volume k in its axes."""
-    n_unknowns = roof.counts[UNKNOWNS]
+    n_unknowns = roof.counts[UNKNOWN_COUNT]
     walls: list[OutlineWall] = []
     rows = np.full((N_SIDES + 1, 3), np.nan)
     design = np.zeros((N_SIDES + 1, 3, n_unknowns))
     for p in range(roof.n_planes[k]):
         a, b, c = read_line(roof, roof.plane_lines[k, p])
-        u, v = (axes @ [a, b]).tolist()
+        u, v = (x if abs(x) > STRAIGHT else 0.0 for x in (axes @ [a, b]).tolist())
         place = LEVEL if roof.slopes[k, p] < 0 else find_place(u, v)
         if place < 0 or np.isfinite(rows[place, 2]):
             walls.append(OutlineWall(math.atan2(-v, -u), c))
@@ -87,19 +77,19 @@ def read_planes(roof: Tables, k: int, axes: np.ndarray) -> Planes:
                 np.concatenate([x, np.zeros((1, *x.shape[1:]))]) for x in (rows, design)
             )
             place = len(rows) - 1
-        row = roof.planes[k, p]
-        rows[place] = [*(axes @ row[:2]), row[2]]
+        slope = roof.values[roof.slopes[k, p]] if roof.slopes[k, p] >= 0 else 0.0
+        rows[place] = [slope * u, slope * v, roof.planes[k, p, 2]]
         design[place, 2, roof.heights[k, p]] = 1.0
         if roof.slopes[k, p] >= 0:
             design[place, :, roof.slopes[k, p]] += [u, v, c]
-    return Planes(rows, design, tuple(walls))
+    return PlaceRows(rows, design, tuple(walls))
 
 
 def find_place(u: float, v: float) -> int:
     """Return which of the four sides a plane rises from that faces along u, v; -1 for none."""
     along = [u, -u, v, -v]
     place = max(range(N_SIDES), key=along.__getitem__)
-    return place if along[place] > FACING_COSINE else -1
+    return place if along[place] > FACED else -1
 
 
 def read_sides(
@@ -131,12 +121,12 @@ def cut_sides(sides: list[Side], corners: np.ndarray) -> list[Side]:
 
 
 def name_part(
-    planes: Planes,
+    planes: PlaceRows,
     sides: list[Side],
     axes: np.ndarray,
     regions: list[shapely.Polygon],
     covariance: np.ndarray,
-    frame,
+    frame: PlanFrame,
     allowed: tuple[str, ...] = (),
 ) -> Part:
     """Name a volume over its `regions` (plan coordinates) as a part of the family.
@@ -175,14 +165,14 @@ def name_part(
     return member.part(outlines, name_among(member.name, allowed), changes, len(probed_ends))
 
 
-def measure_modes(planes: Planes, covariance: np.ndarray) -> np.ndarray:
+def measure_modes(planes: PlaceRows, covariance: np.ndarray) -> np.ndarray:
     """Return independent changes (k, 3, p) of planes, of one standard deviation each."""
     used = np.flatnonzero(planes.design.any(axis=(0, 1)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(used, used)])
     return planes.design[:, :, used] @ (vectors * np.sqrt(np.maximum(variances, 0.0)))
 
 
-def measure_registration(planes: Planes, rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
+def measure_registration(planes: PlaceRows, rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
     """Return by how much (k, 3, 2) planes change if their swath lies off.
 
     It is off by a standard deviation along u or along v. The visible planes (`rows`) are tied to
@@ -197,247 +187,3 @@ def measure_registration(planes: Planes, rows: np.ndarray, positions: np.ndarray
     moved = (positions @ design[is_present]).reshape(-1, len(used))
     shifted = -REGISTERED_PLAN_M * rows[is_present, :2].repeat(len(positions), axis=0)
     return design @ np.linalg.lstsq(moved, shifted, rcond=None)[0]
-
-
-def find_visible_planes(rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Return which planes (k,) are not everywhere above some single other one.
-
-    `positions` (n, 3) are u, v, 1 of the regions' corners. If only planes over walls are visible,
-    the lowest other plane stays: a shape has one.
-    """
-    is_visible = np.isfinite(rows[:, 2])
-    if is_visible.sum() < 2:
-        return is_visible
-    z = rows @ positions.T
-    # In [k][j], plane k is nowhere below plane j.
-    is_above = (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()
-    for k in np.nonzero(is_visible)[0].tolist():
-        is_visible[k] = not any(
-            is_above[k][j] for j in np.nonzero(is_visible)[0].tolist() if j != k
-        )
-    if not is_visible[: LEVEL + 1].any():
-        is_visible[np.nanargmin(z[: LEVEL + 1].mean(axis=1))] = True
-    return is_visible
-
-
-def measure_common_lean(rows: np.ndarray) -> float:
-    """Return the angle (rad) by which axes must turn for planes to face along them.
-
-    These are a pair of planes that face each other. It is 0 if there is no such pair.
-    """
-    for first, second, axis in ((2, 3, 1), (0, 1, 0)):
-        gradients = [rows[k, :2] for k in (first, second) if np.isfinite(rows[k, 2])]
-        if not gradients:
-            continue
-        angles = [
-            math.remainder(math.atan2(g[1], g[0]) - axis * 0.5 * math.pi, math.pi)
-            for g in gradients
-        ]
-        if len(angles) == 1 or abs(angles[0] - angles[1]) < STRAIGHT:
-            return angles[0]
-    return 0.0
-
-
-def turn_planes(rows: np.ndarray, angle: float) -> np.ndarray:
-    """Return planes (k, 3), or several (k, 3, m), over axes turned by `angle`.
-
-    A plane that then nearly faces along an axis does so exactly.
-    """
-    c, s = math.cos(angle), math.sin(angle)
-    rows = (rows.swapaxes(1, -1) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])).swapaxes(
-        1, -1
-    )
-    along = rows[EACH, 1 - AXIS]
-    rows[EACH, 1 - AXIS] = np.where(np.abs(along) < 1e-8, 0.0, along)
-    return rows
-
-
-def turn_side(side: Side, edge: int, angle: float) -> Side:
-    """Return the side in axes turned by `angle`."""
-    if angle == 0.0:
-        return side
-    slope = math.atan(side.lean) + (angle if edge < 2 else -angle)
-    scale = math.cos(math.atan(side.lean)) / math.cos(slope)
-    return replace(side, offset=side.offset * scale, lean=math.tan(slope))
-
-
-def measure_rectangle(sides: list[Side], corners: np.ndarray) -> list[float]:
-    """Return the lowest and highest u and v of the sides in their middle.
-
-    They lie no further out than the regions' `corners` (n, 2).
-    """
-    lowest_corner, highest_corner = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-    ends = []
-    for axis in (0, 1):
-        lower_side, upper_side = sides[2 * axis], sides[2 * axis + 1]
-        middle = 0.5 * (lowest_corner[1 - axis] + highest_corner[1 - axis])
-        start, end = (
-            lower_side.offset + lower_side.lean * middle,
-            upper_side.offset + upper_side.lean * middle,
-        )
-        start = start if lower_side.anchored else max(start, lowest_corner[axis])
-        end = end if upper_side.anchored else min(end, highest_corner[axis])
-        ends += [lowest_corner[axis], highest_corner[axis]] if end - start < 1e-3 else [start, end]
-    return ends
-
-
-def list_moved_ends(
-    sides: list[Side], ends: list[float]
-) -> tuple[list[list[float]], list[list[float]]]:
-    """List the `ends` of a rectangle after moves of its sides.
-
-    These are the lowest and highest u, v. The first list has each side moved by its standard
-    deviation, the second each side that no points determine, moved a little.
-    """
-    middle, known_ends, probed_ends = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])), [], []
-    for k, side in enumerate(sides):
-        is_given = (
-            side.anchored or abs(ends[k] - side.offset - side.lean * middle[1 - k // 2]) > GIVEN_M
-        )
-        if side.sigma == math.inf:
-            probed_ends.append([*ends[:k], ends[k] + PROBE_M, *ends[k + 1 :]])
-        elif not is_given and side.sigma > 0.0:
-            known_ends.append([*ends[:k], ends[k] + side.sigma, *ends[k + 1 :]])
-    return known_ends, probed_ends
-
-
-def regularise(
-    rows: np.ndarray,
-    ends: np.ndarray,
-    kappa: float,
-    walls: tuple[OutlineWall, ...] = (),
-    hidden: Sequence[int] = (),
-) -> Member:
-    """Make members over m rectangles with common eaves and apex where these are near.
-
-    `ends` (4, m) are the lowest and highest u, v, and `rows` (5 and those over `walls`, 3, m) the
-    planes, which all have the same sides. The first axis is at `kappa`. A side that lies `hidden`
-    takes the eave of the others, too.
-    """
-    centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
-    planes = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
-    sides, count = [k for k in planes if k < N_SIDES], rows.shape[2]
-    eaves, slopes, leans = (
-        np.full((N_SIDES, count), np.inf),
-        np.zeros((N_SIDES, count)),
-        np.zeros((N_SIDES, count)),
-    )
-    for k in sides:
-        axis = k // 2
-        slopes[k] = SIGN[k] * rows[k, axis]
-        leans[k] = rows[k, 1 - axis] / slopes[k]
-        eaves[k] = (
-            rows[k, 0] * centre[0] + rows[k, 1] * centre[1] + rows[k, 2] - slopes[k] * half[axis]
-        )
-    top = rows[LEVEL, 2] if LEVEL in planes else np.full(count, np.inf)
-    if sides:
-        centre, half, eaves = level_eaves(centre, half, eaves, slopes, leans, sides, hidden)
-    return join_apex(
-        Member(
-            kappa,
-            centre,
-            half,
-            eaves,
-            slopes,
-            top,
-            leans,
-            measure_cants(rows[LEVEL + 1 :], walls, centre),
-        )
-    )
-
-
-def measure_cants(
-    rows: np.ndarray, walls: tuple[OutlineWall, ...], centre: np.ndarray
-) -> np.ndarray:
-    """Return the cants (4, c, m) of members about `centre` (2, m).
-
-    Their planes over `walls` are `rows` (n, 3, m), NaN where one is not visible.
-    """
-    cants = []
-    for wall, row in zip(walls, rows, strict=True):
-        out = wall.offset - math.cos(wall.facing) * centre[0] - math.sin(wall.facing) * centre[1]
-        cants.append(
-            [np.full_like(out, wall.facing), out, *measure_eave(row, wall.facing, out, centre)]
-        )
-    visible_cants = [cant for cant in cants if np.isfinite(cant[3]).all()]
-    return np.array(visible_cants).reshape(-1, 4, centre.shape[1]).swapaxes(0, 1)
-
-
-def measure_eave(plane: np.ndarray, facing: float, out: Any, centre: np.ndarray) -> tuple[Any, Any]:
-    """Return the height of a plane a, b, c (3, m) at a wall, and its slope there.
-
-    The wall lies so far `out` from `centre`, and faces that way.
-    """
-    (a, b, z), c, s = plane, math.cos(facing), math.sin(facing)
-    return a * (centre[0] + out * c) + b * (centre[1] + out * s) + z, -c * a - s * b
-
-
-def level_eaves(
-    centre: np.ndarray,
-    half: np.ndarray,
-    eaves: np.ndarray,
-    slopes: np.ndarray,
-    leans: np.ndarray,
-    sides: list[int],
-    hidden: Sequence[int] = (),
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Move `sides` out to the lowest eave's height, where that is near.
-
-    Returns centres and halves (2, m) and eaves (4, m) of the members. Sides that lie `hidden` under
-    other parts have no known place, and move from far, and inwards as well.
-    """
-    given_sides = [k for k in sides if k not in hidden] or sides
-    lowest, outwards, eaves = eaves[given_sides].min(axis=0), np.zeros_like(eaves), eaves.copy()
-    for k in sides:
-        further = (eaves[k] - lowest) / slopes[k]
-        if k in given_sides:
-            outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
-        else:
-            outwards[k] = np.where(np.abs(further) < HIDDEN_SHARE * half[k // 2], further, 0.0)
-    low_shift, high_shift = outwards[::2], outwards[1::2]
-    shift = 0.5 * (high_shift - low_shift)
-    for k in sides:
-        lower = eaves[k] + slopes[k] * (leans[k] * shift[1 - k // 2] - outwards[k])
-        eaves[k] = np.where(np.abs(lower - lowest) < 1e-6, lowest, lower)
-    return centre + shift, half + 0.5 * (high_shift + low_shift), eaves
-
-
-def vary_member(members: Member, changes: np.ndarray) -> Member:
-    """Change the first of several members by each of `changes` (5 and cants, 3, p).
-
-    Its sides stay. The other members follow unchanged.
-    """
-    count = changes.shape[2]
-    varied = members.those([0] * count + list(range(1, members.eaves.shape[1])))
-    for k in members.sides:
-        axis = k // 2
-        middle = members.centre[:, 0].copy()  # becomes that of the side
-        middle[axis] -= SIGN[k] * members.half[axis, 0]
-        varied.slopes[k, :count] += SIGN[k] * changes[k, axis]
-        varied.eaves[k, :count] += (
-            changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
-        )
-    varied.top[:count] += changes[LEVEL, 2]
-    for k, plane in enumerate(changes[LEVEL + 1 :]):
-        facing, out = members.cants[:2, k, 0].tolist()
-        varied.cants[2:, k, :count] += measure_eave(plane, facing, out, members.centre[:, 0])
-    return varied
-
-
-def join_apex(members: Member) -> Member:
-    """Let the four planes of a hip meet in one point, if two pairs nearly do.
-
-    The eaves stay.
-    """
-    if not all(members.has) or members.has_top:
-        return members
-    apex, other_apex = members.apex(0), members.apex(1)
-    is_near = (np.abs(apex - other_apex) <= APEX_M) & ~members.leans.any(axis=0)
-    # A run is the distance from an eave to the point in plan.
-    runs = (np.stack([apex, apex, other_apex, other_apex]) - members.eaves) / members.slopes
-    return replace(
-        members,
-        slopes=np.where(
-            is_near, (0.5 * (apex + other_apex) - members.eaves) / runs, members.slopes
-        ),
-    )

@@ -11,6 +11,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from ..union.objective import compute_cell_cost, compute_point_cost
 from .draw import compute_height, count_corners, draw, measure_low_steps, meets
 from .prices import (
     CORNER_UNITS,
@@ -18,9 +19,9 @@ from .prices import (
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
-from .tables import UNKNOWNS, VOLUMES
+from .tables import UNKNOWN_COUNT, VOLUME_COUNT
 
-REACH_M = 0.03  # Points so far (m) beside a volume are over it.
+OVER_M = 0.03  # Points so far (m) beside a volume are over it.
 DAMPING = 0.05  # Points that hold an unknown at its value.
 
 Site = namedtuple(
@@ -42,23 +43,10 @@ Site = namedtuple(
 
 
 @compiled
-def compute_point_cost(z_point, z_roof, dead, width):
-    r = max(abs(z_point - z_roof) - dead, 0.0) / width
-    return min(r * r, 1.0)
-
-
-@compiled
-def compute_cell_cost(z_roof, weight, shade, low, high):
-    if z_roof < low or z_roof > high:
-        return weight
-    return shade * (z_roof - low) / (high - low)
-
-
-@compiled
 def list_view(roof, box):
     """Return the numbers of the volumes that reach into a box."""
-    out, count = np.empty(roof.counts[VOLUMES], np.int64), 0
-    for k in range(roof.counts[VOLUMES]):
+    out, count = np.empty(roof.counts[VOLUME_COUNT], np.int64), 0
+    for k in range(roof.counts[VOLUME_COUNT]):
         if roof.n_planes[k] > 0 and meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
             out[count] = k
             count += 1
@@ -89,7 +77,7 @@ def price_misfit(roof, site, view, points):
     for m in range(len(points)):
         i = points[m]
         if i < site.n:
-            height, _, _ = compute_height(roof, view, site.x[i], site.y[i], REACH_M)
+            height, _, _ = compute_height(roof, view, site.x[i], site.y[i], OVER_M)
             total += compute_point_cost(site.z[i], height, site.dead, site.width)
         else:
             height, _, _ = compute_height(roof, view, site.x[i], site.y[i], 0.0)
@@ -109,8 +97,8 @@ def price_drawing(roof, drawing, view, site, box):
 @compiled
 def price_tables(roof):
     """Return the units of all volumes and unknowns."""
-    total, is_used = 0.0, np.zeros(roof.counts[UNKNOWNS], np.bool_)
-    for k in range(roof.counts[VOLUMES]):
+    total, is_used = 0.0, np.zeros(roof.counts[UNKNOWN_COUNT], np.bool_)
+    for k in range(roof.counts[VOLUME_COUNT]):
         if roof.n_planes[k] == 0:
             continue
         total += VOLUME_UNITS
@@ -147,7 +135,7 @@ def sum_normal_equations(roof, site, view, points, places, matrix, vector):
         i = points[m]
         if i >= site.n:
             continue
-        height, k, p = compute_height(roof, view, site.x[i], site.y[i], REACH_M)
+        height, k, p = compute_height(roof, view, site.x[i], site.y[i], OVER_M)
         residual = site.z[i] - height
         if k < 0 or abs(residual) > site.dead + site.width:
             continue
@@ -194,11 +182,11 @@ def fit_unknowns(roof, site, view, points, places, count, rounds):
             if places[u] >= 0:
                 roof.values[u] = solution[places[u]]
         for m in range(len(view)):
-            place_all_planes(roof, view[m])
+            place_planes(roof, view[m])
 
 
 @compiled
-def place_all_planes(roof, k):
+def place_planes(roof, k):
     """Compute the planes of volume k from its unknowns."""
     for p in range(roof.n_planes[k]):
         slope = roof.slopes[k, p]
@@ -219,10 +207,10 @@ def list_unknowns(roof, site, box):
 
     The others get -1: they keep their value, because points outside the box hold them.
     """
-    n_unknowns, bounds = roof.counts[UNKNOWNS], site.bounds
+    n_unknowns, bounds = roof.counts[UNKNOWN_COUNT], site.bounds
     places, count = np.zeros(n_unknowns, np.int64), 0
     is_used = np.zeros(n_unknowns, np.bool_)
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         if roof.n_planes[k] == 0:
             continue
         is_inside = (

@@ -6,15 +6,15 @@ import numpy as np
 import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M, with_area
+from ..union.regions import list_polygons
 from .draw import Drawing, join_fragments
-from .tables import FAR_M, N_SIDES, VOLUMES, Tables
+from .tables import FAR_M, N_SIDES, VOLUME_COUNT, Tables
 
 GAP_M = 1e-3  # A gap this much wider (m) touches what lies beside it.
-LEAST_M2 = 1e-9  # Area (m2) below which a polygon is none.
 HIGHER_M = 1e-6  # A volume no more than this (m) below another is not below it.
 
 
-HIDDEN_M = 0.2  # Distance (m) by which a part reaches below what hides it.
+BELOW_M = 0.2  # Distance (m) by which a part reaches below what hides it.
 LEAST_PLACE_M2 = 1.0  # Area (m2) of the smallest place that is a part by itself.
 
 
@@ -73,17 +73,10 @@ def split_region(
             continue
         for g in inside:
             others = shapely.union_all([places[h] for h in inside if h != g])
-            reach = shapely.buffer(places[g], HIDDEN_M, join_style="mitre")
+            reach = shapely.buffer(places[g], BELOW_M, join_style="mitre")
             cut = shapely.intersection(polygon, reach, grid_size=OVERLAY_GRID_M)
             parts[g] += list_polygons(subtract(cut, others))
     return parts
-
-
-def list_polygons(geometry: shapely.Geometry) -> list[shapely.Polygon]:
-    """List the polygons of a geometry that have an area."""
-    return [
-        p for p in shapely.get_parts(geometry) if p.geom_type == "Polygon" and p.area > LEAST_M2
-    ]
 
 
 def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Polygon]]:
@@ -92,7 +85,7 @@ def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Po
     They overlap as volumes do. What a later volume replaces is cut out. A volume without sides
     roofs only where no other is higher. A place that no volume covers goes to the one beside it.
     """
-    quads = [draw_quad(roof, k, outline) for k in range(roof.counts[VOLUMES])]
+    quads = [draw_quad(roof, k, outline) for k in range(roof.counts[VOLUME_COUNT])]
     regions: list[shapely.Geometry] = []
     for k, quad in enumerate(quads):
         if roof.replaces[k]:

@@ -7,17 +7,17 @@ from itertools import combinations, pairwise
 import numpy as np
 import shapely
 
-from .draw import MOST_CORNERS
+from .draw import RING_CORNERS
 from .price import Site
 
 SHORTEST_EDGE_M = 0.7  # Shortest edge (m) of an outline along whose line a volume may end.
 SHORTEST_CHORD_M = 1.5  # Shortest line (m) between two corners.
-MOST_CHORD_CORNERS = 16  # Most corners of an outline with such lines.
-MOST_PART_CORNERS = MOST_CORNERS // 2  # Most corners of a convex part: cutting it adds some.
+CHORD_CORNERS = 16  # Most corners of an outline with such lines.
+MOST_PART_CORNERS = RING_CORNERS // 2  # Most corners of a convex part: cutting it adds some.
 BAY_DEPTH_M = 0.3  # Depth (m) from which on a bay is one.
-LEAST_BAY_M2, MOST_BAY_M2 = 0.3, 40.0  # Area (m2) of the smallest and largest bay.
-FEWEST_BAY_POINTS = 3  # Fewer points show no height.
-LEAST_PART_M2 = 1e-6  # Area (m2) of the smallest part.
+SMALLEST_BAY_M2, LARGEST_BAY_M2 = 0.3, 40.0  # Area (m2) of the smallest and largest bay.
+BAY_POINTS = 3  # Fewer points show no height.
+CONVEX_PART_M2 = 1e-6  # Area (m2) of the smallest part.
 
 
 def make_site(scene, outline: shapely.Polygon, unit: float) -> Site:
@@ -30,7 +30,7 @@ def make_site(scene, outline: shapely.Polygon, unit: float) -> Site:
         for values in (scene.U[0], scene.V[0], scene.z, scene.weight, scene.shade)
     )
     rings = split_convex(outline)
-    parts, sizes = np.zeros((len(rings), MOST_CORNERS, 2)), np.array([len(r) for r in rings])
+    parts, sizes = np.zeros((len(rings), RING_CORNERS, 2)), np.array([len(r) for r in rings])
     for part, ring in zip(parts, rings, strict=True):
         part[: len(ring)] = ring
     boxes = np.array([[*np.sort(r[:, 0])[[0, -1]], *np.sort(r[:, 1])[[0, -1]]] for r in rings])
@@ -73,7 +73,7 @@ def list_outline_lines(outline: shapely.Polygon) -> np.ndarray:
         ]
     n_edges = len(segments)
     corners = shapely.get_coordinates(outline.exterior)[:-1]
-    if len(corners) <= MOST_CHORD_CORNERS:
+    if len(corners) <= CHORD_CORNERS:
         segments += [
             (start, end)
             for (i, start), (j, end) in combinations(enumerate(corners), 2)
@@ -111,10 +111,10 @@ def list_bays(outline: shapely.Polygon, points: np.ndarray) -> tuple[np.ndarray,
             ]
         )
         for bay in shapely.get_parts(shapely.intersection(outline, beyond)):
-            if bay.geom_type != "Polygon" or not LEAST_BAY_M2 < bay.area < MOST_BAY_M2:
+            if bay.geom_type != "Polygon" or not SMALLEST_BAY_M2 < bay.area < LARGEST_BAY_M2:
                 continue
             inside = shapely.contains_xy(bay, points[:, :2])
-            if inside.sum() < FEWEST_BAY_POINTS:
+            if inside.sum() < BAY_POINTS:
                 continue
             places = shapely.get_coordinates(bay) @ along
             sides.append(
@@ -136,7 +136,7 @@ def split_convex(polygon: shapely.Polygon) -> list[np.ndarray]:
     Mehlhorn 1983).
     """
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    triangles = shapely.orient_polygons(triangles[shapely.area(triangles) > LEAST_PART_M2])
+    triangles = shapely.orient_polygons(triangles[shapely.area(triangles) > CONVEX_PART_M2])
     rings = {i: [tuple(c) for c in t.exterior.coords[:-1]] for i, t in enumerate(triangles)}
     owner = {edge: i for i, ring in rings.items() for edge in list_edges(ring)}
     inner = [edge for edge in owner if edge < edge[::-1] and edge[::-1] in owner]

@@ -15,13 +15,13 @@ from ..union.volumes import (
 )
 from .tables import (
     FAR_M,
-    NO_NUMBER,
+    NO_UNKNOWN,
     Tables,
     add_line,
     add_plane,
     add_unknown,
     make_tables,
-    place_all,
+    place_volumes,
 )
 
 ROOM = 2  # Room for so many times the volumes that there are.
@@ -43,7 +43,7 @@ def make_roof(volumes: np.ndarray, sides: list, turns: np.ndarray, with_base: bo
             normal = line[:2] if edge < 2 else line[1::-1]
             roof.sides[row, edge] = add_line(roof, *(normal @ axes), line[2])
         add_planes(roof, row, volumes[k], sides[k], axes)
-    place_all(roof)
+    place_volumes(roof)
     return roof
 
 
@@ -56,7 +56,7 @@ def add_planes(roof: Tables, row: int, volume: np.ndarray, sides: list, axes: np
     for p in np.flatnonzero(np.isfinite(volume[OFFSET0 : OFFSET0 + LEVEL + 1])).tolist():
         z = volume[OFFSET0 + p]
         if p == LEVEL:
-            add_plane(roof, row, roof.sides[row, 0], add_unknown(roof, z), NO_NUMBER)
+            add_plane(roof, row, roof.sides[row, 0], add_unknown(roof, z), NO_UNKNOWN)
             continue
         slope, lean = volume[SLOPE0 + p], volume[LEAN0 + p]
         rise = np.array([1.0 if p % 2 == 0 else -1.0, lean])

@@ -5,7 +5,7 @@
   is -(k + 1).
 - An **unknown** is a height or a slope. Planes with one slope share its number.
 - A **plane** is z = height + slope d, with d the distance from its line. A level one has no slope.
-- A **volume** has four sides, at most MOST_PLANES planes, and joins others or replaces them. Its
+- A **volume** has four sides, at most VOLUME_PLANES planes, and joins others or replaces them. Its
   roof is the lowest of its planes, the whole roof the highest of the volumes over a place. A volume
   that replaces hides all that came before it.
 
@@ -20,13 +20,13 @@ import numpy as np
 
 from ...compiled import compiled
 
-MOST_PLANES = 8  # Most planes of a volume: four sides, a top and three over cut corners.
+VOLUME_PLANES = 8  # Most planes of a volume: four sides, a top and three over cut corners.
 N_SIDES = 4  # Sides of a volume: the first two face each other, and the last two.
 FAR_M = 1e4  # Distance (m) of a side that other volumes or the outline hide.
-NO_NUMBER = -1  # A level plane's slope, and what a volume does not have.
-VOLUMES, LINES, UNKNOWNS = 0, 1, 2  # Places in `Tables.counts`.
+NO_UNKNOWN = -1  # A level plane's slope, and what a volume does not have.
+VOLUME_COUNT, LINE_COUNT, UNKNOWN_COUNT = 0, 1, 2  # Places in `Tables.counts`.
 ONE_PLANE = 1e-4  # Planes whose coefficients differ less (m, rise over run) are one.
-PARALLEL = 1e-9  # Sine of the angle below which two lines do not cross.
+PARALLEL_SINE = 1e-9  # Sine of the angle below which two lines do not cross.
 
 Tables = namedtuple(
     "Tables",
@@ -38,10 +38,10 @@ Tables = namedtuple(
 - counts (3,): volumes, lines and unknowns in use.
 - lines (l, 3), values (u,).
 - sides (v, 4): signed lines. n_planes (v,): 0 for a volume that was left out.
-- plane_lines, heights, slopes (v, MOST_PLANES): a signed line and unknowns.
+- plane_lines, heights, slopes (v, VOLUME_PLANES): a signed line and unknowns.
 - replaces (v,).
 
-The rest follows from these: half_planes (v, 4, 3), planes (v, MOST_PLANES, 3) and boxes (v, 4),
+The rest follows from these: half_planes (v, 4, 3), planes (v, VOLUME_PLANES, 3) and boxes (v, 4),
 which are the least and greatest x and y of each volume's plan.
 """
 
@@ -54,12 +54,12 @@ def make_tables(volumes: int, lines: int, unknowns: int) -> Tables:
         np.zeros(unknowns),
         np.zeros((volumes, N_SIDES), np.int64),
         np.zeros(volumes, np.int64),
-        np.zeros((volumes, MOST_PLANES), np.int64),
-        np.full((volumes, MOST_PLANES), NO_NUMBER),
-        np.full((volumes, MOST_PLANES), NO_NUMBER),
+        np.zeros((volumes, VOLUME_PLANES), np.int64),
+        np.full((volumes, VOLUME_PLANES), NO_UNKNOWN),
+        np.full((volumes, VOLUME_PLANES), NO_UNKNOWN),
         np.zeros(volumes, np.int64),
         np.zeros((volumes, N_SIDES, 3)),
-        np.zeros((volumes, MOST_PLANES, 3)),
+        np.zeros((volumes, VOLUME_PLANES, 3)),
         np.zeros((volumes, 4)),
     )
 
@@ -72,7 +72,7 @@ def make_tables_like(roof: Tables) -> Tables:
 @compiled
 def copy_tables(source, target):
     """Copy all rows in use."""
-    v, l, u = source.counts[VOLUMES], source.counts[LINES], source.counts[UNKNOWNS]
+    v, l, u = source.counts[VOLUME_COUNT], source.counts[LINE_COUNT], source.counts[UNKNOWN_COUNT]
     target.counts[:] = source.counts
     target.lines[:l] = source.lines[:l]
     target.values[:u] = source.values[:u]
@@ -91,9 +91,9 @@ def copy_tables(source, target):
 def has_room(roof):
     """Return whether a move may add a volume with all its lines and unknowns."""
     return (
-        roof.counts[VOLUMES] < len(roof.sides)
-        and roof.counts[LINES] + N_SIDES < len(roof.lines)
-        and roof.counts[UNKNOWNS] + 2 * MOST_PLANES < len(roof.values)
+        roof.counts[VOLUME_COUNT] < len(roof.sides)
+        and roof.counts[LINE_COUNT] + N_SIDES < len(roof.lines)
+        and roof.counts[UNKNOWN_COUNT] + 2 * VOLUME_PLANES < len(roof.values)
     )
 
 
@@ -108,7 +108,7 @@ def read_line(roof, signed):
 @compiled
 def add_line(roof, a, b, c):
     """Add a line, or find it among those that there are. Returns its signed number."""
-    count = roof.counts[LINES]
+    count = roof.counts[LINE_COUNT]
     for k in range(count):
         for sign in (1, -1):
             if (
@@ -118,16 +118,16 @@ def add_line(roof, a, b, c):
             ):
                 return sign * (k + 1)
     roof.lines[count, 0], roof.lines[count, 1], roof.lines[count, 2] = a, b, c
-    roof.counts[LINES] = count + 1
+    roof.counts[LINE_COUNT] = count + 1
     return count + 1
 
 
 @compiled
 def add_unknown(roof, value):
     """Add an unknown, and return its number."""
-    count = roof.counts[UNKNOWNS]
+    count = roof.counts[UNKNOWN_COUNT]
     roof.values[count] = value
-    roof.counts[UNKNOWNS] = count + 1
+    roof.counts[UNKNOWN_COUNT] = count + 1
     return count
 
 
@@ -135,7 +135,7 @@ def add_unknown(roof, value):
 def add_plane(roof, k, line, height, slope):
     """Give volume k one more plane, if it has room."""
     p = roof.n_planes[k]
-    if p < MOST_PLANES:
+    if p < VOLUME_PLANES:
         roof.plane_lines[k, p], roof.heights[k, p], roof.slopes[k, p] = line, height, slope
         roof.n_planes[k] = p + 1
 
@@ -156,7 +156,7 @@ def cross_lines(roof, first, second):
     a, b, c = read_line(roof, first)
     d, e, f = read_line(roof, second)
     det = a * e - b * d
-    if abs(det) < PARALLEL:
+    if abs(det) < PARALLEL_SINE:
         return np.inf, np.inf
     return (b * f - e * c) / det, (d * c - a * f) / det
 
@@ -188,9 +188,9 @@ def place_volume(roof, k):
 
 
 @compiled
-def place_all(roof):
+def place_volumes(roof):
     """Compute what follows from the tables."""
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         place_volume(roof, k)
 
 
@@ -203,10 +203,10 @@ def measure_middle(roof, k, s, box):
     if not (np.isfinite(x0) and np.isfinite(x1)):
         return 0.0, 0.0, 0.0
     dx, dy, low, high = x1 - x0, y1 - y0, 0.0, 1.0
-    if abs(dx) > PARALLEL:
+    if abs(dx) > PARALLEL_SINE:
         first, last = (box[0] - x0) / dx, (box[1] - x0) / dx
         low, high = max(low, min(first, last)), min(high, max(first, last))
-    if abs(dy) > PARALLEL:
+    if abs(dy) > PARALLEL_SINE:
         first, last = (box[2] - y0) / dy, (box[3] - y0) / dy
         low, high = max(low, min(first, last)), min(high, max(first, last))
     if high <= low:
@@ -219,7 +219,7 @@ def measure_middle(roof, k, s, box):
 def pack(roof):
     """Remove volumes that were left out, and lines and unknowns that nothing uses."""
     place = 0
-    for k in range(roof.counts[VOLUMES]):
+    for k in range(roof.counts[VOLUME_COUNT]):
         if roof.n_planes[k] == 0:
             continue
         if place < k:
@@ -227,7 +227,7 @@ def pack(roof):
             roof.plane_lines[place], roof.heights[place] = roof.plane_lines[k], roof.heights[k]
             roof.slopes[place], roof.replaces[place] = roof.slopes[k], roof.replaces[k]
         place += 1
-    roof.counts[VOLUMES] = place
+    roof.counts[VOLUME_COUNT] = place
     new_line, new_unknown = np.full(len(roof.lines), -1), np.full(len(roof.values), -1)
     for k in range(place):
         for s in range(N_SIDES):
@@ -238,16 +238,16 @@ def pack(roof):
             if roof.slopes[k, p] >= 0:
                 new_unknown[roof.slopes[k, p]] = 0
     count = 0
-    for l in range(roof.counts[LINES]):
+    for l in range(roof.counts[LINE_COUNT]):
         if new_line[l] == 0:
             roof.lines[count], new_line[l] = roof.lines[l], count
             count += 1
-    roof.counts[LINES], count = count, 0
-    for u in range(roof.counts[UNKNOWNS]):
+    roof.counts[LINE_COUNT], count = count, 0
+    for u in range(roof.counts[UNKNOWN_COUNT]):
         if new_unknown[u] == 0:
             roof.values[count], new_unknown[u] = roof.values[u], count
             count += 1
-    roof.counts[UNKNOWNS] = count
+    roof.counts[UNKNOWN_COUNT] = count
     for k in range(place):
         for s in range(N_SIDES):
             sign = 1 if roof.sides[k, s] > 0 else -1
