@@ -76,7 +76,14 @@ function mark(row) {
   row.tag.hidden = !row.tag.textContent;
 }
 const markCurrent = () => rows.filter(row => row.id === now.id).forEach(mark);
-const seeCurrent = () => $("list").querySelector(".current")?.scrollIntoView({ block: "nearest" });
+
+// Scroll the list to its current row. `scrollIntoView` would also move where the Tab key begins.
+const seeCurrent = () => {
+  const [list, row] = [$("list"), $("list").querySelector(".current")];
+  if (!row) return;
+  const [outer, inner] = [list.getBoundingClientRect(), row.getBoundingClientRect()];
+  list.scrollTop += Math.min(inner.top - outer.top, 0) + Math.max(inner.bottom - outer.bottom, 0);
+};
 
 // The next building that is not accepted yet, or the one before, whatever it is.
 function step(by) {
