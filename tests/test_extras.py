@@ -34,6 +34,7 @@ PACKAGES = {
     "pyarrow": "parquet",
     "psycopg": "postgis",
     "ifcopenshell": "ifc",
+    "ezdxf": "dxf",
     "trimesh": "trimesh",
     "pyvista": "pyvista",
     "geopandas": "geopandas",
@@ -43,7 +44,7 @@ PACKAGES = {
     "pvlib": "sun",
 }
 
-CONVERSIONS = {"ifc", "trimesh", "pyvista", "geopandas", "sun"}  # what no run asks for
+CONVERSIONS = {"ifc", "dxf", "trimesh", "pyvista", "geopandas", "sun"}  # what no run asks for
 
 # name: (package that is missing, TOML, further options)
 NEEDY = {

@@ -10,6 +10,7 @@ FORMATS = {
     "stl": "buildings.stl",
     "3dtiles": "buildings.3dtiles",
     "ifc": "buildings.ifc",
+    "dxf": "buildings.dxf",
     "cityjson": "buildings.city.json",
     "citygml3": "buildings.citygml3.gml",
     "fgb": "buildings.fgb",

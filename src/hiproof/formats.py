@@ -143,6 +143,11 @@ FORMATS = {
     "ifc": Format(
         file="buildings.ifc", what="IFC4X3 with map conversion (extra `ifc`)", module="meshes.ifc"
     ),
+    "dxf": Format(
+        file="buildings.dxf",
+        what="DXF: 3D faces and outlines on layers, for CAD (extra `dxf`)",
+        module="meshes.dxf",
+    ),
 }
 CONVERTED = {name: format for name, format in FORMATS.items() if name != "parameters"}
 """What `hiproof convert` writes: the parameters are what it reads."""

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pyogrio
 import pytest
+import shapely
 from lxml import etree
 
 import hiproof
@@ -55,6 +56,8 @@ def outputs(run, tmp_path_factory):
             reader("pyarrow")
         if name == "ifc":
             reader("ifcopenshell")
+        if name == "dxf":
+            reader("ezdxf")
         path = folder / FORMATS[name].file
         if not path.exists():
             given = {"geoid_height": 43.2} if name == "3dtiles" else {}
@@ -192,6 +195,59 @@ def test_ifc_in_feet_names_its_unit(run, tmp_path):
     convert(run, tmp_path / "a.ifc", crs="EPSG:2263+5703")
     text = (tmp_path / "a.ifc").read_text()
     assert "IFCMAPCONVERSIONSCALED" in text and "IFCCONVERSIONBASEDUNIT" in text
+
+
+def open_sound_drawing(path):
+    """Open a drawing that ezdxf's own audit finds nothing wrong with."""
+    document = reader("ezdxf").readfile(path)
+    assert document.audit().errors == [] and document.audit().fixes == []
+    return document
+
+
+def measure_drawing(space):
+    """The volume that the 3D faces of a drawing enclose, and the area of its outlines."""
+    corners = np.array([[tuple(p) for p in f.wcs_vertices()[:3]] for f in space.query("3DFACE")])
+    corners -= corners[0, 0]
+    volume = np.linalg.det(corners).sum() / 6
+    outlines = [shapely.Polygon(p.get_points("xy")) for p in space.query("LWPOLYLINE")]
+    return volume, shapely.unary_union(outlines).area
+
+
+def test_ezdxf_opens_faces_on_layers_and_outlines(run, outputs, volumes):
+    document = open_sound_drawing(outputs("dxf"))
+    space = document.modelspace()
+    assert document.header["$INSUNITS"] == 6
+    assert [text.dxf.text for text in space.query("TEXT")] == MODELLED
+    volume, _ = measure_drawing(space)
+    assert volume == pytest.approx(sum(volumes.values()), rel=1e-6)
+    layers = {face.dxf.layer for face in space.query("3DFACE")}
+    assert layers == {"RoofSurface", "WallSurface", "GroundSurface"}
+    assert all(line.closed and line.dxf.layer == "Outline" for line in space.query("LWPOLYLINE"))
+
+
+def test_visible_edges_of_a_drawing_are_those_of_the_faces(outputs, run):
+    """An edge between two triangles of one face is drawn by neither."""
+    expected = sum(
+        len(ring)
+        for b in hiproof.open_run(run)
+        if b.built
+        for f in b.solid.faces
+        for ring in f.rings
+    )
+    faces = open_sound_drawing(outputs("dxf")).modelspace().query("3DFACE")
+    hidden = [face.get_edges_visibility() for face in faces]
+    assert sum(a + b + d for a, b, _, d in hidden) == expected
+
+
+def test_a_drawing_in_feet_is_as_large_in_feet(run, outputs, tmp_path):
+    convert(run, tmp_path / "a.dxf", crs="EPSG:2263+5703") if outputs("dxf") else None
+    document = open_sound_drawing(tmp_path / "a.dxf")
+    assert document.header["$INSUNITS"] == 21
+    (volume, area), (volume_m3, area_m2) = (
+        measure_drawing(d.modelspace()) for d in (document, open_sound_drawing(outputs("dxf")))
+    )
+    foot_m = 1200 / 3937
+    assert (volume * foot_m**3, area * foot_m**2) == pytest.approx((volume_m3, area_m2), rel=1e-5)
 
 
 def read_global_ids(path):

@@ -6,6 +6,7 @@ glb, gltf    binary glTF 2.0, its container and its content
 obj          Wavefront OBJ
 stl          binary STL
 ifc          IFC4X3
+dxf          DXF, for CAD
 tiles        3D Tiles 1.1
 page_mesh    a solid packed for a page's JavaScript
 """
