@@ -62,7 +62,9 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
     summary, out = update
     assert summary.outside == {"built": 1, "demolished": 1, "extended": 1, "unmapped": 1}
     with (out / "changes.csv").open() as file:
-        rows = {row["kind"]: row for row in csv.DictReader(file) if row["class"] == "outside"}
+        table = [row for row in csv.DictReader(file) if row["class"] == "outside"]
+    rows, areas = {row["kind"]: row for row in table}, [float(row["area_m2"]) for row in table]
+    assert areas == sorted(areas, reverse=True) and len(set(areas)) > 1
     assert rows["extended"]["id"] == "house-0" and rows["built"]["id"] == ""
     meta, _, geometry, columns = pyogrio.raw.read(out / "changes.gpkg", layer="changed_places")
     kinds = columns[list(meta["fields"]).index("kind")].tolist()

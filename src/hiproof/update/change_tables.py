@@ -66,14 +66,15 @@ class FoundChange:
 def write_changes(folder: Path) -> tuple[list[FoundChange], tuple[Path, ...]]:
     """Write changes.csv and changes.gpkg into the folder of an update.
 
-    Returns the buildings that are not unchanged, and both paths. There are none in the folder of
+    Roofs outside all outlines come last, the largest first. Returns the buildings that are not unchanged, and both paths. There are none in the folder of
     another run.
     """
     with opened_parameters(folder / FORMATS["parameters"].file) as (head, records):
         if head.update is None:
             return [], ()
         found = collect_changes(records, head.update)
-    outside = [report_outside(roof, head.update.survey) for roof in head.update.roofs_outside]
+    by_size = sorted(head.update.roofs_outside, key=lambda roof: roof["area"], reverse=True)
+    outside = [report_outside(roof, head.update.survey) for roof in by_size]
     files = folder / CSV_FILE, folder / GPKG_FILE
     with atomic(files[0]) as temporary:
         write_csv(Path(temporary), [*found, *outside])
