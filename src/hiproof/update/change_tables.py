@@ -66,8 +66,8 @@ class FoundChange:
 def write_changes(folder: Path) -> tuple[list[FoundChange], tuple[Path, ...]]:
     """Write changes.csv and changes.gpkg into the folder of an update.
 
-    Roofs outside all outlines come last, the largest first. Returns the buildings that are not unchanged, and both paths. There are none in the folder of
-    another run.
+    Returns the buildings that are not unchanged, and both paths. There are none in the folder of
+    another run. Roofs outside all outlines come last, the largest first.
     """
     with opened_parameters(folder / FORMATS["parameters"].file) as (head, records):
         if head.update is None:
