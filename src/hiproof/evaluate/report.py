@@ -36,11 +36,18 @@ DISTRIBUTIONS = (
     ("psd_mean", "mean distance of a building's points, facades included", "m"),
     ("p95", "95th percentile of the distances", "m"),
     ("share_within_20cm", "share of points 0.3 m inside the outline within 0.2 m of the roof", ""),
-    ("outline_iou", "outline IoU", ""),
+    ("outline_iou", "outline IoU: overlap of roof and footprint, 1 where equal", ""),
     ("density", "points per square metre", ""),
     ("volume_m3", "volume", "m³"),
 )
-TABLE_FIGURES = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
+TABLE_FIGURES = {
+    "psd_mean": "mean distance, m",
+    "psd_std": "standard deviation, m",
+    "rmse": "root mean square, m",
+    "p95": "95 of 100 closer than, m",
+    "share_within_20cm": "share within 0.2 m",
+    "outline_iou": "outline IoU",
+}
 
 
 def write_report(
@@ -187,7 +194,7 @@ def sentence(code: str) -> str:
 
 def figure_table(run: EvaluatedRun) -> str:
     """Return the table of mean figures by roof type."""
-    head = head_row("type", "buildings", *(name.replace("_", " ") for name in TABLE_FIGURES))
+    head = head_row("type", "buildings", *TABLE_FIGURES.values())
     rows = ""
     for kind, figures in summarise(run.figures).items():
         cells = "".join(
