@@ -41,13 +41,44 @@ HEAD = """# Roof types and their parameters
 """
 
 
+NAMES = {
+    "flat": "flat roof",
+    "monopitch": "single slope, lean-to roof",
+    "gable": "gable roof",
+    "hip": "hip roof",
+    "half_hip": "half-hipped roof: gables whose tops are cut off by a hip",
+    "pyramid": "pyramid, tent roof",
+    "mansard": "slopes on all sides up to a level top",
+    "shed": "saw-tooth roof",
+    "asymmetric_gable": "gable with slopes or eaves that differ: saltbox, catslide",
+    "gambrel": "gambrel: a gable whose slopes are steeper below",
+    "side_hip": "gable at one end, hip at the other",
+    "side_half_hip": "gable at one end, half hip at the other",
+    "half_mansard": "one slope up to a level top",
+    "truncated_gable": "two opposite slopes up to a level top",
+    "side_mansard": "three slopes up to a level top",
+    "corner": "two slopes that meet in a hip, as at the corner of a wing",
+    "corner_mansard": "two adjacent slopes up to a level top",
+    "cone": "cone",
+    "broach": "spire of eight sides",
+    "dome": "dome",
+    "barrel": "barrel roof",
+    "half_cone": "half a cone, as over an apse",
+    "hexagonal_spire": "spire of six sides",
+    "onion": "onion",
+}
+"""What a person calls each roof type."""
+
+
 def make_page() -> str:
     """Return docs/primitives.md."""
-    sections = [
-        f"## {name}\n\n{', '.join(f'`{p}`' for p in list_parameters(name))}\n\n"
-        f"![{name}](primitives/{name}.svg)\n"
-        for name in CATALOGUE
-    ]
+    sections = []
+    for name in CATALOGUE:
+        parameters = ", ".join(f"`{p}`" for p in list_parameters(name))
+        sections.append(
+            f"## {name}\n\n{NAMES[name].capitalize()}.\n\n{parameters}\n\n"
+            f"![{name}](primitives/{name}.svg)\n"
+        )
     return "\n".join([HEAD, *sections])
 
 
