@@ -1,6 +1,7 @@
 """The command line itself: groups, help, examples, completion, progress, `--quiet` and `--json`."""
 
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -79,15 +80,17 @@ def test_a_command_shows_that_it_works_before_it_imports_what_computes(name):
     assert done.stdout.strip() == "[]", done.stderr
 
 
-def test_reconstruct_shows_ten_options_first_and_all_on_request():
-    first = list_options(invoke("reconstruct", "--help").output)
-    every = list_options(invoke("reconstruct", "--help-all", env={"COLUMNS": "200"}).output)
-    shown = {"--" + name.replace("_", "-") for name in COMMANDS["reconstruct"]["first"]}
-    assert len(shown - {"--help-all"}) == 10
-    assert first - {"--help"} == shown
-    assert {opt for param in COMMAND_LINE["reconstruct"].params for opt in param.opts} - {
-        "clouds"
-    } <= every
+@pytest.mark.parametrize("name", ["reconstruct", "update", "enrich", "build"])
+def test_a_long_command_explains_few_options_and_names_all(name):
+    brief = invoke(name, "--help", env={"COLUMNS": "200"}).output
+    every = list_options(invoke(name, "--help-all", env={"COLUMNS": "200"}).output)
+    first = {"--" + option.replace("_", "-") for option in COMMANDS[name]["first"]}
+    assert len(first - {"--help-all"}) <= 10
+    assert set(re.findall(r"^  (--[\w-]+)", brief, re.MULTILINE)) - {"--help"} == first
+    options = {
+        param.opts[0] for param in COMMAND_LINE[name].params if param.opts[0].startswith("--")
+    }
+    assert options <= every and options <= set(re.findall(r"--[\w-]+", brief))
 
 
 def test_a_shell_completes_commands_and_options():

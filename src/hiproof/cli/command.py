@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import textwrap
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any
@@ -32,7 +33,8 @@ ALL_OPTIONS = "hiproof.all_options"  # key of a context whose help shows every o
 class Command(click.Command):
     """A command whose help shows the options that people need first.
 
-    `--help-all` shows every option; without it the help always does. Help is plain text, which
+    It names the others by group, and `--help-all` explains them; without that option the help
+    explains all. Help is plain text, which
     needs no markup and no columns for types.
     """
 
@@ -40,24 +42,29 @@ class Command(click.Command):
         """Write nothing: arguments come with the options, before them."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        for heading, params in self.group_parameters(ctx).items():
-            write_parameters(formatter, heading, params, ctx)
+        first = COMMANDS[self.name or ""].get("first")
+        groups = self.group_parameters(ctx)
+        if not first or ctx.meta.get(ALL_OPTIONS):
+            for heading, params in groups.items():
+                write_parameters(formatter, heading, params, ctx)
+            return
+        by_name = {param.name: param for param in self.get_params(ctx)}
+        shown = [by_name[name] for name in (*first, "help") if name in by_name]
+        arguments = groups.pop("Arguments", [])
+        write_parameters(formatter, "Arguments", arguments, ctx)
+        write_parameters(formatter, MAIN_HEADING, shown, ctx)
+        write_names(formatter, groups, shown)
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         write_example(formatter, self.name or "")
 
     def group_parameters(self, ctx: Any) -> dict[str, list[Any]]:
-        """Return the parameters that the help shows, under their headings."""
-        params, first = self.get_params(ctx), COMMANDS[self.name or ""].get("first")
+        """Return all parameters under their headings."""
         groups: dict[str, list[Any]] = {"Arguments": [], MAIN_HEADING: []}
-        for param in params:
+        for param in self.get_params(ctx):
             is_argument = param.param_type_name == "argument"
             heading = "Arguments" if is_argument else getattr(param, "heading", MAIN_HEADING)
             groups.setdefault(heading, []).append(param)
-        if first and not ctx.meta.get(ALL_OPTIONS):
-            by_name = {param.name: param for param in params}
-            options = [by_name[name] for name in (*first, "help") if name in by_name]
-            return {"Arguments": groups["Arguments"], MAIN_HEADING: options}
         return {heading: group for heading, group in groups.items() if group}
 
 
@@ -69,6 +76,21 @@ def write_parameters(formatter: Any, heading: str, params: Iterable[Any], ctx: A
     records = filter(None, [param.get_help_record(ctx) for param in params])
     with formatter.section(heading):
         formatter.write_dl([(name, make_phrase(text)) for name, text in records])
+
+
+def write_names(formatter: Any, groups: dict[str, list[Any]], shown: list[Any]) -> None:
+    """Write the names of the options that are not `shown`, by group."""
+    names: dict[str, list[str]] = {}
+    for heading, group in groups.items():
+        subject = heading.removeprefix("Settings: ") if ":" in heading else "general"
+        left = [p.opts[0] for p in group if p not in shown and p.opts[0] != "--help"]
+        if left:
+            names.setdefault(subject, []).extend(left)
+    with formatter.section("More, explained by --help-all"):
+        for subject, left in names.items():
+            text = f"{subject}: {', '.join(left)}"
+            lines = textwrap.wrap(text, formatter.width - 4, break_on_hyphens=False)
+            formatter.write("".join(f"{'    ' if k else '  '}{s}\n" for k, s in enumerate(lines)))
 
 
 def make_phrase(text: str) -> str:
