@@ -132,6 +132,7 @@ def test_every_text_is_known_to_name_files_or_not():
         "settings.read.clearance_column",
         "settings.read.raised_column",
         "settings.read.year_column",
+        "settings.read.shift",
         "epochs",
         "settings.enrich.use_attribute",
         "settings.read.overture_catalogue",

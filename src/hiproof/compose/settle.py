@@ -130,9 +130,14 @@ def settle_outlines(outlines: Sequence[shapely.Polygon]) -> list[shapely.Polygon
 def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
     """Round the outline.
 
-    Where that makes it cross itself, it is the largest valid polygon on the same grid.
+    Where that makes it cross itself, it is the largest valid polygon on the same grid. Raises
+    shapely's GEOSException for an outline that crosses itself before.
     """
-    return max(settle_outlines([outline]), key=lambda polygon: polygon.area)
+    result = rounded_outline(outline)
+    if result.is_valid:
+        return result
+    on_grid = shapely.get_parts(shapely.set_precision(outline, 10.0**-PLAN_DIGITS))
+    return rounded_outline(max(on_grid, key=lambda polygon: polygon.area, default=outline))
 
 
 def round_building(building: Building) -> Building:
