@@ -80,7 +80,7 @@ def simplify_outline(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Po
     for ring in (polygon.exterior, *polygon.interiors):
         previous, xy = math.inf, shapely.get_coordinates(ring)
         while MOST_OUTLINE_VERTICES < len(xy) < 0.9 * previous:
-            previous, xy = len(xy), simplified_in_pieces(xy, tolerance_m)
+            previous, xy = len(xy), simplify_in_pieces(xy, tolerance_m)
         rings.append(xy)
     outer, *holes = [ring if len(ring) >= 4 else None for ring in rings]
     if outer is None:
@@ -91,7 +91,7 @@ def simplify_outline(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Po
     return shapely.simplify(rough, tolerance_m, preserve_topology=False)
 
 
-def simplified_in_pieces(xy: np.ndarray, tolerance_m: float) -> np.ndarray:
+def simplify_in_pieces(xy: np.ndarray, tolerance_m: float) -> np.ndarray:
     """Simplify a ring's coordinates (n, 2) in pieces of PIECE_VERTICES edges."""
     ends = np.append(np.arange(0, len(xy) - 2, PIECE_VERTICES), len(xy) - 1)
     vertices = np.concatenate(

@@ -147,9 +147,7 @@ def compare_points(
     s_new = np.fmin(s_new, np.fmax(s_old, 2 * noise.point))  # as an unchanged roof would scatter
     with np.errstate(divide="ignore", invalid="ignore"):
         sampling = MEDIAN_VARIANCE * (s_old**2 / n_old + s_new**2 / n_new)
-    sigma = np.sqrt(
-        np.where(np.isfinite(sampling), sampling, np.inf) + noise.cell**2 + noise.roof**2
-    )
+    sigma = np.sqrt(np.where(np.isfinite(sampling), sampling, np.inf) + noise.variance)
     near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
     return CellComparison(
         cell_m,
@@ -211,9 +209,7 @@ def compare_with_roof(
     cells, number = number_cells(np.floor(new[:, :2] / cell_m))
     median, scatter, count = summarise_cells(number, residuals, len(cells), noise.point)
     zero = np.zeros(len(cells))
-    sigma = np.sqrt(
-        MEDIAN_VARIANCE * scatter**2 / np.maximum(count, 1) + noise.cell**2 + noise.roof**2
-    )
+    sigma = np.sqrt(MEDIAN_VARIANCE * scatter**2 / np.maximum(count, 1) + noise.variance)
     near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
     kept = compute_share_near(number, residuals, zero, near)
     none = np.zeros(0, np.int64), np.zeros(0)

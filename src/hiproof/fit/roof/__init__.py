@@ -18,34 +18,23 @@ names       from volumes to named parts of the family of roof shapes
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import shapely
 
-from ...errors import FitError
-from ...model import Part, as_xyz
-from ...read.plausible import is_plausible
+from ...model import Part
 from ...settings import Settings
-from ..union import measure_unexplained_share, restrict_type, select_largest_polygon
-from ..union.clamp import clamp_parts
-from ..union.curved import fit_curved_shapes
+from ..union import fit_by
 from ..union.fit import BuildingFit
-from ..union.larger import combine_parts
+from ..union.names import name_planes
 from ..union.objective import is_base_visible
-from ..union.outline import draw_outline
-from ..union.own import fit_custom_shapes
-from ..union.plan import Plan, lay_out_plan
-from ..union.regions import exclude_parts
+from ..union.plan import Plan
 from ..union.scene import Scene
-from ..union.search import find_volumes
-from ..union.shown import keep_visible
 from ..union.sides import choose_sides
 from ..union.unite import gather_ends
 from .accept import improve
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
 from .draw import draw_whole_roof, make_drawing
-from .names import cut_sides, find_axes, name_part, read_planes, read_sides
+from .names import cut_sides, find_axes, read_planes, read_sides
 from .price import Site
 from .prices import compute_unit
 from .regions import list_places
@@ -61,14 +50,7 @@ def fit_building(
     outline: shapely.Polygon | None = None,
     settings: Settings | None = None,
 ) -> BuildingFit:
-    """Fit the roof of one building to `points_local` (n, 3) over `outline`.
-
-    Both are in metres of one local frame. Without an outline, it is estimated from the points. With
-    one, points outside it do not count. Where `settings.fit.types` names types, all parts have one
-    of these types or are flat.
-
-    Raises FitError if nothing can be fitted: if no points lie inside the outline, if it has no
-    area, or if the points span no area. Raises InputError for points of another shape.
+    """Fit the roof of one building, with the arguments, errors and outcome of the fit in use.
 
     >>> x, y = np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4))
     >>> z = np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)
@@ -77,42 +59,24 @@ def fit_building(
     >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
     (['flat', 'gable'], 0.0)
     """
-    settings = settings or Settings()
-    points_local = as_xyz(points_local)
-    points_local = points_local[is_plausible(points_local)]
-    outline = draw_outline(points_local) if outline is None else outline
-    outline = select_largest_polygon(outline)
-    plan = lay_out_plan(points_local, outline)
-    if len(plan.cloud.u) == 0:
-        raise FitError(
-            "expected roof points inside the outline, got none; "
-            "add a cloud that covers the building"
-        )
-    types = settings.fit.types
-    volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
+    return fit_by(name_volumes, points_local, outline, settings or Settings())
+
+
+def name_volumes(
+    volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, settings: Settings
+) -> list[Part]:
+    """Draw the search's volumes, improve them until no move saves, and name them as parts."""
     plan_outline = shapely.transform(outline, plan.frame.uv_plan)
     site = make_site(scene, plan_outline, compute_unit(plan.density, settings.compound))
-    roof = draw_volumes(volumes, outline, plan, scene, site)
-    visible = keep_visible(read_parts(roof, site, plan_outline, plan, types), plan, scene)
-    parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
-    parts = fit_curved_shapes(parts, plan.points, outline, settings)
-    parts = [restrict_type(part, types, points_local) for part in parts]
-    z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
-    parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
-    if exclude_parts(parts, visible):  # new ones may hide others
-        parts = keep_visible(parts, plan, scene, widest_m2=0.0)
-    unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
-    return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
-
-
-def draw_volumes(
-    volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, site: Site
-) -> Tables:
-    """Return the tables of the search's volumes along walls, improved until no move saves."""
-    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
-    roof = make_roof(volumes, sides, scene.turn, is_base_visible(volumes, scene))
+    roof = start_roof(volumes, outline, plan, scene)
     improve(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
-    return roof
+    return read_parts(roof, site, plan_outline, plan, settings.fit.types)
+
+
+def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:
+    """Return the tables of the search's volumes along walls."""
+    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
+    return make_roof(volumes, sides, scene.turn, is_base_visible(volumes, scene))
 
 
 def read_parts(
@@ -128,6 +92,8 @@ def read_parts(
         sides = read_sides(roof, k, axes, anchored, sigmas)
         if is_cut:
             sides = cut_sides(sides, shapely.get_coordinates(polygons) @ axes.T)
-        planes = read_planes(roof, k, axes)
-        parts.append(name_part(planes, sides, axes, polygons, covariance, plan.frame, types))
+        planes = read_planes(roof, k, axes, covariance)
+        local = [shapely.transform(polygon, plan.frame.xy_local) for polygon in polygons]
+        local_axes = axes @ plan.frame.rotation
+        parts.append(name_planes(planes, sides, local_axes, local, plan.frame, types))
     return parts

@@ -19,12 +19,11 @@ from .price import (
     list_points,
     list_unknowns,
     list_view,
-    place_planes,
     price_drawing,
     price_misfit,
     price_tables,
 )
-from .tables import VOLUME_COUNT, copy_tables, has_room, pack
+from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes
 
 CHANGE_MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corners may change.
 BOX_STEP_M = 0.5  # Boxes end at multiples of this (m), so that many moves have one box.

@@ -8,13 +8,11 @@ from ...compiled import compiled
 from ..union.objective import compute_point_cost
 from ..union.sides import (
     FEWEST_NEEDED,
-    LEAST_KNOWN,
     LEAST_NEED,
     MOVED_M,
     MOVES,
-    NATS_A_POINT,
-    POINT_SIGMA_M,
     SHOWN_M,
+    weigh_places,
 )
 from .draw import compute_height
 from .price import (
@@ -82,15 +80,8 @@ def estimate_side_sigmas(roof, inner, outer, site, k, anchored):
             needed += int(gain < -LEAST_NEED and 0.0 <= depth < SHOWN_M)
             for q in range(len(moved)):
                 cost[q] += gain if -depth <= moved[q] else 0.0
-        if needed < FEWEST_NEEDED:
-            continue
-        if anchored[s]:
-            sigmas[s] = 0.0
-            continue
-        weight = np.exp(-NATS_A_POINT * (cost - cost.min()))
-        if max(weight[0], weight[-1]) <= LEAST_KNOWN * weight.max():
-            variance = (weight * moved**2).sum() / weight.sum()
-            sigmas[s] = np.sqrt(variance + POINT_SIGMA_M**2)
+        if needed >= FEWEST_NEEDED:
+            sigmas[s] = 0.0 if anchored[s] else weigh_places(cost, moved)
     return sigmas
 
 

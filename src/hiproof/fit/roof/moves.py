@@ -297,54 +297,69 @@ def apply_move(roof, move, site, changed):
     if roof.n_planes[a] == 0:
         return False
     changed[a] = True
+    is_possible = True
     if kind == LEAVE_OUT:
         roof.n_planes[a] = 0
-    elif kind == LEAVE_PLANE:
-        if b >= roof.n_planes[a] or roof.n_planes[a] < 2:
-            return False
-        drop_plane(roof, a, b)
-    elif kind == TO_OUTLINE:
-        line, sign = site.lines[abs(c) - 1], 1.0 if c > 0 else -1.0
-        roof.sides[a, b] = add_line(roof, sign * line[0], sign * line[1], sign * line[2])
-    elif kind == TO_LINE:
-        if abs(c) > roof.counts[LINE_COUNT] or roof.sides[a, b] == c:
-            return False
-        roof.sides[a, b] = c
-    elif kind == RUN_ON:
-        e, f, g = read_line(roof, roof.sides[a, b])
-        roof.sides[a, b] = add_line(roof, e, f, g + RUN_ON_STEPS_M[c])
+    elif TO_OUTLINE <= kind <= RUN_ON:
+        line = find_new_side(roof, kind, a, b, c, site)
+        is_possible = line != 0
+        roof.sides[a, b] = line if is_possible else roof.sides[a, b]
     elif kind == MERGE:
-        if roof.n_planes[b] == 0 or not merge(roof, a, b, site, d):
-            return False
+        is_possible = roof.n_planes[b] > 0 and merge(roof, a, b, site, d)
         changed[b] = True
-        if c:
+        if is_possible and c:
             face_planes(roof, a, c, site)
     elif kind == FACE:
-        if not face_planes(roof, a, b, site):
-            return False
+        is_possible = face_planes(roof, a, b, site)
     elif kind == TURN:
         roof.replaces[a] = 1 - roof.replaces[a]
-    elif kind == GIVE:
-        add_plane(roof, a, roof.sides[a, b], d, c)
-    elif kind == GIVE_WALL:
-        line = site.lines[b]
-        add_plane(roof, a, add_line(roof, line[0], line[1], line[2]), d, c)
     elif kind == LEVEL_EAVES:
-        if not level_eaves(roof, a, b, c, site):
-            return False
-    elif kind == TILT:
-        if b >= roof.n_planes[a] or roof.slopes[a, b] >= 0:
-            return False
-        roof.heights[a, b] = add_unknown(roof, roof.values[roof.heights[a, b]])
-        roof.plane_lines[a, b], roof.slopes[a, b] = roof.sides[a, c], add_unknown(roof, 0.0)
-    elif kind == MAKE_LEVEL:
-        if b >= roof.n_planes[a] or roof.slopes[a, b] < 0:
-            return False
-        x, y = find_centre(roof, a, site)
-        row = roof.planes[a, b]
-        roof.heights[a, b] = add_unknown(roof, row[0] * x + row[1] * y + row[2])
-        roof.slopes[a, b] = NO_UNKNOWN
+        is_possible = level_eaves(roof, a, b, c, site)
+    else:
+        is_possible = change_plane(roof, move, site)
     place_volume(roof, a)
+    return is_possible
+
+
+@compiled
+def find_new_side(roof, kind, k, s, number, site):
+    """Return the line on which a move puts side s of volume k, 0 where that is no move."""
+    if kind == TO_OUTLINE:
+        line, sign = site.lines[abs(number) - 1], 1.0 if number > 0 else -1.0
+        return add_line(roof, sign * line[0], sign * line[1], sign * line[2])
+    if kind == TO_LINE:
+        is_other = abs(number) <= roof.counts[LINE_COUNT] and roof.sides[k, s] != number
+        return number if is_other else 0
+    a, b, c = read_line(roof, roof.sides[k, s])
+    return add_line(roof, a, b, c + RUN_ON_STEPS_M[number])
+
+
+@compiled
+def change_plane(roof, move, site):
+    """Give, take, tilt or level one plane of a volume. Returns whether the move is possible."""
+    kind, k, b, c, d = move[0], move[1], move[2], move[3], move[4]
+    if kind == GIVE:
+        add_plane(roof, k, roof.sides[k, b], d, c)
+        return True
+    if kind == GIVE_WALL:
+        line = site.lines[b]
+        add_plane(roof, k, add_line(roof, line[0], line[1], line[2]), d, c)
+        return True
+    if b >= roof.n_planes[k]:
+        return False
+    is_level = roof.slopes[k, b] < 0
+    if kind == LEAVE_PLANE and roof.n_planes[k] > 1:
+        drop_plane(roof, k, b)
+    elif kind == TILT and is_level:
+        roof.heights[k, b] = add_unknown(roof, roof.values[roof.heights[k, b]])
+        roof.plane_lines[k, b], roof.slopes[k, b] = roof.sides[k, c], add_unknown(roof, 0.0)
+    elif kind == MAKE_LEVEL and not is_level:
+        x, y = find_centre(roof, k, site)
+        row = roof.planes[k, b]
+        roof.heights[k, b] = add_unknown(roof, row[0] * x + row[1] * y + row[2])
+        roof.slopes[k, b] = NO_UNKNOWN
+    else:
+        return False
     return True
 
 

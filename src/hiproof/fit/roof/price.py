@@ -19,7 +19,7 @@ from .prices import (
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
-from .tables import UNKNOWN_COUNT, VOLUME_COUNT
+from .tables import UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
 DAMPING = 0.05  # Points that hold an unknown at its value.
@@ -183,22 +183,6 @@ def fit_unknowns(roof, site, view, points, places, count, rounds):
                 roof.values[u] = solution[places[u]]
         for m in range(len(view)):
             place_planes(roof, view[m])
-
-
-@compiled
-def place_planes(roof, k):
-    """Compute the planes of volume k from its unknowns."""
-    for p in range(roof.n_planes[k]):
-        slope = roof.slopes[k, p]
-        row = roof.planes[k, p]
-        row[2] = roof.values[roof.heights[k, p]]
-        if slope < 0:
-            row[0], row[1] = 0.0, 0.0
-        else:
-            line = roof.plane_lines[k, p]
-            l, s = abs(line) - 1, roof.values[slope] if line > 0 else -roof.values[slope]
-            row[0], row[1] = s * roof.lines[l, 0], s * roof.lines[l, 1]
-            row[2] += s * roof.lines[l, 2]
 
 
 @compiled

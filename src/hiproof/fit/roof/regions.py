@@ -6,11 +6,11 @@ import numpy as np
 import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M, with_area
-from ..union.regions import list_polygons
+from ..union.clamp import clip_ring
+from ..union.regions import find_neighbour, list_polygons, merge_inside, widen_gap
 from .draw import Drawing, join_fragments
 from .tables import FAR_M, N_SIDES, VOLUME_COUNT, Tables
 
-GAP_M = 1e-3  # A gap this much wider (m) touches what lies beside it.
 HIGHER_M = 1e-6  # A volume no more than this (m) below another is not below it.
 
 
@@ -102,7 +102,10 @@ def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Po
         outline, shapely.union_all(quads, grid_size=OVERLAY_GRID_M), grid_size=OVERLAY_GRID_M
     )
     for gap in list_polygons(bare):
-        give_gap(gap, lists, outline)
+        wide_gap = widen_gap(gap)
+        k, q = find_neighbour(wide_gap, lists)
+        if lists[k]:
+            lists[k][q : q + 1] = merge_inside(lists[k][q], wide_gap, outline)
     return lists
 
 
@@ -124,19 +127,6 @@ def draw_quad(roof: Tables, k: int, outline: shapely.Polygon) -> shapely.Geometr
     return with_area(cut)
 
 
-def clip_ring(ring: list, a: float, b: float, c: float) -> list:
-    """Clip a convex ring to where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
-    kept = []
-    for (x0, y0), (x1, y1) in zip([ring[-1], *ring[:-1]] if ring else [], ring, strict=True):
-        d0, d1 = a * x0 + b * y0 + c, a * x1 + b * y1 + c
-        if (d0 > 0.0) != (d1 > 0.0):
-            t = d0 / (d0 - d1)
-            kept.append((x0 + t * (x1 - x0), y0 + t * (y1 - y0)))
-        if d1 > 0.0:
-            kept.append((x1, y1))
-    return kept
-
-
 def is_below(roof: Tables, j: int, k: int, quad: shapely.Geometry) -> bool:
     """Return whether volume j is below k somewhere in its quad, and does not replace it."""
     if roof.replaces[j] and j > k:
@@ -155,24 +145,3 @@ def compute_heights(roof: Tables, k: int, xy: np.ndarray) -> np.ndarray:
 
 def subtract(region: shapely.Geometry, hole: shapely.Geometry) -> shapely.Geometry:
     return with_area(shapely.difference(region, hole, grid_size=OVERLAY_GRID_M))
-
-
-def give_gap(
-    gap: shapely.Polygon, regions: list[list[shapely.Polygon]], outline: shapely.Polygon
-) -> None:
-    """Add a gap to the polygon that shares most of its border."""
-    wide = shapely.buffer(gap, GAP_M, quad_segs=1)
-    shared = [
-        (shapely.intersection(wide, polygon).area, k, q)
-        for k, polygons in enumerate(regions)
-        for q, polygon in enumerate(polygons)
-        if shapely.intersects(wide, polygon)
-    ]
-    if not shared:
-        return
-    _, k, q = max(shared)
-    merged = shapely.union_all([regions[k][q], wide], grid_size=OVERLAY_GRID_M)
-    polygons = list_polygons(
-        shapely.intersection(with_area(merged), outline, grid_size=OVERLAY_GRID_M)
-    )
-    regions[k][q : q + 1] = polygons

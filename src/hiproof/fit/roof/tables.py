@@ -162,20 +162,28 @@ def cross_lines(roof, first, second):
 
 
 @compiled
+def place_planes(roof, k):
+    """Compute the planes of volume k from its unknowns."""
+    for p in range(roof.n_planes[k]):
+        slope = roof.slopes[k, p]
+        row = roof.planes[k, p]
+        row[2] = roof.values[roof.heights[k, p]]
+        if slope < 0:
+            row[0], row[1] = 0.0, 0.0
+        else:
+            line = roof.plane_lines[k, p]
+            l, s = abs(line) - 1, roof.values[slope] if line > 0 else -roof.values[slope]
+            row[0], row[1] = s * roof.lines[l, 0], s * roof.lines[l, 1]
+            row[2] += s * roof.lines[l, 2]
+
+
+@compiled
 def place_volume(roof, k):
     """Compute the planes, the half planes and the box of volume k from the tables."""
     for s in range(N_SIDES):
         a, b, c = read_line(roof, roof.sides[k, s])
         roof.half_planes[k, s, 0], roof.half_planes[k, s, 1], roof.half_planes[k, s, 2] = a, b, c
-    for p in range(roof.n_planes[k]):
-        z, slope = roof.values[roof.heights[k, p]], roof.slopes[k, p]
-        if slope < 0:
-            roof.planes[k, p, 0], roof.planes[k, p, 1], roof.planes[k, p, 2] = 0.0, 0.0, z
-        else:
-            a, b, c = read_line(roof, roof.plane_lines[k, p])
-            s = roof.values[slope]
-            roof.planes[k, p, 0], roof.planes[k, p, 1] = s * a, s * b
-            roof.planes[k, p, 2] = s * c + z
+    place_planes(roof, k)
     x0, x1, y0, y1 = FAR_M, -FAR_M, FAR_M, -FAR_M
     for s in range(2):
         for t in range(2, N_SIDES):

@@ -79,6 +79,7 @@ fit         the outcome
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import shapely
@@ -116,6 +117,9 @@ from .weld import weld
 
 __all__ = ["BuildingFit", "fit_building"]
 
+NameParts = Callable[[np.ndarray, shapely.Polygon, Plan, Scene, Settings], list[Part]]
+"""What makes named parts of volumes over an outline, in the plan and scene of a building."""
+
 
 def fit_building(
     points_local: np.ndarray,
@@ -138,7 +142,16 @@ def fit_building(
     >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
     (['flat', 'gable'], 0.0)
     """
-    settings = settings or Settings()
+    return fit_by(name_volumes, points_local, outline, settings or Settings())
+
+
+def fit_by(
+    name_parts: NameParts,
+    points_local: np.ndarray,
+    outline: shapely.Polygon | None,
+    settings: Settings,
+) -> BuildingFit:
+    """Fit a building as `fit_building` does, with a way to draw and name the search's volumes."""
     points_local = as_xyz(points_local)
     points_local = points_local[is_plausible(points_local)]
     outline = draw_outline(points_local) if outline is None else outline
@@ -151,20 +164,7 @@ def fit_building(
         )
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    site, ends = PlanSite(outline, plan, scene, {}), gather_ends(outline, plan, scene)
-    cache: Cache = {}
-    volumes = tidy_volumes(volumes, ends, site, cache)
-    unit = compute_unit_points(plan.density, COMMON_HOUSE_M2, settings.compound)
-    volumes = add_bays(volumes, outline, plan, scene, unit)
-    roof = draw_roof(volumes, ends, scene, cache)
-    agreement = agree_planes(volumes, roof.sides, roof.planes, scene)
-    base = is_base_visible(volumes, scene)
-    sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
-    sides, regions = join_levels(volumes, sides, planes, regions, site)
-    parts = [
-        name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, types)
-        for k, polygons in list_part_polygons(regions, outline, plan)
-    ]
+    parts = name_parts(volumes, outline, plan, scene, settings)
     visible = keep_visible(parts, plan, scene)
     parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
     parts = fit_curved_shapes(parts, plan.points, outline, settings)
@@ -175,6 +175,26 @@ def fit_building(
         parts = keep_visible(parts, plan, scene, widest_m2=0.0)
     unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
+
+
+def name_volumes(
+    volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, settings: Settings
+) -> list[Part]:
+    """Draw the search's volumes and mend what its price does not see. Returns named parts."""
+    site, ends = PlanSite(outline, plan, scene, {}), gather_ends(outline, plan, scene)
+    cache: Cache = {}
+    volumes = tidy_volumes(volumes, ends, site, cache)
+    unit = compute_unit_points(plan.density, COMMON_HOUSE_M2, settings.compound)
+    volumes = add_bays(volumes, outline, plan, scene, unit)
+    roof = draw_roof(volumes, ends, scene, cache)
+    agreement = agree_planes(volumes, roof.sides, roof.planes, scene)
+    base = is_base_visible(volumes, scene)
+    sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
+    sides, regions = join_levels(volumes, sides, planes, regions, site)
+    return [
+        name_part(volumes[k], planes[k], sides[k], polygons, plan, scene, settings.fit.types)
+        for k, polygons in list_part_polygons(regions, outline, plan)
+    ]
 
 
 def tidy_volumes(

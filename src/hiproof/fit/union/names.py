@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ...frames import PlanFrame
 from ...model import Part
 from ...primitives.family import AXIS, SIGN, Member, name_among
 from .finish import OutlineWall, Planes
@@ -49,13 +50,28 @@ def name_part(
     """
     c, s = scene.turn[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
-    corners = shapely.get_coordinates(regions) - plan.frame.origin[:2]
+    return name_planes(planes, sides, axes, regions, plan.frame, allowed)
+
+
+def name_planes(
+    planes: Planes,
+    sides: list[Side],
+    axes: np.ndarray,
+    regions: list[shapely.Polygon],
+    frame: PlanFrame,
+    allowed: tuple[str, ...] = (),
+) -> Part:
+    """Name planes and sides over `regions` (local coordinates) as a part of the family.
+
+    `axes` (2, 2) are those of the planes and sides in local coordinates, about the frame's origin.
+    """
+    corners = shapely.get_coordinates(regions) - frame.origin[:2]
     positions = np.column_stack([corners @ axes.T, np.ones(len(corners))])
     rows = np.where(find_visible_planes(planes.rows, positions)[:, None], planes.rows, np.nan)
     registrations = measure_registration(planes, rows, positions)
     turn = measure_common_lean(rows)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
-    rows = turn_planes(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]
+    rows = turn_planes(rows, turn) + [0.0, 0.0, frame.origin[2]]
     sides = [turn_side(side, k, turn) for k, side in enumerate(sides)]
     ends = measure_rectangle(sides, corners @ axes.T)
     known_ends, probed_ends = list_moved_ends(sides, ends)
@@ -72,7 +88,7 @@ def name_part(
     )
     is_given = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # visible cants only
     changes = vary_member(members, modes[is_given]).turn(turns)
-    member = replace(member.turn(turns), centre=member.centre @ axes + plan.frame.origin[:2])
+    member = replace(member.turn(turns), centre=member.centre @ axes + frame.origin[:2])
     return member.part(regions, name_among(member.name, allowed), changes, len(probed_ends))
 
 

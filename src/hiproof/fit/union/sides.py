@@ -416,6 +416,15 @@ def estimate_place_sigma(volume, edge, uv, gain, line):
         if gain[i] != 0.0 and is_beside and abs(x[i]) < MOVED_M:
             for m in range(len(cost)):
                 cost[m] += gain[i] if sign * x[i] <= moved[m] else 0.0
+    return weigh_places(cost, moved)
+
+
+@compiled
+def weigh_places(cost, moved):
+    """Return the standard deviation (m) of a side by what it costs (points) where it is moved.
+
+    `cost` and `moved` (m) are (n,). It is infinite if the side may lie at either end of these.
+    """
     weight = np.exp(-NATS_A_POINT * (cost - measure_range(cost)[0]))
     if max(weight[0], weight[-1]) > LEAST_KNOWN * measure_range(weight)[1]:
         return np.inf
