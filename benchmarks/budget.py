@@ -1,6 +1,6 @@
-"""CPU time of a whole run, in milliseconds a building by stage, on Delft.
+"""CPU time of a run over Delft by stage.
 
-    python -m benchmarks.budget [--data ../shared/data/delft]
+usage: python -m benchmarks.budget [--data ../shared/data/delft]
 
 One process runs Delft twice. The second run is measured, so that imports and loaded code do not
 count. Every stage is timed without the stages inside it; "other" is the rest of the run. The table
@@ -9,7 +9,6 @@ ends with the total, measured around the run. The stages have to sum to it withi
 
 from __future__ import annotations
 
-import argparse
 import functools
 import tempfile
 import time
@@ -23,6 +22,8 @@ from typing import Any
 from unittest.mock import patch
 
 from hiproof.city.run import Request, Summary, reconstruct_area
+
+from .tables import FigureTable, make_parser
 
 DELFT = Path(__file__).parents[1].parent / "shared" / "data" / "delft"
 STAGES = {
@@ -49,10 +50,7 @@ MOST_OTHER = 0.05
 
 
 class Clock:
-    """Seconds by stage, each without the stages that it calls.
-
-    `read` tells the time (s).
-    """
+    """Seconds by stage, each without the stages that it calls. `read` tells the time (s)."""
 
     def __init__(self, read: Callable[[], float] = time.process_time) -> None:
         self.read = read
@@ -87,14 +85,6 @@ def measure(run: Callable[[], Summary]) -> tuple[Clock, float, int]:
         return clock, time.process_time() - start, summary.buildings
 
 
-def print_table(clock: Clock, total: float, buildings: int) -> None:
-    rows = [(stage, clock.seconds[stage]) for stage in STAGES]
-    rows += [("other", total - sum(clock.seconds.values())), ("total", total)]
-    print("| Stage | CPU, ms a building | Share |\n| --- | --- | --- |")
-    for stage, seconds in rows:
-        print(f"| {stage} | {1000 * seconds / buildings:.2f} | {100 * seconds / total:.1f} % |")
-
-
 def refuse_incomplete(clock: Clock, total: float) -> None:
     """End with an error where the stages do not sum to the total (s)."""
     counted = sum(clock.seconds.values())
@@ -106,10 +96,10 @@ def refuse_incomplete(clock: Clock, total: float) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="accepted; the run is short anyway")
+    parser = make_parser(__doc__)
     parser.add_argument("--data", type=Path, default=DELFT, help="folder with Delft's files")
-    data = parser.parse_args().data
+    a = parser.parse_args()
+    data = a.data
     if not data.is_dir():
         raise SystemExit(
             f"Expected Delft's files in {data}, found no such folder. Name it with --data."
@@ -122,8 +112,13 @@ def main() -> None:
         )
         reconstruct_area(request)
         clock, total, buildings = measure(lambda: reconstruct_area(request))
-        print_table(clock, total, buildings)
-        refuse_incomplete(clock, total)
+    rows = [(stage, clock.seconds[stage]) for stage in STAGES]
+    rows += [("other", total - sum(clock.seconds.values())), ("total", total)]
+    with FigureTable(a.record, "stage", "CPU, ms a building", "share, %") as table:
+        for stage, seconds in rows:
+            share = f"{100 * seconds / total:.1f}"
+            table.add(stage, f"{1000 * seconds / buildings:.2f}", share)
+    refuse_incomplete(clock, total)
 
 
 if __name__ == "__main__":

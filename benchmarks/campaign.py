@@ -1,4 +1,4 @@
-"""Search for internal errors, invalid solids and records that do not rebuild.
+"""Internal errors, invalid solids and records that do not rebuild.
 
 usage: python -m benchmarks.campaign [--count 20000] [--first-seed 0] [--processes 1]
                                      [--only simulated real roofs] [--work FOLDER]
@@ -24,7 +24,6 @@ The exit code is 0 if the first four are none.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -35,7 +34,7 @@ import tempfile
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -59,14 +58,12 @@ from hiproof.status import Status
 
 from .campaign_scenes import BUILDINGS_A_SCENE, write_cloud, write_scene
 from .judging import SHARED
+from .tables import FigureTable, make_parser
 from .towns import TOWNS, read_town
 
 SHARES = (1.0, 0.5, 0.25, 0.125)  # Shares of the points of real clouds.
 TOWN_DENSITIES = (2.0, 8.0)  # points/m2
 MOST_TOLD = 5  # Tracebacks and other findings printed a run.
-OTHER_TOWNS = {
-    name: SHARED / f"data/towns/{name}.city.json" for name in ("vienna", "rotterdam", "delft_5907")
-}
 
 
 @dataclass
@@ -94,6 +91,8 @@ INTERNAL, INVALID, INVALID_WRITTEN = (
 NOT_ALIKE, ENDED = "not rebuilt alike", "run that ended"
 CHECKED = "solids in files"
 MUST_BE_NONE = (INTERNAL, INVALID, INVALID_WRITTEN, NOT_ALIKE, ENDED)
+FLAT = (Status.FLAT_FALLBACK.code, Status.SIMPLIFIED.code)
+COUNTED = ("buildings", CHECKED, *MUST_BE_NONE, *FLAT)
 
 
 def judge_run(name: str, request: Request) -> Findings:
@@ -267,7 +266,7 @@ def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
     """
     if (data / "roofn3d").exists() or (data / "hand_drawn").exists():
         yield "real roofs", partial(request_roofs_run, data, work / "real-roofs")
-    for town, path in (TOWNS | OTHER_TOWNS).items():
+    for town, path in TOWNS.items():
         for density in TOWN_DENSITIES if path.exists() else ():
             folder = work / f"{town}-{density:g}"
             yield (
@@ -282,10 +281,7 @@ def request_roofs_run(data: Path, folder: Path) -> Request:
 
 
 def request_town_run(path: Path, density: float, folder: Path) -> Request:
-    """Return the run over all buildings of a town.
-
-    It is scanned at `density` (points/m2).
-    """
+    """Return the run over all buildings of a town. It is scanned at `density` (points/m2)."""
     return lay_out([building.scan_points(density) for building in read_town(path)], folder)
 
 
@@ -323,67 +319,41 @@ def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--count", type=int, default=20000)
-    parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument(
-        "--only", nargs="*", choices=("simulated", "real", "roofs"), help="[default: all]"
-    )
+    parser = make_parser(__doc__, count=20000, first_seed=0, processes=1)
+    kinds = ("simulated", "real", "roofs")
+    parser.add_argument("--only", nargs="*", choices=kinds, default=kinds, help="[default: all]")
     parser.add_argument("--work", type=Path)
     parser.add_argument("--data", type=Path, default=SHARED / "data")
-    request = parser.parse_args()
-    work = request.work or Path(tempfile.mkdtemp(prefix="hiproof-campaign-"))
-    expected = request.only or ("simulated", "real", "roofs")
+    a = parser.parse_args()
+    work = a.work or Path(tempfile.mkdtemp(prefix="hiproof-campaign-"))
+    full, remainder = divmod(a.count, BUILDINGS_A_SCENE)
+    sizes = [BUILDINGS_A_SCENE] * full + [remainder] * (remainder > 0)
+    tasks = {
+        "simulated": (judge_scene, [(a.first_seed + k, n, work) for k, n in enumerate(sizes)]),
+        "real": (judge_real, list_real_runs(a.data, work)),
+        "roofs": (judge_real, list_roof_runs(a.data, work)),
+    }
+    is_clean = True
+    with (
+        ProcessPoolExecutor(a.processes, mp_context=get_context("spawn")) as pool,
+        FigureTable(a.record, "data", *COUNTED) as table,
+    ):
+        for name in a.only:
+            judge, inputs = tasks[name]
+            findings = print_findings(pool.map(judge, inputs))
+            table.add(name, *(findings.counts[kind] for kind in COUNTED))
+            is_clean &= findings.is_clean
+    return 0 if is_clean else 1
+
+
+def print_findings(all_findings: Iterable[Findings]) -> Findings:
+    """Print findings as they come; return all of their counts."""
     total = Findings()
-    with ProcessPoolExecutor(request.processes, mp_context=get_context("spawn")) as pool:
-        if "simulated" in expected:
-            full, remainder = divmod(request.count, BUILDINGS_A_SCENE)
-            sizes = [BUILDINGS_A_SCENE] * full + [remainder] * (remainder > 0)
-            tasks = [(request.first_seed + k, size, work) for k, size in enumerate(sizes)]
-            report("simulated", pool.map(judge_scene, tasks), total)
-        if "real" in expected:
-            report("real clouds", pool.map(judge_real, list_real_runs(request.data, work)), total)
-        if "roofs" in expected:
-            report(
-                "real roofs and towns",
-                pool.map(judge_real, list_roof_runs(request.data, work)),
-                total,
-            )
-    print_counts("all", total)
-    return 0 if total.is_clean else 1
-
-
-def report(name: str, all_findings: Iterator[Findings], total: Findings) -> None:
-    """Print findings as they come and the counts at the end.
-
-    The counts are added to `total`.
-    """
-    own_findings = Findings()
     for findings in all_findings:
         for text in findings.texts[:MOST_TOLD]:
             print(text, flush=True)
-        own_findings.counts.update(findings.counts)
-    total.counts.update(own_findings.counts)
-    print_counts(name, own_findings)
-
-
-def print_counts(name: str, findings: Findings) -> None:
-    """Print one line a count, first those that must be zero."""
-    print(
-        f"{name}: {findings.counts['buildings']} buildings, "
-        f"{findings.counts[CHECKED]} solids in files"
-    )
-    for kind in (*MUST_BE_NONE, Status.FLAT_FALLBACK.code, Status.SIMPLIFIED.code):
-        print(f"  {kind:32} {findings.counts[kind]}")
-    statuses = {k: n for k, n in findings.counts.items() if k in {s.code for s in Status}}
-    print(
-        "  statuses: "
-        + ", ".join(f"{n} {k}" for k, n in sorted(statuses.items(), key=lambda pair: -pair[1])),
-        flush=True,
-    )
+        total.counts.update(findings.counts)
+    return total
 
 
 if __name__ == "__main__":

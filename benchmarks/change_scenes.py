@@ -176,15 +176,17 @@ def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> 
     return counts
 
 
-def run_scenes(folder: Path, seeds: list[int], is_verbose: bool) -> None:
-    """Run all scenes; print a line each, and recall and precision of all."""
+def run_scenes(folder: Path, seeds: list[int], is_verbose: bool) -> dict[str, float]:
+    """Run all scenes, and print a line each; return the figures of all."""
     total: Counter[str] = Counter()
     for seed in seeds:
         for number, scene in enumerate(SCENES):
             total += run_scene(scene, folder / f"scene_{seed}_{number}", seed, is_verbose)
-    print(
-        f"{total['changed']} changes of {total['houses']} houses: recall "
-        f"{total['hits'] / total['changed']:.3f}, precision "
-        f"{total['hits'] / max(total['hits'] + total['alarms'], 1):.3f}, kind right "
-        f"{total['right'] / max(total['hits'], 1):.3f}, {total['alarms']} untouched houses reported"
-    )
+    return {
+        "houses": total["houses"],
+        "changed": total["changed"],
+        "recall": total["hits"] / total["changed"],
+        "precision": total["hits"] / max(total["hits"] + total["alarms"], 1),
+        "kind right": total["right"] / max(total["hits"], 1),
+        "untouched houses reported": total["alarms"],
+    }

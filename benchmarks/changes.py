@@ -1,4 +1,4 @@
-"""Simulated cities surveyed twice: are changes found and named?
+"""Changes that are found and named in simulated cities surveyed twice.
 
 usage: python -m benchmarks.changes [--seeds 100 101] [--count 100] [--densities 8 3]
                                     [--share 0.2] [--keep FOLDER] [--verbose]
@@ -28,7 +28,6 @@ Seeds 0 to 9 are for choosing constants, 100 to 109 for reporting.
 
 from __future__ import annotations
 
-import argparse
 import csv
 import dataclasses
 import json
@@ -60,6 +59,7 @@ from hiproof.update.run import UpdateSummary, update_area
 from .change_scenes import run_scenes
 from .compounds import compare_parts
 from .kept_parts import count_kept, describe_kept
+from .tables import FigureTable, make_parser
 
 USUAL_SHARE = 0.2  # of the buildings that change; as many others are disturbed
 SHIFT_M = np.array([0.16, -0.12, 0.05])
@@ -258,8 +258,10 @@ def update_city(folder: Path, out: str = "updated", refine: bool = False) -> Upd
     return update_area(request)
 
 
-def measure_cost(folder: Path, seed: int, count: int, densities: tuple[float, float]) -> None:
-    """Print the CPU time of run and update, and their ratio, round by round."""
+def measure_cost(
+    folder: Path, seed: int, count: int, densities: tuple[float, float]
+) -> dict[str, float]:
+    """Return the CPU time of an update over that of a run, round by round and the median."""
     write_city(folder, seed, count, densities, COST_SHARE)
     shares = []
     for _ in range(COST_ROUNDS):
@@ -270,7 +272,8 @@ def measure_cost(folder: Path, seed: int, count: int, densities: tuple[float, fl
         run, update = np.diff(times).tolist()
         shares.append(update / run)
         print(f"CPU: run {run:.1f} s, update {update:.1f} s: {shares[-1]:.3f}", flush=True)
-    print(f"median {np.median(shares):.3f}")
+    rounds = {f"update over run, round {k + 1}": share for k, share in enumerate(shares)}
+    return rounds | {"median": float(np.median(shares))}
 
 
 def measure_refined(
@@ -303,8 +306,9 @@ def read_models(folder: Path) -> dict[str, Building]:
     return {building.id: building for building in buildings if building.built is not None}
 
 
-def report_refined(results: list[dict[str, list[dict[str, float]]]]) -> None:
-    """Print the RMS of errors over sigma, of all parameters and of each."""
+def report_refined(results: list[dict[str, list[dict[str, float]]]]) -> dict[str, float]:
+    """Return the RMS of errors over sigma, and print that of each parameter."""
+    figures: dict[str, float] = {}
     for name in ("models", "refined"):
         found = [errors for result in results for errors in result[name]]
         by_name: dict[str, list[float]] = {}
@@ -318,10 +322,10 @@ def report_refined(results: list[dict[str, list[dict[str, float]]]]) -> None:
             f"{parameter} {np.sqrt(np.mean(np.square(values))):.2f} ({len(values)})"
             for parameter, values in sorted(by_name.items())
         )
-        print(
-            f"{name}: {len(found)} buildings, RMS {rms:.2f} of estimated parameters, "
-            f"{rms_all:.2f} with held ones: {each}"
-        )
+        print(f"  {name}: {len(found)} buildings, {each}")
+        figures[f"{name}: RMS of estimated parameters"] = float(rms)
+        figures[f"{name}: RMS with held ones"] = float(rms_all)
+    return figures
 
 
 def score(results: list[dict], is_verbose: bool) -> dict[str, float]:
@@ -368,11 +372,7 @@ def score(results: list[dict], is_verbose: bool) -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--seeds", type=int, nargs="+", default=[100])
-    parser.add_argument("--count", type=int, default=100, help="buildings a city")
+    parser = make_parser(__doc__, seeds=[100], count=100)
     parser.add_argument("--densities", type=float, nargs=2, default=(8.0, 8.0))
     parser.add_argument("--share", type=float, default=USUAL_SHARE, help="of buildings that change")
     parser.add_argument("--keep", type=Path, help="folder in which cities and models stay")
@@ -381,39 +381,45 @@ def main() -> None:
     parser.add_argument("--scenes", action="store_true", help="run small scenes alone")
     parser.add_argument("--verbose", action="store_true", help="list every building that is wrong")
     given = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch:
+    d = tuple(given.densities)
+    columns = ("figure", "value")
+    with tempfile.TemporaryDirectory() as scratch, FigureTable(given.record, *columns) as table:
         folder = given.keep or Path(scratch)
-        d = tuple(given.densities)
         if given.scenes:
-            run_scenes(folder, given.seeds, given.verbose)
-            return
-        if given.cost:
-            measure_cost(folder / "cost", given.seeds[0], given.count, d)
-            return
-        if given.refine:
+            figures = run_scenes(folder, given.seeds, given.verbose)
+        elif given.cost:
+            figures = measure_cost(folder / "cost", given.seeds[0], given.count, d)
+        elif given.refine:
             cities = [(folder / f"refine_{seed}", seed) for seed in given.seeds]
-            report_refined([measure_refined(*city, given.count, d) for city in cities])
-            return
-        results = [
-            run_city(
-                folder / f"{seed}_{given.count}_{d[0]:g}_{d[1]:g}_{given.share:g}",
-                seed,
-                given.count,
-                d,
-                given.share,
-            )
-            for seed in given.seeds
-        ]
-        for result in results:
-            print(
-                "shift", result["shift"].xyz, "sigma", result["shift"].sigma, result["shift"].noise
-            )
-            error = result["shift"].xyz[2] - result["truth"]["height"]
-            print(f"common height {error:+.4f} m beside that of the ground")
-            print(f"CPU: run {result['seconds'][0]:.1f} s, update {result['seconds'][1]:.1f} s")
-        for name, value in score(results, given.verbose).items():
-            print(f"{name:24s} {value:.4g}")
-        print(describe_kept(sum((result["kept"] for result in results), Counter())))
+            figures = report_refined([measure_refined(*city, given.count, d) for city in cities])
+        else:
+            figures = run_cities(folder, given.seeds, given.count, d, given.share, given.verbose)
+        for name, value in figures.items():
+            table.add(name, value)
+
+
+def run_cities(
+    folder: Path,
+    seeds: list[int],
+    count: int,
+    densities: tuple[float, float],
+    share: float,
+    is_verbose: bool,
+) -> dict[str, float]:
+    """Survey, run and update cities; return the figures of all."""
+    results = []
+    for seed in seeds:
+        name = f"{seed}_{count}_{densities[0]:g}_{densities[1]:g}_{share:g}"
+        results.append(run_city(folder / name, seed, count, densities, share))
+    for result in results:
+        shift, (run, update) = result["shift"], result["seconds"]
+        error = shift.xyz[2] - result["truth"]["height"]
+        print(
+            f"  shift {shift.xyz}, sigma {shift.sigma}, height {error:+.4f} m beside that of the "
+            f"ground; CPU: run {run:.1f} s, update {update:.1f} s"
+        )
+    kept = sum((result["kept"] for result in results), Counter())
+    return score(results, is_verbose) | describe_kept(kept)
 
 
 if __name__ == "__main__":

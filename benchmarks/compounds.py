@@ -1,6 +1,4 @@
-"""Compound roofs with known truth.
-
-It measures volumes and types found, the surface's error, and honest standard deviations.
+"""Volumes, types, surfaces and standard deviations of simulated compound roofs.
 
 usage: python -m benchmarks.compounds [--each 20] [--densities 2 5 10] [--kinds L T ...]
 [--first-seed 0]
@@ -22,7 +20,6 @@ their footprint and compared with the truth on a 0.2 m raster:
 
 from __future__ import annotations
 
-import argparse
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -31,11 +28,12 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
+from hiproof.fit.union import BuildingFit, fit_building
 from hiproof.model import Part, Roof
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, SimBuilding, random_compound, scan
 from hiproof.simulate.scene import Defects
 
-from .judging import RASTER_M, BuildingFit, fit_roof_parts, make_raster
+from .judging import RASTER_M, make_raster
 from .matching import (
     compute_sigma_errors,
     has_hidden_end,
@@ -43,6 +41,7 @@ from .matching import (
     match_parts,
     merge_alike,
 )
+from .tables import FigureTable, make_parser
 
 STEP_M, NEAR_STEP_CELLS, NEAR_M = 0.4, 3, 0.1
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6745
@@ -117,23 +116,39 @@ def compare_parts(
 
 def judge_compound(kind: str, density: float, seed: int) -> Outcome:
     building, points = draw_compound(kind, density, seed)
-    fit = fit_roof_parts(points, building.outline)
+    fit = fit_building(points, building.outline)
     n_true, right, ratios = compare_parts(building.roof, fit.roof_parts)
     return Outcome(
         *measure_errors(building.roof, fit), len(fit.roof_parts), n_true, right, tuple(ratios)
     )
 
 
-def report(name: str, findings: list[Outcome]) -> str:
+COLUMNS = (
+    "points/m2, kind",
+    "volumes right, %",
+    "types right, %",
+    "RMSE, m: median",
+    f"under {NEAR_M} m, %",
+    "without steps: median",
+    f"under {NEAR_M} m, %",
+    "parts of true",
+)
+
+
+def make_cells(outcomes: list[Outcome]) -> list[str]:
+    """Return the cells of COLUMNS but the first."""
     whole, plain, parts, n_true, types = np.array(
-        [(o.rmse, o.rmse_away_from_steps, o.parts, o.wanted, o.types_right) for o in findings]
+        [(o.rmse, o.rmse_away_from_steps, o.parts, o.wanted, o.types_right) for o in outcomes]
     ).T
-    return (
-        f"{name:24s} volumes {np.mean(parts == n_true):6.1%}  types {types.mean():6.1%}"
-        f"  RMSE {np.median(whole):.3f} m, {np.mean(whole < NEAR_M):6.1%} under {NEAR_M}"
-        f"  without steps {np.median(plain):.3f}, {np.mean(plain < NEAR_M):6.1%}"
-        f"  parts {parts.mean():.2f} of {n_true.mean():.2f}"
-    )
+    return [
+        f"{100 * np.mean(parts == n_true):.1f}",
+        f"{100 * types.mean():.1f}",
+        f"{np.median(whole):.3f}",
+        f"{100 * np.mean(whole < NEAR_M):.1f}",
+        f"{np.median(plain):.3f}",
+        f"{100 * np.mean(plain < NEAR_M):.1f}",
+        f"{parts.mean():.2f} of {n_true.mean():.2f}",
+    ]
 
 
 def report_sigmas(outcomes: Iterable[Outcome]) -> str:
@@ -152,23 +167,20 @@ def report_sigmas(outcomes: Iterable[Outcome]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, densities=[2.0, 5.0, 10.0], first_seed=0)
     parser.add_argument("--each", type=int, default=20, help="buildings a kind and density")
-    parser.add_argument(
-        "--densities", type=float, nargs="+", default=[2.0, 5.0, 10.0], help="points a square metre"
-    )
     parser.add_argument("--kinds", nargs="+", choices=COMPOUND_KINDS, default=COMPOUND_KINDS)
-    parser.add_argument("--first-seed", type=int, default=0)
-    arguments = parser.parse_args()
-    seeds = range(arguments.first_seed, arguments.first_seed + arguments.each)
-    for density in arguments.densities:
-        total = []
-        for kind in arguments.kinds:
-            name = [judge_compound(kind, density, seed) for seed in seeds]
-            total += name
-            print(report(f"{density:g}/m2 {kind}", name), flush=True)
-        print(report(f"{density:g}/m2 all", total))
-        print(f"{density:g}/m2 {report_sigmas(total)}", flush=True)
+    a = parser.parse_args()
+    seeds = range(a.first_seed, a.first_seed + a.each)
+    with FigureTable(a.record, *COLUMNS) as table:
+        for density in a.densities:
+            total = []
+            for kind in a.kinds:
+                outcomes = [judge_compound(kind, density, seed) for seed in seeds]
+                total += outcomes
+                print(f"  {density:g} {kind}: " + " | ".join(make_cells(outcomes)), flush=True)
+            table.add(f"{density:g}, all", *make_cells(total))
+            print(f"  {report_sigmas(total)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Measure how well cones, half cones, spires, domes and barrel vaults are found.
+"""Cones, half cones, spires, domes, barrel vaults, slim towers and drums that are found.
 
-usage: python -m benchmarks.curved [--seeds 16] [--first-seed 100] [--densities 8 2]
+usage: python -m benchmarks.curved [--count 16] [--first-seed 100] [--densities 8 2]
 
-The last lines count slim towers of 3 by 3 m, 3 to 15 m above the ridge of such a house, that the
+The last rows count slim towers of 3 by 3 m, 3 to 15 m above the ridge of such a house, that the
 roof has within 0.3 m of their height, and drums of which 97 % of the plan are within 0.3 m. Drums
 are level discs in the corner of such a house, in its middle, and higher or lower in the middle of
 another, of which they leave a ring.
@@ -18,7 +18,6 @@ those under the shape.
 
 from __future__ import annotations
 
-import argparse
 import math
 from dataclasses import dataclass
 
@@ -29,6 +28,8 @@ from hiproof.fit.union import fit_building
 from hiproof.model.heights import find_highest
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import ROUND
+
+from .tables import FigureTable, make_parser
 
 KINDS = {
     "alone": (*ROUND, "barrel"),
@@ -192,34 +193,28 @@ def is_drum_found(setting: str, seed: int, density: float) -> bool:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--seeds", type=int, default=16)
-    parser.add_argument("--first-seed", type=int, default=100)
+    parser = make_parser(__doc__, count=16, first_seed=100, densities=[8.0, 2.0])
     parser.add_argument("--kinds", nargs="*", help="only these")
-    parser.add_argument("--densities", type=float, nargs="*", default=[8.0, 2.0])
-    request = parser.parse_args()
-    seeds = range(request.first_seed, request.first_seed + request.seeds)
-    print("| points/m2 | setting | kind | right | height within 0.2 m | volume within 3 % |")
-    print("| --- | --- | --- | --- | --- | --- |")
-    for density in request.densities:
-        for setting, kinds in KINDS.items():
-            for kind in kinds if not request.kinds else set(kinds) & set(request.kinds):
-                outcomes = [judge_scene(draw_scene(kind, setting, s, density)) for s in seeds]
-                shares = [
-                    np.mean([one.is_right for one in outcomes]),
-                    np.mean([abs(one.height_error_m) <= 0.2 for one in outcomes]),
-                    np.mean([abs(one.volume_error) <= 0.03 for one in outcomes]),
-                ]
-                cells = " | ".join(f"{100 * share:.0f} %" for share in shares)
-                print(f"| {density:g} | {setting} | {kind} | {cells} |", flush=True)
-    for density in request.densities:
-        share = np.mean([is_slim_tower_found(seed, density) for seed in seeds])
-        print(f"slim towers at {density:g} points/m2: {100 * share:.0f} % found", flush=True)
-        for setting in DRUM_SETTINGS:
-            share = np.mean([is_drum_found(setting, seed, density) for seed in seeds])
-            print(f"drums, {setting}, at {density:g} points/m2: {100 * share:.0f} % found")
+    a = parser.parse_args()
+    seeds = range(a.first_seed, a.first_seed + a.count)
+    columns = ("points/m2", "setting", "kind", "right, %", "in height, %", "in volume, %")
+    with FigureTable(a.record, *columns) as table:
+        for density in a.densities:
+            for setting, kinds in KINDS.items():
+                for kind in kinds if not a.kinds else set(kinds) & set(a.kinds):
+                    outcomes = [judge_scene(draw_scene(kind, setting, s, density)) for s in seeds]
+                    right = np.array(
+                        [
+                            (o.is_right, abs(o.height_error_m) <= 0.2, abs(o.volume_error) <= 0.03)
+                            for o in outcomes
+                        ]
+                    )
+                    table.add(density, setting, kind, *(100.0 * right.mean(axis=0)))
+            found = [is_slim_tower_found(seed, density) for seed in seeds]
+            table.add(density, "slim tower", "", 100.0 * np.mean(found), "", "")
+            for setting in DRUM_SETTINGS:
+                found = [is_drum_found(setting, seed, density) for seed in seeds]
+                table.add(density, setting, "drum", 100.0 * np.mean(found), "", "")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""Compound roofs on a real town, at four densities.
-
-Solids for every footprint are measured against all points.
+"""Roofs of a real town at four densities, against all its points.
 
 usage: python -m benchmarks.delft [--set delft|amsterdam_west|two_epochs] [--shares 1 0.5 0.25
 0.125] [--parity even|odd]
@@ -11,16 +9,13 @@ Fits and composes every footprint of the folder from its `*.laz` (class 6), thin
 the full cloud. `--parity` takes the footprints whose id is an even or an odd number: constants are
 chosen on the even ones of Delft and reported on the odd. Amsterdam West is for reporting only.
 
-Prints one row a density: the measured figures, faces in the mean, parts in the mean, the share of
-the roof area in plan whose part has a type other than "free", milliseconds a building on one core
-for fitting and for composing, how far roofs leave the range of their points, how many solids the
-check refused, and how many parts are narrower than 1 m (of these, how many stand 2 m or more above
-all they touch); below it the area by type.
+A row is a density: milliseconds are those of fitting and composing, "beyond" is how far roofs leave
+the range of their points, and narrow parts are under 1 m wide (standing ones rise 2 m or more above
+all that they touch).
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 import tempfile
 import time
@@ -33,6 +28,7 @@ import shapely
 
 from hiproof.compose import check_solid, compose
 from hiproof.errors import HiproofError
+from hiproof.fit.union import fit_building
 from hiproof.frames import LocalFrame
 from hiproof.geometry.point_grid import assign_points
 from hiproof.model import ROOF, Building, Footprint, Model, Roof
@@ -41,14 +37,8 @@ from hiproof.settings import Settings
 from hiproof.status import Status
 from hiproof.write import write_cityjson
 
-from .judging import (
-    SHARED,
-    count_narrow_parts,
-    fit_roof_parts,
-    load_tool,
-    measure_named_share,
-    sum_area_by_type,
-)
+from .judging import SHARED, count_narrow_parts, describe_parts, load_tool
+from .tables import FigureTable, make_parser
 
 SETS = {"delft": "footprints.gpkg", "amsterdam_west": "footprints_bag.gpkg"}
 EPOCHS = {"two_epochs": "footprints.gpkg"}  # sets whose clouds lie in folders by year
@@ -78,7 +68,7 @@ def model(
     frame = LocalFrame.around(points)
     local, outline = frame.to_local(points), shapely.transform(footprint.polygon, frame.to_local)
     started = time.process_time()
-    fit = fit_roof_parts(local, outline, settings)
+    fit = fit_building(local, outline, settings)
     result = time.process_time()
     roof = Roof(fit.roof_parts, fit.outline, frame)
     figures = {"fit": result - started, "parts": len(fit.roof_parts)}
@@ -86,25 +76,17 @@ def model(
         solid = compose(roof, float(local[:, 2].min()) - WALL_M, settings)
     except HiproofError as error:
         print(f"{footprint.id}: {error}")
-        return None, figures | {
-            "compose": time.process_time() - result,
-            "faces": 0,
-            "beyond": 0.0,
-            "bad": 1.0,
-        }
+        seconds = time.process_time() - result
+        return None, figures | {"compose": seconds, "faces": 0, "beyond": 0.0, "bad": 1.0}
     figures["compose"] = time.process_time() - result
-    top = np.unique(
-        np.concatenate([np.concatenate(face.rings) for face in solid.select_faces(ROOF)]).astype(
-            int
-        )
-    )
+    rings = [ring for face in solid.select_faces(ROOF) for ring in face.rings]
+    top = np.unique(np.concatenate(rings).astype(int))
     z = solid.vertices[top, 2]
     figures["faces"] = len(solid.select_faces(ROOF))
     figures["beyond"] = max(z.max() - local[:, 2].max(), local[:, 2].min() - z.min())
     figures["bad"] = float(len(check_solid(solid)) > 0)
-    return Building(
-        footprint.id, Status.MODELLED, built=Model(roof, solid.move(frame.origin))
-    ), figures
+    model = Model(roof, solid.move(frame.origin))
+    return Building(footprint.id, Status.MODELLED, built=model), figures
 
 
 def select_footprints(path: Path, parity: str | None) -> list[Footprint]:
@@ -178,41 +160,53 @@ def measure(buildings: list[Building], data_set: Asked, tools: Path = SHARED / "
         return load_tool("roof_residuals", tools).measure(models, footprints, data_set.clouds)
 
 
-def make_row(share: float, data_set: Asked, tools: Path, settings: Settings) -> str:
+COLUMNS = (
+    "share of points",
+    "within 0.2 m",
+    "modelled",
+    "parts",
+    "faces",
+    "median RMSE, m",
+    "ms a building: median; mean; most",
+    "beyond its points, m",
+    "invalid",
+    "narrow parts; standing",
+)
+
+
+def make_cells(data_set: Asked, tools: Path, settings: Settings) -> tuple[list[str], str]:
+    """Model a set; return the cells of COLUMNS but the first, and a line on its parts."""
     buildings, columns = model_buildings(data_set, settings)
     figures = measure(buildings, data_set, tools)
     narrow, standing = np.sum([count_narrow_parts(building.roof) for building in buildings], axis=0)
-    durations, areas = 1e3 * (columns["fit"] + columns["compose"]), sum_area_by_type(buildings)
-    return (
-        f"{share:<6g} {len(data_set.footprints)} footprints  "
-        f"share {figures['share_within_20cm']:.4f}  modelled {figures['modelled']}"
-        f"  faces median {figures['median_roof_faces']:.0f} ({np.median(columns['faces']):.0f}) "
-        f"mean {columns['faces'].mean():.2f}"
-        f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named "
-        f"{measure_named_share(buildings):.3f}"
-        f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(durations):.1f} mean "
-        f"{durations.mean():.1f} max {durations.max():.0f}"
-        f" (fit {1e3 * np.median(columns['fit']):.1f})  beyond {columns['beyond'].max():.2f}  bad "
-        f"{columns['bad'].sum():.0f}"
-        f"  narrow {narrow} (standing {standing})"
-        f"\n       "
-        + ", ".join(f"{name} {area / areas.total():.1%}" for name, area in areas.items())
-    )
+    ms = 1e3 * (columns["fit"] + columns["compose"])
+    cells = [
+        f"{figures['share_within_20cm']:.4f}",
+        f"{figures['modelled']} of {len(data_set.footprints)}",
+        f"{columns['parts'].mean():.2f}",
+        f"{columns['faces'].mean():.2f}",
+        f"{figures['median_rmse_m']:.3f}",
+        f"{np.median(ms):.1f}; {ms.mean():.1f}; {ms.max():.0f}",
+        f"{columns['beyond'].max():.2f}",
+        f"{columns['bad'].sum():.0f}",
+        f"{narrow}; {standing}",
+    ]
+    return cells, describe_parts(buildings)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, parity=None)
     parser.add_argument("--set", choices=[*SETS, *EPOCHS], default="delft")
     parser.add_argument("--data", type=Path, help="folder of the set's files")
     parser.add_argument("--tools", type=Path, default=SHARED / "tools")
     parser.add_argument("--shares", type=float, nargs="+", default=[1.0, 0.5, 0.25, 0.125])
-    parser.add_argument(
-        "--parity", choices=("even", "odd"), help="footprints whose id is such a number"
-    )
-    arguments = parser.parse_args()
-    for share in arguments.shares:
-        request = read_set(arguments.set, share, arguments.parity, arguments.data)
-        print(make_row(share, request, arguments.tools, Settings()), flush=True)
+    a = parser.parse_args()
+    with FigureTable(a.record, *COLUMNS) as table:
+        for share in a.shares:
+            data_set = read_set(a.set, share, a.parity, a.data)
+            cells, parts = make_cells(data_set, a.tools, Settings())
+            table.add(share, *cells)
+            print(parts, flush=True)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 They change parameters and use the page's buttons. Each becomes a valid solid or one sentence.
 
-python -m benchmarks edits [EDITS] [BUILDINGS]
+usage: python -m benchmarks.edits [EDITS] [BUILDINGS]
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Compare roofs with those that people drew by hand: edges and corners.
-
-Both are drawn over the same points.
+"""Edges and corners of roofs that people drew by hand over the same points.
 
 usage: python -m benchmarks.hand_drawn [--mode points|footprints|both] [--parity even|odd]
            [--worst N]
@@ -13,7 +11,6 @@ choose by the even ones, report the odd ones.
 
 from __future__ import annotations
 
-import argparse
 import re
 import time
 from types import ModuleType
@@ -24,7 +21,8 @@ from hiproof import reconstruct
 from hiproof.model import Building
 
 from .judging import load_tool
-from .wireframes import Score, WireframeCounts, list_worst, make_size_table, summarise
+from .tables import FigureTable, make_parser
+from .wireframes import COLUMNS, Score, WireframeCounts, list_worst, make_cells, make_size_rows
 
 MODES = {"points": "points only", "footprints": "with footprints"}
 SHORT_M = 1.0
@@ -81,21 +79,15 @@ def compare_building(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, parity=None, worst=0)
     parser.add_argument("--mode", choices=(*MODES, "both"), default="both")
-    parser.add_argument(
-        "--parity", choices=("even", "odd"), help="take the roofs with such a number"
-    )
-    parser.add_argument("--worst", type=int, default=0, help="name the roofs with the worst edges")
-    arguments = parser.parse_args()
+    a = parser.parse_args()
     judge = load_tool("hand_drawn")
-    for mode in MODES if arguments.mode == "both" else (arguments.mode,):
-        scores, (short, right) = score_roofs(judge, mode == "footprints", arguments.parity)
-        print(f"{len(scores)} roofs drawn by hand, {MODES[mode]}")
-        rows = [*summarise(scores), f"edges under {SHORT_M:g} m: {short}, of which right {right}"]
-        worst = [f"worst    {line}" for line in list_worst(scores, arguments.worst)]
-        rows += [*make_size_table(scores), *worst]
-        print("\n".join("  " + row for row in rows), flush=True)
+    with FigureTable(a.record, "input", *COLUMNS, f"under {SHORT_M:g} m: edges; right") as table:
+        for mode in MODES if a.mode == "both" else (a.mode,):
+            scores, (short, right) = score_roofs(judge, mode == "footprints", a.parity)
+            table.add(MODES[mode], *make_cells(scores), f"{short}; {right}")
+            print("\n".join([*make_size_rows(scores), *list_worst(scores, a.worst)]))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Are chimneys found, and nothing where there is none?
+"""Chimneys that are found, and false objects on roofs.
 
 usage: python -m benchmarks.installations [--count 100] [--densities 8 2]
 
@@ -10,7 +10,6 @@ have no object.
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from dataclasses import replace
 
@@ -34,7 +33,8 @@ from hiproof.simulate.scene import (
 )
 from hiproof.simulate.shapes import box
 
-FIRST_SEED = 100
+from .tables import FigureTable, make_parser
+
 FOUND_CHIMNEY_M = 1.0  # between the middles of a chimney and of the object found
 SEEN_POINTS, SEEN_RISE_M = 4, 0.5
 WITH = Settings.from_dict({"reconstruct": {"installations": True}})
@@ -98,21 +98,18 @@ def judge_house(seed: int, density: float) -> tuple[Counter[str], list[float]]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--densities", type=float, nargs="+", default=[8.0, 2.0])
-    options = parser.parse_args()
-    print("points/m2  chimneys  found  off (median)  false objects a house")
-    for density in options.densities:
-        results = [judge_house(FIRST_SEED + k, density) for k in range(options.count)]
-        counts = sum((result[0] for result in results), Counter())
-        errors = [gap for _, gaps in results for gap in gaps]
-        share = counts["found"] / max(counts["chimneys"], 1)
-        print(
-            f"{density:9g}  {counts['chimneys']:8}  {100 * share:4.0f}%  "
-            f"{np.median(errors) if errors else np.nan:11.2f}m  "
-            f"{counts['false'] / counts['houses']:.3f}"
-        )
+    parser = make_parser(__doc__, count=100, first_seed=100, densities=[8.0, 2.0])
+    a = parser.parse_args()
+    columns = ("points/m2", "chimneys", "found, %", "off, median, m", "false objects a house")
+    with FigureTable(a.record, *columns) as table:
+        for density in a.densities:
+            results = [judge_house(a.first_seed + k, density) for k in range(a.count)]
+            counts = sum((result[0] for result in results), Counter())
+            errors = [gap for _, gaps in results for gap in gaps]
+            share = 100 * counts["found"] / max(counts["chimneys"], 1)
+            off = f"{np.median(errors) if errors else np.nan:.2f}"
+            false = f"{counts['false'] / counts['houses']:.3f}"
+            table.add(density, counts["chimneys"], f"{share:.0f}", off, false)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,4 @@
-"""What several benchmarks share.
-
-It is one call of a building's fit, the judges in ../shared/tools, and figures of parts.
-"""
+"""Load the judges in ../shared/tools, and measure parts."""
 
 from __future__ import annotations
 
@@ -16,24 +13,13 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
-from hiproof.fit.union import BuildingFit, fit_building
 from hiproof.model import Building, Roof
-from hiproof.settings import Settings
+from hiproof.status import Status
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 RASTER_M = 0.2
 # m: nobody draws a part that is narrower; a step by which one stands out
 NARROW_M, STANDING_M = 1.0, 2.0
-
-
-def fit_roof_parts(
-    points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None
-) -> BuildingFit:
-    """Fit the roof of one building.
-
-    Only here do benchmarks name the search that they measure.
-    """
-    return fit_building(points_local, outline, settings or Settings())
 
 
 def load_tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
@@ -47,10 +33,7 @@ def load_tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
 
 
 def make_raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
-    """Return plan points (n, 2) inside `outline` on a square grid.
-
-    It is one point within it where the grid has none.
-    """
+    """Return plan points (n, 2) inside `outline` on a square grid, one at least."""
     x0, y0, x1, y1 = outline.bounds
     axes = (np.arange(lower + 0.5 * step_m, upper, step_m) for lower, upper in ((x0, x1), (y0, y1)))
     xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -59,10 +42,7 @@ def make_raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarra
 
 
 def measure_visible_areas(roof: Roof) -> np.ndarray:
-    """Return the plan area (m2) where each part is the highest.
-
-    What is hidden under another does not count.
-    """
+    """Return the plan area (m2) where each part is the highest."""
     xy = make_raster(roof.outline)
     top = np.argmax([part.height_at(xy) for part in roof.parts], axis=0)
     return roof.outline.area * np.bincount(top, minlength=len(roof.parts)) / len(top)
@@ -104,10 +84,7 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
 
 
 def sum_area_by_type(buildings: Iterable[Building]) -> Counter[str]:
-    """Sum the roof area in plan (m2) by type of part, the largest first.
-
-    It is that of all `buildings`.
-    """
+    """Sum the roof area in plan (m2) of all buildings by type of part, the largest first."""
     areas: Counter[str] = Counter()
     for roof in (building.roof for building in buildings if building.built is not None):
         for part, area in zip(roof.parts, measure_visible_areas(roof), strict=True):
@@ -116,9 +93,17 @@ def sum_area_by_type(buildings: Iterable[Building]) -> Counter[str]:
 
 
 def measure_named_share(buildings: Iterable[Building]) -> float:
-    """Return the share of the roof area in plan with a named type.
-
-    Named types have parameters, "free" being none.
-    """
+    """Return the share of the roof area in plan whose type has parameters, all but "free"."""
     areas = sum_area_by_type(buildings)
     return 1.0 - areas["free"] / max(areas.total(), 1e-9)
+
+
+def describe_parts(buildings: list[Building]) -> str:
+    """Describe how many parts and which types buildings have, by area in plan."""
+    areas, parts = sum_area_by_type(buildings), [len(building.parts) for building in buildings]
+    types = ", ".join(f"{name} {area / areas.total():.1%}" for name, area in areas.items())
+    modelled = sum(building.status is Status.MODELLED for building in buildings)
+    return (
+        f"  {np.mean(parts):.2f} parts a building, {modelled} of {len(buildings)} modelled without "
+        f"reserve, named share {measure_named_share(buildings):.3f}: {types}"
+    )

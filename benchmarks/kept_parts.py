@@ -95,17 +95,16 @@ def measure_world(model: Building, xy: np.ndarray) -> np.ndarray:
     return np.nan_to_num(measure_heights(model.roof, xy))
 
 
-def describe_kept(counts: Counter[str]) -> str:
-    """Return the figures as text."""
-    lines = [f"{counts['buildings']} changed buildings with a new model"]
+def describe_kept(counts: Counter[str]) -> dict[str, float]:
+    """Return shares of parts that are kept, and of places that differ or are reported."""
+    figures: dict[str, float] = {"changed buildings with a new model": counts["buildings"]}
     for kind, what in (("unchanged", "their parameters"), ("moved", "all but their heights")):
-        parts = max(counts[f"{kind} parts"], 1)
-        shares = counts[f"{kind} continued"] / parts, counts[f"{kind} kept"] / parts
-        lines.append(
-            f"of {counts[f'{kind} parts']} {kind} parts {shares[0]:.3f} are continued and "
-            f"{shares[1]:.3f} keep {what}"
-        )
-    differ = counts["differ"] / max(counts["unchanged places"], 1)
-    lines.append(f"both models differ at {differ:.3f} of the unchanged places")
-    lines.append(f"{counts['not real']} of {counts['reported']} reported places did not change")
-    return "\n".join(lines)
+        parts = counts[f"{kind} parts"]
+        figures[f"{kind} parts"] = parts
+        figures[f"{kind} parts that are continued"] = counts[f"{kind} continued"] / max(parts, 1)
+        figures[f"{kind} parts that keep {what}"] = counts[f"{kind} kept"] / max(parts, 1)
+    places = max(counts["unchanged places"], 1)
+    figures["unchanged places at which models differ"] = counts["differ"] / places
+    figures["reported places"] = counts["reported"]
+    figures["reported places that did not change"] = counts["not real"]
+    return figures

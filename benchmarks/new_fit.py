@@ -16,6 +16,8 @@ from hiproof.fit import roof, union
 def main() -> None:
     if len(sys.argv) < 2:
         sys.exit("expected the name of a benchmark, got none; say for example: towns")
+    if "--record" in sys.argv:
+        sys.exit("expected a benchmark without --record, since RESULTS.md is of the fit in use")
     union.fit_building = roof.fit_building
     name = sys.argv.pop(1)
     importlib.import_module(f"benchmarks.{name}").main()

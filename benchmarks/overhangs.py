@@ -1,6 +1,7 @@
-"""Are overhangs as long as they should be, and none where there is none?
+"""Lengths of overhangs, and false ones.
 
-usage: python -m benchmarks.overhangs [--count 100] [--first 100] [--densities 8 2] [--compounds]
+usage: python -m benchmarks.overhangs [--count 100] [--first-seed 100] [--densities 8 2]
+                                      [--compounds]
 
 Houses of all types (seeds 100 and above) are scanned by simulation with roofs that reach 0.3 to
 1.0 m beyond the walls, by the same on opposite sides, and again with none. Every third stands under
@@ -11,7 +12,6 @@ closed, and to keep their volume.
 
 from __future__ import annotations
 
-import argparse
 import time
 from dataclasses import dataclass, field, replace
 
@@ -33,7 +33,8 @@ from hiproof.simulate.roofs import SimBuilding
 from hiproof.simulate.scanner import scan_scene
 from hiproof.simulate.scene import Defects, building_bodies, make_scene, trees
 
-FIRST_SEED = 100
+from .tables import FigureTable, make_parser
+
 OVERHANGS_DRAWN_M = 0.3, 1.0
 AROUND_HOUSE_M = 3.0  # of points beyond the walls
 WITH = Settings.from_dict({"segment": {"network": "never"}, "write": {"lods": ["2.2", "2.3"]}})
@@ -146,25 +147,26 @@ def triangulate_face(solid: Solid, face: Face) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--first", type=int, default=FIRST_SEED)
-    parser.add_argument("--densities", type=float, nargs="+", default=[8.0, 2.0])
+    parser = make_parser(__doc__, count=100, first_seed=100, densities=[8.0, 2.0])
     parser.add_argument("--compounds", action="store_true")
-    options = parser.parse_args()
-    print("points/m2  edges  RMSE  bias  missed  error/sigma  false  left out  invalid  seconds")
-    for density in options.densities:
-        tally, start = OverhangTally(), time.perf_counter()
-        for k in range(options.count):
-            judge_house(tally, options.first + k, density, options.compounds)
-        errors = np.array(tally.errors)
-        print(
-            f"{density:9g}  {len(errors):5}  {np.sqrt((errors**2).mean()):.3f}  "
-            f"{errors.mean():+.3f}  {tally.missed / len(errors):.3f}  "
-            f"{np.sqrt(np.mean(np.square(tally.by_sigma))):.2f}  "
-            f"{tally.false / options.count:.3f}  {tally.left_out}  {tally.invalid}  "
-            f"{time.perf_counter() - start:.0f}"
-        )
+    a = parser.parse_args()
+    columns = ("points/m2", "edges", "RMSE; bias, m", "missed", "error/sigma, RMS", "false")
+    with FigureTable(a.record, *columns, "left out; invalid", "s") as table:
+        for density in a.densities:
+            tally, start = OverhangTally(), time.perf_counter()
+            for k in range(a.count):
+                judge_house(tally, a.first_seed + k, density, a.compounds)
+            errors = np.array(tally.errors)
+            table.add(
+                density,
+                len(errors),
+                f"{np.sqrt((errors**2).mean()):.3f}; {errors.mean():+.3f}",
+                f"{tally.missed / len(errors):.3f}",
+                f"{np.sqrt(np.mean(np.square(tally.by_sigma))):.2f}",
+                f"{tally.false / a.count:.3f}",
+                f"{tally.left_out}; {tally.invalid}",
+                f"{time.perf_counter() - start:.0f}",
+            )
 
 
 if __name__ == "__main__":

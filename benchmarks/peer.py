@@ -1,8 +1,6 @@
-"""The cost of Delft for a whole process, beside that of roofer.
+"""Cost of a whole process over Delft, in seconds and in decodings of its two LAZ files.
 
-It is in seconds and in decodings of its two LAZ files.
-
-    python -m benchmarks.peer [--runs 3] [--data ../shared/data/delft]
+usage: python -m benchmarks.peer [--runs 3] [--data ../shared/data/delft]
 
 Seconds do not travel between machines; decoding the same files (laspy, lazrs), measured between the
 runs, does. Each line is the median of fresh processes, everything from reading to the written files
@@ -13,7 +11,6 @@ machine where both were measured.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import statistics
@@ -21,6 +18,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from .tables import FigureTable, make_parser
 
 ROOT = Path(__file__).parents[1]
 ROOFER = {"cpu_s": 3.4, "peak_mb": 92.0, "decode_s": 0.30}
@@ -78,9 +77,8 @@ def measure_process(script: str, inputs: tuple[list[str], str, str]) -> list[flo
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__)
     parser.add_argument("--runs", type=int, default=3)
-    parser.add_argument("--quick", action="store_true", help="one run of each")
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data" / "delft")
     args = parser.parse_args()
     if not args.data.is_dir():
@@ -93,27 +91,22 @@ def main() -> None:
         measure_process(ONCE, inputs)  # compiles, where nobody did
         runs = [
             [measure_process(script, inputs) for script in (DECODE, ONCE, STEADY)]
-            for _ in range(1 if args.quick else args.runs)
+            for _ in range(args.runs)
         ]
     decode = statistics.median(run[0][0] for run in runs)
     print(f"decoding the LAZ files: {decode:.2f} s CPU, the unit\n")
-    print(
-        "| Delft | CPU, decodings | CPU, s | wall, s | peak memory, MB |\n| --- | --- | --- | --- "
-        "| --- |"
-    )
-    for place, name in (
-        (1, "whole process, compiled before"),
-        (2, "steady: the second run in a process"),
-    ):
-        cpu = statistics.median(run[place][0] for run in runs)
-        units = statistics.median(run[place][0] / run[0][0] for run in runs)
-        wall, peak = (statistics.median(run[place][k] for run in runs) for k in (1, 2))
-        print(f"| {name} | {units:.1f} | {cpu:.2f} | {wall:.2f} | {peak:.0f} |")
-    speed_ratio = ROOFER["cpu_s"] / ROOFER["decode_s"]
-    print(
-        f"| roofer 1.1, measured elsewhere | {speed_ratio:.1f} | {ROOFER['cpu_s']:.2f} there | | "
-        f"{ROOFER['peak_mb']:.0f} |"
-    )
+    columns = ("Delft", "CPU, decodings", "CPU, s", "wall, s", "peak memory, MB")
+    with FigureTable(args.record, *columns) as table:
+        for place, name in (
+            (1, "whole process, compiled before"),
+            (2, "second run in a process"),
+        ):
+            units = statistics.median(run[place][0] / run[0][0] for run in runs)
+            cpu, wall, peak = (statistics.median(run[place][k] for run in runs) for k in range(3))
+            table.add(name, f"{units:.1f}", f"{cpu:.2f}", f"{wall:.2f}", f"{peak:.0f}")
+        units = ROOFER["cpu_s"] / ROOFER["decode_s"]
+        name = "roofer 1.1, on another machine"
+        table.add(name, f"{units:.1f}", ROOFER["cpu_s"], "", f"{ROOFER['peak_mb']:.0f}")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ Compiling for another processor takes a minute.
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -19,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 from .judging import SHARED
+from .tables import FigureTable, make_parser
 
 VECTORS = "AVX512_ICL AVX512_CLX AVX512_SKX X86_V4"
 PROCESSORS = {
@@ -40,15 +40,15 @@ def reconstruct_buildings(data: Path, environment: dict[str, str]) -> dict[str, 
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__)
     parser.add_argument("--data", type=Path, default=SHARED / "data" / "delft")
-    data = parser.parse_args().data
-    here = reconstruct_buildings(data, {})
-    for name, environment in PROCESSORS.items():
-        other = reconstruct_buildings(data, environment)
-        unlike = [id for id, record in here.items() if other.get(id) != record]
-        words = f"; other ones: {', '.join(unlike)}" if unlike else ""
-        print(f"{name}: {len(here) - len(unlike)} of {len(here)} the same{words}", flush=True)
+    a = parser.parse_args()
+    here = reconstruct_buildings(a.data, {})
+    with FigureTable(a.record, "processor", "the same", "of", "other ones") as table:
+        for name, environment in PROCESSORS.items():
+            other = reconstruct_buildings(a.data, environment)
+            unlike = [id for id, record in here.items() if other.get(id) != record]
+            table.add(name, len(here) - len(unlike), len(here), ", ".join(unlike))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""Real footprints put beside their roofs: is the shift found?
-
-And do those that lie right stay?
+"""Footprints put beside their roofs, whose shift is to be found.
 
 usage: python -m benchmarks.registration [--sets delft amsterdam_west two_epochs essen ...]
                                          [--parity even|odd]
@@ -8,8 +6,7 @@ usage: python -m benchmarks.registration [--sets delft amsterdam_west two_epochs
 The footprints of each set are shifted by vectors of 0.3 to 3 m in directions drawn by chance. "all"
 shifts all of them and estimates their common shift, as a run does before there are work tiles.
 "row" shifts one row of touching footprints, "one" a single house: those that stand alone, and those
-within a row, which a run must leave where they are. "each" is how houses were moved before rows
-were: every house of a shifted data set by itself.
+within a row, which a run must leave where they are.
 
 Printed by distance: how many are found within 0.15 m of the known vector (moved, and to the right
 place), and how many are moved to a place more than 0.3 m beside it. At distance 0 every move is
@@ -22,7 +19,6 @@ either axis).
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterator
 
@@ -37,6 +33,7 @@ from hiproof.read import read_footprints, read_points
 from hiproof.stages.points import distinct
 
 from .judging import SHARED
+from .tables import FigureTable, make_parser
 from .towns import TOWNS, read_town
 
 SETS = {
@@ -67,10 +64,7 @@ def read_set(name: str) -> tuple[Polygons, np.ndarray]:
 
 
 def scan_town(name: str) -> tuple[Polygons, np.ndarray]:
-    """Return surveyed footprints and points of a simulated town.
-
-    Walls are included.
-    """
+    """Return surveyed footprints and points of a simulated town. Walls are included."""
     town, rng = read_town(TOWNS[name]), np.random.default_rng(7)
     polygons = [
         shift_polygons([building.footprint], rng.normal(0.0, SURVEY_M, 2))[0] for building in town
@@ -112,8 +106,6 @@ def iterate_trials(
         offset = draw_vector(distance, number)
         if kind == "row":
             yield shift_polygons([polygons[i] for i in members], offset), offset
-        elif kind == "each":
-            yield from ((shift_polygons([polygons[i]], offset), offset) for i in members)
         elif kind in ("one alone", "one of a row") and (len(members) == 1) == (kind == "one alone"):
             house = members[len(members) // 2]
             moved_row = [
@@ -122,44 +114,39 @@ def iterate_trials(
             yield Outlines(moved_row).row(house), offset
 
 
-def make_row(kind: str, outcomes: list[tuple[np.ndarray, np.ndarray]], distance: float) -> str:
+def make_cells(outcomes: list[tuple[np.ndarray, np.ndarray]]) -> list[str]:
     """Return the figures of some trials: shifts found (2,) and vectors (2,)."""
     distances = np.array([np.hypot(*(result + shifted)) for result, shifted in outcomes])
     moved = np.array([bool(result.any()) for result, _ in outcomes])
     right, wrong = moved & (distances < FOUND_M), moved & (distances > WRONG_M)
-    return (
-        f"{kind:13} {distance:3g} m: {len(outcomes):3} trials, moved {moved.mean():4.0%}, "
-        f"within {FOUND_M:g} m {right.mean():4.0%}, moved wrongly {wrong.mean():4.0%}"
-    )
+    shares = (f"{100 * share.mean():.0f}" for share in (moved, right, wrong))
+    return [str(len(outcomes)), *shares]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, parity=None)
     parser.add_argument("--sets", nargs="+", choices=[*SETS, *TOWNS], default=list(SETS))
-    parser.add_argument("--parity", choices=("even", "odd"), help="every second row")
-    arguments = parser.parse_args()
-    for name in arguments.sets:
-        polygons, points = read_set(name)
-        grid = PointGrid(points)
-        print(f"{name}: {len(polygons)} footprints, {len(Outlines(polygons).members)} rows")
-        for number, distance in enumerate(DISTANCES_M):
-            difference = draw_vector(distance, 100 + number)
-            result = register([(points[:, :2], shift_polygons(polygons, difference))])
-            print(
-                f"{'all':13} {distance:3g} m: {np.hypot(*(result.xy + difference)):.3f} m from "
-                f"the vector, sigma {max(result.sigma):.3f} m, "
-                f"{'moved' if result.is_clear else 'left'}",
-                flush=True,
-            )
-        for kind in ("row", "one alone", "one of a row", "each"):
-            for distance in DISTANCES_M:
-                trials = list(iterate_trials(kind, polygons, distance, arguments.parity))
-                if trials:
+    a = parser.parse_args()
+    columns = ("set", "kind", "off, m", "trials", "moved, %", "found, %", "moved wrongly, %")
+    with FigureTable(a.record, *columns) as table:
+        for name in a.sets:
+            polygons, points = read_set(name)
+            grid = PointGrid(points)
+            for number, distance in enumerate(DISTANCES_M):
+                difference = draw_vector(distance, 100 + number)
+                result = register([(points[:, :2], shift_polygons(polygons, difference))])
+                off = f"{np.hypot(*(result.xy + difference)):.3f} m from the vector"
+                moved = "moved" if result.is_clear else "left"
+                sigma = f"sigma {max(result.sigma):.3f} m"
+                table.add(name, "all", distance, len(polygons), moved, off, sigma)
+            for kind in ("row", "one alone", "one of a row"):
+                for distance in DISTANCES_M:
                     outcomes = [
                         (find_row_shift(row, grid, points) if row else np.zeros(2), difference)
-                        for row, difference in trials
+                        for row, difference in iterate_trials(kind, polygons, distance, a.parity)
                     ]
-                    print(make_row(kind, outcomes, distance), flush=True)
+                    if outcomes:
+                        table.add(name, kind, distance, *make_cells(outcomes))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Measure how the cost of a roof grows with its area, up to a hall of 100,000 m2.
+"""Cost of a roof by its area, up to a hall of 100,000 m2.
 
 usage: python -m benchmarks.scaling [--areas 100 1000 10000] [--density 5]
 
@@ -11,7 +11,6 @@ process held so far.
 
 from __future__ import annotations
 
-import argparse
 import math
 import resource
 import time
@@ -25,9 +24,21 @@ from hiproof.fit.union import fit_building
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 
+from .tables import FigureTable, make_parser
+
 SQUARE_M = 10.0
 NOISE_M = 0.02
 NEAR_M = 0.2
+
+
+COLUMNS = (
+    "area, m2",
+    "ms per 100 m2: fit; compose",
+    f"within {NEAR_M} m",
+    "parts",
+    "memory, MB",
+    "solid",
+)
 
 
 def make_outline(area_m2: float) -> shapely.Polygon:
@@ -63,8 +74,8 @@ def sample_points(outline: shapely.Polygon, density: float) -> np.ndarray:
     return np.column_stack([xy, compute_heights(xy) + rng.normal(0.0, NOISE_M, len(xy))])
 
 
-def measure(area_m2: float, density: float) -> str:
-    """Fit and compose one roof; return a row of its figures."""
+def measure(area_m2: float, density: float) -> list[str]:
+    """Fit and compose one roof; return the cells of COLUMNS."""
     outline = make_outline(area_m2)
     points = sample_points(outline, density)
     started = time.process_time()
@@ -78,27 +89,25 @@ def measure(area_m2: float, density: float) -> str:
     end = time.process_time()
     per_100_m2 = 1e5 / outline.area  # ms for a second
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    figures = (
-        f"{outline.area:8.0f} m2",
-        f"{len(points):8d} points",
-        f"fit {per_100_m2 * (fitted - started):6.1f}",
-        f"compose {per_100_m2 * (end - fitted):5.1f} ms per 100 m2",
-        f"within {NEAR_M} m {1.0 - fit.unexplained:.4f}",
-        f"parts {len(fit.roof_parts):5d}",
-        f"{memory:5.0f} MB",
+    return [
+        f"{outline.area:.0f}",
+        f"{per_100_m2 * (fitted - started):.1f}; {per_100_m2 * (end - fitted):.1f}",
+        f"{1.0 - fit.unexplained:.4f}",
+        f"{len(fit.roof_parts)}",
+        f"{memory:.0f}",
         outcome,
-    )
-    return "  ".join(figures)
+    ]
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = make_parser(__doc__)
     parser.add_argument("--areas", type=float, nargs="+", default=[100.0, 1000.0, 10000.0])
     parser.add_argument("--density", type=float, default=5.0, help="points a square metre")
-    arguments = parser.parse_args()
-    measure(arguments.areas[0], arguments.density)  # loads what is compiled
-    for area_m2 in arguments.areas:
-        print(measure(area_m2, arguments.density), flush=True)
+    a = parser.parse_args()
+    measure(a.areas[0], a.density)  # loads what is compiled
+    with FigureTable(a.record, *COLUMNS) as table:
+        for area_m2 in a.areas:
+            table.add(*measure(area_m2, a.density))
 
 
 if __name__ == "__main__":

@@ -13,13 +13,14 @@ name is read or assigned, so that no layout changes them.
 
 from __future__ import annotations
 
-import argparse
 import ast
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 import hiproof
+
+from .tables import FigureTable, make_parser
 
 PACKAGE = Path(hiproof.__file__).parent
 REPOSITORY = Path(__file__).parents[1]
@@ -88,31 +89,26 @@ def find_files(folder: Path) -> list[Path]:
     return [folder] if folder.suffix == ".py" else sorted(folder.rglob("*.py"))
 
 
-def print_row(name: str, size: Size) -> None:
-    print(f"{name:28} " + " ".join(f"{count:9,}" for count in size))
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser = make_parser(__doc__)
     parser.add_argument("folders", nargs="*", metavar="FOLDER", help="below the package")
     parser.add_argument("--files", action="store_true", help="print a row a file")
-    arguments = parser.parse_args()
+    a = parser.parse_args()
     folders = [
         next((path / name for path in (PACKAGE, REPOSITORY) if (path / name).exists()), Path(name))
-        for name in arguments.folders
+        for name in a.folders
     ] or [path for path in sorted(PACKAGE.iterdir()) if find_files(path)]
-    print(f"{'':28} " + " ".join(f"{name:>9}" for name in Size._fields))
     totals = []
-    for folder in folders:
-        files = find_files(folder)
-        sizes = [measure(path.read_text(encoding="utf-8")) for path in files]
-        if arguments.files:
-            for path, size in zip(files, sizes, strict=True):
-                print_row(str(path.relative_to(folder.parent)), size)
-        totals.append(add(sizes))
-        print_row(folder.name, totals[-1])
-    if len(folders) > 1:
-        print_row("in all", add(totals))
+    with FigureTable(a.record, "", *Size._fields) as table:
+        for folder in folders:
+            files = find_files(folder)
+            sizes = [measure(path.read_text(encoding="utf-8")) for path in files]
+            for path, size in zip(files, sizes, strict=True) if a.files else ():
+                table.add(path.relative_to(folder.parent), *(f"{count:,}" for count in size))
+            totals.append(add(sizes))
+            table.add(folder.name, *(f"{count:,}" for count in totals[-1]))
+        if len(folders) > 1:
+            table.add("in all", *(f"{count:,}" for count in add(totals)))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,4 @@
-"""Is the roof drawn as a person would?
-
-Real towns' LoD2 solids, scanned by simulation, modelled again and compared.
+"""Edges of real towns' roofs, scanned by simulation and modelled again.
 
 usage: python -m benchmarks.towns [--town essen nrw_5657 denhaag vienna rotterdam delft_5907]
            [--density 5] [--without-footprints] [--every K] [--parity even|odd] [--most N]
@@ -23,8 +21,8 @@ are the CPU time of `reconstruct`, recognition and quality included.
 
 from __future__ import annotations
 
-import argparse
 import json
+import math
 import tempfile
 import time
 import traceback
@@ -43,13 +41,21 @@ from hiproof.frames import LocalFrame
 from hiproof.geometry.rings import ring_normal
 from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Roof, Solid
 from hiproof.read.solids import read_solids
-from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
 from hiproof.write import write_all
 
-from .judging import SHARED, measure_named_share, sum_area_by_type
-from .wireframes import Score, count_wireframes, list_worst, make_size_table, summarise
+from .judging import SHARED, describe_parts
+from .tables import FigureTable, make_parser
+from .wireframes import (
+    COLUMNS,
+    Score,
+    count_wireframes,
+    list_worst,
+    make_cells,
+    make_size_rows,
+    summarise,
+)
 
 TOWNS = {
     "essen": SHARED / "data/towns/essen.city.json",
@@ -190,53 +196,28 @@ def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) ->
     (folder / "run.json").write_text(json.dumps({"inputs": {"clouds": [str(cloud)]}}))
 
 
-def model_building(
-    building: TrueBuilding, points: np.ndarray, with_footprint: bool
-) -> tuple[Building, float]:
-    """Reconstruct one building from its scan, and time it (s).
-
-    A bug costs one building, and is shown.
-    """
-    started = time.process_time()
-    try:
-        model = reconstruct(
-            points,
-            building.footprint if with_footprint else None,
-            settings=Settings(),
-            id=building.id,
-        )
-    except Exception:
-        print(f"{building.id} failed: {traceback.format_exc()}")
-        model = Building(building.id, Status.INTERNAL_ERROR)
-    return model, time.process_time() - started
-
-
 def model_all(
     buildings: list[TrueBuilding], points: list[np.ndarray], with_footprint: bool
 ) -> tuple[list[Building], list[float]]:
-    """Reconstruct every building, and return the seconds of each."""
-    model_building(buildings[0], points[0], with_footprint)  # loads what is compiled
-    outcomes = [
-        model_building(b, p, with_footprint) for b, p in zip(buildings, points, strict=True)
-    ]
-    return [model for model, _ in outcomes], [seconds for _, seconds in outcomes]
+    """Reconstruct every building, and return the CPU seconds of each.
 
-
-def describe_times(seconds: list[float]) -> str:
-    """Describe how long the buildings took."""
-    ms = 1e3 * np.array(seconds)
-    mean, longest = ms.mean(), ms.max()
-    return (
-        f"{np.median(ms):.1f} ms a building in the median, {mean:.1f} in the mean, "
-        f"{longest:.0f} at most"
-    )
+    A bug costs one building, and is shown.
+    """
+    models, seconds = [], []
+    for k in (0, *range(len(buildings))):  # the first one twice: it loads what is compiled
+        outline = buildings[k].footprint if with_footprint else None
+        started = time.process_time()
+        try:
+            models.append(reconstruct(points[k], outline, id=buildings[k].id))
+        except Exception:
+            print(f"{buildings[k].id} failed: {traceback.format_exc()}")
+            models.append(Building(buildings[k].id, Status.INTERNAL_ERROR))
+        seconds.append(time.process_time() - started)
+    return models[1:], seconds[1:]
 
 
 def compose_truth(building: TrueBuilding) -> Building:
-    """Return the true roof faces as one shell.
-
-    It has the score of a perfect reconstruction.
-    """
+    """Return the true roof faces as one shell. It has the score of a perfect reconstruction."""
     frame = LocalFrame(
         np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0)
     )
@@ -248,10 +229,7 @@ def compose_truth(building: TrueBuilding) -> Building:
 
 
 def make_roof_pieces(solid: Solid) -> Iterator[Piece]:
-    """Yield a piece for each polygon of the roof's faces.
-
-    Upright ones have none.
-    """
+    """Yield a piece for each polygon of the roof's faces. Upright ones have none."""
     for face in solid.select_faces(ROOF):
         ring = solid.vertices[list(face.rings[0])]
         centre = ring.mean(axis=0)
@@ -272,10 +250,7 @@ def judge_models(
     seconds: list[float],
     folder: Path,
 ) -> list[Score]:
-    """Score each model of `buildings` in `folder`.
-
-    The truth is written there too.
-    """
+    """Score each model of `buildings` in `folder`. The truth is written there too."""
     truth = folder / "truth.city.json"
     write_truth(truth, TOWNS[town], buildings)
     counts = count_wireframes(folder / "buildings.city.jsonl", truth)
@@ -294,60 +269,32 @@ def read_share(model: Building) -> float:
     return float(np.nan_to_num(model.quality.share_within_20cm)) if model.solid is not None else 0.0
 
 
-def report_scores(scores: list[Score], models: list[Building], worst: int) -> str:
-    """Describe the scores and the models of a town."""
-    areas = sum_area_by_type(models)
-    types = ", ".join(f"{name} {area / areas.total():.0%}" for name, area in areas.items())
-    without_reserve = sum(model.status is Status.MODELLED for model in models)
-    rows = [
-        *summarise(scores),
-        f"parts    {np.mean([len(model.parts) for model in models]):.2f} a building; named share"
-        f" {measure_named_share(models):.3f}: {types}",
-        f"status   {without_reserve} of {len(models)} modelled without reserve",
-        *make_size_table(scores),
-        *(f"worst    {line}" for line in list_worst(scores, worst)),
-    ]
-    return "\n".join("  " + row for row in rows)
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = make_parser(__doc__, parity=None, most=None, worst=0)
     parser.add_argument("--town", nargs="+", choices=list(TOWNS), default=USUAL)
     parser.add_argument("--density", type=float, default=5.0, help="points a square metre")
-    parser.add_argument(
-        "--without-footprints", action="store_true", help="estimate outlines from the points"
-    )
+    parser.add_argument("--without-footprints", action="store_true")
     parser.add_argument("--every", type=int, default=1, help="take each k-th building")
-    parser.add_argument(
-        "--parity", choices=("even", "odd"), help="take those at even or odd places"
-    )
-    parser.add_argument(
-        "--most", type=int, help="at most so many buildings a town, drawn by chance"
-    )
-    parser.add_argument(
-        "--worst", type=int, default=0, help="name the buildings with the worst edges"
-    )
-    parser.add_argument(
-        "--save", type=Path, help="keep a run and the truth of each town in this folder"
-    )
-    parser.add_argument(
-        "--composed-truth", action="store_true", help="judge the true roofs as one shell a building"
-    )
+    parser.add_argument("--save", type=Path, help="keep a run and the truth of each town here")
+    parser.add_argument("--composed-truth", action="store_true", help="judge the true roofs")
     a = parser.parse_args()
-    for town in a.town:
-        buildings = choose_buildings(read_town(TOWNS[town]), a.every, a.parity, a.most)
-        points = [building.scan_points(a.density) for building in buildings]
-        if a.composed_truth:
-            models, seconds = list(map(compose_truth, buildings)), [float("nan")] * len(buildings)
-        else:
-            models, seconds = model_all(buildings, points, not a.without_footprints)
-        description = "their true roofs composed" if a.composed_truth else describe_times(seconds)
-        print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {description}")
-        with tempfile.TemporaryDirectory() as temporary:
+    with (
+        FigureTable(a.record, "town", *COLUMNS) as table,
+        tempfile.TemporaryDirectory() as temporary,
+    ):
+        for town in a.town:
+            buildings = choose_buildings(read_town(TOWNS[town]), a.every, a.parity, a.most)
+            points = [building.scan_points(a.density) for building in buildings]
+            if a.composed_truth:
+                models, seconds = [*map(compose_truth, buildings)], [math.nan] * len(buildings)
+            else:
+                models, seconds = model_all(buildings, points, not a.without_footprints)
             folder = (a.save or Path(temporary)) / town
             write_run(folder, models, points)
             scores = judge_models(town, buildings, models, seconds, folder)
-            print(report_scores(scores, models, a.worst), flush=True)
+            table.add(town, *make_cells(scores))
+            print("\n".join([*summarise(scores), *make_size_rows(scores), describe_parts(models)]))
+            print("".join(f"  worst {line}\n" for line in list_worst(scores, a.worst)), end="")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How often is the verdict on a model right?
+"""Verdicts on models against their truth.
 
 usage: python -m benchmarks.verdict [--sources compounds essen ...] [--most 40] [--parity even|odd]
            [--densities 1 2 5 15] [--with-footprints | --without-footprints] [--wrong N]
@@ -22,9 +22,9 @@ changed rule of evaluate/verdict.py is judged in seconds. Its limits were chosen
 
 from __future__ import annotations
 
-import argparse
 import pickle
-from collections.abc import Callable, Iterable, Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -46,6 +46,7 @@ from hiproof.geometry.rings import ring_normal
 from hiproof.model import ROOF, WALL, Building, Model, Solid
 from hiproof.status import Grade
 
+from .tables import FigureTable, make_parser
 from .towns import STEEPEST
 from .verdict_cases import PLACES, Case, iterate_cases
 
@@ -218,74 +219,43 @@ def judge_block(block: Block, folder: Path | None = None) -> list[CaseOutcome]:
     return outcomes
 
 
-def make_line(name: str, outcomes: list[CaseOutcome]) -> str:
-    """Return a row of a table about some outcomes."""
+def make_cells(outcomes: list[CaseOutcome]) -> list[str]:
+    """Return cases, the share of sound ones, and shares of each grade with their sound ones."""
     sound = [outcome for outcome in outcomes if outcome.is_sound]
-    cells = [f"{name:24}", f"{len(outcomes):5d}", f"{len(sound) / len(outcomes):6.3f}"]
+    cells = [f"{len(outcomes)}", f"{len(sound) / len(outcomes):.3f}"]
     for grade in Grade:
-        graded = [outcome for outcome in outcomes if outcome.grade is grade]
-        right = f"{np.mean([outcome.is_sound for outcome in graded]):6.3f}" if graded else "     -"
-        cells.append(f"{len(graded) / len(outcomes):6.3f} {right}")
-    good_shares = (
-        f"{np.mean([outcome.grade is Grade.GOOD for outcome in sound]):6.3f}" if sound else "     -"
-    )
-    return " | ".join([*cells, good_shares])
+        graded = [outcome.is_sound for outcome in outcomes if outcome.grade is grade]
+        right = f"{np.mean(graded):.3f}" if graded else "-"
+        cells.append(f"{len(graded) / len(outcomes):.3f}; {right}")
+    good = [outcome.grade is Grade.GOOD for outcome in sound]
+    return [*cells, f"{np.mean(good):.3f}" if good else "-"]
 
 
-def make_table(outcomes: list[CaseOutcome]) -> str:
-    """Return rows for all outcomes, and by density, area, source and defect."""
-    groups: dict[str, Callable[[CaseOutcome], bool]] = {"all": lambda outcome: True}
-    groups |= {
-        f"{d:g} points/m2": lambda o, d=d: o.block.density == d
-        for d in sorted({o.block.density for o in outcomes})
-    }
-    for lower, upper in pairwise(AREAS_M2):
-        groups[f"{lower:g} to {upper:g} m2"] = lambda o, lower=lower, upper=upper: (
-            lower <= o.area_m2 < upper
-        )
-    groups |= {
-        s: lambda o, s=s: o.block.source == s
-        for s in dict.fromkeys(o.block.source for o in outcomes)
-    }
-    groups |= {
-        f"defect: {d}": lambda o, d=d: o.defect == d
-        for d in dict.fromkeys(o.defect for o in outcomes)
-    }
-    head = (
-        f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
-    )
-    rows = ((name, [o for o in outcomes if belongs(o)]) for name, belongs in groups.items())
-    return "\n".join([head, *(make_line(name, subset) for name, subset in rows if subset)])
+def group_outcomes(outcomes: list[CaseOutcome]) -> dict[str, list[CaseOutcome]]:
+    """Group outcomes by density, area, source and defect; all of them come first."""
+    groups = defaultdict(list, all=outcomes)
+    for o in outcomes:
+        lower, upper = next((a, b) for a, b in pairwise(AREAS_M2) if a <= o.area_m2 < b)
+        for name in (
+            f"{o.block.density:g} points/m2",
+            f"{lower:g} to {upper:g} m2",
+            o.block.source,
+            f"defect: {o.defect}",
+        ):
+            groups[name].append(o)
+    return groups
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "--sources",
-        nargs="+",
-        default=["compounds", *list_sources()],
-        choices=["compounds", *list_sources()],
+    parser = make_parser(
+        __doc__, parity="odd", most=40, densities=[1.0, 2.0, 5.0, 15.0], processes=1
     )
-    parser.add_argument("--most", type=int, default=40, help="buildings of each source")
-    parser.add_argument(
-        "--densities",
-        type=float,
-        nargs="+",
-        default=[1.0, 2.0, 5.0, 15.0],
-        help="points a square metre",
-    )
-    parser.add_argument("--parity", choices=("even", "odd"), default="odd")
-    parser.add_argument(
-        "--with-footprints", action="store_true", help="cases with footprints alone"
-    )
-    parser.add_argument(
-        "--without-footprints", action="store_true", help="cases without footprints alone"
-    )
-    parser.add_argument(
-        "--wrong", type=int, default=0, help="name so many cases called good that are not sound"
-    )
+    sources = ["compounds", *list_sources()]
+    parser.add_argument("--sources", nargs="+", default=sources, choices=sources)
+    parser.add_argument("--with-footprints", action="store_true", help="alone")
+    parser.add_argument("--without-footprints", action="store_true", help="alone")
+    parser.add_argument("--wrong", type=int, default=0, help="name good models that are not sound")
     parser.add_argument("--keep", type=Path, help="folder in which models and points are kept")
-    parser.add_argument("--processes", type=int, default=1)
     a = parser.parse_args()
     footprints = (
         (True,) if a.with_footprints else (False,) if a.without_footprints else (True, False)
@@ -296,16 +266,17 @@ def main() -> None:
     if a.keep:
         a.keep.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(a.processes, mp_context=get_context("spawn")) as pool:
-        name = [
-            outcome
-            for block in pool.map(judge_block, blocks, [a.keep] * len(blocks))
-            for outcome in block
+        found = [
+            o for block in pool.map(judge_block, blocks, [a.keep] * len(blocks)) for o in block
         ]
-    for with_footprints in footprints:
-        members = [outcome for outcome in name if outcome.block.with_footprints == with_footprints]
-        reference = "with" if with_footprints else "without"
-        print(f"{a.parity} buildings, {reference} footprints\n{make_table(members)}\n", flush=True)
-    wrong = [outcome for outcome in name if outcome.grade is Grade.GOOD and not outcome.is_sound]
+    columns = ("footprints", "cases of", "n", "sound", *(f"{grade}; sound" for grade in Grade))
+    with FigureTable(a.record, *columns, "of sound ones good") as table:
+        for with_footprints in footprints:
+            reference = "with" if with_footprints else "without"
+            outcomes = [o for o in found if o.block.with_footprints == with_footprints]
+            for name, group in group_outcomes(outcomes).items():
+                table.add(reference, name, *make_cells(group))
+    wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
     for o in wrong[: a.wrong]:
         reference = "with" if o.block.with_footprints else "without"
         case = f"{o.block.source} {o.id} {o.block.density:g}/m2 {reference} footprint, {o.defect}"

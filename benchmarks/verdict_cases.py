@@ -90,10 +90,7 @@ def cut_hole(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def cover_with_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Put a crown over a tenth to a half of the roof.
-
-    Seven points in ten lie in its leaves.
-    """
+    """Put a crown over a tenth to a half of the roof. Seven points in ten lie in its leaves."""
     middle = shapely.get_coordinates(scene.footprint)[rng.integers(4)]
     distance = np.hypot(*(scene.points[:, :2] - middle).T)
     caught = (distance < np.quantile(distance, rng.uniform(0.1, 0.5))) & (
@@ -154,10 +151,7 @@ def widen_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
 
 
 def halve_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Halve the footprint, as cadastres cut them.
-
-    The other half is not requested.
-    """
+    """Halve the footprint, as cadastres cut them. The other half is not requested."""
     west, south, east, north = scene.footprint.bounds
     middle = rng.uniform(0.3, 0.7) * (east - west) + west
     half = shapely.intersection(scene.footprint, shapely.box(west, south, middle, north))

@@ -20,15 +20,12 @@ from .judging import load_tool
 
 SIZES_M2 = (0.0, 200.0, 400.0, 800.0, np.inf)
 COLUMNS = (
-    "footprint",
     "n",
-    "edges P",
-    "R",
-    "F1 pooled, mean",
-    "  corners F1",
-    "number",
-    "faces",
-    "in 0.2 m",
+    "edge F1, %: pooled; mean",
+    "precision; recall, %",
+    "corner F1, %",
+    "corners; faces, times the truth's",
+    "share in 0.2 m",
     "parts",
     "ms per 100 m2",
 )
@@ -90,10 +87,7 @@ def compute_f1(right: int, n_drawn: int, true: int, n_found: int | None = None) 
 
 
 def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
-    """Compare each building of `truth` with its model.
-
-    A missing one counts as all missed.
-    """
+    """Compare each building of `truth` with its model. A missing one counts as all missed."""
     judge = load_tool("wireframe")
     solids, counts = judge.solids(models), {}
     for name, parts in judge.solids(truth).items():
@@ -112,10 +106,7 @@ def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
 
 
 def sum_counts(counts: Iterable[WireframeCounts]) -> WireframeCounts:
-    """Sum the counts of all buildings.
-
-    The result has the mean of the known height errors.
-    """
+    """Sum the counts of all buildings. The result has the mean of the known height errors."""
     rows = np.array([list(vars(counts_of_one).values()) for counts_of_one in counts], float)
     *numbers, offset, _ = rows.sum(axis=0)
     rmse = measure_finite(np.mean, rows[:, -1])
@@ -129,40 +120,24 @@ def measure_finite(figure, values: np.ndarray) -> float:
 
 
 def summarise(scores: list[Score]) -> list[str]:
-    """Summarise all `scores`: edges, corners, faces and heights."""
+    """Return the offset of right corners, heights and the share of right numbers of faces."""
     total, counts = sum_counts(score.counts for score in scores), [score.counts for score in scores]
     rmse = measure_finite(np.median, np.array([item.height_rmse_m for item in counts]))
-    share_same = np.mean([item.faces == item.true_faces for item in counts])
-    precision, recall = compute_shares(total)
+    same = np.mean([item.faces == item.true_faces for item in counts])
     offset = total.offset_m / max(total.right_corners, 1)
-    times = total.corners / total.true_corners
-    rows = [
-        f"edges    precision {precision:.1%}, recall {recall:.1%}, F1 {total.edge_f1:.1f} %;"
-        f" {total.edges / total.true_edges:.2f} times the truth's",
-        f"corners  F1 {total.corner_f1:.1f} %; {times:.2f} times the truth's"
-        + (f"; {offset:.3f} m off" if total.offset_m else ""),
+    return [
+        f"  corners {offset:.3f} m off; height RMSE {total.height_rmse_m:.3f} m in the mean, "
+        f"{rmse:.3f} in the median; as many faces as the truth {same:.3f}"
     ]
-    if total.true_faces:
-        rows += [
-            f"faces    {total.faces / total.true_faces:.2f} times the truth's;"
-            f" a share of {share_same:.3f} of the buildings has as many",
-            f"heights  RMSE {total.height_rmse_m:.3f} m in the mean, {rmse:.3f} in the median",
-        ]
-    return rows
 
 
-def make_size_table(scores: list[Score]) -> list[str]:
-    """Return a head, a row for all `scores` and one for each class of area.
-
-    Areas are those of footprints; classes without any are left out.
-
-    Pairs are the pooled figure and the mean over buildings. Corners and faces are multiples of
-    the true number.
-    """
-    rows = [align_cells(COLUMNS), make_row("all", scores)]
+def make_size_rows(scores: list[Score]) -> list[str]:
+    """Return a row for each class of footprint area that has any."""
+    rows = []
     for lower, upper in pairwise(SIZES_M2):
         group = [score for score in scores if lower <= score.area_m2 < upper]
-        rows += [make_row(name_class(lower, upper), group)] if group else []
+        if group:
+            rows.append(f"  {lower:.0f} to {upper:.0f} m2: " + " | ".join(make_cells(group)))
     return rows
 
 
@@ -172,45 +147,27 @@ def compute_shares(counts: WireframeCounts) -> tuple[float, float]:
     return right / max(counts.edges, 1), right / max(counts.true_edges, 1)
 
 
-def name_class(low_m2: float, high_m2: float) -> str:
-    if low_m2 == 0.0:
-        return f"< {high_m2:.0f} m2"
-    return f"> {low_m2:.0f} m2" if np.isinf(high_m2) else f"{low_m2:.0f}-{high_m2:.0f} m2"
-
-
-def make_row(name: str, scores: list[Score]) -> str:
-    """Return the row of one class of footprint area."""
+def make_cells(scores: list[Score]) -> list[str]:
+    """Return the cells of COLUMNS: pairs are the pooled figure and the mean over buildings."""
     total = sum_counts(score.counts for score in scores)
     edges = np.mean([score.counts.edge_f1 for score in scores])
-    corners = np.mean([score.counts.corner_f1 for score in scores])
     precision, recall = compute_shares(total)
     areas, ms = np.array([s.area_m2 for s in scores]), 1e3 * np.array([s.seconds for s in scores])
-    cells = [
-        name,
+    faces = f"{total.faces / total.true_faces:.2f}" if total.true_faces else "-"
+    return [
         f"{len(scores)}",
-        f"{100 * precision:.1f}",
-        f"{100 * recall:.1f}",
-        f"{total.edge_f1:.1f}, {edges:.1f}",
-        f"{total.corner_f1:.1f}, {corners:.1f}",
-        f"{total.corners / total.true_corners:.2f}",
-        f"{total.faces / total.true_faces:.2f}" if total.true_faces else "-",
+        f"{total.edge_f1:.1f}; {edges:.1f}",
+        f"{100 * precision:.1f}; {100 * recall:.1f}",
+        f"{total.corner_f1:.1f}",
+        f"{total.corners / total.true_corners:.2f}; {faces}",
         f"{np.mean([s.share for s in scores]):.4f}",
         f"{np.mean([s.parts for s in scores]):.2f}",
-        f"{100 * ms.sum() / areas.sum():.1f}, {np.mean(100 * ms / areas):.1f}",
+        f"{100 * ms.sum() / areas.sum():.1f}",
     ]
-    return align_cells(cells)
-
-
-def align_cells(cells: Iterable[str]) -> str:
-    """Return the cells of a row in columns, the first one to the left."""
-    first, *remainder = zip(cells, COLUMNS, strict=True)
-    return first[0].ljust(12) + "".join(
-        cell.rjust(max(len(head), 5) + 2) for cell, head in remainder
-    )
 
 
 def list_worst(scores: list[Score], limit: int) -> list[str]:
-    """Return a line for each of the `most` buildings with the worst edges."""
+    """Return a line for each of so many buildings with the worst edges."""
     worst = sorted(scores, key=lambda score: score.counts.edge_f1)[:limit]
     return [
         f"{s.id}: edge F1 {s.counts.edge_f1:.0f}, {s.counts.right_edges} of {s.counts.edges} edges"

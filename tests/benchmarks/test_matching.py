@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-import shapely
 from benchmarks.compounds import compare_parts, report_sigmas
 from benchmarks.judging import (
     make_raster,
@@ -21,11 +20,9 @@ from benchmarks.matching import (
     match_parts,
     merge_alike,
 )
-from benchmarks.named_roofs import judge_types, move_parts, read_demo
 
 from hiproof.compose import compose
-from hiproof.frames import LocalFrame
-from hiproof.model import Building, Model, Roof
+from hiproof.model import Building, Model
 from hiproof.simulate import COMPOUND_KINDS, random_building, random_compound
 from hiproof.simulate.shapes import make_part
 from hiproof.status import Status
@@ -154,32 +151,3 @@ def test_areas_that_show_make_up_the_outline():
     assert measure_named_share([free]) == 0.0 and measure_named_share(
         [model, free]
     ) == pytest.approx(0.5)
-
-
-def test_a_roof_keeps_its_place_in_another_frame():
-    roof = random_compound(np.random.default_rng(2), "L", origin=(500.0, 700.0, 20.0)).roof
-    origin = np.array([490.0, 720.0, 3.0])
-    moved = Roof(
-        move_parts(roof, origin),
-        shapely.transform(roof.outline, lambda xy: xy + (10.0, -20.0)),
-        LocalFrame(origin),
-    )
-    xy = make_raster(roof.outline)[::7]
-    assert np.allclose(moved.height_at(xy + (10.0, -20.0)), roof.height_at(xy) + 17.0)
-
-
-def test_the_demos_truth_is_right_and_a_flat_block_is_not():
-    for truth, points, footprint in read_demo():
-        assert len(points) > 50
-        model = standing(truth.roof)
-        assert judge_types(truth, model) == (True, True)
-        assert (
-            truth.footprint.symmetric_difference(footprint.polygon).area
-            < 0.05 * truth.footprint.area
-        )
-        flat = dataclasses.replace(truth.roof.parts[0], type="flat")
-        block = standing(dataclasses.replace(truth.roof, parts=(flat,)))
-        assert judge_types(truth, block) == (
-            truth.type == "flat",
-            truth.type == "flat" and truth.kind == "single",
-        )
