@@ -49,10 +49,7 @@ WRONG_CLASS = 0.03  # share of roof and ground points that have another class
 
 @dataclass
 class Site:
-    """A footprint, what stands on it, and what stands around it.
-
-    `true` is the part of the footprint that is built on.
-    """
+    """A footprint, what stands on and around it, and the part that is truly built on."""
 
     footprint: shapely.Polygon
     true: shapely.Geometry
@@ -66,10 +63,7 @@ class Site:
 def make_house_body(
     rect: tuple[float, float, float, float], eave: float, rise: float, ground: Plane
 ) -> Body:
-    """Make a house of a plan (xmin, ymin, xmax, ymax).
-
-    It is flat, or a gable along its longer side.
-    """
+    """Make a house of a plan (xmin, ymin, xmax, ymax), flat or a gable along it."""
     x0, y0, x1, y1 = rect
     centre, size = np.array([(x0 + x1) / 2, (y0 + y1) / 2]), (x1 - x0, y1 - y0)
     kappa = 0.0 if size[0] >= size[1] else math.pi / 2
@@ -151,10 +145,7 @@ def make_dormer_site(rng: np.random.Generator) -> Site:
 
 
 def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
-    """Let a `share` of the roof points over `area` meet the ground.
-
-    They go through the roof.
-    """
+    """Let a `share` of the roof points over `area` go through the roof to the ground."""
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         inside = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
@@ -171,10 +162,7 @@ def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
 
 
 def make_glass_site(rng: np.random.Generator) -> Site:
-    """Make a glass roof over a court.
-
-    Most of the light goes through, and frames and some panes return.
-    """
+    """Make a glass roof over a court, of which frames and some panes return."""
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     size = rng.uniform(3.0, 7.0, 2)
@@ -183,10 +171,7 @@ def make_glass_site(rng: np.random.Generator) -> Site:
 
 
 def make_passage_site(rng: np.random.Generator) -> Site:
-    """Make a way through a house, under the roof.
-
-    Its ground is seen from aslant for some metres at either end.
-    """
+    """Make a way through a house, whose ground is seen at either end."""
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     start, width, deep = rng.uniform(x0 + 2, x1 - 5), rng.uniform(2.5, 4.0), rng.uniform(1.0, 2.5)
@@ -198,10 +183,7 @@ def make_passage_site(rng: np.random.Generator) -> Site:
 
 
 def make_canopy_site(rng: np.random.Generator) -> Site:
-    """Make a roof that reaches over a yard without walls.
-
-    Ground is seen below it along the open side.
-    """
+    """Make a roof over a yard without walls, with ground seen along its open side."""
     site = make_plain_site(rng, (2.3, 4.0))
     x0, y0, x1, _ = site.footprint.bounds
     return add_ground(
@@ -210,10 +192,7 @@ def make_canopy_site(rng: np.random.Generator) -> Site:
 
 
 def add_ground(site: Site, area: shapely.Geometry, share: float) -> Site:
-    """Add ground points under a site's roof over `area`.
-
-    They have a `share` of the roof's density.
-    """
+    """Add ground points under a roof over `area`, a `share` of the roof's density."""
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         is_above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
@@ -248,10 +227,7 @@ def draw_crowns(
 
 
 def make_tree_site(rng: np.random.Generator) -> Site:
-    """Make a house with too large a footprint, and trees over its corners.
-
-    It is too large by up to 1.2 m at a side.
-    """
+    """Make a house with a footprint up to 1.2 m too wide, and trees over its corners."""
     site = make_plain_site(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     wide = shapely.box(x0, y0, x1 + rng.uniform(0.3, 1.2), y1)
@@ -267,10 +243,7 @@ def shift_footprint(rng: np.random.Generator) -> Site:
 
 
 def remove_house(rng: np.random.Generator, steep: float = 0.06) -> Site:
-    """Make the ground where a house stood.
-
-    There are heaps and bushes on up to half of it, and up to two trees.
-    """
+    """Make ground where a house stood, with heaps, bushes and up to two trees."""
     site = make_plain_site(rng, steep=steep)
     x0, y0, x1, y1 = site.footprint.bounds
     bodies = []
@@ -312,10 +285,7 @@ def make_green_roof_site(rng: np.random.Generator) -> Site:
 
 
 def make_slope_site(rng: np.random.Generator) -> Site:
-    """Make a house on a slope of up to 35 %, its eaves level.
-
-    Uphill they are 2 m lower above the ground.
-    """
+    """Make a house with level eaves on a slope of up to 35 %."""
     return make_plain_site(rng, (3.5, 6.0), 0.35)
 
 
@@ -325,10 +295,7 @@ def make_garage_site(rng: np.random.Generator) -> Site:
 
 
 def make_block_site(rng: np.random.Generator) -> Site:
-    """Make a closed block of houses around a yard.
-
-    The yard is a third to two thirds of its plan.
-    """
+    """Make a closed block of houses around a yard of 1/3 to 2/3 of its plan."""
     (w, h), deep, ground, eave = (
         rng.uniform(24.0, 40.0, 2),
         rng.uniform(4.0, 9.0),
@@ -435,11 +402,7 @@ WAYS = {
 
 
 def make_cells(make: Callable, key: int, density: float, seeds: range) -> list[str]:
-    """Return a cell for each way in which a kind of site is judged.
-
-    It has the share without a building, the share with bare ground cut, and the error of the area
-    left.
-    """
+    """Return the four figures of each way in which a kind of site is judged."""
     outcomes: dict[str, list] = {way: [] for way in WAYS}
     for seed in seeds:
         rng = np.random.default_rng([seed, key, round(10 * density)])

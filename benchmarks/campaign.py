@@ -209,10 +209,7 @@ def judge_real(task: tuple[str, Callable[[], Request]]) -> Findings:
 
 
 def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield runs over every cloud of the data folder, by name.
-
-    Their thinned files are made when called.
-    """
+    """Yield runs over every cloud of the data folder; files are thinned when called."""
     french = Settings.from_dict({"read": {"building_classes": [6, 67]}})
     unnamed = Settings.from_dict({"read": {"crs": "EPSG:5490"}})
     sets = (
@@ -260,10 +257,7 @@ def thin_file(path: Path, share: float, folder: Path) -> Path:
 
 
 def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield runs over real roofs and over scanned towns, by name.
-
-    They have no ground, and are made when called.
-    """
+    """Yield runs over real roofs and scanned towns without ground, made when called."""
     if (data / "roofn3d").exists() or (data / "hand_drawn").exists():
         yield "real roofs", partial(request_roofs_run, data, work / "real-roofs")
     for town, path in TOWNS.items():
@@ -298,10 +292,7 @@ def read_roofs(data: Path) -> list[np.ndarray]:
 
 
 def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
-    """Write clouds (n, 3) side by side, and return the run over them.
-
-    All points are of the building class.
-    """
+    """Write clouds (n, 3) side by side as building points; return the run over them."""
     folder.mkdir(parents=True, exist_ok=True)
     extent = max(float(np.ptp(cloud[:, :2], axis=0).max()) for cloud in clouds) + 30.0
     columns = int(np.ceil(np.sqrt(len(clouds))))

@@ -112,10 +112,7 @@ def write_scene(seed: int, count: int, folder: Path) -> Request:
 
 
 def place_building(seed: int, number: int, settings: SceneSettings) -> Placed:
-    """Draw, scan and damage building `number` of the scene `seed`.
-
-    The scene's `count` does not matter.
-    """
+    """Draw, scan and damage building `number` of the scene `seed`."""
     rng = np.random.default_rng([seed, number])
     row, column = divmod(number - 1, math.isqrt(BUILDINGS_A_SCENE))
     place = ORIGIN + [
@@ -210,10 +207,7 @@ def damage_footprint(
 
 
 def classify(source: np.ndarray, has_classes: bool) -> np.ndarray:
-    """Return the ASPRS classes (n,) of points by their source.
-
-    They are unclassified where the cloud has no classes.
-    """
+    """Return the ASPRS classes (n,) of points by their source, or unclassified ones."""
     if not has_classes:
         return np.full(len(source), UNCLASSIFIED, np.uint8)
     return np.array([CLASS_OF_SOURCE[name] for name in SOURCES], np.uint8)[source]

@@ -48,10 +48,7 @@ class Cost:
 
 
 def make_city(work: Path, buildings: int) -> tuple[list[str], str]:
-    """Return clouds and footprints of a simulated city.
-
-    They are made where they do not exist yet.
-    """
+    """Return clouds and footprints of a simulated city, made where they do not exist yet."""
     folder = work / f"city{buildings}"
     if not (folder / "complete").exists():
         shutil.rmtree(folder, ignore_errors=True)

@@ -49,10 +49,7 @@ MEDIAN_OF_ABSOLUTE_NORMAL = 0.6745
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one compound.
-
-    It has RMSE in m, numbers of parts, and errors over sigma by parameter.
-    """
+    """RMSE (m), numbers of parts, and errors over sigma by parameter of one compound."""
 
     rmse: float
     rmse_away_from_steps: float
@@ -63,10 +60,7 @@ class Outcome:
 
 
 def measure_errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
-    """Return the RMSE (m) over the roof's raster, with and without steps.
-
-    The second leaves out the surroundings of the true roof's steps.
-    """
+    """Return the RMSE (m) over the roof, and that away from the true roof's steps."""
     x0, y0, x1, y1 = truth.outline.bounds
     x, y = np.meshgrid(np.arange(x0, x1, RASTER_M), np.arange(y0, y1, RASTER_M), indexing="ij")
     xy, shape = np.column_stack([x.ravel(), y.ravel()]), x.shape
@@ -86,10 +80,7 @@ def measure_errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
 
 
 def draw_compound(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray]:
-    """Draw a compound of `kind`, and its points (n, 3) in its frame.
-
-    It is always the same for a seed.
-    """
+    """Draw a compound of `kind` by a seed, and its points (n, 3) in its frame."""
     rng = np.random.default_rng([seed, COMPOUND_KINDS.index(kind)])
     building = random_compound(rng, kind)
     cloud = scan(building, rng, ScanSettings(density=density, defects=Defects.none()))
@@ -99,10 +90,7 @@ def draw_compound(kind: str, density: float, seed: int) -> tuple[SimBuilding, np
 def compare_parts(
     truth: Roof, parts: tuple[Part, ...]
 ) -> tuple[int, bool, list[tuple[str, float]]]:
-    """Return the true number of parts, whether all are right, and errors.
-
-    They are right where `parts` are as many, each with its type. Errors are in sigmas.
-    """
+    """Return the true number of parts, whether all are right, and errors in sigmas."""
     as_built = len(parts) == len(truth.parts)
     true_parts = list(truth.parts) if as_built else merge_alike(truth.parts)
     right, ratios = len(parts) == len(true_parts), []

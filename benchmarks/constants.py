@@ -13,7 +13,6 @@ one of `benchmarks.delft`; a number that changes no row does nothing on Delft.
 
 from __future__ import annotations
 
-import argparse
 import ast
 import os
 import shutil
@@ -24,15 +23,14 @@ from pathlib import Path
 
 import hiproof
 
+from .tables import make_parser
+
 PACKAGE, ROOT = Path(hiproof.__file__).parent, Path(__file__).parents[1]
 PARITY = "even"  # of footprints' ids: on these constants are chosen, on the odd ones reported
 
 
 def find_value(text: str, name: str) -> ast.Constant:
-    """Find where the number `name` stands in a module's text.
-
-    Exits with a sentence where it is none.
-    """
+    """Find where the number `name` stands in a module's text, or exit with a sentence."""
     for statement in ast.parse(text).body:
         if isinstance(statement, ast.Assign):
             target, value = statement.targets[0], statement.value
@@ -72,18 +70,12 @@ def change_value(text: str, name: str, factor: float) -> str:
 
 
 def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
-    """Return the output of `benchmarks.delft` with a changed number.
-
-    It runs on a copy of the package in which the number is `factor` times as large.
-    """
+    """Return the output of `benchmarks.delft` on a copy with a changed number."""
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "hiproof"
-        # what is compiled goes along, and is used where it still holds
-        shutil.copytree(PACKAGE, copy)
+        shutil.copytree(PACKAGE, copy)  # what is compiled goes along, and is used where it holds
         file = copy / module
-        file.write_text(
-            change_value(file.read_text(encoding="utf-8"), name, factor), encoding="utf-8"
-        )
+        file.write_text(change_value(file.read_text("utf-8"), name, factor), encoding="utf-8")
         command = [
             sys.executable,
             "-m",
@@ -94,43 +86,29 @@ def measure_rows(module: Path, name: str, factor: float, shares: list[str]) -> s
             *shares,
         ]
         path = os.pathsep.join([folder, *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {**os.environ, "PYTHONPATH": path}
         process = subprocess.run(
-            command,
-            cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": path},
-            capture_output=True,
-            text=True,
-            check=False,
+            command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
         )
         return process.stdout or process.stderr
 
 
-def tell() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument(
-        "name", help="module and name, such as hiproof.fit.union.prices.CORNER_COST"
-    )
-    parser.add_argument(
-        "--shares", nargs="+", default=["1", "0.25"], help="of the points, as in benchmarks.delft"
-    )
+def main() -> None:
+    parser = make_parser(__doc__)
+    parser.add_argument("name", help="such as hiproof.fit.union.prices.CORNER_COST")
+    parser.add_argument("--shares", nargs="+", default=["1", "0.25"], help="of the points")
     parser.add_argument("--factors", nargs="+", type=float, default=[0.5, 1.0, 2.0])
-    arguments = parser.parse_args()
-    place, _, name = arguments.name.removeprefix("hiproof.").rpartition(".")
+    a = parser.parse_args()
+    place, _, name = a.name.removeprefix("hiproof.").rpartition(".")
     module = Path(*place.split(".")).with_suffix(".py")
     module = module if (PACKAGE / module).is_file() else module.with_suffix("") / "__init__.py"
     if not (PACKAGE / module).is_file():
-        sys.exit(
-            f"expected a module of hiproof and a name in it, got {arguments.name}; the page of "
-            "constants lists them"
-        )
+        sys.exit(f"expected a module of hiproof and a name in it, got {a.name}; see the constants")
     value = find_value((PACKAGE / module).read_text(encoding="utf-8"), name).value
-    for factor in arguments.factors:
-        print(
-            f"{name} = {value!r} times {factor:g}:\n"
-            f"{measure_rows(module, name, factor, arguments.shares)}",
-            flush=True,
-        )
+    for factor in a.factors:
+        rows = measure_rows(module, name, factor, a.shares)
+        print(f"{name} = {value!r} times {factor:g}:\n{rows}", flush=True)
 
 
 if __name__ == "__main__":
-    tell()
+    main()

@@ -51,10 +51,7 @@ GRID_M = 0.1  # Distance between the places at which heights are compared.
 
 @dataclass(frozen=True)
 class CurvedScene:
-    """A simulated building with one curved shape.
-
-    It has its points (n, 3) and outline, the plan of the shape, and the true roof at places.
-    """
+    """Points (n, 3), outline, plan of the curved shape and true roof of a building."""
 
     kind: str
     points: np.ndarray

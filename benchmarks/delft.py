@@ -61,10 +61,7 @@ def thin_points(paths: list[Path], share: float) -> np.ndarray:
 def model(
     points: np.ndarray, footprint: Footprint, settings: Settings
 ) -> tuple[Building | None, dict[str, float]]:
-    """Model one building, and return its figures.
-
-    They are seconds of fitting and composing, faces, and metres beyond its points.
-    """
+    """Model one building; return its CPU seconds, faces, and metres beyond its points."""
     frame = LocalFrame.around(points)
     local, outline = frame.to_local(points), shapely.transform(footprint.polygon, frame.to_local)
     started = time.process_time()
@@ -90,10 +87,7 @@ def model(
 
 
 def select_footprints(path: Path, parity: str | None) -> list[Footprint]:
-    """Return footprints of the file with an even or an odd number, or all.
-
-    The number is at the end of their id.
-    """
+    """Return footprints whose id ends in an even or an odd number, or all."""
     footprints = list(read_footprints(path))
     if parity is None:
         return footprints
@@ -102,10 +96,7 @@ def select_footprints(path: Path, parity: str | None) -> list[Footprint]:
 
 @dataclass(frozen=True)
 class Asked:
-    """A set: its footprints, the files of its cloud, and its points.
-
-    Points (n, 3) are those of the `footprints` that have any.
-    """
+    """Footprints of a set, files of its cloud, and points (n, 3) of those that have any."""
 
     footprints: list[Footprint]
     clouds: list[Path]
@@ -115,10 +106,7 @@ class Asked:
 def read_set(
     name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None
 ) -> Asked:
-    """Read the set `name`, its cloud thinned to `share`.
-
-    `data` is its folder where that is another.
-    """
+    """Read the set `name`, its cloud thinned to `share`, from its folder or from `data`."""
     data = data or SHARED / "data" / name
     footprints = select_footprints(data / (SETS | EPOCHS)[name], parity)
     clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
@@ -134,11 +122,7 @@ def read_set(
 def model_buildings(
     data_set: Asked, settings: Settings
 ) -> tuple[list[Building], dict[str, np.ndarray]]:
-    """Model all buildings, and return their figures.
-
-    Buildings that could not be composed are left out; figures are those of `model` for every
-    building.
-    """
+    """Model all buildings; return those that could be composed, and figures of all."""
     model(*data_set.own_points[0], settings)  # compiles or loads what is compiled
     outcomes = [model(points, footprint, settings) for points, footprint in data_set.own_points]
     columns = {
@@ -148,10 +132,7 @@ def model_buildings(
 
 
 def measure(buildings: list[Building], data_set: Asked, tools: Path = SHARED / "tools") -> dict:
-    """Return roof_residuals.py's figures of the written models.
-
-    They are within the footprints, on all points of the cloud.
-    """
+    """Return roof_residuals.py's figures of the written models on all points of the cloud."""
     with tempfile.TemporaryDirectory() as folder:
         models, footprints = Path(folder) / "models.city.jsonl", Path(folder) / "asked.gpkg"
         write_cityjson(models, buildings)

@@ -42,10 +42,7 @@ def generate_buildings(count: int, seed: int = 0) -> list[Building]:
 
 
 def draw_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
-    """Draw the request of one of the page's buttons.
-
-    It is at any part and any place about the roof.
-    """
+    """Draw the request of one of the page's buttons, at any part and place."""
     part, other = (int(k) for k in rng.integers(len(building.parts), size=2))
     x0, y0, x1, y1 = building.roof.outline.bounds
     place = [rng.uniform(x0 - 1.0, x1 + 1.0), rng.uniform(y0 - 1.0, y1 + 1.0), 0.0]
@@ -77,10 +74,7 @@ def draw_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[
 
 
 def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, Counter]:
-    """Edit each building again and again.
-
-    An edit stands on those before it that made a building.
-    """
+    """Edit buildings again and again, each time on what the last edit made."""
     rng, houses = np.random.default_rng(seed), generate_buildings(buildings)
     outcomes = {kind: Counter() for kind in (*EDIT_KINDS, *PRESSES)}
     sentences: Counter = Counter()

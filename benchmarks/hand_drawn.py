@@ -31,12 +31,7 @@ SHORT_M = 1.0
 def score_roofs(
     judge: ModuleType, with_footprint: bool, parity: str | None
 ) -> tuple[list[Score], list[int]]:
-    """Return the score of every roof, and short edges.
-
-    These are the numbers of short edges and of right ones among them.
-
-    `parity` takes roofs with an even or an odd number. A short edge has less than a metre.
-    """
+    """Return the score of every roof, and the numbers of short edges and right ones."""
     scores, short = [], np.zeros(2, int)
     for name, points, corners, edges, footprint in judge.reference():
         if parity is None or int(re.sub(r"\D", "", name)) % 2 == (parity == "odd"):
@@ -60,10 +55,7 @@ def compare_building(
     true_corners: np.ndarray,
     true_edges: np.ndarray,
 ) -> tuple[WireframeCounts, tuple[int, int]]:
-    """Return a building's counts against the drawn roof, and short edges.
-
-    These are the numbers of short edges and right ones.
-    """
+    """Return a building's counts, and its numbers of short edges and right ones."""
     corners, edges = judge.model_wireframe(building)
     tolerance = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()
     right, right_corners, height_errors = judge.matched(

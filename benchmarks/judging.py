@@ -49,12 +49,7 @@ def measure_visible_areas(roof: Roof) -> np.ndarray:
 
 
 def count_narrow_parts(roof: Roof) -> tuple[int, int]:
-    """Count parts narrower than NARROW_M, and those that stand out.
-
-    They stand STANDING_M or more above all that they touch.
-
-    A part's width is that of the smallest rectangle around its outlines within the roof's.
-    """
+    """Count parts narrower than NARROW_M, and those STANDING_M above all around."""
     xy = make_raster(roof.outline)
     heights = np.array([np.nan_to_num(part.height_at(xy), nan=-np.inf) for part in roof.parts])
     top, z = heights.argmax(axis=0), heights.max(axis=0)

@@ -28,10 +28,7 @@ EXACT = (*SHAPE, "position")
 
 
 def count_kept(folder: Path, roofs: Mapping[str, tuple[Roof, Roof]]) -> Counter[str]:
-    """Count parts and places of the changed buildings of a city.
-
-    `roofs` are the true ones before and after, by id.
-    """
+    """Count parts and places of changed buildings, by true roofs before and after."""
     counts: Counter[str] = Counter()
     before, after = (read_records(folder / name) for name in ("models", "updated"))
     for id, truth in roofs.items():

@@ -26,12 +26,7 @@ ALONG = ("length", "ridge_length", "t_x", "t_y")
 
 
 def merge_alike(parts: Sequence[Part]) -> list[Part]:
-    """Merge neighbours among `parts` that nothing distinguishes.
-
-    A row's houses under one ridge are such parts.
-
-    A united part keeps the parameters its members share; its place along the row is NaN.
-    """
+    """Merge neighbours that nothing distinguishes; their place along a row is NaN."""
     parts = list(parts)
     for k in range(len(parts) - 1, 0, -1):
         united = merge_parts(parts[k - 1], parts[k])
@@ -41,10 +36,7 @@ def merge_alike(parts: Sequence[Part]) -> list[Part]:
 
 
 def merge_parts(a: Part, b: Part) -> Part | None:
-    """Merge two parts of the same planes side by side.
-
-    Returns None where they differ or lie otherwise.
-    """
+    """Merge two parts of the same planes side by side, or return None."""
     if (
         a.type != b.type
         or len(a.pieces) > 1
@@ -73,10 +65,7 @@ def merge_parts(a: Part, b: Part) -> Part | None:
 
 
 def match_parts(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
-    """Return for each true part the index of the fitted one, -1 for none.
-
-    They are matched at plan points (n, 2).
-    """
+    """Return for each true part the index of the fitted one at places (n, 2), or -1."""
     tops = [np.argmax([part.height_at(xy) for part in parts], axis=0) for parts in (truth, fit)]
     common = np.zeros((len(truth), len(fit)))
     np.add.at(common, tuple(tops), 1.0)
@@ -89,10 +78,7 @@ def match_parts(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> l
 
 
 def has_hidden_end(part: Part, other_parts: Sequence[Part]) -> bool:
-    """Return whether an end of `part` lies under or in other roofs.
-
-    Ends are those of its length.
-    """
+    """Return whether an end of the length of `part` lies under or in other roofs."""
     if "length" not in part.parameters or len(part.pieces) > 1 or not other_parts:
         return False
     along = np.array([math.cos(part.kappa), math.sin(part.kappa)])

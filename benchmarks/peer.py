@@ -59,10 +59,7 @@ STEADY = WHOLE + "start = used(); run(); tell(start)"
 
 
 def measure_process(script: str, inputs: tuple[list[str], str, str]) -> list[float]:
-    """Measure CPU seconds, wall seconds and peak memory (MB) of a process.
-
-    It is fresh, and reports them itself.
-    """
+    """Measure CPU seconds, wall seconds and peak memory (MB) of a fresh process."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT / "src"),

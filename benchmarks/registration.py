@@ -94,10 +94,7 @@ def find_row_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.nda
 def iterate_trials(
     kind: str, polygons: Polygons, distance: float, parity: str | None
 ) -> Iterator[Trial]:
-    """Yield rows as a run sees them, and the vector of the shift.
-
-    It is that of the house in question.
-    """
+    """Yield rows as a run sees them, and the vector by which a house is off."""
     outlines = Outlines(polygons)
     rows = [numbers.tolist() for numbers in outlines.members]
     for number, members in enumerate(rows):

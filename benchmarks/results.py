@@ -35,7 +35,6 @@ ORDER = (
     "compounds",
     "curved",
     "overhangs",
-    "installations",
     "bare_ground",
     "registration",
     "verdict",

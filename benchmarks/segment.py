@@ -49,10 +49,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Opinion:
-    """The answers of network and fit on one building.
-
-    `bics` are of the fit to the points the network calls roof.
-    """
+    """Answers of the network, and of the fit to the points that it calls roof."""
 
     network: dict[str, float]
     bics: dict[str, float]
@@ -67,10 +64,7 @@ class Opinion:
 
 
 def collect_opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
-    """Collect the answers of the network alone, the fit alone, and both.
-
-    The fit alone takes all points; the evidence is that of the fit to the network's roof points.
-    """
+    """Collect the answers of the network alone, the fit alone, and both."""
     recognition = segment(points, Settings().replace({"fit": {"types": types}}))
     from_all, informed = fit_or_none(points, types), fit_or_none(points, types, recognition.weights)
     bics, n_used = (informed.bics, informed.points_used) if informed else ({}, 0)
@@ -89,10 +83,7 @@ def fit_or_none(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray 
 def simulate_samples(
     count: int, density: float, seed: int = TEST_SEED
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield (type, points) of `count` buildings at one density.
-
-    All of the scanner's defects are in them.
-    """
+    """Yield (type, points) of `count` buildings at one density."""
     for index in range(count):
         rng = np.random.default_rng([seed, int(10 * density), index])
         points, _, type = training_sample(
@@ -102,10 +93,7 @@ def simulate_samples(
 
 
 def calibrate(count: int) -> None:
-    """Print the combination's balanced accuracy over exponents.
-
-    They are those of the evidence, on buildings of another seed.
-    """
+    """Print the combination's balanced accuracy over exponents of the evidence."""
     for density in (1.0, 2.0, 5.0, 10.0):
         opinions = [
             (truth, collect_opinion(points))

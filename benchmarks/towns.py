@@ -2,16 +2,14 @@
 
 usage: python -m benchmarks.towns [--town essen nrw_5657 denhaag vienna rotterdam delft_5907]
            [--density 5] [--without-footprints] [--every K] [--parity even|odd] [--most N]
-           [--worst N] [--save DIR] [--composed-truth]
+           [--worst N] [--save DIR]
 
 A building is the solids of one CityJSON building (its parts with it) whose grounds touch; those of
 30 m2 or more are scanned one by one (generator seeded by the id, no gaps in the cloud) and
 reconstructed under their true ground outline, or without it. `wireframe.py` compares corners, edges
 and faces of the written models with the true ones. `--every` takes each k-th building, `--parity`
 those at even or odd places, `--most` draws so many by chance, always the same ones.
-`--composed-truth` judges the true roof faces themselves, composed as one shell a building: towns
-draw the parts of a building one by one, and where their steps cross a single shell has other edges,
-so that this is about the best there is. Every figure comes for all buildings and by footprint area,
+Every figure comes for all buildings and by footprint area,
 pooled and as the mean over buildings (see `wireframes.py`). Without `--town` the first three towns
 are taken: all buildings of Vienna are dear. Vienna's are perimeter blocks, Rotterdam's rows with
 surfaces that are not closed, Delft's machine-made with many short edges. `--save` keeps for each
@@ -22,13 +20,11 @@ are the CPU time of `reconstruct`, recognition and quality included.
 from __future__ import annotations
 
 import json
-import math
 import tempfile
 import time
 import traceback
 import zlib
 from collections import defaultdict
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,10 +32,7 @@ import numpy as np
 import shapely
 
 from hiproof import reconstruct
-from hiproof.compose import compose
-from hiproof.frames import LocalFrame
-from hiproof.geometry.rings import ring_normal
-from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Roof, Solid
+from hiproof.model import GROUND, Building, Solid
 from hiproof.read.solids import read_solids
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
@@ -67,26 +60,19 @@ TOWNS = {
 }
 USUAL = ("essen", "nrw_5657", "denhaag")
 SMALLEST_M2 = 30.0
-STEEPEST = 0.1  # cosine of the slope: 84 degrees
 TOUCH_M = 0.01
 
 
 @dataclass(frozen=True)
 class TrueBuilding:
-    """Solids that touch each other, and the union of their grounds (world).
-
-    They are kept by the ids of their city objects.
-    """
+    """Solids that touch, by the ids of their city objects, and the union of their grounds."""
 
     id: str
     solids: dict[str, Solid]
     footprint: shapely.Polygon
 
     def scan_points(self, density: float) -> np.ndarray:
-        """Scan points (n, 3) of the building by itself, ground left out.
-
-        They are always the same for one id.
-        """
+        """Scan points (n, 3) of the building without ground, always the same for one id."""
         rng = np.random.default_rng(zlib.crc32(self.id.encode()))
         cloud = scan_solids(
             list(self.solids.values()), rng, ScanSettings(density=density, defects=Defects.none())
@@ -95,10 +81,7 @@ class TrueBuilding:
 
 
 def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding]:
-    """Read the buildings of a CityJSON file with a large enough ground.
-
-    It is `smallest_m2` or more; buildings come in the order of their ids.
-    """
+    """Read the buildings of a CityJSON file with a ground of `smallest_m2` or more."""
     objects = json.loads(path.read_text(encoding="utf-8"))["CityObjects"]
     solids = defaultdict(dict)
     for name, solid in read_solids(path):
@@ -108,10 +91,7 @@ def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding
 
 
 def group_touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
-    """Group the solids of one building that touch.
-
-    They are several buildings where their grounds lie apart.
-    """
+    """Group the solids of one building whose grounds touch."""
     grounds = {name: find_ground(solid) for name, solid in solids.items()}
     joined = shapely.union_all(
         [ground.buffer(TOUCH_M, join_style="mitre") for ground in grounds.values()]
@@ -149,10 +129,7 @@ def find_ground(solid: Solid) -> shapely.Geometry:
 def choose_buildings(
     buildings: list, step: int = 1, parity: str | None = None, limit: int | None = None
 ) -> list:
-    """Choose every k-th of `buildings`, or even or odd ones, in order.
-
-    At most so many are drawn by a fixed chance.
-    """
+    """Choose each k-th, even or odd places, and at most so many by a fixed chance."""
     buildings = buildings[::step]
     buildings = buildings if parity is None else buildings[("even", "odd").index(parity) :: 2]
     if limit is None or limit >= len(buildings):
@@ -164,10 +141,7 @@ def choose_buildings(
 
 
 def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:
-    """Write the city objects of `buildings` from the CityJSON file `source`.
-
-    Those with several become parts of one object.
-    """
+    """Write the city objects of `buildings` from the CityJSON file `source`."""
     city = json.loads(source.read_text(encoding="utf-8"))
     objects, city["CityObjects"] = city["CityObjects"], {}
     for building in buildings:
@@ -185,10 +159,7 @@ def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None
 
 
 def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) -> None:
-    """Write models and points of a town as `hiproof reconstruct` does.
-
-    `hiproof report` and docs/draw_roofs.py read them.
-    """
+    """Write models and points of a town as `hiproof reconstruct` does."""
     folder.mkdir(parents=True, exist_ok=True)
     write_all(folder, models)
     cloud = folder / "points.xyz"
@@ -199,10 +170,7 @@ def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) ->
 def model_all(
     buildings: list[TrueBuilding], points: list[np.ndarray], with_footprint: bool
 ) -> tuple[list[Building], list[float]]:
-    """Reconstruct every building, and return the CPU seconds of each.
-
-    A bug costs one building, and is shown.
-    """
+    """Reconstruct every building; return the CPU seconds of each. A bug costs one."""
     models, seconds = [], []
     for k in (0, *range(len(buildings))):  # the first one twice: it loads what is compiled
         outline = buildings[k].footprint if with_footprint else None
@@ -214,33 +182,6 @@ def model_all(
             models.append(Building(buildings[k].id, Status.INTERNAL_ERROR))
         seconds.append(time.process_time() - started)
     return models[1:], seconds[1:]
-
-
-def compose_truth(building: TrueBuilding) -> Building:
-    """Return the true roof faces as one shell. It has the score of a perfect reconstruction."""
-    frame = LocalFrame(
-        np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0)
-    )
-    solids = [solid.move(-frame.origin) for solid in building.solids.values()]
-    parts = tuple(Part("free", (piece,)) for solid in solids for piece in make_roof_pieces(solid))
-    roof = Roof(parts, shapely.transform(building.footprint, frame.to_local), frame)
-    solid = compose(roof, min(float(solid.vertices[:, 2].min()) for solid in solids))
-    return Building(building.id, Status.MODELLED, built=Model(roof, solid.move(frame.origin)))
-
-
-def make_roof_pieces(solid: Solid) -> Iterator[Piece]:
-    """Yield a piece for each polygon of the roof's faces. Upright ones have none."""
-    for face in solid.select_faces(ROOF):
-        ring = solid.vertices[list(face.rings[0])]
-        centre = ring.mean(axis=0)
-        normal = ring_normal(ring)
-        if normal[2] < STEEPEST * np.linalg.norm(normal):
-            continue
-        a, b = -normal[:2] / normal[2]
-        outer, *holes = (solid.vertices[list(other), :2] for other in face.rings)
-        for polygon in shapely.get_parts(shapely.make_valid(shapely.Polygon(outer, holes))):
-            if polygon.geom_type == "Polygon" and polygon.area > 1e-3:
-                yield Piece(polygon, np.array([[a, b, centre[2] - a * centre[0] - b * centre[1]]]))
 
 
 def judge_models(
@@ -262,10 +203,7 @@ def judge_models(
 
 
 def read_share(model: Building) -> float:
-    """Return the share of the points within 0.2 m of the roof.
-
-    It is 0 where there is no model or no measurement.
-    """
+    """Return the share of points within 0.2 m of the roof, 0 without a model."""
     return float(np.nan_to_num(model.quality.share_within_20cm)) if model.solid is not None else 0.0
 
 
@@ -276,7 +214,6 @@ def main() -> None:
     parser.add_argument("--without-footprints", action="store_true")
     parser.add_argument("--every", type=int, default=1, help="take each k-th building")
     parser.add_argument("--save", type=Path, help="keep a run and the truth of each town here")
-    parser.add_argument("--composed-truth", action="store_true", help="judge the true roofs")
     a = parser.parse_args()
     with (
         FigureTable(a.record, "town", *COLUMNS) as table,
@@ -285,10 +222,7 @@ def main() -> None:
         for town in a.town:
             buildings = choose_buildings(read_town(TOWNS[town]), a.every, a.parity, a.most)
             points = [building.scan_points(a.density) for building in buildings]
-            if a.composed_truth:
-                models, seconds = [*map(compose_truth, buildings)], [math.nan] * len(buildings)
-            else:
-                models, seconds = model_all(buildings, points, not a.without_footprints)
+            models, seconds = model_all(buildings, points, not a.without_footprints)
             folder = (a.save or Path(temporary)) / town
             write_run(folder, models, points)
             scores = judge_models(town, buildings, models, seconds, folder)

@@ -47,10 +47,10 @@ from hiproof.model import ROOF, WALL, Building, Model, Solid
 from hiproof.status import Grade
 
 from .tables import FigureTable, make_parser
-from .towns import STEEPEST
 from .verdict_cases import PLACES, Case, iterate_cases
 
 SOUND_RMSE_M = 0.2
+STEEPEST = 0.1  # cosine of the slope: 84 degrees
 LEVEL_M, LEVEL_M2, LEVEL_SHARE, LEVEL_WIDTH_M = 0.5, 2.0, 0.02, 1.0
 RASTER_M, MOST_PLACES = 0.25, 6000
 AREAS_M2 = (0.0, 80.0, 200.0, np.inf)
@@ -75,12 +75,7 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """A case with its model, and how wrong the model is.
-
-    It has the RMSE (m) of the surface, and the number of wrong levels.
-
-    `evidence` is what the verdict is found by: model, points (n, 3) and unused points (m, 3).
-    """
+    """A case, what its verdict is found by, its RMSE (m) and number of wrong levels."""
 
     block: Block
     id: str
@@ -115,12 +110,7 @@ def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
 
 
 def compute_heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
-    """Return the height (n,) of the highest polygon at `xy` (n, 2).
-
-    It is NaN where there is none.
-
-    Upright polygons do not count.
-    """
+    """Return the height (n,) of the highest sloping polygon at `xy` (n, 2), or NaN."""
     z = np.full(len(xy), -np.inf)
     for rings in polygons:
         normal, centre = ring_normal(rings[0]), rings[0].mean(axis=0)
@@ -135,10 +125,7 @@ def compute_heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 
 
 def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
-    """Compare the true and the model's surface.
-
-    Returns the RMSE (m), and how many levels are missing or wrong.
-    """
+    """Return the RMSE (m) between two surfaces, and the number of wrong levels."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.move(-origin) for solid in case.solids], [building.solid.move(-origin)]
     area, seen_area = shapely.transform(
@@ -173,10 +160,7 @@ def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
 
 
 def find_patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
-    """Count patches of a raster that are large enough for a level.
-
-    They are LEVEL_WIDTH_M wide and `least_m2` large; the raster is (rows, columns).
-    """
+    """Count patches of a raster that are LEVEL_WIDTH_M wide and `least_m2` large."""
     width = max(2, round(LEVEL_WIDTH_M / step))
     wide = ndimage.binary_opening(np.pad(is_off, width), np.ones((width, width)))
     labels, count = ndimage.label(wide)
@@ -198,10 +182,7 @@ def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
 
 
 def judge_block(block: Block, folder: Path | None = None) -> list[CaseOutcome]:
-    """Reconstruct and compare the cases of a block, or read them from `folder`.
-
-    A building without a model is left out.
-    """
+    """Reconstruct and compare the cases of a block, or read them from `folder`."""
     path = folder / block.file_name if folder else None
     if path and path.exists():
         return pickle.loads(path.read_bytes())

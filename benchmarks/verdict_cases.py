@@ -63,10 +63,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Scene:
-    """Points (n, 3) and the footprint of a building, changed by a defect.
-
-    `asked` is the true area asked for.
-    """
+    """Points (n, 3) and footprint, changed by a defect, and the true area asked for."""
 
     points: np.ndarray
     footprint: shapely.Polygon
@@ -218,10 +215,7 @@ def take_from_town(
 
 
 def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
-    """Yield number, truth and scanner of buildings of a source.
-
-    They are at most so many, evenly chosen, as many even as odd ones.
-    """
+    """Yield number, truth and scanner of at most so many buildings."""
     if source == "compounds":
         yield from ((seed, *simulate_compound(seed)) for seed in range(limit))
         return
@@ -232,10 +226,7 @@ def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuildi
 
 
 def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
-    """Return the true area as far as it has points.
-
-    It reaches half a distance between points around them, gaps between them closed.
-    """
+    """Return the true area as far as it has points, with gaps closed."""
     spacing, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
     spacing = max(spacing, (scene.asked.area / max(len(points), 1)) ** 0.5)
     seen_area = (

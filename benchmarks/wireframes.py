@@ -61,10 +61,7 @@ class WireframeCounts:
 
 @dataclass(frozen=True)
 class Score:
-    """One building: counts, footprint area, CPU time, parts, and share.
-
-    The share is that of its points within 0.2 m.
-    """
+    """Counts, footprint area, CPU time, parts and share within 0.2 m of one building."""
 
     id: str
     counts: WireframeCounts
@@ -75,10 +72,7 @@ class Score:
 
 
 def compute_f1(right: int, n_drawn: int, true: int, n_found: int | None = None) -> float:
-    """Return F1 (%) of `right` among drawn and found ones.
-
-    Found ones, by default `right`, are among `true`.
-    """
+    """Return F1 (%) of `right` among drawn ones, and of found among true ones."""
     precision, recall = (
         right / max(n_drawn, 1),
         (right if n_found is None else n_found) / max(true, 1),

@@ -24,10 +24,7 @@ SETS = ("stbarth", "ctview")
 
 
 def model_found(name: str) -> tuple[list[tuple[Building, float]], float]:
-    """Reconstruct every building found in the set's cloud, and time it.
-
-    Returns also the seconds in which they were found.
-    """
+    """Reconstruct every building found in a cloud; return all seconds, too."""
     cloud = read_points(*sorted((SHARED / "data" / name).glob("*.laz")))
     outcomes, started = [], time.process_time()
     buildings = split_buildings(cloud)

@@ -1,6 +1,5 @@
 """Heights from attributes stand in for points that are missing, and count after everything else."""
 
-import doctest
 import json
 
 import numpy as np
@@ -12,7 +11,6 @@ from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, SettingsError
-from hiproof.parametric import fallback
 from hiproof.parametric.building import build
 from hiproof.parametric.run import build_file
 from hiproof.settings import Settings
@@ -127,7 +125,3 @@ def test_bad_columns_are_refused_in_a_sentence(files, tmp_path):
         run(cloud, footprints, tmp_path / "a", fallback_roof_height="+hight")
     with pytest.raises(SettingsError, match="only --fallback-roof-height takes"):
         run(cloud, footprints, tmp_path / "b", fallback_ground_height="+ground")
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(fallback).failed == 0

@@ -3,7 +3,6 @@ buildings alone.
 """
 
 import dataclasses
-import doctest
 import json
 
 import numpy as np
@@ -14,7 +13,6 @@ import shapely
 import hiproof
 from hiproof.city import run as city_run
 from hiproof.city.folder.ledger import Ledger
-from hiproof.city.plan import table_values
 from hiproof.city.plan.overrides import table_records
 from hiproof.city.work import solve
 from hiproof.city.work.noted import noted_file, save_run_boxes
@@ -41,10 +39,6 @@ def gable_scan():
 
 def override(scanned, **said):
     return overridden(read_override({"id": "a", **said}), *scanned, settings=PLAIN, id="a")
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(table_values).failed == 0
 
 
 def test_a_type_is_obeyed_and_the_rest_fitted(gable_scan):

@@ -2,7 +2,6 @@
 feet again.
 """
 
-import doctest
 import json
 import warnings
 
@@ -16,8 +15,6 @@ import shapely
 from lxml import etree
 from rasterio.transform import from_origin
 
-import hiproof.frames
-import hiproof.write.naming
 import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
@@ -88,12 +85,6 @@ def lengths(building):
 @pytest.fixture(scope="module")
 def in_metres(tmp_path_factory):
     return run(tmp_path_factory.mktemp("units") / "metres", METRES, "EPSG:7415", "EPSG:28992")
-
-
-def test_examples_in_the_docstrings_run():
-    assert (
-        doctest.testmod(hiproof.frames).failed == doctest.testmod(hiproof.write.naming).failed == 0
-    )
 
 
 @pytest.mark.parametrize("units", [METRES, FEET, MIXED])

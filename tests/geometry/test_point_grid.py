@@ -1,12 +1,9 @@
 """Points found through the grid are exactly those a point-by-point test finds."""
 
-import doctest
-
 import numpy as np
 import pytest
 import shapely
 
-import hiproof.geometry.point_grid
 from hiproof.geometry.point_grid import PointGrid, assign_points
 from hiproof.model import Footprint
 
@@ -62,7 +59,3 @@ def test_no_points_and_no_polygon_find_nothing():
         0,
     ]
     assert len(PointGrid(np.ones((4, 2))).inside(shapely.box(1e6, 1e6, 1e6 + 1, 1e6 + 1))) == 0
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.geometry.point_grid).failed == 0

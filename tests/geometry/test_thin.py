@@ -1,11 +1,8 @@
 """Points put into cells and counted once: the compiled loops against NumPy's own functions."""
 
-import doctest
-
 import numpy as np
 import pytest
 
-import hiproof.geometry.thin
 from hiproof.geometry.thin import cell_range, occupied_cells, rank_in_cells, without_repeats
 
 
@@ -54,7 +51,3 @@ def test_one_point_a_cell_equals_the_plain_loop(spread, cell_m):
 def test_the_range_of_cells_holds_all_points():
     xy = np.array([[-0.5, 3.9], [8.0, 4.0]])
     assert cell_range(xy, 4.0) == ((-1, 0), (4, 2))
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.geometry.thin).failed == 0

@@ -1,20 +1,11 @@
 """CRSs are compared in plan, named for CityGML and combined with heights."""
 
-import doctest
-
 import pytest
 from pyproj import CRS
 
-import hiproof.read.columns
-import hiproof.read.crs
 from hiproof.errors import InputError
 from hiproof.read.crs import combine, find_units, parse_crs, same_horizontal, vertical_crs
 from hiproof.write.naming import srs_name
-
-
-@pytest.mark.parametrize("module", [hiproof.read.crs, hiproof.read.columns])
-def test_examples_in_the_docstrings_run(module):
-    assert doctest.testmod(module).failed == 0
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 never lost.
 """
 
-import doctest
 import json
 
 import numpy as np
@@ -11,8 +10,6 @@ import pytest
 import shapely
 from pyproj import CRS, Transformer
 
-import hiproof.read.attribute_columns
-import hiproof.read.polygons
 from hiproof.city.plan.overlap import check_overlap
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
@@ -49,11 +46,6 @@ def write(path, geometries, crs="EPSG:28992", **fields):
 
 def shift(polygon, x):
     return shapely.transform(polygon, lambda xy: xy + [x, 0])
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.polygons).failed == 0
-    assert doctest.testmod(hiproof.read.attribute_columns).failed == 0
 
 
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])

@@ -1,6 +1,5 @@
 """Attributes that pyogrio cannot read pass through as text, in one remark, and refuse no file."""
 
-import doctest
 import json
 import sqlite3
 
@@ -9,7 +8,6 @@ import pyogrio
 import pytest
 import shapely
 
-import hiproof.read.features
 from hiproof.city.plan.prepare import say_if_columns_run_out
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
@@ -40,10 +38,6 @@ def read_values(path, name, **options):
     return [footprint.attributes.get(name) for footprint in footprints], [
         str(remark.message) for remark in remarks
     ]
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.features).failed == 0
 
 
 ODD = {

@@ -2,14 +2,11 @@
 height is read.
 """
 
-import doctest
-
 import numpy as np
 import pytest
 import rasterio
 from rasterio.transform import Affine, from_origin
 
-import hiproof.read.raster_checks
 from hiproof.errors import DamagedRaster, InputError, InputWarning
 from hiproof.frames import Units
 from hiproof.read import read_terrain
@@ -64,10 +61,6 @@ def write(
 
 def read_height(path, **asked):
     return read_terrain(path, **asked).height_at(PLACE)[0]
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.raster_checks).failed == 0
 
 
 @pytest.mark.parametrize(

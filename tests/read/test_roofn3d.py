@@ -1,12 +1,9 @@
 """RoofN3D's two files, made small here in their exact layout, come back whole and once."""
 
-import doctest
-
 import numpy as np
 import pytest
 import shapely
 
-import hiproof.read.roofn3d
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.roofn3d import read_roofn3d, read_roofn3d_labels
 
@@ -92,10 +89,6 @@ def test_a_field_of_megabytes_and_empty_fields_are_read(tmp_path):
     )
     records = list(read_roofn3d(path))
     assert [len(r.points) for r in records] == [50_000, 0, 0] and records[1].outline.is_empty
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.roofn3d).failed == 0
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 above.
 """
 
-import doctest
 import itertools
 import json
 import sqlite3
@@ -13,7 +12,6 @@ import pyogrio
 import pytest
 import shapely
 
-import hiproof.read.wkb
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.read.polygons import is_surface, simple_polygons
@@ -94,10 +92,6 @@ KINDS = {
     ),
 }
 """(WKB, areas from above) by name."""
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.read.wkb).failed == 0
 
 
 def write(path, declared, *geometries):

@@ -2,7 +2,6 @@
 its source.
 """
 
-import doctest
 import pickle
 
 import numpy as np
@@ -11,7 +10,6 @@ import rasterio
 from pyproj import Transformer
 from rasterio.transform import from_origin
 
-import hiproof.geometry.thin
 from hiproof.errors import InputError
 from hiproof.geometry.thin import thin_to_grid
 from hiproof.read import raster
@@ -53,10 +51,6 @@ def inside(count=200, seed=1, margin=1.0):
 def ground(count=4000, seed=2):
     xy = np.random.default_rng(seed).uniform([WEST, NORTH - 40], [WEST + 60, NORTH], (count, 2))
     return np.column_stack([xy, plane(xy)])
-
-
-def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.geometry.thin).failed == 0
 
 
 def test_a_raster_is_interpolated_between_pixel_centres(tmp_path):

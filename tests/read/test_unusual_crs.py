@@ -1,6 +1,5 @@
 """Any CRS definition is understood, or its unit and axes are, or it is refused in one sentence."""
 
-import doctest
 import struct
 
 import laspy
@@ -12,8 +11,6 @@ import shapely
 from laspy.vlrs.vlr import VLR
 from pyproj import CRS
 
-import hiproof.read.axes
-import hiproof.read.geokeys
 from hiproof.city.plan.frame import settle_frame
 from hiproof.city.plan.prepare import read_headers
 from hiproof.city.run import Request
@@ -174,11 +171,6 @@ REFUSED = {
     ),
 }
 """(definition, what the sentence must name)."""
-
-
-def test_examples_in_the_docstrings_run():
-    for module in (hiproof.read.axes, hiproof.read.geokeys):
-        assert doctest.testmod(module).failed == 0
 
 
 @pytest.mark.parametrize("kind", [*UNDERSTOOD, *LOCAL])
