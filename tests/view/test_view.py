@@ -23,7 +23,7 @@ from hiproof.errors import HiproofError, InputError, InputWarning, OutputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
 from hiproof.view.server import ViewHandler, make_server, render_page
 from hiproof.write import files
-from hiproof.write.colours import SUN_STOPS, UNKNOWN_COLOUR, srgb
+from hiproof.write.colours import SUN_STOPS, UNKNOWN_COLOUR, page_colours, srgb
 from hiproof.write.meshes.tiles import write_models
 from hiproof.write.meshes.viewed import ViewedModel
 from pages import BROWSER, needs_browser
@@ -212,6 +212,28 @@ def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
         rgb = 255 * np.array(srgb(colour))
         assert np.allclose(say["sun"][str(row)]["roof"], rgb, atol=2.0)
         assert say["sun"][str(row)]["other"] == say["types"][str(row)]["other"]
+
+
+@needs_browser
+def test_roofs_have_the_colours_of_an_update_where_one_is_told(serving, tmp_path):
+    changes = [{"hiproof_change": "changed"}, {}, {"hiproof_change": "uncertain"}]
+    models = [
+        ViewedModel(id, kind, solid, told, {0: kind})
+        for (id, (kind, solid)), told in zip(SOLIDS.items(), changes, strict=False)
+    ]
+    with pytest.warns(UserWarning, match="no CRS"):
+        write_models(tmp_path / "a.3dtiles", models)
+    page = render_page("run").replace("</body>", SUN.replace('"sun"', '"change"') + "</body>")
+    text = render_document(page, tmp_path / "a.3dtiles", serving, tmp_path / "profile")
+    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
+    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
+    say = json.loads(answer[1])
+    expected = [told.get("hiproof_change") for told in changes[: len(models)]]
+    named = {name for name in expected if name} | {"unchanged"}
+    assert set(say["legend"].split()) == named and say["back"] == say["types"]
+    for row, name in enumerate(expected):
+        rgb = 255 * np.array(srgb(page_colours()["change"][name or "unchanged"]))
+        assert np.allclose(say["sun"][str(row)]["roof"], rgb, atol=2.0)
 
 
 @needs_browser

@@ -14,12 +14,10 @@ import shapely
 from ..status import Change, Status
 from ..write.attribute_list import OWN
 from ..write.colours import (
-    CHANGE_COLOURS,
     GRADE_COLOURS,
     NO_MODEL,
     STATUS_COLOURS,
     SURVEY_COLOURS,
-    UNCHANGED_COLOUR,
     page_colours,
 )
 from ..write.meshes.page_mesh import pack_values, solid_mesh
@@ -46,8 +44,7 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     return {
         "buildings": buildings,
         "colours": page_colours()
-        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "surveys": SURVEY_COLOURS}
-        | {"change": {UNCHANGED: UNCHANGED_COLOUR, **CHANGE_COLOURS}},
+        | {"status": STATUS_COLOURS, "quality": GRADE_COLOURS, "surveys": SURVEY_COLOURS},
         "types": types,
         "mesh": mesh_data(run, types, origin),
         "points": point_data(run, origin),

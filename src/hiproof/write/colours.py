@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..primitives.catalogue import CATALOGUE
+from ..status import Change
 
 OTHER = "other"
 ROOF_COLOURS = {
@@ -104,6 +105,7 @@ def page_colours() -> dict[str, Any]:
         "unknown": UNKNOWN_COLOUR,
         "residual": [list(stop) for stop in RESIDUAL_STOPS],
         "sun": [list(stop) for stop in SUN_STOPS],
+        "change": {Change.UNCHANGED.code: UNCHANGED_COLOUR, **CHANGE_COLOURS},
     }
 
 

@@ -33,35 +33,47 @@ function lineOf({ type, parameters }, number, told) {
 function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
 
 let sky = "";
+const changes = new Set(["unchanged"]);  // classes of buildings in view
+const MODES = { sun: "sun on roofs", change: "change" };  // beside the roof type
 
-// The irradiation of a roof in a year, kWh/m2, null where `hiproof enrich --sun` did not tell it.
-function sunOf(tile, row) {
-  tile.suns ||= [];
-  if (tile.suns[row] === undefined) {
+// What a row tells beside the type: the irradiation of its roof in a year (kWh/m2) where `hiproof enrich --sun` ran,
+// and its class in an update; null where unknown.
+function toldOf(tile, row) {
+  tile.told ||= [];
+  if (tile.told[row] === undefined) {
     const values = Object.fromEntries(tile.table.row(row).map(({ name, value }) => [name, value]));
     const area = values.hiproof_flat_roof_area_m2 + values.hiproof_sloped_roof_area_m2;
     sky = values.hiproof_sun_sky || sky;
-    tile.suns[row] = values.hiproof_roof_sun_kwh > 0 && area > 0 ? values.hiproof_roof_sun_kwh / area : null;
+    const sun = values.hiproof_roof_sun_kwh > 0 && area > 0 ? values.hiproof_roof_sun_kwh / area : null;
+    tile.told[row] = { sun, change: values.hiproof_change || null };
   }
-  return tile.suns[row];
+  return tile.told[row];
 }
 
-function sunColour(tile, row) {
-  const sun = sunOf(tile, row);
-  return rgb(sun === null ? colours.unknown : colourByStops(colours.sun, sun));
-}
+const colourBy = {
+  sun: ({ sun }) => sun === null ? colours.unknown : colourByStops(colours.sun, sun),
+  change: ({ change }) => colours.change[change || "unchanged"],
+};
 
 function colourRoofs() {
-  const isSun = document.getElementById("mode").value === "sun";
-  scene.recolourRoofs(isSun ? sunColour : null);
-  if (isSun) showLegend(colours.sun.map(([from, colour]) => [`from ${from} kWh/m²${sky ? ` (${sky})` : ""}`, colour]));
+  const mode = document.getElementById("mode").value, colour = colourBy[mode];
+  scene.recolourRoofs(colour ? (tile, row) => rgb(colour(toldOf(tile, row))) : null);
+  if (mode === "sun") showLegend(colours.sun.map(([from, colour]) => [`from ${from} kWh/m²${sky ? ` (${sky})` : ""}`, colour]));
+  else if (mode === "change") showLegend(Object.entries(colours.change).filter(([name]) => changes.has(name)));
   else showTypes();
 }
 
+// Offer the modes that a row tells of.
+function offer(told) {
+  if (told.change) changes.add(told.change);
+  const select = document.getElementById("mode"), offered = Array.from(select.options, option => option.value);
+  for (const name in MODES) if (told[name] !== null && !offered.includes(name)) select.append(new Option(MODES[name], name));
+  document.getElementById("colour-by").hidden = select.options.length === 1;
+}
+
 function legend(tile) {
-  const control = document.getElementById("colour-by");
-  for (let row = 0; control.hidden && row < tile.table.count; row++) control.hidden = sunOf(tile, row) === null;
   for (let row = 0; row < tile.table.count; row++) {
+    offer(toldOf(tile, row));
     const told = tile.table.row(row), whole = [{ type: told.find(({ name }) => name === "type").value }];
     for (const { type } of told.map(partsOf).find(Boolean) || whole) {
       const entry = entryOf(colours, type);
