@@ -35,6 +35,7 @@ PACKAGES = {
     "psycopg": "postgis",
     "ifcopenshell": "ifc",
     "ezdxf": "dxf",
+    "rhino3dm": "rhino",
     "trimesh": "trimesh",
     "pyvista": "pyvista",
     "geopandas": "geopandas",
@@ -44,7 +45,8 @@ PACKAGES = {
     "pvlib": "sun",
 }
 
-CONVERSIONS = {"ifc", "dxf", "trimesh", "pyvista", "geopandas", "sun"}  # what no run asks for
+# what no run asks for
+CONVERSIONS = {"ifc", "dxf", "rhino", "trimesh", "pyvista", "geopandas", "sun"}
 
 # name: (package that is missing, TOML, further options)
 NEEDY = {

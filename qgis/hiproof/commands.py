@@ -11,6 +11,7 @@ FORMATS = {
     "3dtiles": "buildings.3dtiles",
     "ifc": "buildings.ifc",
     "dxf": "buildings.dxf",
+    "3dm": "buildings.3dm",
     "cityjson": "buildings.city.json",
     "citygml3": "buildings.citygml3.gml",
     "fgb": "buildings.fgb",

@@ -148,6 +148,11 @@ FORMATS = {
         what="DXF: 3D faces and outlines on layers, for CAD (extra `dxf`)",
         module="meshes.dxf",
     ),
+    "3dm": Format(
+        file="buildings.3dm",
+        what="meshes on layers, for Rhino and Grasshopper (extra `rhino`)",
+        module="meshes.rhino",
+    ),
 }
 CONVERTED = {name: format for name, format in FORMATS.items() if name != "parameters"}
 """What `hiproof convert` writes: the parameters are what it reads."""

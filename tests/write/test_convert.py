@@ -20,6 +20,7 @@ from hiproof.errors import InputError
 from hiproof.formats import CONVERTED, FORMATS
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
+from hiproof.write.colours import WALL_COLOUR, srgb
 from sample_parameters import write_parameters_of_each_kind
 
 SCHEMAS = Path(__file__).parents[3] / "shared" / "schemas"
@@ -58,6 +59,8 @@ def outputs(run, tmp_path_factory):
             reader("ifcopenshell")
         if name == "dxf":
             reader("ezdxf")
+        if name == "3dm":
+            reader("rhino3dm")
         path = folder / FORMATS[name].file
         if not path.exists():
             given = {"geoid_height": 43.2} if name == "3dtiles" else {}
@@ -178,9 +181,20 @@ def test_ifcopenshell_opens_valid_buildings(outputs, volumes):
     buildings = {building.Name: building for building in model.by_type("IfcBuilding")}
     assert list(buildings) == MODELLED
     for name, building in buildings.items():
-        shape = ifcopenshell.geom.create_shape(ifcopenshell.geom.settings(), building)
-        found = ifcopenshell.util.shape.get_volume(shape.geometry)
-        assert found == pytest.approx(volumes[name], rel=1e-6)
+        (contained,) = building.ContainsElements
+        elements, volume = contained.RelatedElements, 0.0
+        assert {element.is_a() for element in elements} == {"IfcRoof", "IfcWall", "IfcSlab"}
+        for element in elements:
+            shape = ifcopenshell.geom.create_shape(ifcopenshell.geom.settings(), element)
+            vertices = ifcopenshell.util.shape.get_vertices(shape.geometry)
+            faces = ifcopenshell.util.shape.get_faces(shape.geometry)
+            volume += np.linalg.det(vertices[faces]).sum() / 6
+            (style,) = shape.geometry.materials
+            if element.is_a("IfcWall"):
+                colour = [style.diffuse.r(), style.diffuse.g(), style.diffuse.b()]
+                assert colour == pytest.approx(srgb(WALL_COLOUR))
+        assert volume == pytest.approx(volumes[name], rel=1e-6)  # they close the solid
+    assert {roof.PredefinedType for roof in model.by_type("IfcRoof")} >= {"GABLE_ROOF"}
     properties = ifcopenshell.util.element.get_psets(buildings["yard"])["hiproof"]
     assert properties["year"] == 1905 and properties["rf_volume_lod22"] == pytest.approx(440.0)
     (conversion,), (crs,) = (
@@ -195,6 +209,24 @@ def test_ifc_in_feet_names_its_unit(run, tmp_path):
     convert(run, tmp_path / "a.ifc", crs="EPSG:2263+5703")
     text = (tmp_path / "a.ifc").read_text()
     assert "IFCMAPCONVERSIONSCALED" in text and "IFCCONVERSIONBASEDUNIT" in text
+
+
+def test_rhino3dm_opens_meshes_that_close_each_solid(outputs, volumes):
+    rhino = reader("rhino3dm")
+    document = rhino.File3dm.Read(str(outputs("3dm")))
+    layers = {layer.Index: layer.Name for layer in document.Layers}
+    found, kinds = dict.fromkeys(volumes, 0.0), set()
+    for item in document.Objects:
+        mesh, attributes = item.Geometry, item.Attributes
+        vertices = np.array([[p.X, p.Y, p.Z] for p in mesh.Vertices], float)
+        faces = np.array([mesh.Faces[k][:3] for k in range(len(mesh.Faces))])
+        found[attributes.Name] += np.linalg.det(vertices[faces]).sum() / 6
+        kinds.add(layers[attributes.LayerIndex])
+        assert dict(attributes.GetUserStrings())["id"] == attributes.Name
+    assert found == pytest.approx(volumes, rel=1e-4)  # of float32
+    assert kinds == {"RoofSurface", "WallSurface", "GroundSurface"}
+    assert document.Strings["origin"].startswith("84994 445996 ")
+    assert document.Strings["crs"] == "EPSG:7415"
 
 
 def open_sound_drawing(path):

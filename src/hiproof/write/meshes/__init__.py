@@ -7,6 +7,7 @@ obj          Wavefront OBJ
 stl          binary STL
 ifc          IFC4X3
 dxf          DXF, for CAD
+rhino        3DM, for Rhino
 tiles        3D Tiles 1.1
 page_mesh    a solid packed for a page's JavaScript
 """

@@ -19,7 +19,7 @@ import shapely
 
 from ...extras import import_extra
 from ...model import CEILING, GROUND, ROOF, WALL, Face
-from ..colours import GROUND_COLOUR, MARK_COLOUR, ROOF_COLOURS, WALL_COLOUR
+from ..colours import GROUND_COLOUR, ROOF_COLOURS, WALL_COLOUR
 from .triangles import faces_triangles
 from .viewed import ViewedModel
 
@@ -30,9 +30,11 @@ LAYERS = {
     WALL: WALL_COLOUR,
     GROUND: GROUND_COLOUR,
     CEILING: GROUND_COLOUR,
-    OUTLINE_LAYER: MARK_COLOUR,
-    BUILDING_ID_LAYER: MARK_COLOUR,
+    OUTLINE_LAYER: None,
+    BUILDING_ID_LAYER: None,
 }
+"""The colour of each layer; None is white on a dark background and black on a light one."""
+
 DRAWING_UNITS = {"metre": 6, "foot": 2, "US survey foot": 21}  # $INSUNITS; 0 is no unit
 INVISIBLE_EDGES = (1, 2, 8)  # bits of a 3DFACE whose fourth corner is its third
 TEXT_HEIGHT_M = 0.5  # of ids: legible beside a house on a plan at 1:500
@@ -71,7 +73,7 @@ def start_drawing(ezdxf: Any, crs: str | None) -> tuple[Any, float]:
     if crs is not None:
         document.header.custom_vars.append("CRS", crs)
     for name, colour in LAYERS.items():
-        document.layers.add(name, true_color=int(colour[1:], 16))
+        document.layers.add(name, true_color=colour and int(colour[1:], 16))
     return document, units.plan
 
 

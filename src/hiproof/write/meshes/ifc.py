@@ -1,6 +1,7 @@
 """IFC4X3: one IfcBuilding a model (needs ifcopenshell).
 
-It has a faceted body, a property set and the CRS of its site.
+It has a property set, and contains an IfcRoof for each part, an IfcWall and an IfcSlab. These are
+surfaces, which together close its solid.
 
 Coordinates are metres about an origin that IfcMapConversion places in the CRS. Names of properties
 are those of all other formats.
@@ -18,10 +19,10 @@ import numpy as np
 
 from ...extras import import_extra
 from ...frames import Units
-from ...model import Face
-from ..colours import srgb
+from ...model import CEILING, GROUND, ROOF, WALL, Face
+from ..colours import list_legend, srgb
 from ..naming import UniqueNames
-from .viewed import Look, ViewedModel, merge_values
+from .viewed import Look, ViewedModel, choose_look, merge_values
 
 IFC_SCHEMA = "IFC4X3"
 PROPERTY_SET = "hiproof"
@@ -31,6 +32,24 @@ NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
 BUILDING_SQUARE_M, TOWN_SQUARE_M = 1_000.0, 10_000.0
 FIXED_TIME = "2000-01-01T00:00:00"  # in place of the clock's, for files that do not depend on it
 PRECISION_M = 1e-4  # of coordinates, as all formats have them
+
+ELEMENTS = {
+    WALL: ("IfcWall", "NOTDEFINED"),
+    GROUND: ("IfcSlab", "BASESLAB"),
+    CEILING: ("IfcSlab", "NOTDEFINED"),
+}
+"""The element of a building that faces other than roofs belong to, and its predefined type."""
+
+IFC_ROOF_TYPES = {
+    "flat": "FLAT_ROOF",
+    "monopitch": "SHED_ROOF",
+    "gable": "GABLE_ROOF",
+    "hip": "HIP_ROOF",
+    "half hip": "HIPPED_GABLE_ROOF",
+    "mansard": "MANSARD_ROOF",
+    "pyramid": "PAVILION_ROOF",
+}
+"""Predefined types of IfcRoof by entry of the legend; the others are user-defined."""
 
 IFC_VALUES = {str: "IfcText", float: "IfcReal", int: "IfcInteger", bool: "IfcBoolean"}
 
@@ -99,38 +118,67 @@ class IfcModel:
             self.origin = np.floor(model.solid.vertices.min(axis=0))
         middle = (model.solid.vertices.min(axis=0) + model.solid.vertices.max(axis=0)) / 2
         key = self.keys.take(f"{model.id} {self.name_square(middle, BUILDING_SQUARE_M)}")
-        shape = self.make(
-            "IfcShapeRepresentation",
-            ContextOfItems=self.body,
-            RepresentationIdentifier="Body",
-            RepresentationType="Brep",
-            Items=[self.make_body(model)],
-        )
         building = self.make_rooted(
             "IfcBuilding",
             key,
             Name=model.id,
             ObjectType=model.roof_type,
-            ObjectPlacement=self.make(
-                "IfcLocalPlacement",
-                PlacementRelTo=self.placement,
-                RelativePlacement=self.placement.RelativePlacement,
-            ),
-            Representation=self.make("IfcProductDefinitionShape", Representations=[shape]),
+            ObjectPlacement=self.place(),
             CompositionType="ELEMENT",
         )
         self.buildings.append(building)
         self.add_properties(building, key, model)
+        self.make_rooted(
+            "IfcRelContainedInSpatialStructure",
+            key,
+            RelatedElements=self.make_elements(key, model),
+            RelatingStructure=building,
+        )
 
-    def make_body(self, model: ViewedModel) -> Any:
-        """Make the closed shell of a solid, coloured by kind and roof type."""
+    def place(self) -> Any:
+        return self.make(
+            "IfcLocalPlacement",
+            PlacementRelTo=self.placement,
+            RelativePlacement=self.placement.RelativePlacement,
+        )
+
+    def make_elements(self, key: str, model: ViewedModel) -> list[Any]:
+        """Make the roof of each part, the walls and the slabs of a building."""
         points = [self.point(place) for place in model.solid.vertices - self.origin]
-        faces = []
-        for look, members in model.faces_by_look().items():
-            for face in members:
-                faces.append(self.make_face(face, points))
-                self.make("IfcStyledItem", Item=faces[-1], Styles=[self.style(look)])
-        return self.make("IfcFacetedBrep", Outer=self.make("IfcClosedShell", CfsFaces=faces))
+        elements = []
+        for (kind, part), faces in model.faces_by_element().items():
+            roof_type = model.part_types.get(part, model.roof_type)
+            predefined = IFC_ROOF_TYPES.get(list_legend(roof_type), "USERDEFINED")
+            entity, predefined = ELEMENTS.get(kind) or ("IfcRoof", predefined)
+            elements.append(
+                self.make_rooted(
+                    entity,
+                    f"{key} {kind} {part}",
+                    Name=f"{kind} {part}" if kind == ROOF else kind,
+                    ObjectType=roof_type if kind == ROOF else None,
+                    ObjectPlacement=self.place(),
+                    Representation=self.make_surfaces(
+                        [self.make_face(face, points) for face in faces],
+                        choose_look(faces[0], model.part_types),
+                    ),
+                    PredefinedType=predefined,
+                )
+            )
+        return elements
+
+    def make_surfaces(self, faces: list[Any], look: Look) -> Any:
+        """Make the shape of an element."""
+        surfaces = self.make("IfcConnectedFaceSet", CfsFaces=faces)
+        item = self.make("IfcFaceBasedSurfaceModel", FbsmFaces=[surfaces])
+        self.make("IfcStyledItem", Item=item, Styles=[self.style(look)])
+        shape = self.make(
+            "IfcShapeRepresentation",
+            ContextOfItems=self.body,
+            RepresentationIdentifier="Body",
+            RepresentationType="SurfaceModel",
+            Items=[item],
+        )
+        return self.make("IfcProductDefinitionShape", Representations=[shape])
 
     def make_face(self, face: Face, points: list[Any]) -> Any:
         bounds = [

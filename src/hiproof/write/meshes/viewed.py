@@ -42,6 +42,14 @@ class ViewedModel(NamedTuple):
                 result.setdefault(choose_look(face, self.part_types), []).append(face)
         return result
 
+    def faces_by_element(self) -> dict[tuple[str, int], list[Face]]:
+        """Group the roof faces of each part, walls, grounds and ceilings, by kind and part."""
+        result: dict[tuple[str, int], list[Face]] = {}
+        for kind in (ROOF, WALL, GROUND, CEILING):
+            for face in self.solid.select_faces(kind):
+                result.setdefault((kind, face.part if kind == ROOF else 0), []).append(face)
+        return result
+
 
 def view_building(
     building: Building, attributes: dict[str, Any], units: Units, lods: Sequence[str] = ()
