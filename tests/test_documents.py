@@ -15,8 +15,8 @@ DOCUMENTS = [
     *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))
 ]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
-# by docs/generated.py, when the site is built
-MADE = ("commands.md", "settings.md", "constants.md")
+# by docs/generated.py and docs/demo_in_3d.py, when the site is built
+MADE = ("commands.md", "settings.md", "constants.md", "demo/index.html")
 COMMANDS = app.commands
 OPTIONS = {
     name
