@@ -7,6 +7,7 @@ import pytest
 import shapely
 
 import hiproof
+from gable_at_corner import CORNER, FOOTPRINT, LevelSite, gable_height
 from hiproof.cli.convert import convert_models
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
@@ -16,21 +17,9 @@ from hiproof.settings import Settings
 from hiproof.write.building_attributes import building_attributes, measure_figures
 from hiproof.write.meshes.stl import STL_TRIANGLE
 from hiproof.write.parameters import building_record
-from tiny_town import gable
 from written_run import require_valid_files, write_run
 
-CORNER = np.array([85000.0, 446000.0])
-FOOTPRINT = shapely.box(*CORNER, *(CORNER + [12, 8]))
 EAVES_M, GABLES_M, THICKNESS_M = 0.6, 0.4, 0.2
-
-
-class LevelStreet:
-    """Level terrain at -1 m."""
-
-    source = "level"
-
-    def height_at(self, xy):
-        return np.full(len(xy), -1.0)
 
 
 def make_settings(**reconstruct):
@@ -42,7 +31,7 @@ def scan(eaves=EAVES_M, gables=GABLES_M, density=8.0):
     """Points of a gable of 12 by 8 m whose roof reaches beyond its walls, and of ground around."""
     rng = np.random.default_rng(100)
     xy = rng.uniform((-3, -3), (15, 11), (round(18 * 14 * density), 2))
-    z = gable(xy[:, 0], xy[:, 1], 8.0, 12.0, 5.0, 3.0)
+    z = gable_height(xy)
     is_roof = (np.abs(xy - [6, 4]) <= [6 + gables, 4 + eaves]).all(axis=1)
     z = np.where(is_roof, z, -1.0) + rng.normal(0, 0.03, len(xy))
     return np.column_stack([xy + CORNER, z])
@@ -51,9 +40,7 @@ def scan(eaves=EAVES_M, gables=GABLES_M, density=8.0):
 def reconstruct(id="house", footprint=FOOTPRINT, neighbours=(), settings=None, **scanned):
     settings = make_settings() if settings is None else settings
     points = scan(**scanned)
-    return hiproof.reconstruct(
-        points, footprint, LevelStreet(), settings, id, neighbours=neighbours
-    )
+    return hiproof.reconstruct(points, footprint, LevelSite(), settings, id, neighbours=neighbours)
 
 
 def measure_sides(house):

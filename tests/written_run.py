@@ -1,6 +1,10 @@
 """The files of a run written of given buildings, and built again of their parameters."""
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
+from lxml import etree
 
 from hiproof.compose import check_solid
 from hiproof.formats import list_requested_files
@@ -11,6 +15,16 @@ from hiproof.write import FileHead, fragments, join_fragments
 from hiproof.write.naming import gml_name
 
 MODELS = (".gml", ".jsonl")
+SCHEMAS = Path(__file__).parents[2] / "shared/schemas"
+OF_CITYGML = {"buildings.gml": "citygml2", "buildings.citygml3.gml": "citygml3"}
+
+
+@cache
+def open_schema(name):
+    """The schema of a version of CityGML, None where ../shared has none."""
+    path = SCHEMAS / name / "CityGML.xsd"
+    parser = etree.XMLParser(no_network=True, huge_tree=True)
+    return etree.XMLSchema(etree.parse(path, parser)) if path.exists() else None
 
 
 def write_run(folder, buildings, write, crs="EPSG:7415"):
@@ -24,12 +38,16 @@ def write_run(folder, buildings, write, crs="EPSG:7415"):
 
 
 def require_valid_files(folder, buildings, write):
-    """Every shell of every file is valid, and `hiproof build` makes each file again."""
+    """Every shell of every file is valid, CityGML obeys its schema where ../shared has it, and
+    `hiproof build` makes each file again.
+    """
     for path in write_run(folder, buildings, write):
         if path.suffix in MODELS and path.name != "parameters.jsonl":
             solids = list(read_solids(path))
             assert len(solids) >= len(buildings)
             assert [(name, check_solid(s)) for name, s in solids if check_solid(s)] == []
+        if path.name in OF_CITYGML and (schema := open_schema(OF_CITYGML[path.name])):
+            schema.assertValid(etree.parse(path))
     build_file(folder / "parameters.jsonl", folder / "again")
     for path in write_run(folder, buildings, write):
         assert (folder / "again" / path.name).read_bytes() == path.read_bytes(), path.name
