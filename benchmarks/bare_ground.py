@@ -284,16 +284,6 @@ def make_green_roof_site(rng: np.random.Generator) -> Site:
     return site
 
 
-def make_slope_site(rng: np.random.Generator) -> Site:
-    """Make a house with level eaves on a slope of up to 35 %."""
-    return make_plain_site(rng, (3.5, 6.0), 0.35)
-
-
-def make_garage_site(rng: np.random.Generator) -> Site:
-    """Make the roof of a garage below ground, 0 to 1.2 m above it."""
-    return make_plain_site(rng, (0.0, 1.2))
-
-
 def make_block_site(rng: np.random.Generator) -> Site:
     """Make a closed block of houses around a yard of 1/3 to 2/3 of its plan."""
     (w, h), deep, ground, eave = (
@@ -330,14 +320,14 @@ SOUND = {
     "under trees": make_tree_site,
     "footprint beside": shift_footprint,
     "green roof": make_green_roof_site,
-    "slope": make_slope_site,
+    "slope": lambda rng: make_plain_site(rng, (3.5, 6.0), 0.35),  # to 35 %, its eaves level
     "shed 1.8-2.5 m": lambda rng: make_shed_site(rng, (1.8, 2.5)),
     "carport": lambda rng: make_shed_site(rng, (2.0, 2.5), 0.5),
 }
 GONE = {
     "gone": remove_house,
     "gone, slope to 25 %": lambda rng: remove_house(rng, 0.25),
-    "garage deck": make_garage_site,
+    "garage deck": lambda rng: make_plain_site(rng, (0.0, 1.2)),  # of one below ground
 }
 
 

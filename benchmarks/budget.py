@@ -23,9 +23,9 @@ from unittest.mock import patch
 
 from hiproof.city.run import Request, Summary, reconstruct_area
 
+from .judging import DELFT, list_files
 from .tables import FigureTable, make_parser
 
-DELFT = Path(__file__).parents[1].parent / "shared" / "data" / "delft"
 STAGES = {
     "find the common shift of footprints": "hiproof.city.plan.prepare.jobs_from_footprints",
     "make the rest of the plan": "hiproof.city.folder.resume.make_plan",
@@ -99,17 +99,10 @@ def main() -> None:
     parser = make_parser(__doc__)
     parser.add_argument("--data", type=Path, default=DELFT, help="folder with Delft's files")
     a = parser.parse_args()
-    data = a.data
-    if not data.is_dir():
-        raise SystemExit(
-            f"Expected Delft's files in {data}, found no such folder. Name it with --data."
-        )
-    clouds = tuple(sorted(map(str, data.glob("*.laz"))))
+    clouds, footprints = list_files(a.data)
     warnings.simplefilter("ignore")
     with tempfile.TemporaryDirectory() as out:
-        request = Request(
-            clouds, Path(out), str(data / "footprints.gpkg"), restart=True, processes=1
-        )
+        request = Request(clouds, Path(out), footprints, restart=True, processes=1)
         reconstruct_area(request)
         clock, total, buildings = measure(lambda: reconstruct_area(request))
     rows = [(stage, clock.seconds[stage]) for stage in STAGES]

@@ -10,7 +10,6 @@ there. The second survey is shifted as a whole. A scene has 24 houses, or one.
 from __future__ import annotations
 
 import csv
-import dataclasses
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +26,7 @@ from hiproof.simulate.scanner import Scan
 from hiproof.simulate.scene import SOURCES
 from hiproof.simulate.survey import write_laz
 from hiproof.update.request import UpdateRequest
-from hiproof.update.run import update_area
+from hiproof.update.run import UpdateSummary, update_area
 
 PITCH_M, CORNER, SLOPE = 34.0, np.array([85000.0, 446000.0]), np.array([0.01, -0.015])
 NOISE_M, HORIZONTAL_NOISE_M = 0.03, 0.05
@@ -140,6 +139,34 @@ def write_outlines(path: Path, houses: list[House]) -> None:
     pyogrio.raw.write(path, wkb, [ids], ["id"], geometry_type="Polygon", crs="EPSG:28992")
 
 
+def reconstruct_city(folder: Path) -> None:
+    """Reconstruct the first survey of a city from the beginning."""
+    footprints = str(folder / "footprints.gpkg")
+    clouds, out = (str(folder / "first.laz"),), folder / "models"
+    request = Request(clouds, out, footprints, id_attribute="id", restart=True)
+    reconstruct_area(request, lambda *_: None)
+
+
+def update_city(folder: Path, out: str = "updated", refine: bool = False) -> UpdateSummary:
+    """Update the models of a city with its second survey, from the beginning."""
+    request = UpdateRequest(
+        (str(folder / "second.laz"),),
+        folder / out,
+        run=folder / "models",
+        run_parameters=str(folder / "models" / "parameters.jsonl"),
+        restart=True,
+        date="2024-05-01",
+        refine=refine,
+    )
+    return update_area(request)
+
+
+def read_changes(folder: Path) -> dict[str, dict[str, str]]:
+    """Return the rows of an update's table of changes by id."""
+    with (folder / "updated" / "changes.csv").open(encoding="utf-8") as table:
+        return {row["id"]: row for row in csv.DictReader(table)}
+
+
 def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> Counter[str]:
     """Run and update a scene; return counts of changes, hits, right kinds and alarms."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -149,20 +176,8 @@ def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> 
         cloud = scan_houses(houses, density, rng, name == "second")
         cloud = cloud.move(np.array(scene.shift_m)) if name == "second" else cloud
         write_laz(folder / f"{name}.laz", iter([cloud]), np.array([*CORNER, 0.0]))
-    run = Request(
-        (str(folder / "first.laz"),),
-        folder / "models",
-        str(folder / "footprints.gpkg"),
-        id_attribute="id",
-    )
-    reconstruct_area(run, lambda *_: None)
-    request = UpdateRequest((str(folder / "second.laz"),), folder / "updated", date="2024-05-01")
-    parameters = str(folder / "models" / "parameters.jsonl")
-    summary = update_area(
-        dataclasses.replace(request, run=folder / "models", run_parameters=parameters)
-    )
-    with (folder / "updated" / "changes.csv").open() as table:
-        rows = {row["id"]: row for row in csv.DictReader(table)}
+    reconstruct_city(folder)
+    summary, rows = update_city(folder), read_changes(folder)
     counts = Counter(houses=len(houses))
     for house in houses:
         row = rows.get(house.id, {"class": "unchanged", "kind": ""})

@@ -28,7 +28,6 @@ Seeds 0 to 9 are for choosing constants, 100 to 109 for reporting.
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import json
 import tempfile
@@ -39,8 +38,6 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.model import Building, Roof
 from hiproof.parametric.building import build
 from hiproof.parametric.file import read_parameters
@@ -53,10 +50,8 @@ from hiproof.simulate.survey import survey, write_footprints, write_laz
 from hiproof.simulate.town import Lot
 from hiproof.update.places import move_to_frame
 from hiproof.update.refine import REFINED
-from hiproof.update.request import UpdateRequest
-from hiproof.update.run import UpdateSummary, update_area
 
-from .change_scenes import run_scenes
+from .change_scenes import read_changes, reconstruct_city, run_scenes, update_city
 from .compounds import compare_parts
 from .kept_parts import count_kept, describe_kept
 from .tables import FigureTable, make_parser
@@ -215,11 +210,9 @@ def run_city(
     middle = time.process_time()
     summary = update_city(folder)
     end = time.process_time()
-    with (folder / "updated" / "changes.csv").open() as table:
-        rows = {row["id"]: row for row in csv.DictReader(table)}
     return {
         "truth": truth,
-        "rows": rows,
+        "rows": read_changes(folder),
         "seconds": (middle - start, end - middle),
         "shift": summary.surveys.shift,
         "kept": count_kept(folder, find_changed_roofs(seed, count, densities[0], share)),
@@ -234,28 +227,6 @@ def find_changed_roofs(
     lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
     after, by_id = draw_truth(seed, lots, share)[1], {lot.id: lot for lot in lots}
     return {id: (by_id[id].building.roof, lot.building.roof) for id, lot in after.items()}
-
-
-def reconstruct_city(folder: Path) -> None:
-    """Reconstruct the first survey of a city from the beginning."""
-    footprints = str(folder / "footprints.gpkg")
-    clouds, out = (str(folder / "first.laz"),), folder / "models"
-    request = Request(clouds, out, footprints, id_attribute="id", restart=True)
-    reconstruct_area(request, lambda *_: None)
-
-
-def update_city(folder: Path, out: str = "updated", refine: bool = False) -> UpdateSummary:
-    """Update the models of a city with its second survey, from the beginning."""
-    request = UpdateRequest(
-        (str(folder / "second.laz"),),
-        folder / out,
-        run=folder / "models",
-        run_parameters=str(folder / "models" / "parameters.jsonl"),
-        restart=True,
-        date="2024-05-01",
-        refine=refine,
-    )
-    return update_area(request)
 
 
 def measure_cost(

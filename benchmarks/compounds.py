@@ -6,16 +6,11 @@ usage: python -m benchmarks.compounds [--each 20] [--densities 2 5 10] [--kinds 
 Simulated buildings (simulate/compounds.py) are scanned without defects of the scene, fitted under
 their footprint and compared with the truth on a 0.2 m raster:
 
-    volumes   share of buildings with the true number of parts, where houses of a row that nothing
-              tells apart may be one
-    types     share with that number, each true part found (matching.py says how) and called by its
-              type
-    RMSE      over the whole roof in m: the median, and the share of buildings under 0.1 m; then the
-              same without the
-              cells within 0.5 m of a step of the true roof
-    sigmas    root mean square of error over standard deviation, by parameter, over the parts found
-              with their type; in
-              brackets the same from the median, which a few blunders do not move
+    volumes   buildings with the true number of parts; equal houses of a row may be one
+    types     those with that number, and each true part found (matching.py) and called by its type
+    RMSE      over the whole roof (m), and without the cells within 0.5 m of a step
+    sigmas    RMS of error over standard deviation by parameter of parts found with their type; in
+              brackets from the median, which a few blunders do not move
 """
 
 from __future__ import annotations

@@ -17,9 +17,17 @@ from hiproof.model import Building, Roof
 from hiproof.status import Status
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
+DELFT = SHARED / "data" / "delft"
 RASTER_M = 0.2
 # m: nobody draws a part that is narrower; a step by which one stands out
 NARROW_M, STANDING_M = 1.0, 2.0
+
+
+def list_files(data: Path) -> tuple[tuple[str, ...], str]:
+    """Return the clouds and the footprints of Delft in a folder."""
+    if not data.is_dir():
+        raise SystemExit(f"expected Delft's files in {data}, got no such folder; name it by --data")
+    return tuple(sorted(map(str, data.glob("*.laz")))), str(data / "footprints.gpkg")
 
 
 def load_tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:

@@ -19,6 +19,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from .judging import DELFT, list_files
 from .tables import FigureTable, make_parser
 
 ROOT = Path(__file__).parents[1]
@@ -76,15 +77,11 @@ def measure_process(script: str, inputs: tuple[list[str], str, str]) -> list[flo
 def main() -> None:
     parser = make_parser(__doc__)
     parser.add_argument("--runs", type=int, default=3)
-    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data" / "delft")
+    parser.add_argument("--data", type=Path, default=DELFT)
     args = parser.parse_args()
-    if not args.data.is_dir():
-        raise SystemExit(
-            f"expected Delft's files in {args.data}, got no such folder; name it with --data"
-        )
-    clouds = sorted(map(str, args.data.glob("*.laz")))
+    clouds, footprints = list_files(args.data)
     with tempfile.TemporaryDirectory() as out:
-        inputs = (clouds, str(args.data / "footprints.gpkg"), out)
+        inputs = (list(clouds), footprints, out)
         measure_process(ONCE, inputs)  # compiles, where nobody did
         runs = [
             [measure_process(script, inputs) for script in (DECODE, ONCE, STEADY)]

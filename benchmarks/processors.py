@@ -17,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from .judging import SHARED
+from .judging import DELFT, list_files
 from .tables import FigureTable, make_parser
 
 VECTORS = "AVX512_ICL AVX512_CLX AVX512_SKX X86_V4"
@@ -30,10 +30,10 @@ PROCESSORS = {
 
 def reconstruct_buildings(data: Path, environment: dict[str, str]) -> dict[str, str]:
     """Reconstruct a data set in a process of its own, and read the records."""
-    clouds = sorted(map(str, data.glob("*.laz")))
+    clouds, footprints = list_files(data)
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-W", "ignore", "-m", "hiproof", "reconstruct", *clouds]
-        command += ["--footprints", str(data / "footprints.gpkg"), "--out", folder, "--quiet"]
+        command += ["--footprints", footprints, "--out", folder, "--quiet"]
         subprocess.run(command, check=True, env={**os.environ, **environment})
         _, *lines = Path(folder, "parameters.jsonl").read_text(encoding="utf-8").splitlines()
     return {json.loads(line)["id"]: line for line in lines}
@@ -41,7 +41,7 @@ def reconstruct_buildings(data: Path, environment: dict[str, str]) -> dict[str, 
 
 def main() -> None:
     parser = make_parser(__doc__)
-    parser.add_argument("--data", type=Path, default=SHARED / "data" / "delft")
+    parser.add_argument("--data", type=Path, default=DELFT)
     a = parser.parse_args()
     here = reconstruct_buildings(a.data, {})
     with FigureTable(a.record, "processor", "the same", "of", "other ones") as table:

@@ -29,19 +29,13 @@ from hiproof.city.plan.outlines import Outlines, row_outline
 from hiproof.fit.align import AROUND_M, find_shift
 from hiproof.fit.registration import register
 from hiproof.geometry.point_grid import PointGrid
-from hiproof.read import read_footprints, read_points
 from hiproof.stages.points import distinct
 
-from .judging import SHARED
+from . import delft
 from .tables import FigureTable, make_parser
 from .towns import TOWNS, read_town
 
-SETS = {
-    "delft": ("delft/footprints.gpkg", "delft"),
-    "amsterdam_west": ("amsterdam_west/footprints_bag.gpkg", "amsterdam_west"),
-    "two_epochs": ("two_epochs/footprints.gpkg", "two_epochs/2014"),
-}
-BUILDING_CLASS = 6
+SETS = ("delft", "amsterdam_west", "two_epochs")
 SURVEY_M = 0.1  # Standard deviation of each footprint of a simulated town, along x and y.
 TOWN_DENSITY = 5.0  # points/m2
 DISTANCES_M = (0.0, 0.3, 0.5, 1.0, 2.0, 3.0)
@@ -55,12 +49,11 @@ def read_set(name: str) -> tuple[Polygons, np.ndarray]:
     """Return a set's footprints within its cloud, and its roof points (n, 3)."""
     if name in TOWNS:
         return scan_town(name)
-    footprints, folder = SETS[name]
-    clouds = [read_points(path) for path in sorted((SHARED / "data" / folder).glob("*.la[sz]"))]
-    points = np.concatenate([cloud.xyz[cloud.classification == BUILDING_CLASS] for cloud in clouds])
-    cloud = shapely.box(*points[:, :2].min(axis=0), *points[:, :2].max(axis=0))
-    polygons = [footprint.polygon for footprint in read_footprints(SHARED / "data" / footprints)]
-    return [polygon for polygon in polygons if cloud.buffer(1.0).contains(polygon)], points
+    asked = delft.read_set(name)
+    points = delft.thin_points(asked.clouds, 1.0)
+    cloud = shapely.box(*points[:, :2].min(axis=0), *points[:, :2].max(axis=0)).buffer(1.0)
+    polygons = [footprint.polygon for footprint in asked.footprints]
+    return [polygon for polygon in polygons if cloud.contains(polygon)], points
 
 
 def scan_town(name: str) -> tuple[Polygons, np.ndarray]:

@@ -4,17 +4,15 @@ usage: python -m benchmarks.towns [--town essen nrw_5657 denhaag vienna rotterda
            [--density 5] [--without-footprints] [--every K] [--parity even|odd] [--most N]
            [--worst N] [--save DIR]
 
-A building is the solids of one CityJSON building (its parts with it) whose grounds touch; those of
-30 m2 or more are scanned one by one (generator seeded by the id, no gaps in the cloud) and
-reconstructed under their true ground outline, or without it. `wireframe.py` compares corners, edges
-and faces of the written models with the true ones. `--every` takes each k-th building, `--parity`
-those at even or odd places, `--most` draws so many by chance, always the same ones.
-Every figure comes for all buildings and by footprint area,
-pooled and as the mean over buildings (see `wireframes.py`). Without `--town` the first three towns
-are taken: all buildings of Vienna are dear. Vienna's are perimeter blocks, Rotterdam's rows with
-surfaces that are not closed, Delft's machine-made with many short edges. `--save` keeps for each
-town what a run would leave and `truth.city.json`, to be drawn by docs/draw_roofs.py. Milliseconds
-are the CPU time of `reconstruct`, recognition and quality included.
+A building is the solids of one CityJSON building whose grounds touch. Those of 30 m2 or more are
+scanned one by one, by the id and without gaps, and reconstructed under their true ground outline or
+without it. `wireframe.py` compares corners, edges and faces of the written models with the true
+ones. `--every` takes each k-th building, `--parity` those at even or odd places, `--most` draws so
+many by chance, always the same ones. Figures come pooled and as the mean over buildings, also by
+footprint area. Without `--town` the first three towns are taken. Vienna's are perimeter blocks,
+Rotterdam's rows with surfaces that are not closed, Delft's machine-made with many short edges.
+`--save` keeps what a run would leave and `truth.city.json`, to be drawn by docs/draw_roofs.py.
+Milliseconds are the CPU time of `reconstruct`, recognition and quality included.
 """
 
 from __future__ import annotations

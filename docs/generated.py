@@ -185,8 +185,7 @@ def describe_constants() -> str:
     text = (
         "# Constants\n\nEvery number that has a name in the code, with its unit and its reason. "
         "What a user may want to change is a "
-        "[setting](settings.md) instead. `python -m benchmarks.constants NAME` shows what half and "
-        "double of one do to Delft.\n"
+        "[setting](settings.md) instead.\n"
     )
     for room, room_constants in groupby(list_constants(), lambda constant: constant.room):
         text += f"\n## {room}\n\n"
