@@ -5,6 +5,7 @@ import os
 import signal
 import warnings
 
+import numpy as np
 import pytest
 
 import pages
@@ -12,9 +13,13 @@ import planted
 from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work import solve
 from hiproof.city.work.tasks import ALL, make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
+from hiproof.parametric.run import build_file
+from sample_models import sample_points, write_sample_run
+from sample_parameters import write_parameters_of_each_kind
 from tiny_town import write_town
 
 
@@ -76,6 +81,37 @@ def reference_run(town_files, tmp_path_factory):
         patch.setattr(city_run, "solve_tile", planted.solve_quickly)
         reconstruct_area(Request((town_files[0],), out, town_files[1]))
     return out
+
+
+@pytest.fixture
+def solved_ids(monkeypatch):
+    """The ids of buildings that are solved, as they are."""
+    ids, original = [], solve.solve_one
+
+    def solve_one(plan, job, *known):
+        ids.append(job.id)
+        return original(plan, job, *known)
+
+    monkeypatch.setattr(solve, "solve_one", solve_one)
+    return ids
+
+
+@pytest.fixture(scope="session")
+def sample_run(tmp_path_factory):
+    """The folder of a small finished run and its points; do not write into it."""
+    folder = tmp_path_factory.mktemp("sample")
+    write_sample_run(folder)
+    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def run_of_each_kind(tmp_path_factory):
+    """The folder of a run with a building of each kind; do not write into it."""
+    folder = tmp_path_factory.mktemp("each_kind")
+    write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
+    build_file(folder / "given" / "parameters.jsonl", folder / "run")
+    return folder / "run"
 
 
 @pytest.fixture(scope="session")

@@ -24,22 +24,9 @@ from tiny_town import make_town, write_footprints, write_town
 
 
 @pytest.fixture
-def solved_ids(monkeypatch):
-    """The ids of buildings that are solved, as they are."""
-    ids, original = [], solve.solve_one
-
-    def solve_one(plan, job, *known):
-        ids.append(job.id)
-        return original(plan, job, *known)
-
-    monkeypatch.setattr(solve, "solve_one", solve_one)
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    return ids
-
-
-@pytest.fixture
-def town(tmp_path, solved_ids):
+def town(tmp_path, solved_ids, monkeypatch):
     """The houses, their cloud, and a way to write and run another set of them."""
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     houses = make_town().footprints
     cloud, path = write_town(tmp_path / "town")
     request = Request((str(cloud),), tmp_path / "out", str(path))

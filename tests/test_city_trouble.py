@@ -62,18 +62,24 @@ def test_a_building_that_ends_its_process_is_left_out_alone(
     assert rows == {id: row for id, row in by_id(reference_run).items() if id != planted.DEADLY}
 
 
+def stop_in_second_tile(request):
+    """End a run of two tiles of two buildings at the third building."""
+
+    def stop(step, finished, total):
+        if step == "solve" and finished == 3:
+            raise SystemExit
+
+    with pytest.raises(SystemExit):
+        reconstruct_area(request, stop)
+
+
 def test_losses_with_the_main_process_lead_to_quarantine(
     town_files, reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
-    def kill(step, finished, total):
-        if step == "solve" and finished == 3:  # of two tiles of two buildings, in the second
-            raise SystemExit
-
-    with pytest.raises(SystemExit):
-        reconstruct_area(request, kill)
+    stop_in_second_tile(request)
     database = sqlite3.connect(tmp_path / ".hiproof" / "ledger.sqlite")
     database.execute("update task set losses = 3 where kind = 'solve' and state = 'open'")
     database.commit()
@@ -93,12 +99,7 @@ def test_points_that_somebody_removed_are_sorted_again(
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
-    def kill(step, finished, total):
-        if step == "solve" and finished == 3:  # of two tiles of two buildings, in the second
-            raise SystemExit
-
-    with pytest.raises(SystemExit):
-        reconstruct_area(request, kill)
+    stop_in_second_tile(request)
     shutil.rmtree(tmp_path / ".hiproof" / "points")
     reconstruct_area(request)
     assert records(tmp_path) == records(reference_run)

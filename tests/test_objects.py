@@ -10,24 +10,14 @@ import hiproof
 from hiproof import progress
 from hiproof.errors import InputError, NoModelError
 from hiproof.formats import FORMATS
-from hiproof.parametric.run import build_file
 from hiproof.status import Grade, Status
 from parametric_house import gable_house
-from sample_parameters import write_parameters_of_each_kind
 
 LOST = hiproof.Building("lost", Status.NO_POINTS)
 
 
-@pytest.fixture(scope="module")
-def run_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("objects")
-    write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
-    build_file(folder / "given" / "parameters.jsonl", folder / "run")
-    return folder / "run"
-
-
-def test_a_building_is_shown_in_one_line(run_folder):
-    assert [repr(building) for building in hiproof.open_run(run_folder)] == [
+def test_a_building_is_shown_in_one_line(run_of_each_kind):
+    assert [repr(building) for building in hiproof.open_run(run_of_each_kind)] == [
         "<Building 'gable': modelled, gable, 1 part>",
         "<Building 'hip and tower': modelled, hip, 2 parts>",
         "<Building 'yard': modelled, flat, 1 part>",
@@ -38,9 +28,9 @@ def test_a_building_is_shown_in_one_line(run_folder):
     )
 
 
-def test_a_mesh_of_trimesh_is_closed_and_coloured_by_roof_type(run_folder):
+def test_a_mesh_of_trimesh_is_closed_and_coloured_by_roof_type(run_of_each_kind):
     pytest.importorskip("trimesh", reason="no trimesh here: pip install 'hiproof[trimesh]'")
-    for building in hiproof.open_run(run_folder):
+    for building in hiproof.open_run(run_of_each_kind):
         if building.built is None:
             continue
         mesh = building.to_trimesh()
@@ -67,10 +57,10 @@ def test_a_mesh_of_pyvista_says_what_its_cells_are():
     assert set(mesh.cell_data["part"][mesh.cell_data["kind"] == "RoofSurface"].tolist()) == {0}
 
 
-def test_a_data_frame_has_the_rows_of_the_geopackage(run_folder):
+def test_a_data_frame_has_the_rows_of_the_geopackage(run_of_each_kind):
     geopandas = pytest.importorskip("geopandas", reason="needs the extra `geopandas`")
-    frame = hiproof.to_geodataframe(hiproof.open_run(run_folder))
-    table = geopandas.read_file(run_folder / FORMATS["gpkg"].file, layer="buildings")
+    frame = hiproof.to_geodataframe(hiproof.open_run(run_of_each_kind))
+    table = geopandas.read_file(run_of_each_kind / FORMATS["gpkg"].file, layer="buildings")
     assert list(frame.columns.drop("geometry")) == list(table.columns.drop("geometry"))
     assert frame.crs == table.crs == "EPSG:28992"
     assert frame["id"].tolist() == table["id"].tolist()
@@ -88,8 +78,8 @@ def test_a_data_frame_is_made_of_buildings_too():
         assert frame.crs == "EPSG:28992"
 
 
-def test_a_run_is_read_while_it_is_iterated(run_folder, tmp_path):
-    lines = (run_folder / "parameters.jsonl").read_text().splitlines(keepends=True)
+def test_a_run_is_read_while_it_is_iterated(run_of_each_kind, tmp_path):
+    lines = (run_of_each_kind / "parameters.jsonl").read_text().splitlines(keepends=True)
     path = tmp_path / "parameters.jsonl"
     path.write_text("".join(lines[:2]) + "no JSON\n")
     run = hiproof.open_run(path)
@@ -100,17 +90,17 @@ def test_a_run_is_read_while_it_is_iterated(run_folder, tmp_path):
         next(buildings)
 
 
-def test_a_run_without_parameters_has_solids(run_folder, tmp_path):
+def test_a_run_without_parameters_has_solids(run_of_each_kind, tmp_path):
     name = FORMATS["cityjsonseq"].file
-    (tmp_path / name).write_bytes((run_folder / name).read_bytes())
-    before, after = (list(hiproof.open_run(folder)) for folder in (run_folder, tmp_path))
+    (tmp_path / name).write_bytes((run_of_each_kind / name).read_bytes())
+    before, after = (list(hiproof.open_run(folder)) for folder in (run_of_each_kind, tmp_path))
     assert [b.id for b in after] == [b.id for b in before]
     for one, other in zip(before[:3], after[:3], strict=True):
         assert other.volume == pytest.approx(one.volume, abs=1e-3) and other.type == one.type
         areas = [[area.area for area in b.compute_visible_areas()] for b in (one, other)]
         assert areas[1] == pytest.approx(areas[0], abs=0.01)
     assert after[3].status is Status.NO_POINTS
-    assert hiproof.open_run(run_folder).record["buildings"] == 4
+    assert hiproof.open_run(run_of_each_kind).record["buildings"] == 4
 
 
 def test_a_folder_of_no_run_is_refused(tmp_path):

@@ -14,7 +14,6 @@ import hiproof
 from hiproof.city import run as city_run
 from hiproof.city.folder.ledger import Ledger
 from hiproof.city.plan.overrides import table_records
-from hiproof.city.work import solve
 from hiproof.city.work.noted import noted_file, save_run_boxes
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
@@ -192,19 +191,6 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(gable_scan):
 def test_what_an_override_cannot_say_is_one_sentence(overrides, message):
     with pytest.raises(InputError, match=message):
         read_override(overrides)
-
-
-@pytest.fixture
-def solved_ids(monkeypatch):
-    """The ids of buildings that are solved, as they are."""
-    solved, original = [], solve.solve_one
-
-    def solve_one(plan, job, *others):
-        solved.append(job.id)
-        return original(plan, job, *others)
-
-    monkeypatch.setattr(solve, "solve_one", solve_one)
-    return solved
 
 
 def request(town_files, out, path, *lines, **changes):

@@ -24,7 +24,7 @@ from hiproof.city.work.tasks import ALL, MAIN_JOB, make_ready
 from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
-from hiproof.errors import InputError, OutputError
+from hiproof.errors import InputError
 from hiproof.evaluate.run import evaluate_run
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
@@ -183,23 +183,6 @@ def test_running_again_redoes_nothing_and_changes_nothing(finished_run, files):
     assert {name: (out / name).stat().st_mtime_ns for name in RECORDS} == times
 
 
-def test_other_settings_on_the_same_folder_are_refused_unless_restarted(files, tmp_path):
-    request = Request((str(files[0]),), tmp_path, str(files[1]))
-    reconstruct_area(request)
-    other = Request(
-        request.clouds,
-        tmp_path,
-        request.footprints,
-        settings=Settings.from_dict({"fit": {"parts": "one"}}),
-    )
-    with pytest.raises(OutputError, match="--restart"):
-        reconstruct_area(other)
-    redrawn = Request(
-        request.clouds, tmp_path, request.footprints, settings=other.settings, restart=True
-    )
-    assert reconstruct_area(redrawn).buildings == 4
-
-
 def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
     town = make_town()
     rng = np.random.default_rng(3)
@@ -303,26 +286,6 @@ def test_a_killed_run_goes_on_and_ends_the_same(finished_run, files, tmp_path):
     assert records(tmp_path) == records(finished_run[0])
 
 
-def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(
-    files, tmp_path, monkeypatch
-):
-    from hiproof import method
-
-    original = method.fit
-
-    def fail_for_one_building(points, outline, recognised, settings):
-        if outline.bounds[0] < -6.4:
-            raise RuntimeError("planted")
-        return original(points, outline, recognised, settings)
-
-    monkeypatch.setattr(method, "fit", fail_for_one_building)
-    summary = reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1])))
-    assert summary.exit_code == 1
-    assert 1 <= summary.by_status["internal_error"] < 4
-    assert all("planted" in detail for _, detail in summary.failures)
-    assert len(parameters(tmp_path)) == 4
-
-
 def test_strange_footprints_each_get_an_outcome(tmp_path):
     town = make_town()
     x, y = town.xyz[:, :2].min(axis=0)
@@ -346,21 +309,6 @@ def test_strange_footprints_each_get_an_outcome(tmp_path):
     assert by_id["empty"] == by_id["line"] == "bad_footprint"
     assert by_id["away from points"] == "no_points"
     assert any(id.startswith("bow-tie") for id in by_id)
-
-
-def test_a_damaged_tile_is_named_and_harms_no_other(finished_run, files, tmp_path):
-    town = make_town()
-    west = town.xyz[:, 0] < town.xyz[:, 0].min() + 60
-    good = write_cloud(tmp_path / "a.laz", town.xyz[west], town.classification[west])
-    bad = write_cloud(tmp_path / "b.laz", town.xyz[~west], town.classification[~west])
-    bad.write_bytes(bad.read_bytes()[: bad.stat().st_size // 3])
-    summary = reconstruct_area(Request((str(good), str(bad)), tmp_path / "out", str(files[1])))
-    assert summary.exit_code == 2
-    assert [name for name, _ in summary.broken_inputs] == [str(bad)]
-    whole = {row["id"]: row for row in parameters(finished_run[0])}
-    rows = {row["id"]: row for row in parameters(tmp_path / "out")}
-    assert set(rows) == set(whole)
-    assert all(rows[id] == whole[id] for id in ("house-0", "house-1"))
 
 
 def test_without_footprints_the_cloud_is_split(files, tmp_path):
@@ -422,19 +370,6 @@ def test_the_command_line_says_what_it_did(files, tmp_path):
         == 0
     )
     assert "buildings done: 4 of 4" in invoke("status", tmp_path).output
-
-
-def test_check_finds_a_broken_solid(files, finished_run, tmp_path):
-    lines = (finished_run[0] / "buildings.city.jsonl").read_text().splitlines()
-    feature = json.loads(lines[1])
-    solid = next(g for g in feature["CityObjects"]["house-0"]["geometry"] if g["type"] == "Solid")
-    solid["boundaries"][0].pop()
-    solid["semantics"]["values"][0].pop()
-    path = tmp_path / "broken.city.jsonl"
-    path.write_text("\n".join([lines[0], json.dumps(feature)]))
-    got = invoke("check", path)
-    assert got.exit_code == 1
-    assert "302" in got.output
 
 
 @pytest.mark.parametrize(

@@ -26,23 +26,15 @@ from hiproof.evaluate.evaluation import (
 from hiproof.evaluate.metrics import plan_outline
 from hiproof.evaluate.models import BuildingModel
 from hiproof.evaluate.run import evaluate_run, outline_of_solid
-from sample_models import ORIGIN, courtyard_solid, gable_solid, sample_points, write_sample_run
+from sample_models import ORIGIN, courtyard_solid, gable_solid, write_sample_run
 
 
 @pytest.fixture(scope="module")
-def run_folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
-    write_sample_run(folder)
-    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def run(run_folder):
+def run(sample_run):
     return evaluate_run(
-        run_folder,
-        [str(run_folder / "points.xyz")],
-        reference=str(run_folder / "buildings.city.jsonl"),
+        sample_run,
+        [str(sample_run / "points.xyz")],
+        reference=str(sample_run / "buildings.city.jsonl"),
     )
 
 
@@ -71,9 +63,9 @@ def test_a_model_equals_itself(run):
     ) == (0, 0, 0, 0)
 
 
-def test_a_reference_from_elsewhere_is_told_of(run_folder, tmp_path):
+def test_a_reference_from_elsewhere_is_told_of(sample_run, tmp_path):
     text = (
-        (run_folder / "buildings.city.jsonl")
+        (sample_run / "buildings.city.jsonl")
         .read_text()
         .replace('"house-1"', '"a"')
         .replace('"block 2"', '"b"')
@@ -82,7 +74,7 @@ def test_a_reference_from_elsewhere_is_told_of(run_folder, tmp_path):
         text.replace(str(ORIGIN[0]), str(ORIGIN[0] + 5000)).replace('"bare"', '"c"')
     )
     with pytest.warns(InputWarning, match="no building of it stands where one of the run does"):
-        evaluate_run(run_folder, reference=str(tmp_path / "other.city.jsonl"))
+        evaluate_run(sample_run, reference=str(tmp_path / "other.city.jsonl"))
 
 
 def test_differences_have_the_sign_of_ours_minus_theirs():
@@ -99,7 +91,7 @@ def test_a_reference_without_roof_surfaces_gives_no_figures():
     assert math.isnan(compare(solid, "x", walls).ridge_height_m)
 
 
-def test_footprints_bring_points_beyond_the_roof(tmp_path, run_folder):
+def test_footprints_bring_points_beyond_the_roof(tmp_path, sample_run):
     path = tmp_path / "areas.geojson"
     west, south = ORIGIN[:2]
     ring = [
@@ -113,7 +105,7 @@ def test_footprints_bring_points_beyond_the_roof(tmp_path, run_folder):
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
     path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
-    run = evaluate_run(run_folder, [str(run_folder / "points.xyz")], footprints=str(path))
+    run = evaluate_run(sample_run, [str(sample_run / "points.xyz")], footprints=str(path))
     assert run.figures[0].quality.outline_iou == pytest.approx(8 / 12)
 
 
@@ -197,9 +189,9 @@ def test_a_building_without_a_model_misses_all_its_points():
     )
 
 
-def test_the_command_writes_both_tables(run_folder, tmp_path):
+def test_the_command_writes_both_tables(sample_run, tmp_path):
     import_command("evaluate")(
-        [str(run_folder), str(run_folder / "points.xyz"), "--out", str(tmp_path)],
+        [str(sample_run), str(sample_run / "points.xyz"), "--out", str(tmp_path)],
         standalone_mode=False,
     )
     assert len((tmp_path / "evaluation.csv").read_text().splitlines()) == 4
@@ -208,10 +200,10 @@ def test_the_command_writes_both_tables(run_folder, tmp_path):
     )
 
 
-def test_the_tables_fit_a_narrow_terminal(run_folder, tmp_path, monkeypatch, capsys):
+def test_the_tables_fit_a_narrow_terminal(sample_run, tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
-    points, reference = str(run_folder / "points.xyz"), str(run_folder / "buildings.city.jsonl")
-    evaluate(run_folder, [points], reference=reference, out=tmp_path)
+    points, reference = str(sample_run / "points.xyz"), str(sample_run / "buildings.city.jsonl")
+    evaluate(sample_run, [points], reference=reference, out=tmp_path)
     output = capsys.readouterr().out
     assert (
         "…" not in output
@@ -221,19 +213,19 @@ def test_the_tables_fit_a_narrow_terminal(run_folder, tmp_path, monkeypatch, cap
     )
 
 
-def test_buildings_that_no_mean_holds_are_counted(run_folder, tmp_path, capsys):
-    cloud = str(run_folder / "points.xyz")
-    evaluate(run_folder, [cloud], out=tmp_path)
+def test_buildings_that_no_mean_holds_are_counted(sample_run, tmp_path, capsys):
+    cloud = str(sample_run / "points.xyz")
+    evaluate(sample_run, [cloud], out=tmp_path)
     output = capsys.readouterr().out
     rows = json.loads((tmp_path / "evaluation.json").read_text())["buildings"]
     n_without = sum(row["psd_mean"] is None for row in rows)
     assert 0 < n_without < len(rows) and f"{n_without} building" in output
 
 
-def test_the_clouds_are_the_runs_own_where_none_are_named(run_folder, tmp_path):
+def test_the_clouds_are_the_runs_own_where_none_are_named(sample_run, tmp_path):
     write_sample_run(tmp_path)
     record = json.loads((tmp_path / "run.json").read_text())
-    cloud = str(run_folder / "points.xyz")
+    cloud = str(sample_run / "points.xyz")
     (tmp_path / "run.json").write_text(json.dumps({**record, "inputs": {"clouds": [cloud]}}))
     evaluate(tmp_path, out=tmp_path / "own")
     evaluate(tmp_path, [cloud], out=tmp_path / "named")
@@ -248,12 +240,12 @@ def test_no_cloud_to_measure_against_is_refused(tmp_path):
         evaluate(tmp_path)
 
 
-def test_buildings_of_which_no_place_is_known_have_no_points(run_folder, tmp_path):
-    lines = (run_folder / "buildings.city.jsonl").read_text().splitlines(keepends=True)
+def test_buildings_of_which_no_place_is_known_have_no_points(sample_run, tmp_path):
+    lines = (sample_run / "buildings.city.jsonl").read_text().splitlines(keepends=True)
     for name, kept_lines in (("none", []), ("bare", lines[-1:])):
         (tmp_path / name).mkdir()
         (tmp_path / name / "buildings.city.jsonl").write_text("".join([lines[0], *kept_lines]))
-        evaluate(tmp_path / name, [str(run_folder / "points.xyz")])
+        evaluate(tmp_path / name, [str(sample_run / "points.xyz")])
         rows = json.loads((tmp_path / name / "evaluation.json").read_text())["buildings"]
         assert [row["points"] for row in rows] == [0] * len(kept_lines)
 
@@ -263,9 +255,9 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path):
         evaluate_run(tmp_path)
 
 
-def test_a_missing_cloud_is_refused(run_folder):
+def test_a_missing_cloud_is_refused(sample_run):
     with pytest.raises(HiproofError, match="expected a point cloud"):
-        evaluate_run(run_folder, ["nowhere.laz"])
+        evaluate_run(sample_run, ["nowhere.laz"])
 
 
 def test_a_broken_run_record_is_refused(tmp_path):

@@ -24,7 +24,7 @@ from hiproof.evaluate.report_pictures import (
 from hiproof.evaluate.run import evaluate_run
 from hiproof.write.colours import CHANGE_COLOURS, RESIDUAL_STOPS, type_colour
 from pages import BROWSER, needs_browser
-from sample_models import sample_points, two_parts, write_sample_run
+from sample_models import two_parts, write_sample_run
 
 LISTEN = """<script>
 const faults = [];
@@ -65,11 +65,8 @@ document.body.append(result);
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
-    write_sample_run(folder)
-    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
-    return evaluate_run(folder, [str(folder / "points.xyz")])
+def run(sample_run):
+    return evaluate_run(sample_run, [str(sample_run / "points.xyz")])
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from hiproof.city.plan.work_plan import WorkPlan, make_jobs
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.geometry.point_grid import PointGrid, grow_polygon
 from hiproof.model import Footprint
-from hiproof.read.polygons import MOST_MEETINGS, WIDEST_BUILDING_M, meetings, simple_polygons
+from hiproof.read.polygons import WIDEST_BUILDING_M, simple_polygons
 from hiproof.settings import Settings
 from hiproof.stages.outline import MOST_OUTLINE_VERTICES, without_needless_vertices
 from run_records import by_id
@@ -116,13 +116,6 @@ def test_courtyards_narrower_than_what_is_left_out_go_with_it():
     outline = shapely.Polygon(shapely.box(-1, -1, 21, 21).exterior, yards)
     simple, remark = without_needless_vertices(outline)
     assert len(simple.interiors) == 0 and "of 2005 vertices" in remark
-
-
-def test_meetings_count_edges_that_do_not_follow_one_another():
-    assert (
-        meetings(shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])) == 1 + 1
-    )  # the crossing, and the two uprights' none
-    assert meetings(shapely.Polygon(ODD["80,000 crossings"][0])) > MOST_MEETINGS
 
 
 @QUICK

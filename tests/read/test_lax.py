@@ -11,7 +11,6 @@ import pytest
 from hiproof.errors import InputWarning
 from hiproof.read.lax import read_lax
 from hiproof.read.pointcloud import iter_points
-from hiproof.read.runs import join_runs
 from read.test_pointcloud import write_las
 
 POINTS = 4000
@@ -104,12 +103,6 @@ def test_boxes_away_from_all_points_read_nothing(indexed_cloud):
     path, _ = indexed_cloud
     runs = read_lax(path).find_runs(np.array([[0.0, 0.0, 9.0, 9.0]]))
     assert len(runs) == 0 and list(iter_points(path, runs=runs)) == []
-
-
-def test_runs_that_are_near_are_one():
-    runs = np.array([[200_000, 200_010], [0, 10], [5, 8], [59_000, 60_000]])
-    assert join_runs(runs).tolist() == [[0, 10], [59_000, 60_000], [200_000, 200_010]]
-    assert join_runs(np.array([[0, 10], [50_009, 50_020]])).tolist() == [[0, 50_020]]
 
 
 def test_a_file_without_index_has_none(tmp_path):

@@ -21,7 +21,6 @@ from hiproof.formats import CONVERTED, FORMATS
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
 from hiproof.write.colours import WALL_COLOUR, srgb
-from sample_parameters import write_parameters_of_each_kind
 
 SCHEMAS = Path(__file__).parents[3] / "shared" / "schemas"
 PARSER = {"no_network": True, "huge_tree": True}
@@ -33,12 +32,8 @@ def reader(name):
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """The folder of a run of four buildings."""
-    folder = tmp_path_factory.mktemp("convert")
-    write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
-    build_file(folder / "given" / "parameters.jsonl", folder / "run")
-    return folder / "run"
+def run(run_of_each_kind):
+    return run_of_each_kind
 
 
 @pytest.fixture(scope="module")

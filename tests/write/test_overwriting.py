@@ -12,18 +12,15 @@ from click.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.errors import OutputError
-from hiproof.parametric.run import build_file
 from hiproof.write.files import atomic, hidden_name, scratch
-from sample_parameters import write_parameters_of_each_kind
 from tiny_town import make_town, write_town
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def folder(run_of_each_kind, tmp_path_factory):
     """A folder with a run's files, and the clouds and footprints of another."""
     folder = tmp_path_factory.mktemp("overwriting")
-    write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
-    build_file(folder / "given" / "parameters.jsonl", folder / "run")
+    shutil.copytree(run_of_each_kind.parent, folder, dirs_exist_ok=True)
     write_town(folder, make_town(houses=1))
     return folder
 
