@@ -1,17 +1,9 @@
-"""Malformed addresses with a known secret, and everything that may repeat it.
-
-    PYTHONPATH=tests python -m fuzz.leaking_addresses COUNT [SEED]
-
-prints the leaks that COUNT addresses find. The same seed makes the same addresses.
-"""
+"""Malformed addresses with a known secret, and everything that may repeat it."""
 
 from __future__ import annotations
 
-import logging
 import random
-import re
 import sys
-import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
@@ -29,29 +21,9 @@ from sample_models import write_sample_run
 PARTS = ("Xq7Zw", "kV9jR", "Tb4Yh")  # of secrets; no word of a message holds one
 SIGNS = (
     "",
-    "%",
-    "%%",
-    "%zz",
-    "%4",
-    "@",
-    ":",
-    "/",
-    "//",
-    "?",
-    "#",
-    "&",
-    "=",
-    " ",
-    "'",
-    '"',
-    "\\",
-    ",",
-    ";",
-    "+",
-    "[",
-    "]",
+    *"%@:/?#&= '\"\\,;+[]é\t$!|<{-\u202e",
+    *["%%", "%zz", "%4", "//", "%20", "%40", "%2F", "%25", ".."],
 )
-SIGNS += ("%20", "%40", "%2F", "%25", "é", "\t", "$", "!", "|", "<", "{", "..", "-", "\u202e")
 SHAPES = (
     "postgresql://adm:{}@127.0.0.1:1/t?table=fp",
     "postgres://adm:{}@127.0.0.1:1/t?table=fp",
@@ -218,18 +190,3 @@ def find_leaks(
                     file.unlink()
             if find_leak(output):
                 yield way, given_address, output
-
-
-def main() -> None:
-    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    logging.captureWarnings(False)
-    with tempfile.TemporaryDirectory() as folder:
-        name = list(find_leaks(Path(folder), count, seed))
-    for way, message, output in name[:20]:
-        context_lines = [line for line in output.splitlines() if find_leak(line)]
-        print(f"--- {way}\n{message}\n{re.sub(chr(10), ' ', str(context_lines[:3]))[:600]}")
-    print(f"{count} addresses, {len(name)} leaks")
-
-
-if __name__ == "__main__":
-    main()

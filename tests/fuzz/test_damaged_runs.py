@@ -7,7 +7,7 @@ import pytest
 from fuzz.damaged_runs import FILES, READERS, find_fault, find_faults, write_sound_run
 from hiproof.log import LOGGER
 
-COUNT = 40  # damaged runs, each read by one reader; `python -m fuzz.damaged_runs` tries more
+COUNT = 40  # damaged runs, each read by one reader
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from hiproof import masking
 from hiproof.cli import addresses_in
 from hiproof.masking import mask, remember
 
-COUNT = 10  # addresses tried as inputs of commands; `python -m fuzz.leaking_addresses` tries more
+COUNT = 10  # addresses tried as inputs of commands
 
 
 @pytest.mark.filterwarnings("ignore")

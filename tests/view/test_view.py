@@ -264,14 +264,6 @@ def test_page_and_tiles_are_served(tiles, serving):
     assert answer(port, "/tiles/r.glb")[1][:4] == b"glTF"
 
 
-def test_nothing_outside_is_served(tiles, serving):
-    (tiles.parent / "secret.txt").write_text("x")
-    port = serving(make_server(tiles, "run"))
-    assert answer(port, "/../secret.txt")[0] == 404
-    assert answer(port, "/", host="elsewhere.example")[0] == 403
-    assert answer(port, "/", host=f"localhost:{port + 1}")[0] == 403
-
-
 def test_a_port_that_is_taken_is_told(tiles, serving):
     port = serving(make_server(tiles, "run"))
     with pytest.raises(InputError, match="leave --port out"):
