@@ -65,9 +65,7 @@ def describe_settings() -> str:
     )
     for section in dataclasses.fields(Settings):
         values = getattr(Settings(), section.name)
-        text += (
-            f"\n## {section.name}\n\n{(values.__doc__ or '').partition('] ')[2].capitalize()}\n\n"
-        )
+        text += f"\n## {section.name}\n\n{(values.__doc__ or '').partition('] ')[2]}\n\n"
         text += (
             "| setting | default | unit | values | meaning | option |\n| --- | --- | --- | --- | "
             "--- | --- |\n"

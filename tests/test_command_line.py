@@ -81,7 +81,7 @@ def test_a_command_shows_that_it_works_before_it_imports_what_computes(name):
 
 
 @pytest.mark.parametrize("name", ["reconstruct", "update", "enrich", "build"])
-def test_a_long_command_explains_few_options_and_names_all(name):
+def test_a_long_command_explains_few_options_and_has_a_line_a_group_of_the_others(name):
     brief = invoke(name, "--help", env={"COLUMNS": "200"}).output
     every = list_options(invoke(name, "--help-all", env={"COLUMNS": "200"}).output)
     first = {"--" + option.replace("_", "-") for option in COMMANDS[name]["first"]}
@@ -90,7 +90,16 @@ def test_a_long_command_explains_few_options_and_names_all(name):
     options = {
         param.opts[0] for param in COMMAND_LINE[name].params if param.opts[0].startswith("--")
     }
-    assert options <= every and options <= set(re.findall(r"--[\w-]+", brief))
+    assert options <= every
+    lines = brief.partition("explained by --help-all:\n")[2].partition("\n\n")[0].splitlines()
+    left = [
+        param for param in COMMAND_LINE[name].params if param.name not in COMMANDS[name]["first"]
+    ]
+    headings = {getattr(param, "heading", "") for param in left}
+    subjects = {h.removeprefix("Settings: ") for h in headings if h.startswith("Settings: ")}
+    more = {COMMANDS[name]["more"]} if "more" in COMMANDS[name] else set()
+    assert {line.strip() for line in lines} == subjects | more
+    assert max(map(len, lines)) <= 80
 
 
 def test_a_shell_completes_commands_and_options():

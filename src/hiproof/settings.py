@@ -48,7 +48,7 @@ def setting(
 
 @dataclass(frozen=True)
 class ReadSettings:
-    """[read] which points count."""
+    """[read] which points count, units, surveys, passages, heights without points."""
 
     building_classes: tuple[int, ...] = setting(
         (6,),
@@ -157,7 +157,7 @@ class ReadSettings:
 
 @dataclass(frozen=True)
 class FitSettings:
-    """[fit] fitting primitives to points."""
+    """[fit] roof types to choose among, and how they are fitted."""
 
     types: tuple[str, ...] = setting(
         (), "roof types to choose among; empty means the whole catalogue", option="--types"
@@ -187,7 +187,7 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class CompoundSettings:
-    """[compound] roofs of several parts."""
+    """[compound] how much detail roofs of several parts have."""
 
     detail: str = setting(
         "full",
@@ -250,7 +250,7 @@ class ComposeSettings:
 
 @dataclass(frozen=True)
 class ReconstructSettings:
-    """[reconstruct] one building from points to solid."""
+    """[reconstruct] moved footprints, walls, overhangs, chimneys, bare ground."""
 
     align: str = setting(
         "auto",
@@ -312,7 +312,7 @@ class ReconstructSettings:
 
 @dataclass(frozen=True)
 class CitySettings:
-    """[city] many buildings."""
+    """[city] many buildings, their files and failures."""
 
     max_points_a_building: int = setting(
         20000,
@@ -338,7 +338,7 @@ class CitySettings:
 
 @dataclass(frozen=True)
 class WriteSettings:
-    """[write] contents of the output files."""
+    """[write] LoDs, building parts, CityGML versions, tables, CRS, OpenStreetMap tags."""
 
     lods: tuple[str, ...] = setting(
         ("2.2",),
@@ -400,7 +400,7 @@ class WriteSettings:
 
 @dataclass(frozen=True)
 class EnrichSettings:
-    """[enrich] answers about finished models."""
+    """[enrich] party walls, sun, weather and thermal zones of finished models."""
 
     touch_m: float = setting(
         0.3,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import inspect
 import re
-import textwrap
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from typing import Any
@@ -33,16 +32,17 @@ ALL_OPTIONS = "hiproof.all_options"  # key of a context whose help shows every o
 class Command(click.Command):
     """A command whose help shows the options that people need first.
 
-    It names the others by group, and `--help-all` explains them; without that option the help
-    explains all. Help is plain text, which
-    needs no markup and no columns for types.
+    A line a group names the subjects of the others, and `--help-all` explains them; without that
+    option the help explains all. Help is plain text, which needs no markup and no columns for
+    types.
     """
 
     def format_arguments(self, ctx: Any, formatter: Any) -> None:
         """Write nothing: arguments come with the options, before them."""
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        first = COMMANDS[self.name or ""].get("first")
+        row = COMMANDS[self.name or ""]
+        first = row.get("first")
         groups = self.group_parameters(ctx)
         if not first or ctx.meta.get(ALL_OPTIONS):
             for heading, params in groups.items():
@@ -53,7 +53,7 @@ class Command(click.Command):
         arguments = groups.pop("Arguments", [])
         write_parameters(formatter, "Arguments", arguments, ctx)
         write_parameters(formatter, MAIN_HEADING, shown, ctx)
-        write_names(formatter, groups, shown)
+        write_groups(formatter, groups, shown, row.get("more", ""))
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         write_example(formatter, self.name or "")
@@ -78,19 +78,19 @@ def write_parameters(formatter: Any, heading: str, params: Iterable[Any], ctx: A
         formatter.write_dl([(name, make_phrase(text)) for name, text in records])
 
 
-def write_names(formatter: Any, groups: dict[str, list[Any]], shown: list[Any]) -> None:
-    """Write the names of the options that are not `shown`, by group."""
-    names: dict[str, list[str]] = {}
-    for heading, group in groups.items():
-        subject = heading.removeprefix("Settings: ") if ":" in heading else "general"
-        left = [p.opts[0] for p in group if p not in shown and p.opts[0] != "--help"]
-        if left:
-            names.setdefault(subject, []).extend(left)
-    with formatter.section("More, explained by --help-all"):
-        for subject, left in names.items():
-            text = f"{subject}: {', '.join(left)}"
-            lines = textwrap.wrap(text, formatter.width - 4, break_on_hyphens=False)
-            formatter.write("".join(f"{'    ' if k else '  '}{s}\n" for k, s in enumerate(lines)))
+def write_groups(formatter: Any, groups: dict[str, list[Any]], shown: list[Any], more: str) -> None:
+    """Write a line for each group of options that are not all `shown`.
+
+    `more` describes those that are no settings.
+    """
+    names = {param.name for param in shown}
+    lines = [
+        heading.removeprefix("Settings: ") if ":" in heading else more
+        for heading, group in groups.items()
+        if {param.name for param in group} - names
+    ]
+    with formatter.section("More options, explained by --help-all"):
+        formatter.write("".join(f"  {line}\n" for line in dict.fromkeys(filter(None, lines))))
 
 
 def make_phrase(text: str) -> str:
