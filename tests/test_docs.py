@@ -18,6 +18,7 @@ import hiproof
 from hiproof.cli.app import app
 from hiproof.enrich.run import enrich_run
 from hiproof.primitives import CATALOGUE
+from hiproof.primitives.catalogue import describe_type
 from hiproof.settings import EnrichSettings, Settings
 from hiproof.simulate import demo_files
 
@@ -55,6 +56,10 @@ def test_every_command_and_option_is_explained(name):
 def test_the_page_of_roof_types_names_every_one():
     text = (ROOT / "docs/primitives.md").read_text()
     assert [name for name in CATALOGUE if f"\n## {name}\n" not in text] == []
+    for name in CATALOGUE:
+        words, brackets, _ = describe_type(name).partition(" (")
+        section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
+        assert not brackets or words in section.lower()
 
 
 def test_the_architecture_names_every_room():

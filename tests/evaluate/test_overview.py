@@ -25,7 +25,10 @@ def test_a_building_whose_points_lie_off_its_roof_is_not_called_modelled():
 def test_the_median_building_and_the_worst_tenth_are_named():
     overview = Overview.of(GOOD._replace(share=(60 + i) / 100) for i in range(40))
     assert (overview.median_share, overview.worst_tenth_share) == (0.80, 0.64)
-    assert "80.0 % in the median building, less than 64.0 % in the worst tenth" in overview.fit
+    assert (
+        "80.0 % in the median building; a tenth of the buildings have less than 64.0 %"
+        in overview.fit
+    )
 
 
 def test_every_outcome_without_a_model_needs_attention_unless_a_person_wanted_it():

@@ -120,6 +120,8 @@ def make_table(summary: dict, columns: dict[str, str], title: str, caption: str)
     """Return a table with a line a roof type."""
     from rich.table import Column, Table
 
+    from ..primitives.catalogue import describe_type
+
     table = Table(
         Column("type", no_wrap=True),
         "buildings",
@@ -131,7 +133,7 @@ def make_table(summary: dict, columns: dict[str, str], title: str, caption: str)
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]
         table.add_row(
-            kind,
+            describe_type(kind),
             str(figures["buildings"]),
             *("" if mean is None else f"{mean:.3f}" for mean in means),
         )

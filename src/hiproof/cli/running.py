@@ -83,12 +83,13 @@ def print_files(files: Iterable[Path], seconds: Mapping[str, float]) -> None:
 def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: str) -> list[str]:
     """Describe the overview of the run in the folder `out` in lines.
 
-    They are the result, how well the models fit, and what needs attention with the command that
-    shows it.
+    They are the result, the models' quality, how well they fit, and what needs attention with the
+    command that shows it.
     """
-    lines = [click.style(overview.headline, bold=True), *filter(None, [overview.fit])]
+    lines = [click.style(overview.headline, bold=True)]
     if by_quality:
         lines.append("quality: " + graded_words(by_quality))
+    lines += filter(None, [overview.fit])
     if overview.attention:
         lines.append("needs attention:")
     for kind, count in overview.attention.items():

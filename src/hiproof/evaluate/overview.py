@@ -95,7 +95,8 @@ class Overview:
             return ""
         return (
             f"roof points within 0.2 m of the roof: {100 * self.median_share:.1f} % in the median "
-            f"building, less than {100 * self.worst_tenth_share:.1f} % in the worst tenth"
+            "building; a tenth of the buildings have less than "
+            f"{100 * self.worst_tenth_share:.1f} %"
         )
 
 

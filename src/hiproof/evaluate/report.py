@@ -20,6 +20,7 @@ import numpy as np
 from .. import __version__
 from ..log import count_things
 from ..masking import masked_values
+from ..primitives.catalogue import describe_type
 from ..status import Grade, Status
 from .evaluation import summarise
 from .metrics import psd
@@ -201,7 +202,7 @@ def figure_table(run: EvaluatedRun) -> str:
             f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>"
             for name in TABLE_FIGURES
         )
-        head_cell = f'<th scope="row">{escape(kind)}</th>'
+        head_cell = f'<th scope="row">{escape(describe_type(kind))}</th>'
         rows += f"<tr>{head_cell}<td>{figures['buildings']}</td>{cells}</tr>"
     return f"<table>{head}{rows}</table>"
 
@@ -260,7 +261,7 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
         model.solid.move(-origin), points - origin, psd(model.solid, points), model.part_types
     )
     text = (
-        f"{escape(model.grade)} {escape(model.roof_type)}, "
+        f"{escape(model.grade)} {escape(describe_type(model.roof_type))}, "
         f"{100 * quality.share_within_20cm:.0f} % of the points "
         "inside the outline within 0.2 m of the roof; RMSE of all, facades included, "
         f"{quality.rmse:.2f} m"

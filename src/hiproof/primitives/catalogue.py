@@ -44,3 +44,17 @@ def get(name: str) -> Primitive:
             f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; see `hiproof settings`"
         )
     return CATALOGUE[name]
+
+
+def describe_type(kind: str) -> str:
+    """Return what people call a roof type, with its name where that differs.
+
+    What is no type of the catalogue stays as it is.
+
+    >>> describe_type("side_hip"), describe_type("half_hip"), describe_type("free")
+    ('hip at one side (side_hip)', 'half hip', 'free')
+    """
+    if kind not in CATALOGUE:
+        return kind
+    words = SHAPE_ROWS[kind].get("words")
+    return f"{words} ({kind})" if words else kind.replace("_", " ")

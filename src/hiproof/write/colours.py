@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..primitives.catalogue import CATALOGUE
+from ..primitives.catalogue import CATALOGUE, describe_type
 from ..status import Change
 
 OTHER = "other"
@@ -99,6 +99,7 @@ def page_colours() -> dict[str, Any]:
     """Return what a page needs to colour models and to draw its legend."""
     return {
         "legends": {kind: list_legend(kind) for kind in CATALOGUE},
+        "words": {kind: describe_type(kind) for kind in CATALOGUE},
         "type": ROOF_COLOURS,
         "wall": WALL_COLOUR,
         "mark": MARK_COLOUR,

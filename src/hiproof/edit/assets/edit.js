@@ -121,7 +121,7 @@ function largest(handles) {
 function show(model, home = false) {
   now.model = model;
   now.part = Math.min(now.part, Math.max((model.parts || []).length - 1, 0));
-  $("title").textContent = `${plainly(now.id)}: ${model.type || "no model"}`;
+  $("title").textContent = `${plainly(now.id)}: ${model.type ? typeWords(start.colours, model.type) : "no model"}`;
   $("reasons").textContent = [...now.reasons, now.outcome].filter(Boolean).join("; ");
   const accepted = now.accepted;
   $("accepted").textContent = accepted ? `accepted by ${accepted.who || "somebody"}, ${accepted.when || "some time ago"}${accepted.note ? `: ${accepted.note}` : ""} ` : "";
@@ -140,7 +140,7 @@ function showWhole() {
   if (now.left) $("title").textContent = `${plainly(now.id)}: left out`;
 }
 
-const FIGURES = [["share_within_20cm", "points within 0.2 m of the roof", v => `${(100 * v).toFixed(1)} %`], ["unexplained_area_m2", "unexplained area", v => `${v.toFixed(0)} m²`],
+const FIGURES = [["share_within_20cm", "points within 0.2 m of the roof", v => `${(100 * v).toFixed(1)} %`], ["unexplained_area_m2", "area of points over 0.5 m off the roof", v => `${v.toFixed(0)} m²`],
   ["rmse", "RMSE", v => `${v.toFixed(3)} m`], ["volume_m3", "volume", v => `${v.toFixed(0)} m³`], ["ridge_height", "highest ridge", v => `${v.toFixed(2)} m`], ["points", "points", v => v]];
 
 function showFigures() {
@@ -366,7 +366,7 @@ function showNumbers(part, handle) {
   if (!part) return;
   if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?${new URLSearchParams({ type: part.type })}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
   const select = document.createElement("select");
-  select.id = "type"; select.append(...start.types.map(type => new Option(type, type, false, type === part.type)));
+  select.id = "type"; select.append(...start.types.map(type => new Option(typeWords(start.colours, type), type, false, type === part.type)));
   // Letters are shortcuts again after a choice by the mouse; by keys, more choices may follow.
   let isByKey = false;
   select.addEventListener("keydown", () => { isByKey = true; });

@@ -60,7 +60,7 @@ function buttonOf(building, index) {
 
 function mark(element, building, index, parent) {
   element.dataset.building = index;
-  (element.querySelector("title") || element).textContent = `${building.id}: ${building.type}, ${building.outcome}`;
+  (element.querySelector("title") || element).textContent = `${building.id}: ${typeWords(data.colours, building.type)}, ${building.outcome}`;
   element.addEventListener("click", () => { if (!dragged) select(index); });
   parent.append(element);
   return element;
@@ -131,7 +131,7 @@ function select(index) {
   selected = index;
   marks[index].classList.add("selected");
   const building = data.buildings[index], details = document.getElementById("details");
-  const rows = [["id", building.id], ["type", building.type], ["outcome", building.outcome],
+  const rows = [["id", building.id], ["type", typeWords(data.colours, building.type)], ["outcome", building.outcome],
     ...Object.entries(building.measured), ...Object.entries(building.attributes)];
   const table = document.createElement("table");
   table.append(...rows.map(([name, value]) => headedRow(name, String(value))));

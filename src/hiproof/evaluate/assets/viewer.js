@@ -270,6 +270,9 @@ function rgb(colour) { return [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2)
 function entryOf(colours, type) { return colours.legends[type] || "other"; }
 function typeColour(colours, type) { return colours.type[entryOf(colours, type)]; }
 
+// What people call a roof type.
+function typeWords(colours, type) { return colours.words[type] || type; }
+
 // Let the styles know the colour of what is selected.
 function showMark(colours) { document.documentElement.style.setProperty("--mark", colours.mark); }
 

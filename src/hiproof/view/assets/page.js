@@ -27,7 +27,7 @@ function partsOf({ name, value }) {
 
 function lineOf({ type, parameters }, number, told) {
   const named = Object.entries(parameters).map(([name, size]) => `${name} ${Math.round(100 * size) / 100}`);
-  return { name: `part ${number}`, told, value: `${type}: ${named.join(", ")}` };
+  return { name: `part ${number}`, told, value: `${typeWords(colours, type)}: ${named.join(", ")}` };
 }
 
 function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
