@@ -5,6 +5,9 @@ usage: python -m benchmarks.changes --scenes [--seeds 100] [--verbose]
 Single roofs of random shape stand on a slope, one in a square of 34 m. Houses that rise do so by
 0.4 to 3.2 m; houses that lose a side keep 45 to 80 % of their length, and the ground lies bare
 there. The second survey is shifted as a whole. A scene has 24 houses, or one.
+
+Of lost sides, it prints the median of the reported area over the true one. A model is left whole if
+it still covers half of the lost side, and silent if it is graded good all the same.
 """
 
 from __future__ import annotations
@@ -20,17 +23,21 @@ import shapely
 
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
+from hiproof.parametric.building import build
+from hiproof.parametric.file import read_parameters
 from hiproof.simulate import random_building
 from hiproof.simulate.roofs import SimBuilding
 from hiproof.simulate.scanner import Scan
 from hiproof.simulate.scene import SOURCES
 from hiproof.simulate.survey import write_laz
+from hiproof.status import Grade
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import UpdateSummary, update_area
 
 PITCH_M, CORNER, SLOPE = 34.0, np.array([85000.0, 446000.0]), np.array([0.01, -0.015])
 NOISE_M, HORIZONTAL_NOISE_M = 0.03, 0.05
 RISES_M, KEPT = (0.4, 3.2), (0.45, 0.8)
+LEFT_WHOLE = 0.5  # of a lost side, above which its model did not follow
 GROUND, ROOF = SOURCES.index("ground"), SOURCES.index("roof")
 
 
@@ -187,8 +194,39 @@ def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> 
         counts["right"] += bool(house.kind) and row["kind"] == house.kind
         if is_verbose and (is_found != bool(house.kind) or house.kind != row["kind"]):
             print(f"    {house.id} {house.building.type}: {house.kind or 'nothing'} -> {row}")
-    print(f"{scene.name}: {dict(counts)}, taken off {summary.surveys.shift.clear_xyz.tolist()}")
+    lost = measure_lost(folder / "updated", houses, is_verbose)
+    counts += Counter(whole=sum(share > LEFT_WHOLE for _, share, _ in lost))
+    counts += Counter(silent=sum(share > LEFT_WHOLE and good for _, share, good in lost))
+    area = f", lost area {np.median([a for a, _, _ in lost]):.2f}" if lost else ""
+    shift = summary.surveys.shift.clear_xyz.tolist()
+    print(f"{scene.name}: {dict(counts)}{area}, taken off {shift}", flush=True)
     return counts
+
+
+def measure_lost(
+    folder: Path, houses: list[House], is_verbose: bool
+) -> list[tuple[float, float, bool]]:
+    """Return of each lost side its reported area over the true one, and what became of the model.
+
+    That is the share of the side that the model still covers, and whether it is graded good.
+    """
+    records = {record["id"]: record for record in read_parameters(folder / "parameters.jsonl")}
+    result = []
+    for house in houses:
+        outline = house.building.roof.outline
+        lost = shapely.transform(outline.intersection(house.bare), lambda xy, h=house: xy + h.place)
+        record = records[house.id]
+        if lost.is_empty or not record["parts"]:
+            continue
+        model = build(record)
+        area = shapely.transform(model.roof.outline, model.roof.frame.to_world)
+        places = (record.get("change") or {}).get("places", [])
+        reported = sum(place["area"] for place in places if place["kind"] == "part_removed")
+        share = area.intersection(lost).area / lost.area
+        result.append((reported / lost.area, share, model.grade is Grade.GOOD))
+        if is_verbose and share > LEFT_WHOLE:
+            print(f"    {house.id} {house.building.type} covers {share:.2f}: {record['detail']}")
+    return result
 
 
 def run_scenes(folder: Path, seeds: list[int], is_verbose: bool) -> dict[str, float]:
@@ -204,4 +242,6 @@ def run_scenes(folder: Path, seeds: list[int], is_verbose: bool) -> dict[str, fl
         "precision": total["hits"] / max(total["hits"] + total["alarms"], 1),
         "kind right": total["right"] / max(total["hits"], 1),
         "untouched houses reported": total["alarms"],
+        "models left whole": total["whole"],
+        "of them graded good": total["silent"],
     }

@@ -20,7 +20,7 @@ from .stages.judge import judge
 from .stages.outline import to_local
 from .stages.points import drop_neighbour_roofs, usable
 from .stages.recognise import recognise
-from .stages.remarks import add_remark
+from .stages.remarks import add_finding, add_remark
 from .stages.solid import (
     add_installations,
     add_overhangs,
@@ -96,4 +96,5 @@ def reconstruct(
     building = open_passages(building, base, given)
     building = add_installations(building, points, settings)
     building = add_overhangs(building, surroundings, neighbours, settings)
-    return add_remark(building, of_footprint, site.remark)
+    building = add_remark(building, of_footprint)
+    return (add_finding if site.is_doubtful else add_remark)(building, site.remark)

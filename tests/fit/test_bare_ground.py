@@ -77,6 +77,43 @@ def test_a_roof_stays_whole(ground):
     assert find_bare_ground(FOOTPRINT, scatter(FOOTPRINT, 5), ground) is None
 
 
+def lose_side(seed):
+    """A side beyond a line in any direction, of a tenth to a half of the footprint."""
+    rng = np.random.default_rng(seed)
+    side, centre = shapely.Polygon(), np.array([8.0, 6.0])
+    while not 0.1 < side.area / FOOTPRINT.area < 0.5:
+        across, along = rng.uniform(0, 7), np.array([[-50.0, 0], [50, 0], [50, 50], [-50, 50]])
+        turn = rng.uniform(0, 2 * math.pi)
+        rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+        side = FOOTPRINT & shapely.Polygon((along + [0, across]) @ rotation + centre)
+    return side
+
+
+@pytest.mark.parametrize("was_roof, least", [(False, 34), (True, 37)])
+def test_a_side_is_cut_off_along_its_own_edge(was_roof, least):
+    """Of 367 sides 97 % were found, narrow ones less; where a roof stood, of 376 98 %."""
+    found = 0
+    for seed in range(40):
+        side, density = lose_side(seed), (2, 4, 10)[seed % 3]
+        roof, ground = scatter(FOOTPRINT - side, density, seed), scatter(side, 1, seed + 1)
+        result = find_bare_ground(FOOTPRINT, roof, ground, was_roof)
+        if result is not None and result.outline is not None:
+            missed = result.outline & side
+            found += missed.area < 0.3 * side.area
+            assert (FOOTPRINT - side - result.outline).area < 0.06 * FOOTPRINT.area, seed
+    assert found >= least
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_less_bare_ground_counts_where_a_roof_stood(seed):
+    corner = shapely.Polygon([(0, 0), (4, 0), (0, 3)])
+    ground = scatter(corner, 2, seed)
+    assert find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - corner, 8, seed), ground) is None
+    result = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - corner, 8, seed), ground, True)
+    assert (result.outline & corner).area < 0.5 * corner.area
+    assert (result.outline.symmetric_difference(FOOTPRINT - corner)).area < 0.6 * corner.area
+
+
 def test_a_yard_that_would_leave_two_buildings_is_measured_and_not_cut():
     yard = shapely.box(5, 0, 11, 12)
     result = find_bare_ground(FOOTPRINT, scatter(FOOTPRINT - yard, 5), scatter(yard, 1))

@@ -26,11 +26,11 @@ def run(tmp_path_factory):
     return folder / "models"
 
 
-def update(run, out, town, **options):
+def update(run, out, town, changes=None, **options):
     cloud = str(write_cloud(out.with_suffix(".laz"), town.xyz, town.classification))
     parameters = str(run / "parameters.jsonl")
     request = UpdateRequest((cloud,), out, run=run, run_parameters=parameters, date="2024-05-01")
-    update_area(dataclasses.replace(request, **options))
+    update_area(dataclasses.replace(request, **options), changes)
     return by_id(out)
 
 
@@ -68,15 +68,40 @@ def test_what_lies_bare_is_lost_at_any_density(run, density, tmp_path):
         assert outlines[0].area - outlines[1].area == pytest.approx(area, rel=0.25), id
 
 
-def test_a_corner_that_lies_bare_is_reported_whatever_the_model_becomes(run, tmp_path):
-    town = make_town(seed=7, density=8.0)
-    x0, y0, _, _ = town.footprints["house-1"].bounds
-    corner = shapely.Polygon([(x0, y0), (x0 + 6.0, y0), (x0, y0 + 5.0)])
+def lay_corner_bare(town, id, size):
+    """Pull down a triangle at a corner of a house; return it."""
+    x0, y0, _, _ = town.footprints[id].bounds
+    corner = shapely.Polygon([(x0, y0), (x0 + size[0], y0), (x0, y0 + size[1])])
     gone = shapely.intersects_xy(corner, *town.xyz[:, :2].T)
     town.xyz[gone, 2] = ORIGIN[2] + 0.01 * (town.xyz[gone, 0] - ORIGIN[0])
     town.classification[gone] = 2
-    kinds = {id: take_kind(row) for id, row in update(run, tmp_path / "out", town).items()}
+    return corner
+
+
+@pytest.mark.parametrize("density", [4.0, 8.0, 16.0])
+@pytest.mark.parametrize("size", [(6.0, 5.0), (4.0, 3.0), (10.0, 7.0)])
+def test_a_model_loses_a_corner_that_lies_bare_or_is_not_good(run, size, density, tmp_path):
+    town = make_town(seed=7, density=density)
+    corner = lay_corner_bare(town, "house-1", size)
+    after = update(run, tmp_path / "out", town)
+    kinds = {id: take_kind(row) for id, row in after.items()}
     assert kinds == dict.fromkeys(town.footprints, "unchanged") | {"house-1": "part_removed"}
+    row = after["house-1"]
+    outline = shapely.transform(
+        shapely.Polygon(row["outline"][0]), lambda xy: xy + row["origin"][:2]
+    )
+    if outline.intersection(corner).area > 0.5 * corner.area:
+        assert row["quality"] != "good"
+        assert "of bare ground inside its footprint is roofed over" in row["detail"]
+
+
+def test_full_trust_in_footprints_keeps_the_model_and_says_so(run, tmp_path):
+    town = make_town(seed=7, density=8.0)
+    lay_bare(town, "house-1", 0.6)
+    row = update(run, tmp_path / "out", town, {"reconstruct": {"footprint_trust": "full"}})
+    assert take_kind(row["house-1"]) == "part_removed"
+    assert row["house-1"]["quality"] == "fair"
+    assert "of bare ground inside its footprint is roofed over" in row["house-1"]["detail"]
 
 
 @pytest.mark.parametrize("density", [0.5, 0.7, 1.0, 1.5])

@@ -52,6 +52,9 @@ LEAST_AREA_M2, LEAST_WIDTH_M = 8.0, 2.0
 lightwells are built over.
 """
 
+LEAST_LOST_M2 = 2.0
+"""Bare ground that is cut out where a roof stood before: smaller places are chimneys and edges."""
+
 MOST_ROOF, LEAST_SEEN = 0.12, 0.5
 """Shares of a rectangle's places that may be roof, and that must be bare ground."""
 
@@ -67,6 +70,12 @@ outline.
 
 MOST_PIECES = 6
 """Rectangles that are looked for; a yard of more corners is cut roughly."""
+
+MOST_CUT_DIRECTIONS = 3
+"""Directions that are tried: the footprint's, then those of edges that it does not follow."""
+
+OUTLINE_EDGE_M = 1.5
+"""Distance (m) from the outline within which an edge of bare ground is the outline's own."""
 
 THIN_M = 0.6
 """Width (m) of what is left between a cut and the outline below which it is cut off, too: half a
@@ -91,37 +100,85 @@ class BareGround:
 
 
 def find_bare_ground(
-    outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray
+    outline: shapely.Polygon,
+    roof: np.ndarray,
+    ground: np.ndarray,
+    was_roof: bool = False,
 ) -> BareGround | None:
     """Return the bare ground inside `outline`, None where there is little.
+
+    Where it is known that it `was_roof`, less is enough, in any direction.
 
     roof: (n, 2 or more) points of roofs, trees and whatever else stands high; ground: (m, 2 or
     more) points of the ground; all in one frame in metres.
     """
+    least_m2 = LEAST_LOST_M2 if was_roof else LEAST_AREA_M2
     inner = shapely.buffer(shapely.simplify(outline, NEEDLESS_M), -LEAST_WIDTH_M / 2)
     mask = find_inside(inner, ground[:, 0], ground[:, 1])
-    if count_cells(np.floor(ground[mask, :2])) < LEAST_SEEN * LEAST_AREA_M2 / 2 or len(roof) == 0:
+    if count_cells(np.floor(ground[mask, :2])) < LEAST_SEEN * least_m2 / 2 or len(roof) == 0:
         return None
-    angle = main_direction(outline)
+    cuts = [lay_pieces(outline, roof, ground, main_direction(outline), least_m2)]
+    if cuts[0].remainder is outline and not was_roof:
+        return None
+    while cuts[-1].left_m2 >= least_m2 / 2 and len(cuts) < MOST_CUT_DIRECTIONS:
+        cuts.append(lay_pieces(outline, roof, ground, cuts[-1].edge_angle, least_m2))
+    best = min(cuts, key=lambda cut: cut.left_m2)
+    if best.remainder is outline:
+        return None
+    area = outline.area - best.remainder.area
+    parts = sorted(shapely.get_parts(best.remainder), key=shapely.area, reverse=True)
+    is_one = (
+        bool(parts)
+        and parts[0].area > 0.9 * best.remainder.area
+        and parts[0].area > (1 - MOST_CUT) * outline.area
+    )
+    return BareGround(parts[0], outline.area - parts[0].area) if is_one else BareGround(None, area)
+
+
+@dataclass(frozen=True)
+class BareCut:
+    """The `remainder` of an outline without pieces along a direction.
+
+    `left_m2` is the bare ground that it still holds, and `edge_angle` the direction of the longest
+    edge between roof and bare ground.
+    """
+
+    remainder: shapely.Geometry
+    left_m2: float
+    edge_angle: float
+
+
+def lay_pieces(
+    outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray, angle: float, least_m2: float
+) -> BareCut:
+    """Cut pieces of `least_m2` of bare ground along the direction `angle` (rad) from an outline."""
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
     scene = ClassifiedPoints.of(
         shapely.transform(outline, lambda xy: xy @ turn), roof[:, :2] @ turn, ground[:, :2] @ turn
     )
-    pieces = list(scene.pieces())
+    rows, columns = np.nonzero(scene.value == 1.0)
+    bare = np.column_stack([scene.x[columns], scene.y[rows]])
+    edge_angle = angle + find_longest_edge(bare, scene.node, scene.outline) if len(bare) else angle
+    pieces = list(scene.pieces(least_m2))
     if not pieces:
-        return None
+        return BareCut(outline, len(bare) * scene.node**2, edge_angle)
     remainder = subtract_pieces(scene.outline, pieces)
-    area = scene.outline.area - remainder.area
-    parts = sorted(shapely.get_parts(remainder), key=shapely.area, reverse=True)
-    is_one = (
-        bool(parts)
-        and parts[0].area > 0.9 * remainder.area
-        and parts[0].area > (1 - MOST_CUT) * scene.outline.area
-    )
-    if not is_one:
-        return BareGround(None, area)
-    back = shapely.transform(parts[0], lambda xy: xy @ turn.T)
-    return BareGround(back, scene.outline.area - parts[0].area)
+    left = find_inside(remainder, *bare.T).sum() * scene.node**2
+    return BareCut(shapely.transform(remainder, lambda xy: xy @ turn.T), float(left), edge_angle)
+
+
+def find_longest_edge(bare: np.ndarray, node: float, outline: shapely.Polygon) -> float:
+    """Return the direction (rad) of the longest straight edge of places (n, 2) in an outline.
+
+    Places are `node` (m) apart, and edges along the outline do not count.
+    """
+    area = shapely.union_all(shapely.buffer(shapely.points(bare), node, cap_style="square"))
+    ring = shapely.simplify(max(shapely.get_parts(area), key=shapely.area).exterior, 2 * node)
+    ends = shapely.get_coordinates(ring)
+    steps, middles = np.diff(ends, axis=0), (ends[1:] + ends[:-1]) / 2
+    is_inner = shapely.distance(outline.exterior, shapely.points(middles)) > OUTLINE_EDGE_M
+    x, y = steps[np.argmax(np.hypot(*steps.T) * is_inner)]
+    return math.atan2(y, x)
 
 
 def subtract_pieces(outline: shapely.Polygon, pieces: list[shapely.Polygon]) -> shapely.Geometry:
@@ -172,13 +229,14 @@ class ClassifiedPoints:
         value[inside] = np.where(is_roof, -ROOF_COST, np.where(is_seen, 1.0, -UNSEEN_COST))
         return cls(outline, roof, ground, spacing, node, x, y, value.reshape(grid_x.shape))
 
-    def pieces(self) -> Iterator[shapely.Polygon]:
-        """Yield rectangles of bare ground, the largest first."""
+    def pieces(self, least_m2: float) -> Iterator[shapely.Polygon]:
+        """Yield rectangles of at least `least_m2` of bare ground, the largest first."""
+        least_width_m = min(LEAST_WIDTH_M, least_m2 / 2)
         for _ in range(MOST_PIECES):
             top, bottom, left, right, total = largest_sum(self.value)
             block = self.value[top:bottom, left:right]
             inside = block != 0
-            if total * self.node**2 < LEAST_AREA_M2 * LEAST_SEEN or not inside.any():
+            if total * self.node**2 < least_m2 * LEAST_SEEN or not inside.any():
                 return
             visible, roof = (
                 (block == 1.0).sum() / inside.sum(),
@@ -192,7 +250,7 @@ class ClassifiedPoints:
             piece = shapely.box(*(self.side(box, k) for k in range(4)))
             part = shapely.intersection(piece, self.outline)
             width = min(np.ptp(shapely.get_coordinates(part), axis=0)) if not part.is_empty else 0.0
-            if part.area >= LEAST_AREA_M2 and width >= LEAST_WIDTH_M:
+            if part.area >= least_m2 and width >= least_width_m:
                 yield piece
 
     def side(self, box: np.ndarray, k: int) -> float:

@@ -35,12 +35,14 @@ class Site:
     """The ground's evidence about a building before its fit.
 
     It has the points and the outline that remain, whether nothing stands there, and a remark.
+    `is_doubtful` says whether the remark speaks against a model: bare ground lies under its roof.
     """
 
     points: np.ndarray
     outline: shapely.Polygon | None
     remark: str = ""
     is_empty: bool = False
+    is_doubtful: bool = False
 
 
 def look_at_ground(
@@ -71,7 +73,7 @@ def look_at_ground(
                 f"no model: nothing stands on the footprint, {share}",
                 is_empty=True,
             )
-        return Site(points, outline, f"perhaps nothing stands there: {share}")
+        return Site(points, outline, f"perhaps nothing stands there: {share}", is_doubtful=True)
     lower = standing.is_low[: len(points)]
     selection = (
         points[~lower] if lower.mean() >= LEAST_LOW else points
@@ -134,8 +136,8 @@ def cut_bare_ground(
     area = f"{bare_ground.area_m2:.0f} m2 {Doubt.BARE_GROUND_INSIDE.value}"
     if bare_ground.outline is None or settings.reconstruct.footprint_trust == "full":
         advice = "" if bare_ground.outline is None else "; --footprint-trust points cuts it out"
-        return Site(points, outline, f"{area} is roofed over{advice}")
+        return Site(points, outline, f"{area} is roofed over{advice}", is_doubtful=True)
     inside = find_inside(bare_ground.outline, points[:, 0], points[:, 1])
     if not inside.any():
-        return Site(points, outline, f"{area} is roofed over")
+        return Site(points, outline, f"{area} is roofed over", is_doubtful=True)
     return Site(points.compress(inside, axis=0), bare_ground.outline, f"{area} was cut out")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ..model import Building
-from ..status import Doubt
+from ..status import Doubt, Grade
 
 
 def add_remark(building: Building, *remarks: str) -> Building:
@@ -14,6 +14,12 @@ def add_remark(building: Building, *remarks: str) -> Building:
         return building
     detail = "; ".join(filter(None, (building.detail or building.status.value, *remarks)))
     return dataclasses.replace(building, detail=detail)
+
+
+def add_finding(building: Building, finding: str) -> Building:
+    """Add a remark that speaks against a model, which then is fair at best."""
+    grade = Grade.FAIR if building.grade is Grade.GOOD else building.grade
+    return add_remark(dataclasses.replace(building, grade=grade), finding)
 
 
 def without_doubt(detail: str, doubt: Doubt) -> str:

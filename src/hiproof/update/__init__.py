@@ -17,6 +17,7 @@ kinds      what changed: a part raised, a dormer built, ...
 before     the earlier points sorted and the surveys registered, before there are work tiles
 lineage    parts of the new roof that continue parts of the earlier one
 moved      the earlier model with parts moved up or down, where only these changed
+lost       parts that were pulled down, which the new model loses
 places     places that changed as parameters.jsonl holds them, roofs in one frame
 outside    roofs outside all outlines
 texts      texts of unchanged buildings, taken from the earlier run

@@ -81,7 +81,11 @@ def judge_building(
     found = [c for c in find_clusters(comparison, noise.stray) if c.area_m2 >= SMALLEST_M2]
     likely = [c for c in found if c.chance < significance]
     beyond = unexplained_m2 if old is None else 0.0
-    clear = tuple(c for c in likely if c.is_surface and c.area_m2 > beyond)
+    clear = tuple(
+        c
+        for c in likely
+        if (c.is_surface or lies_bare(c, comparison, z_ground)) and c.area_m2 > beyond
+    )
     chance = min([1.0, *(c.chance for c in clear)])
     if chance_whole < significance:
         return ChangeVerdict(
@@ -120,6 +124,12 @@ def is_gone(comparison: CellComparison, roof: Roof, z_ground: float) -> bool:
     was_roof = chosen & (heights + c.old > z_ground + 2 * OVER_GROUND_M)
     on_ground = was_roof & (heights + c.new < z_ground + OVER_GROUND_M)
     return int(on_ground.sum()) >= max(FEWEST_COMPARED, GONE_SHARE * int(was_roof.sum()))
+
+
+def lies_bare(cluster: ChangedCells, comparison: CellComparison, z_ground: float) -> bool:
+    """Return whether most of a cluster's new points lie on the ground."""
+    z = comparison.points[np.isin(comparison.number, cluster.members), 2]
+    return float(np.median(z)) < z_ground + OVER_GROUND_M
 
 
 def find_heights(roof: Roof, comparison: CellComparison) -> np.ndarray:

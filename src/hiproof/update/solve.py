@@ -32,6 +32,7 @@ from ..model import Building, Roof
 from ..parametric.building import build, with_model
 from ..parametric.override import Override
 from ..parametric.record import read_building, read_terrain_lines
+from ..stages.remarks import add_remark
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
 from ..write.run_files import fragments
@@ -40,6 +41,7 @@ from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, select_roof
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
+from .lost import LostParts
 from .members import UpdateMember, load_members
 from .moved import measure_moved, move_building
 from .places import (
@@ -150,7 +152,9 @@ class Updater:
         lines = tuple(read_terrain_lines(member.record))
         earlier = dataclasses.replace(earlier, terrain_intersection=lines)
         earlier = with_model(earlier, roof, self.plan.settings.compose)
-        return self.follow_verdict(job, member, earlier, verdict)
+        lost = LostParts.find(verdict, roof, earlier.z_ground - roof.frame.origin[2])
+        result = self.follow_verdict(job, member, earlier, verdict, lost)
+        return result if lost is None else lost.doubt(result)
 
     def judge(
         self, job: Job, record: dict[str, Any], earlier: Building, roof: Roof
@@ -181,8 +185,10 @@ class Updater:
         earlier = build(record, self.plan.settings.compose)
         return refine_building(earlier, old, new, self.surveys.date)
 
-    def reconstruct(self, job: Job, member: UpdateMember) -> Building:
-        """Return a building made of the new points and its override.
+    def reconstruct(
+        self, job: Job, member: UpdateMember, lost: LostParts | None = None
+    ) -> Building:
+        """Return a building made of the new points and its override, without `lost` parts.
 
         Where its outline is new, that is moved onto its roof, as in every run.
         """
@@ -190,11 +196,35 @@ class Updater:
         if member.is_same_outline:
             new = new.without_moving()
         building, _ = solve_one(self.plan, job, new, override, self.keep)
+        building = building if lost is None else self.lose_parts(job, building, lost)
         x, y = np.add(member.shift, building.shift).round(SHIFT_DIGITS).tolist()
         return dataclasses.replace(building, shift=(x, y))
 
+    def lose_parts(self, job: Job, building: Building, lost: LostParts) -> Building:
+        """Return a building made again without `lost` parts, where its model covers them."""
+        trust = self.plan.settings.reconstruct.footprint_trust
+        if building.built is None or job.index in self.overrides or trust == "full":
+            return building
+        smaller = (
+            lost.make_smaller_job(job, building.shift) if lost.measure_under(building) else None
+        )
+        if smaller is None:
+            return building
+        new = self.epochs.new.without_moving()
+        result, _ = solve_one(self.plan, smaller, new, None, self.keep)
+        if result.built is None or lost.measure_under(result) >= lost.measure_under(building):
+            return building
+        area_m2 = job.area.area - smaller.area.area
+        result = dataclasses.replace(result, footprint=building.footprint, shift=building.shift)
+        return add_remark(result, f"{area_m2:.0f} m2 {Doubt.BARE_GROUND_INSIDE.value} was cut out")
+
     def follow_verdict(
-        self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
+        self,
+        job: Job,
+        member: UpdateMember,
+        earlier: Building,
+        verdict: ChangeVerdict,
+        lost: LostParts | None,
     ) -> Building:
         """Return the building that a verdict leads to."""
         frame = earlier.roof.frame
@@ -204,7 +234,7 @@ class Updater:
         if verdict.change is Change.NOT_COVERED:
             return self.mark(earlier, verdict, [], member)
         if not member.is_same_outline:
-            return self.redraw(job, member, earlier, verdict)
+            return self.redraw(job, member, earlier, verdict, lost)
         if verdict.change is Change.UNCHANGED:
             return earlier
         if verdict.change is Change.UNCERTAIN:
@@ -214,7 +244,7 @@ class Updater:
         if moved is not None:
             places = self.name_places(earlier, moved, verdict)
             return self.mark(moved, verdict, places, member, list(range(len(moved.parts))))
-        new = self.reconstruct(job, member)
+        new = self.reconstruct(job, member, lost)
         z_ground = earlier.z_ground - frame.origin[2]
         if new.built is None or not explains(
             move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, z_ground
@@ -261,10 +291,15 @@ class Updater:
         return record_places(found, earlier.roof.frame)
 
     def redraw(
-        self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
+        self,
+        job: Job,
+        member: UpdateMember,
+        earlier: Building,
+        verdict: ChangeVerdict,
+        lost: LostParts | None,
     ) -> Building:
         """Return a building over another outline than before."""
-        new = self.reconstruct(job, member)
+        new = self.reconstruct(job, member, lost)
         if new.built is None:
             verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
             return self.mark(earlier, verdict, [], member)
