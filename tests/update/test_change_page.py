@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hiproof.evaluate.report import write_report
+from hiproof.evaluate.report import report_html, write_report
 from hiproof.evaluate.run import evaluate_run
 from hiproof.update.before_after import draw_changes
 from pages import at_every_size, is_too_wide, list_complaints, needs_browser, open_page
@@ -40,7 +40,9 @@ def report(tmp_path_factory):
     raised = replace(raised, solid=raised.solid.move(np.array([0.0, 0.0, RAISED_M])))
     models = (raised, replace(gone, solid=None), *earlier.models[2:])
     points = (earlier.points[0] + [0.0, 0.0, RAISED_M], np.empty((0, 3)), *earlier.points[2:])
-    run = replace(earlier, models=models, points=points)
+    update = {"by_change": {"changed": 1, "gone": 1}, "roofs_outside": {"built": 3}}
+    record = earlier.record | {"update": update}
+    run = replace(earlier, models=models, points=points, record=record)
     write_report(folder / "report.html", run, "an update", changes=draw_changes(run, earlier))
     return (folder / "report.html").as_uri()
 
@@ -59,6 +61,20 @@ def test_each_cloud_and_each_model_can_be_hidden(browser, report, size):
         assert page.evaluate(VISIBLE) == ["model before"]
         page.check('[data-layer="points before"]')
         assert page.evaluate(VISIBLE) == ["model before", "points before"]
+
+
+@at_every_size
+def test_the_page_begins_with_what_to_do_next(browser, report, size):
+    with open_page(browser, report, size) as page:
+        first = page.locator("main section").first
+        steps = first.locator("li strong").all_inner_texts()
+        assert steps == ["1 building", "1 building", "3 roofs"]
+        assert first.inner_text().startswith("What to do next")
+
+
+def test_a_run_that_is_no_update_has_no_next_steps(tmp_path):
+    write_sample_run(tmp_path)
+    assert "What to do next" not in report_html(evaluate_run(tmp_path))
 
 
 @at_every_size

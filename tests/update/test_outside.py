@@ -66,6 +66,9 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
     rows, areas = {row["kind"]: row for row in table}, [float(row["area_m2"]) for row in table]
     assert areas == sorted(areas, reverse=True) and len(set(areas)) > 1
     assert rows["extended"]["id"] == "house-0" and rows["built"]["id"] == ""
+    for kind, row in rows.items():
+        assert float(row["height_m"]) == pytest.approx(4.0, abs=0.3), kind
+        assert 0.9 < float(row["confidence"]) <= 1.0, kind
     meta, _, geometry, columns = pyogrio.raw.read(out / "changes.gpkg", layer="changed_places")
     kinds = columns[list(meta["fields"]).index("kind")].tolist()
     places = dict(zip(kinds, shapely.from_wkb(geometry), strict=True))

@@ -50,6 +50,42 @@ TABLE_FIGURES = {
     "outline_iou": "outline IoU",
 }
 
+NEXT_STEPS = {
+    "uncertain": (
+        "building",
+        "uncertain: points contradict the model, but show no clear roof. "
+        "<code>hiproof edit RUN</code> lists them first.",
+    ),
+    "changed": (
+        "building",
+        "changed and modelled again. The largest changes are drawn below; "
+        "correct what is wrong with <code>hiproof edit RUN</code>.",
+    ),
+    "new": ("building", "new, with a first model. Check them in the same way."),
+    "gone": ("building", "gone. Take them out of your map and your register."),
+    "built": (
+        "roof",
+        "new and without a footprint. Draw footprints over the class "
+        "<code>outside</code> of <code>changes.gpkg</code>, and update again with "
+        "<code>--footprints</code>.",
+    ),
+    "extended": ("roof", "new beside a building. Extend its footprint, and update again."),
+    "unmapped": (
+        "roof",
+        "without a footprint in both surveys. <code>changes.csv</code> lists them "
+        "by size, with height and confidence; draw footprints for those that you map.",
+    ),
+    "demolished": (
+        "roof",
+        "without a footprint and gone. Take them out of your map if it has them.",
+    ),
+    "not_covered": (
+        "building",
+        "not covered by the new survey. Their models are the earlier ones.",
+    ),
+}
+"""What a mapper does next, by class of change, or kind of a roof outside all outlines."""
+
 
 def write_report(
     path: Path,
@@ -90,6 +126,7 @@ def report_html(
         "title": escape(title),
         "style": read_asset("page.css") + read_asset("report.css"),
         "lead": lead(run, len(buildings)),
+        "next": list_next_steps(run),
         "attention": attention_list(run),
         "statuses": status_table(run),
         "qualities": grade_table(run),
@@ -130,6 +167,20 @@ def lead(run: EvaluatedRun, visible: int) -> str:
     part = f" Map and 3D view show {visible:,} of them." if visible < len(run.models) else ""
     text = f"Made by hiproof {escape(str(version))}."
     return f"<strong>{overview.headline}.</strong>{fit} {measured}.{part} {text}"
+
+
+def list_next_steps(run: EvaluatedRun) -> str:
+    """Return the section of what to do after an update; empty for other runs."""
+    update = run.record.get("update") or {}
+    counts = {**(update.get("by_change") or {}), **(update.get("roofs_outside") or {})}
+    rows = "".join(
+        f"<li><strong>{count_things(counts[name], thing)}</strong> {text}</li>"
+        for name, (thing, text) in NEXT_STEPS.items()
+        if counts.get(name)
+    )
+    rows = rows or "<li>Nothing: no building changed.</li>"
+    title = "What to do next (RUN is the output folder)"
+    return f"<section><h2>{title}</h2><ol>{rows}</ol></section>" if update else ""
 
 
 def attention_list(run: EvaluatedRun) -> str:

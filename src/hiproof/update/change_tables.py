@@ -34,8 +34,14 @@ CHANGE_COLUMNS: dict[str, type] = {
     "difference_m": float,
     "sigma_m": float,
     "area_m2": float,
+    "height_m": float,
+    "confidence": float,
 }
-"""Columns of both tables: a change, and its figures at one place."""
+"""Columns of both tables: a change, and its figures at one place.
+
+Roofs outside all outlines have the last two.
+"""
+PLACE_FIGURES = tuple(name.removesuffix("_m2").removesuffix("_m") for name in CHANGE_COLUMNS)[3:]
 TABLE_COLUMNS: dict[str, type] = {
     **CHANGE_COLUMNS,
     "chance": float,
@@ -137,7 +143,7 @@ def make_row(change: FoundChange) -> tuple[Any, ...]:
         change.record["id"],
         found["class"],
         place.get("kind"),
-        *(place.get(name) for name in ("difference", "sigma", "area")),
+        *(place.get(name) for name in PLACE_FIGURES),
         found["chance"],
         found["survey"],
         len(found["places"]),
@@ -153,7 +159,7 @@ def make_place_rows(change: FoundChange) -> list[tuple[Any, ...]]:
             change.record["id"],
             found["class"],
             place.get("kind"),
-            *(place.get(name) for name in ("difference", "sigma", "area")),
+            *(place.get(name) for name in PLACE_FIGURES),
             *(place.get("parts") or (None, None)),
         )
         for place in found["places"]

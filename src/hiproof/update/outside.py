@@ -46,20 +46,21 @@ crowns have metres."""
 HIGH_OVER_GROUND_M = 2.0
 """Height (m) of a roof over the nearest ground: cars and hedges are lower."""
 
+GROUND_AROUND_M = 3.0
+"""Distance (m) around a roof within which the ground counts that its height is measured from."""
+
 BLOCK_M, BLOCK_REACH_M = 1000.0, 200.0
 """Side (m) of the squares that are searched one after the other, and how far around each cells are
 loaded: roofs that are longer are cut."""
 
 ROUNDING_M = 1e-6  # far above the errors of a mean, far below the millimetres of coordinates
 
+KEY_OF_CELL = np.array([2**32, 1])  # with which a column and a row make one number
 AROUND = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)])
 
 
 class SurveyCells:
-    """The roof and the ground of a survey in cells of a metre.
-
-    Where classes mark roofs, the ground's heights do not matter: its cells alone are kept.
-    """
+    """The roof and the ground of a survey in cells of a metre."""
 
     def __init__(self, read: ReadSettings):
         roofs = tuple(set(range(256)) - set(read.ground_classes) - set(NOISE_AND_WATER))
@@ -115,11 +116,16 @@ def average_cells(
 
 
 def find_places(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middles (k, 4) of cells that hold points (n, 3), at no height.
+    """Return the middles (k, 4) of cells that hold points (n, 3), at the mean height of these.
 
-    Each counts as one point."""
-    middles = list_occupied(find_cells(points))[0] + 0.5
-    return np.column_stack([middles, np.zeros_like(middles)]), np.ones(len(middles))
+    Also returns the number of points (k,) of each.
+    """
+    occupied, number = list_occupied(find_cells(points))
+    counts = np.bincount(number).astype(float)
+    places = np.zeros((len(occupied), 4))
+    places[:, :2] = occupied + 0.5
+    places[:, 2] = np.bincount(number, weights=points[:, 2]) / counts
+    return places, counts
 
 
 def list_occupied(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,11 +207,18 @@ def is_level_and_high(cells: np.ndarray, ground: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RoofOutside:
-    """A roof outside all outlines; `id` is the building that it extends, if any."""
+    """A roof outside all outlines; `id` is the building that it extends, if any.
+
+    `height_m` is that over the ground. `confidence` is the share of its cells that lie bare in the
+    other survey, or for an unmapped roof the share that lie as high there. Both are None where they
+    are unknown.
+    """
 
     kind: ChangeKind
     area_m2: float
     place: shapely.Geometry
+    height_m: float | None
+    confidence: float | None
     id: str | None = None
 
     def to_record(self) -> dict[str, Any]:
@@ -215,6 +228,8 @@ class RoofOutside:
             "id": self.id,
             "kind": self.kind.code,
             "area": self.area_m2,
+            "height": None if self.height_m is None else round(self.height_m, 2),
+            "confidence": None if self.confidence is None else round(self.confidence, 2),
             "outlines": polygons,
         }
 
@@ -228,7 +243,7 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     for corner in list_corners([*list_files(folders[0]), *list_files(folders[1])]):
         box = shapely.box(*(corner - BLOCK_REACH_M), *(corner + BLOCK_M + BLOCK_REACH_M))
         new, old = (load_survey(folder, box) for folder in folders)
-        roofs = find_unmapped(new["roof"], old["roof"] if has_earlier else new["roof"], outlines)
+        roofs = find_unmapped(new, old["roof"] if has_earlier else None, outlines)
         if has_earlier:
             roofs += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
             roofs += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
@@ -282,28 +297,55 @@ def find_fresh(
         if on_ground[members].mean() < MOSTLY:
             continue
         place = draw_places(points[members])
+        height = measure_height(points[members], other["ground"])
+        found = float(len(members)), place, height, float(on_ground[members].mean())
         beside = outlines.query(place, predicate="dwithin", distance=BESIDE_M)
         if len(beside) and names:
             id = names[int(outlines.query_nearest(place, all_matches=False)[0])]
-            result.append(RoofOutside(ChangeKind.EXTENDED, float(len(members)), place, id))
+            result.append(RoofOutside(ChangeKind.EXTENDED, *found, id))
         elif not len(beside):
-            result.append(RoofOutside(kind, float(len(members)), place))
+            result.append(RoofOutside(kind, *found))
     return result
 
 
 def find_unmapped(
-    roofs: np.ndarray, other: np.ndarray, outlines: shapely.STRtree
+    survey: dict[str, np.ndarray], other: np.ndarray | None, outlines: shapely.STRtree
 ) -> list[RoofOutside]:
-    """Return roofs away from all outlines that both surveys show."""
-    points = roofs[~touches(roofs, outlines, BESIDE_M)]
-    points = points[is_among(find_cells(points), find_cells(other))]
-    groups = group_cells(points, np.ones(len(points), bool))
-    places = [(len(members), draw_places(points[members])) for members in groups]
-    return [
-        RoofOutside(ChangeKind.UNMAPPED, float(size), place)
-        for size, place in places
-        if not len(outlines.query(place, predicate="dwithin", distance=BESIDE_M))
-    ]
+    """Return roofs of a survey away from all outlines, which the roof cells of the other show, too.
+
+    Without an `other` survey, all are returned.
+    """
+    points = survey["roof"][~touches(survey["roof"], outlines, BESIDE_M)]
+    is_steady = None
+    if other is not None:
+        keys = [find_cells(cells) @ KEY_OF_CELL for cells in (points, other)]
+        _, here, there = np.intersect1d(*keys, return_indices=True)
+        points = points[here]
+        is_steady = np.abs(points[:, 2] - other[there, 2]) < LEVEL_M
+    result = []
+    for members in group_cells(points, np.ones(len(points), bool)):
+        place, height = (
+            draw_places(points[members]),
+            measure_height(points[members], survey["ground"]),
+        )
+        confidence = None if is_steady is None else float(is_steady[members].mean())
+        if not len(outlines.query(place, predicate="dwithin", distance=BESIDE_M)):
+            roof = RoofOutside(ChangeKind.UNMAPPED, float(len(members)), place, height, confidence)
+            result.append(roof)
+    return result
+
+
+def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
+    """Return how high (m) a roof lies over the ground around it.
+
+    `points` (k, 3) and `ground` (m, 3) are cells; the result is None where no ground is near.
+    """
+    low, high = (f(points[:, :2], axis=0) for f in (np.min, np.max))
+    x, y = ground[:, :2].T
+    inside = (x >= low[0] - GROUND_AROUND_M) & (x <= high[0] + GROUND_AROUND_M)
+    inside &= (y >= low[1] - GROUND_AROUND_M) & (y <= high[1] + GROUND_AROUND_M)
+    heights = ground[inside, 2]
+    return float(np.median(points[:, 2]) - np.median(heights)) if len(heights) else None
 
 
 def group_cells(points: np.ndarray, is_core: np.ndarray) -> list[np.ndarray]:
