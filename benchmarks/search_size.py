@@ -107,7 +107,7 @@ def main() -> None:
                 table.add(path.relative_to(folder.parent), *(f"{count:,}" for count in size))
             totals.append(add(sizes))
             table.add(folder.name, *(f"{count:,}" for count in totals[-1]))
-        if len(folders) > 1:
+        if not a.folders:
             table.add("in all", *(f"{count:,}" for count in add(totals)))
 
 

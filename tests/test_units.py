@@ -5,7 +5,6 @@ feet again.
 import json
 import warnings
 
-import laspy
 import numpy as np
 import pyogrio
 import pyproj
@@ -28,7 +27,6 @@ from hiproof.frames import METRES, Units
 from hiproof.parametric.finished import open_run
 from hiproof.read import read_footprints, read_points, read_terrain
 from hiproof.read.crs import find_units
-from hiproof.read.pointcloud import read_header
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write.tables.postgis import database_rows
@@ -241,31 +239,6 @@ def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, size, height, 
     inside, outside = [0.0, 0.0], [44 * 0.3048 + 5.0, 0.0]
     heights = terrain.height_at(np.array([inside, outside]))
     assert heights[0] == pytest.approx(expected) and np.isnan(heights[1])
-
-
-def test_the_unit_of_heights_that_geotiff_keys_name_counts(tmp_path):
-    """NAVD88 by its code (metres), while the heights are in feet, as their unit says: seen in many
-    American files.
-    """
-    header = laspy.LasHeader(point_format=1, version="1.2")
-    header.add_crs(pyproj.CRS("EPSG:2263"))
-    keys = header.vlrs.get("GeoKeyDirectoryVlr")[0]
-    for id, value in ((4096, 5703), (4099, 9003)):
-        entry = type(keys.geo_keys[0])(id=id, tiff_tag_location=0, count=1, value_offset=value)
-        keys.geo_keys.append(entry)
-    keys.geo_keys_header.number_of_keys = len(keys.geo_keys)
-    assert find_units(crs_of_header(header, tmp_path)).height == pytest.approx(US_FOOT)
-    keys.geo_keys.pop()
-    keys.geo_keys_header.number_of_keys -= 1
-    assert find_units(crs_of_header(header, tmp_path)).height == 1.0
-
-
-def crs_of_header(header, folder):
-    """The CRS that a file with this header names."""
-    las = laspy.LasData(header)
-    las.x, las.y, las.z = np.ones((3, 4))
-    las.write(folder / "a.las")
-    return read_header(folder / "a.las").crs
 
 
 def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):

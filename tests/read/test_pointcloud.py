@@ -390,18 +390,6 @@ def test_what_cannot_be_read_gets_one_full_sentence(tmp_path, kind):
     assert message.startswith("expected") and "got" in message and "Traceback" not in message
 
 
-def test_files_in_different_crs_are_refused(tmp_path):
-    xyz, _ = some_points(20)
-    files = (
-        write_las(tmp_path / "a.laz", xyz, epsg=28992),
-        write_las(tmp_path / "b.laz", xyz, epsg=25832),
-    )
-    with pytest.raises(
-        InputError, match=r"in one CRS, got EPSG:28992 .*a\.laz and EPSG:25832 .*b\.laz"
-    ):
-        read_points(*files)
-
-
 def test_no_path_and_a_box_beside_the_points_are_refused(tmp_path):
     with pytest.raises(InputError, match="at least one"):
         read_points()
