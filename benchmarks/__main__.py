@@ -1,15 +1,14 @@
-"""Run every benchmark: `python -m benchmarks [--quick]`.
+"""Run every benchmark of the page of figures, one after the other.
 
-They run one after the other; --quick goes to those that know it.
+usage: python -m benchmarks [--record]
 """
 
 import subprocess
 import sys
-from pathlib import Path
 
-for path in sorted(Path(__file__).parent.glob("*.py")):
-    text = path.read_text()
-    if not path.name.startswith("_") and "def main(" in text:
-        words = [word for word in sys.argv[1:] if f'"{word}"' in text]
-        print(f"\n== python -m benchmarks.{path.stem} {' '.join(words)}", flush=True)
-        subprocess.run([sys.executable, "-m", f"benchmarks.{path.stem}", *words], check=False)
+from .results import ORDER
+
+for name in ORDER:
+    if name != "roofer":  # measured by hand
+        print(f"\n== python -m benchmarks.{name}", flush=True)
+        subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *sys.argv[1:]], check=False)
