@@ -11,7 +11,6 @@ import pytest
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "src/hiproof"
 PAGE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-SELF_EVIDENT = {"cli"}  # one file a command
 NOT_DRAWN = {"__init__", "__main__"}  # what hiproof exports, and what `python -m` calls
 
 
@@ -105,14 +104,3 @@ def test_one_package_alone_imports(library):
     phrase = f"the only package that imports {library}"
     (package,) = (name for name, description in read_table().items() if phrase in description)
     assert {module[0] for module in MODULES if library in list_other_packages(module)} == {package}
-
-
-@pytest.mark.parametrize(
-    "package", sorted(name for name in list_packages() - SELF_EVIDENT if (SOURCES / name).is_dir())
-)
-def test_the_docstring_of_a_package_lists_its_files(package):
-    for init in (SOURCES / package).rglob("__init__.py"):
-        text = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
-        files = {path.stem for path in init.parent.glob("*.py") if not path.stem.startswith("__")}
-        files |= {path.parent.name for path in init.parent.glob("*/__init__.py")}
-        assert [name for name in sorted(files) if not re.search(rf"\b{name}\b", text)] == []

@@ -163,11 +163,6 @@ def test_the_commands_of_a_page_run(page, inputs, models, tmp_path, monkeypatch)
         assert result.exit_code == 0, f"{command}\n{result.output}"
 
 
-def test_what_is_not_run_still_stands_on_a_page():
-    text = "\n".join(command for page in PAGES for command in list_commands(page))
-    assert [part for part in NOT_RUN if part not in text] == []
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_block_of_a_page_is_run_or_listed(page):
     fenced, indented = list_blocks(page)
@@ -179,11 +174,3 @@ def test_every_block_of_a_page_is_run_or_listed(page):
             Settings.from_dict(tomllib.loads(text))
     programs = {line.split()[0] for block in indented for line in block.splitlines()}
     assert page.name in FORMULAS or programs <= {"hiproof", *OTHER_PROGRAMS}
-
-
-def test_what_is_listed_stands_on_a_page():
-    blocks = [list_blocks(page) for page in PAGES]
-    languages = {language for fenced, _ in blocks for language, _ in fenced}
-    lines = [line for _, indented in blocks for block in indented for line in block.splitlines()]
-    assert FENCED.keys() <= languages
-    assert OTHER_PROGRAMS.keys() <= {line.split()[0] for line in lines}

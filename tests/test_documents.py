@@ -17,6 +17,7 @@ DOCUMENTS = [
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 # by docs/generated.py and docs/demo_in_3d.py, when the site is built
 MADE = ("commands.md", "settings.md", "constants.md", "demo/index.html")
+COLUMNS = 100  # of a line, but in tables and in the list that `hiproof attributes` prints
 COMMANDS = app.commands
 OPTIONS = {
     name
@@ -62,12 +63,6 @@ def read_sources():
     return "\n".join(file.read_text() for file in files if file != Path(__file__))
 
 
-@cache
-def list_words():
-    """All names in that text."""
-    return frozenset(re.findall(r"\w+", read_sources()))
-
-
 def find_module_file(name):
     """The file of a module that `python -m` may be given, None where there is none."""
     path = ROOT / name.replace(".", "/")
@@ -85,6 +80,15 @@ def is_path(span):
             r"[\w.-]*(/[\w.-]+)*(/|\.(py|md|toml|json|jsonl|gml|gpkg|parquet|csv|html))", span
         )
     )
+
+
+@pytest.mark.parametrize(
+    "path", [*DOCUMENTS, *(ROOT / "benchmarks").glob("*.md")], ids=lambda path: path.name
+)
+def test_lines_fit(path):
+    outside = [line for line in path.read_text().splitlines() if not line.startswith("|")]
+    long = [line for line in outside if len(line) > COLUMNS and " " in line.strip()]
+    assert path.name == "attributes.md" or long == []
 
 
 @every_document
@@ -158,16 +162,3 @@ def test_attributes_and_settings_exist(path):
     settings = Settings().to_dict()
     pairs = re.findall(r"`\[(\w+)\] (\w+)", path.read_text())
     assert [pair for pair in pairs if pair[1] not in settings.get(pair[0], {})] == []
-
-
-@every_document
-def test_names_of_code_occur_in_it(path):
-    """A word between backticks that looks like a name of code, such as `fit_roof` or
-    `model.Part`.
-    """
-    names = {
-        span.split(".")[-1]
-        for span in list_spans(path)
-        if re.fullmatch(r"@?[a-z]\w*(_|\.[A-Za-z])\w*", span)
-    }
-    assert sorted(names - ATTRIBUTES - list_words()) == []

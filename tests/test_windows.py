@@ -13,7 +13,6 @@ import pytest
 import hiproof
 from hiproof.city.work import processes
 from hiproof.write.files import atomic_file
-from naming import iterate_statements, parse
 
 PACKAGE = Path(hiproof.__file__).parent
 NOT_ON_WINDOWS = {"fcntl", "resource", "pwd", "grp", "termios", "posix", "pty"}
@@ -35,7 +34,7 @@ def test_no_module_is_imported_that_windows_lacks():
     modules = {
         name.split(".")[0]
         for file in PACKAGE.rglob("*.py")
-        for node in iterate_statements(parse(file))
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
         for name in (
             [a.name for a in node.names]
             if isinstance(node, ast.Import)
