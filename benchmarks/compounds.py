@@ -113,7 +113,7 @@ COLUMNS = (
     "RMSE, m: median",
     f"under {NEAR_M} m, %",
     "without steps: median",
-    f"under {NEAR_M} m, %",
+    "of these under, %",
     "parts of true",
 )
 

@@ -24,8 +24,8 @@ HEAD = """# Figures
 `python -m benchmarks.results` prints this page. With `--record` a benchmark measures its table
 again. [HISTORY.md](HISTORY.md) lists what was tried.
 
-Measured on {date}, at commit {commit}, on {machine}, beside other work. Figures of
-another day name it. Where sets have even and odd halves, even ones chose the constants.
+Measured on {date}, the newest at commit {commit}, on {machine}, beside other work.
+Figures of another day name it. Where sets have even and odd halves, even ones chose the constants.
 """
 ORDER = (
     "delft",
@@ -99,9 +99,9 @@ def describe_benchmark(name: str, figures: dict[str, Any], newest: dict[str, Any
         doc = importlib.import_module(f"benchmarks.{name}").__doc__ or ""
         title = doc.splitlines()[0].rstrip(".")
     lines = [f"\n## {title}"]
-    for _, tables in groupby(figures["tables"], lambda table: table["columns"]):
-        shown = [show_columns(table, figures.get("show")) for table in tables]
-        lines += describe_tables(command, shown, newest)
+    shown = [show_columns(table, figures.get("show")) for table in figures["tables"]]
+    for _, tables in groupby(shown, lambda table: table["columns"]):
+        lines += describe_tables(command, list(tables), newest)
     notes = fill(" ".join(figures.get("notes", [])))
     return "\n".join([*lines, *(["", notes] if notes else [])]) + "\n"
 

@@ -23,7 +23,7 @@ import hiproof
 from .tables import FigureTable, make_parser
 
 PACKAGE = Path(hiproof.__file__).parent
-REPOSITORY = Path(__file__).parents[1]
+REPOSITORY, SOURCES = Path(__file__).parents[1], PACKAGE.parent
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -106,7 +106,8 @@ def main() -> None:
             for path, size in zip(files, sizes, strict=True) if a.files else ():
                 table.add(path.relative_to(folder.parent), *(f"{count:,}" for count in size))
             totals.append(add(sizes))
-            table.add(folder.name, *(f"{count:,}" for count in totals[-1]))
+            name = folder.relative_to(SOURCES) if folder.is_relative_to(SOURCES) else folder.name
+            table.add(name, *(f"{count:,}" for count in totals[-1]))
         if not a.folders:
             table.add("in all", *(f"{count:,}" for count in add(totals)))
 
