@@ -91,10 +91,7 @@ def main() -> None:
     print(f"decoding the LAZ files: {decode:.2f} s CPU, the unit\n")
     columns = ("Delft", "CPU, decodings", "CPU, s", "wall, s", "peak memory, MB")
     with FigureTable(args.record, *columns) as table:
-        for place, name in (
-            (1, "whole process, compiled before"),
-            (2, "second run in a process"),
-        ):
+        for place, name in ((1, "whole process, compiled before"), (2, "second run in a process")):
             units = statistics.median(run[place][0] / run[0][0] for run in runs)
             cpu, wall, peak = (statistics.median(run[place][k] for run in runs) for k in range(3))
             table.add(name, f"{units:.1f}", f"{cpu:.2f}", f"{wall:.2f}", f"{peak:.0f}")

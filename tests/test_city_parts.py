@@ -70,16 +70,6 @@ def sloped_ground(rng, n=20000, size=100.0):
     return np.column_stack([xy, 0.1 * xy[:, 0] - 0.05 * xy[:, 1] + rng.normal(0, 0.02, n)])
 
 
-def test_ground_around_a_building_follows_the_slope_under_it():
-    rng = np.random.default_rng(4)
-    ground = sloped_ground(rng)
-    hidden = ((ground[:, :2] > 40) & (ground[:, :2] < 52)).all(axis=1)
-    terrain = GroundAround(ground_cells(ground[~hidden]), np.array([30, 30, 62, 62]))
-    border = shapely.get_coordinates(shapely.segmentize(shapely.box(40.5, 40.5, 51.5, 51.5), 1.0))
-    assert np.abs(terrain.height_at(border) - border @ (0.1, -0.05)).max() < 0.06
-    assert np.isnan(terrain.height_at(np.array([[500.0, 0.0]]))).all()
-
-
 @pytest.mark.parametrize("ground_class", [GroundAround, BareAround, LowestAround])
 def test_ground_of_a_building_ignores_what_lies_outside_its_box(ground_class):
     rng = np.random.default_rng(5)
