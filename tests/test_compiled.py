@@ -3,9 +3,7 @@ that is said once.
 """
 
 import ast
-import base64
 import errno
-import hashlib
 import importlib
 import os
 import pickle
@@ -15,7 +13,6 @@ import subprocess
 import sys
 import tempfile
 import warnings
-import zipfile
 from pathlib import Path
 
 import numba
@@ -265,55 +262,6 @@ def run(packages, *command):
     )
     assert process.returncode == 0, process.stderr
     return process.stdout
-
-
-def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path, monkeypatch):
-    pytest.importorskip("pip", reason="needs pip, to install wheels")
-    packages = (
-        tmp_path
-        / "lib"
-        / f"python{sys.version_info.major}.{sys.version_info.minor}"
-        / "site-packages"
-    )
-    packages.mkdir(parents=True)
-    monkeypatch.syspath_prepend(packages)
-    answers = []
-    for factor in (3, 4):
-        wheel = write_wheel(tmp_path, factor)
-        options = [
-            "--no-index",
-            "--no-deps",
-            "--disable-pip-version-check",
-            "--prefix",
-            str(tmp_path),
-        ]
-        run(packages, "-m", "pip", "install", "--upgrade", *options, str(wheel))
-        importlib.invalidate_caches()
-        answers.append(ask())
-        assert len(files_in(packages)) == 4
-    assert answers == [(61, False, 0), (81, False, 0)]
-
-
-def compute_digest(text):
-    return base64.urlsafe_b64encode(hashlib.sha256(text.encode()).digest()).decode().rstrip("=")
-
-
-def write_wheel(folder, factor):
-    wheel, info = folder / f"town-{factor}-py3-none-any.whl", f"town-{factor}.dist-info"
-    files = {
-        **make_sources(factor),
-        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: town\nVersion: {factor}\n",
-        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: "
-        "py3-none-any\n",
-    }
-    with zipfile.ZipFile(wheel, "w") as archive:
-        for name, text in files.items():
-            archive.writestr(name, text)
-        lines = [
-            f"{name},sha256={compute_digest(text)},{len(text)}\n" for name, text in files.items()
-        ]
-        archive.writestr(f"{info}/RECORD", "".join([*lines, f"{info}/RECORD,,\n"]))
-    return wheel
 
 
 @pytest.mark.parametrize(
