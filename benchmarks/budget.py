@@ -111,7 +111,7 @@ def main() -> None:
         for stage, seconds in rows:
             share = f"{100 * seconds / total:.1f}"
             table.add(stage, f"{1000 * seconds / buildings:.2f}", share)
-    refuse_incomplete(clock, total)
+        refuse_incomplete(clock, total)
 
 
 if __name__ == "__main__":

@@ -250,7 +250,13 @@ def main() -> None:
         found = [
             o for block in pool.map(judge_block, blocks, [a.keep] * len(blocks)) for o in block
         ]
-    columns = ("footprints", "cases of", "n", "sound", *(f"{grade}; sound" for grade in Grade))
+    columns = (
+        "footprints",
+        "cases of",
+        "n",
+        "sound",
+        *(f"{grade.name.lower()}; sound" for grade in Grade),
+    )
     with FigureTable(a.record, *columns, "of sound ones good") as table:
         for with_footprints in footprints:
             reference = "with" if with_footprints else "without"
