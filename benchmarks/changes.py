@@ -42,7 +42,6 @@ from hiproof.model import Building, Roof
 from hiproof.parametric.building import build
 from hiproof.parametric.file import read_parameters
 from hiproof.read.pointcloud import read_points
-from hiproof.simulate.changes import CHANGES, change_building
 from hiproof.simulate.city import City, Stock
 from hiproof.simulate.scanner import Scan, ScanSettings
 from hiproof.simulate.scene import building_bodies
@@ -51,6 +50,7 @@ from hiproof.simulate.town import Lot
 from hiproof.update.places import move_to_frame
 from hiproof.update.refine import REFINED
 
+from .building_changes import CHANGES, change_building
 from .change_scenes import read_changes, reconstruct_city, run_scenes, update_city
 from .compounds import compare_parts
 from .kept_parts import count_kept, describe_kept

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
+from benchmarks.building_changes import CHANGES, change_building
 
 from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
-from hiproof.simulate.changes import CHANGES, change_building
 from hiproof.simulate.roofs import assemble, make_part
 from hiproof.status import Change, ChangeKind
 from hiproof.update.cells import SurveyNoise

@@ -11,8 +11,6 @@ town             houses along streets on hilly ground (relief), with what stands
 survey           a town flown over: points, terrain and footprints in files
 neighbourhood    the demo's town
 city             a town of any size
-edits            what a person may do to a building's parameters
-changes          what happens to a building between two surveys
 """
 
 from .compounds import COMPOUND_KINDS, random_compound
