@@ -599,10 +599,8 @@ def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:
     lower, upper, choices = declared["low"], declared["high"], declared["choices"]
     # so written that NaN is in no bounds; a number without bounds must still be finite
     if isinstance(template, (int, float)) and not isinstance(template, bool):
-        lower, upper = (
-            -LARGEST_INTEGER if lower is None else lower,
-            LARGEST_INTEGER if upper is None else upper,
-        )
+        lower = -LARGEST_INTEGER if lower is None else lower
+        upper = LARGEST_INTEGER if upper is None else upper
         if not lower <= value <= upper:
             bounds = " ".join(f"between {lower} and {upper} {declared['unit']}".split())
             raise SettingsError(

@@ -123,10 +123,8 @@ class Cut:
 
     def is_like(self, other: Cut) -> bool:
         """Return whether both run nearly the same way in nearly the same place."""
-        turn, distance = (
-            abs(self.normal @ other.normal),
-            abs(self.middle @ other.normal - other.offset),
-        )
+        turn = abs(self.normal @ other.normal)
+        distance = abs(self.middle @ other.normal - other.offset)
         lower, upper = other.longest[:2]
         mask = lower < self.middle @ other.along < upper
         return bool(mask and distance < LIKE_M and turn > math.cos(math.radians(LIKE_DEG)))

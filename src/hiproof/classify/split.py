@@ -205,10 +205,8 @@ def select_roof_points(
     index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
     if index is not None:
         return index, False, []
-    unclassified, is_chosen = (
-        select_unclassified(cloud),
-        read.building_classes != ReadSettings().building_classes,
-    )
+    unclassified = select_unclassified(cloud)
+    is_chosen = read.building_classes != ReadSettings().building_classes
     if read.roofs == "class" or (read.roofs == "auto" and is_chosen):
         if unclassified is None or not is_single(cloud.xyz[unclassified, :2]):
             raise InputError(without_building_class(cloud, read.building_classes))

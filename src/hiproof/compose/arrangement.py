@@ -751,10 +751,8 @@ def inside_intervals(soup, lower, upper, px, py, dx, dy):
         side_b = dx * (soup[e, 3] - py) - dy * (soup[e, 2] - px)
         if (side_a > 0) != (side_b > 0):
             s = side_a / (side_a - side_b)
-            x, y = (
-                soup[e, 0] + s * (soup[e, 2] - soup[e, 0]),
-                soup[e, 1] + s * (soup[e, 3] - soup[e, 1]),
-            )
+            x = soup[e, 0] + s * (soup[e, 2] - soup[e, 0])
+            y = soup[e, 1] + s * (soup[e, 3] - soup[e, 1])
             cuts[count] = dx * (x - px) + dy * (y - py)
             count += 1
     return sort_values(cuts[:count])
@@ -819,10 +817,8 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                     )
                     for k in range(0, len(in_p) - 1, 2):
                         for m in range(0, len(in_q) - 1, 2):
-                            t0, t1 = (
-                                max(lower, in_p[k], in_q[m]),
-                                min(upper, in_p[k + 1], in_q[m + 1]),
-                            )
+                            t0 = max(lower, in_p[k], in_q[m])
+                            t1 = min(upper, in_p[k + 1], in_q[m + 1])
                             if t1 - t0 < 1:
                                 continue
                             if count == len(out):

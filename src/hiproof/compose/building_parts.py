@@ -229,10 +229,8 @@ def make_wall_ring(
     a, b = edge
     current, there = part_borders[edge], part_borders.get((b, a))
     low_a, low_b = (levels[a][0], levels[b][0]) if there is None else (there.end, there.start)
-    at_a, at_b = (
-        select_between(levels[a], low_a, current.start),
-        select_between(levels[b], low_b, current.end),
-    )
+    at_a = select_between(levels[a], low_a, current.start)
+    at_b = select_between(levels[b], low_b, current.end)
     return (*at_b, *reversed(at_a)) if len(at_a) + len(at_b) > 2 and at_a and at_b else ()
 
 

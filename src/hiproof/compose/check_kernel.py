@@ -133,14 +133,10 @@ def is_simple_ring(flat, index, lower, upper):
             return False
         if distance_to_segment(flat[a], flat[b], flat[c]) <= ON_SEGMENT_M:
             return False
-        west, east = (
-            min(flat[a, 0], flat[b, 0]) - ON_SEGMENT_M,
-            max(flat[a, 0], flat[b, 0]) + ON_SEGMENT_M,
-        )
-        south, north = (
-            min(flat[a, 1], flat[b, 1]) - ON_SEGMENT_M,
-            max(flat[a, 1], flat[b, 1]) + ON_SEGMENT_M,
-        )
+        west = min(flat[a, 0], flat[b, 0]) - ON_SEGMENT_M
+        east = max(flat[a, 0], flat[b, 0]) + ON_SEGMENT_M
+        south = min(flat[a, 1], flat[b, 1]) - ON_SEGMENT_M
+        north = max(flat[a, 1], flat[b, 1]) + ON_SEGMENT_M
         for j in range(i + 2, size):
             if i == 0 and j == size - 1:
                 continue
@@ -583,10 +579,8 @@ def edges_pierce(
             a, b = index[k], index[k + 1 if k + 1 < ring_start[r + 1] else ring_start[r]]
             if is_outside(vertices, a, b, lower, upper, slack):
                 continue
-            da, db = (
-                measure_above(vertices, a, normal, offset),
-                measure_above(vertices, b, normal, offset),
-            )
+            da = measure_above(vertices, a, normal, offset)
+            db = measure_above(vertices, b, normal, offset)
             if min(da, db) > slack or max(da, db) < -slack:
                 continue
             lands = abs(da) <= slack and not holds_vertex(index, begin, end, a)

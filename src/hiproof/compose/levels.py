@@ -60,10 +60,8 @@ def crossing_place(xy, edges, side, planes, e, x, y, reach):
         for way in (-1.0, 1.0):
             step = way * aside_unit / abs(across) / size
             at_x, at_y = np.rint(x - step * gy), np.rint(y + step * gx)
-            z0, z1 = (
-                evaluate_plane(planes, left, at_x, at_y),
-                evaluate_plane(planes, right, at_x, at_y),
-            )
+            z0 = evaluate_plane(planes, left, at_x, at_y)
+            z1 = evaluate_plane(planes, right, at_x, at_y)
             off = (
                 max(abs(z0 - np.rint(0.5 * (z0 + z1))), abs(z1 - np.rint(0.5 * (z0 + z1))))
                 / aside_unit

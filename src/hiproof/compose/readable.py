@@ -71,10 +71,8 @@ def refuse_wrong_part(part: Part, index: int, roof: Roof, visited: dict[tuple, i
             f"expected part {index} to roof some of the building's outline, got one outside it; "
             "move it there"
         )
-    place, outlines = (
-        (part.kappa, *part.translation.tolist()),
-        tuple(piece.outline.wkb for piece in part.pieces),
-    )
+    place = (part.kappa, *part.translation.tolist())
+    outlines = tuple(piece.outline.wkb for piece in part.pieces)
     same = visited.setdefault((part.type, tuple(part.parameters.items()), place, outlines), index)
     if same != index:
         raise InputError(

@@ -58,10 +58,8 @@ class Desk:
         self.run, self.who = RunFolder(folder), plain_text(who)[:MOST_NOTE]
         self.only = frozenset(only)
         self.refuse_unknown()
-        self.edits, self.points = (
-            Edits(folder, obeyed_by(folder, moved_to)),
-            RunPoints(folder, moved_to),
-        )
+        self.edits = Edits(folder, obeyed_by(folder, moved_to))
+        self.points = RunPoints(folder, moved_to)
 
     def buildings(self, find: str = "") -> dict[str, Any]:
         """Return the most doubtful buildings, of those whose id holds `find`."""
@@ -282,10 +280,8 @@ def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str,
     Where edits were accepted already, these hold them.
     """
     record = run_record(folder)
-    overrides, path = (
-        (record.get("inputs") or {}).get("overrides"),
-        found_inputs(record, moved_to).overrides,
-    )
+    overrides = (record.get("inputs") or {}).get("overrides")
+    path = found_inputs(record, moved_to).overrides
     if not overrides or (folder / EDITS_FILE).exists():
         return {}
     if path is None:

@@ -116,10 +116,8 @@ def sample_terrain(
 
 def find_known_box(terrain: RasterTerrain, boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the box in which a terrain is known near buildings."""
-    low, high = (
-        boxes[:, :2].min(axis=0) - TERRAIN_REACH_M,
-        boxes[:, 2:].max(axis=0) + TERRAIN_REACH_M,
-    )
+    low = boxes[:, :2].min(axis=0) - TERRAIN_REACH_M
+    high = boxes[:, 2:].max(axis=0) + TERRAIN_REACH_M
     sides = np.linspace(low, high, PROBES)
     places = np.stack(np.meshgrid(*sides.T), axis=-1).reshape(-1, 2)
     places = np.concatenate([places, boxes[:, :2], boxes[:, 2:]])

@@ -86,10 +86,8 @@ class EvaluatedRun:
     def only(self, indices: Sequence[int]) -> EvaluatedRun:
         """Return the same run with only these buildings."""
         models = tuple(self.models[i] for i in indices)
-        points, figures = (
-            tuple(self.points[i] for i in indices),
-            tuple(self.figures[i] for i in indices),
-        )
+        points = tuple(self.points[i] for i in indices)
+        figures = tuple(self.figures[i] for i in indices)
         footprints = tuple(self.footprints[i] for i in indices)
         return EvaluatedRun(models, points, figures, self.record, footprints, self.clouds)
 

@@ -59,10 +59,8 @@ class PointGrid:
 
         `bounds` is (xmin, ymin, xmax, ymax).
         """
-        first, last = (
-            self.cell_range(bounds[0], bounds[2], 0),
-            self.cell_range(bounds[1], bounds[3], 1),
-        )
+        first = self.cell_range(bounds[0], bounds[2], 0)
+        last = self.cell_range(bounds[1], bounds[3], 1)
         rows = np.arange(max(last[0], 0), min(last[1], self.rows - 1) + 1)
         left, right = max(first[0], 0), min(first[1], self.columns - 1)
         if left > right or not len(rows):

@@ -88,10 +88,8 @@ def resize(rng: np.random.Generator, part: Part) -> Part:
 def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
     """Cut a corner off a part of one piece, by an oblique plot border."""
     angle = part.kappa + rng.integers(4) * math.pi / 2 + math.radians(rng.uniform(25.0, 65.0))
-    normal, along = (
-        np.array([math.cos(angle), math.sin(angle)]),
-        np.array([-math.sin(angle), math.cos(angle)]),
-    )
+    normal = np.array([math.cos(angle), math.sin(angle)])
+    along = np.array([-math.sin(angle), math.cos(angle)])
     piece = part.pieces[0]
     corners = np.asarray(piece.outline.exterior.coords) @ normal
     middle = np.array(piece.outline.centroid.coords[0])

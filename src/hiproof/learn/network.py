@@ -88,10 +88,8 @@ class FeaturePropagation(nn.Module):
 
     def __init__(self, coarse: int, fine: int, outputs: int):
         super().__init__()
-        self.coarse, self.fine = (
-            nn.Linear(coarse, outputs, bias=False),
-            nn.Linear(fine, outputs, bias=False),
-        )
+        self.coarse = nn.Linear(coarse, outputs, bias=False)
+        self.fine = nn.Linear(fine, outputs, bias=False)
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, coarse, fine, index, weight):

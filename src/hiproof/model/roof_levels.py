@@ -53,10 +53,8 @@ def find_level(share: float, z: np.ndarray, plan: np.ndarray) -> float:
         else:
             count = between
     span = knots[upper] - knots[count]
-    start, middle = (
-        measure_area_below(knots[count], z, plan),
-        measure_area_below(knots[count] + 0.5 * span, z, plan),
-    )
+    start = measure_area_below(knots[count], z, plan)
+    middle = measure_area_below(knots[count] + 0.5 * span, z, plan)
     end = 0.0  # just below the upper knot, so without the triangles that lie level in it
     for t in range(len(z)):
         if z[t, 0] < knots[upper]:

@@ -24,10 +24,8 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
     See `Building.with_part`.
     """
     z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
-    parts, change = (
-        record["parts"],
-        {name: convert_to_plain(value) for name, value in change.items()},
-    )
+    parts = record["parts"]
+    change = {name: convert_to_plain(value) for name, value in change.items()}
     if not 0 <= index <= len(parts):
         raise InputError(
             f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one"

@@ -279,10 +279,8 @@ class Heights:
             indices = np.flatnonzero(covered & (surface.part == index))
             terms, row = self.terms[indices], surface.row[indices]
             for column in columns if len(indices) else ():
-                moved, step = (
-                    x.copy(),
-                    STEP if x[column] + STEP < self.unknowns.high[column] else -STEP,
-                )
+                moved = x.copy()
+                step = STEP if x[column] + STEP < self.unknowns.high[column] else -STEP
                 moved[column] += step
                 planes = self.planes(index, moved)
                 if planes is not None:

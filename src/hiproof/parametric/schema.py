@@ -127,10 +127,8 @@ def parameters_by_type() -> list[dict[str, Any]]:
 
     A part with each side's own parameters is free of this.
     """
-    sides, cants = (
-        "(pitch|eave|skew)_(left|right|front|back)",
-        f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]",
-    )
+    sides = "(pitch|eave|skew)_(left|right|front|back)"
+    cants = f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]"
     side_by_side = {"propertyNames": {"pattern": f"^(width|length|height|{sides}|{cants})$"}}
     rules = []
     for kind, shape in CATALOGUE.items():

@@ -42,10 +42,8 @@ def make_half_cone(sides: int) -> Primitive:
     angles = [2.0 * math.pi * k / sides - 0.5 * math.pi for k in range(1, sides // 2)]
     arc = [(2.0 * radius * math.cos(a) - 1.0, radius * math.sin(a)) for a in angles]
     middles = [2.0 * math.pi * (k + 0.5) / sides - 0.5 * math.pi for k in range(sides // 2)]
-    rim, facings = (
-        ((-1.0, -radius), *arc, (-1.0, radius)),
-        [(math.cos(a), math.sin(a)) for a in middles],
-    )
+    rim = ((-1.0, -radius), *arc, (-1.0, radius))
+    facings = [(math.cos(a), math.sin(a)) for a in middles]
     constants = {"sides": sides, "apothem": apothem, "rim": rim, "facings": facings}
     return make_shape("half_cone", constants, rim=rim)
 

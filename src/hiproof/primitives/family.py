@@ -431,10 +431,8 @@ class Member:
         for k, (name, value) in enumerate(quantities.items()):
             squares[k] = (changed[name] - value) ** 2
         informed = squares.shape[1] - untold
-        variances, unknown = (
-            squares[:, :informed].sum(axis=1).tolist(),
-            squares[:, informed:].sum(axis=1).tolist(),
-        )
+        variances = squares[:, :informed].sum(axis=1).tolist()
+        unknown = squares[:, informed:].sum(axis=1).tolist()
         each = zip(quantities, variances, unknown, strict=True)
         return {
             name: math.sqrt(v) for name, v, free in each if v > NEGLIGIBLE and not free > NEGLIGIBLE

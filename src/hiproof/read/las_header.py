@@ -331,10 +331,8 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
     *centre, half, _, page, page_bytes = struct.unpack_from("<5d2Q", info)
-    lower, upper = (
-        np.array(centre) - half - facts.rounding,
-        np.array(centre) + half + facts.rounding,
-    )
+    lower = np.array(centre) - half - facts.rounding
+    upper = np.array(centre) + half + facts.rounding
     if facts.count and not ((facts.mins >= lower) & (facts.maxs <= upper)).all():
         raise Implausible(
             f"its octree of half width {half:g} about ({format_list(centre)}) does not hold its "

@@ -370,10 +370,8 @@ def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
     Pixels that are not finite are left out. It is NaN where all are.
     """
     row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
-    row1, column1 = (
-        np.minimum(row0 + 1, pixels.shape[0] - 1),
-        np.minimum(column0 + 1, pixels.shape[1] - 1),
-    )
+    row1 = np.minimum(row0 + 1, pixels.shape[0] - 1)
+    column1 = np.minimum(column0 + 1, pixels.shape[1] - 1)
     down, right = row - row0, column - column0
     values = np.stack(
         [pixels[row0, column0], pixels[row0, column1], pixels[row1, column0], pixels[row1, column1]]

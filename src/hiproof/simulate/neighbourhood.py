@@ -93,10 +93,8 @@ def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     import_rasterio()
     lots, terrain = neighbourhood(seed)
     corners = np.array([lot.building.footprint.bounds for lot in lots])
-    lower, upper = (
-        np.floor(corners[:, :2].min(axis=0)) - TERRAIN_BORDER_M,
-        np.ceil(corners[:, 2:].max(axis=0)) + TERRAIN_BORDER_M,
-    )
+    lower = np.floor(corners[:, :2].min(axis=0)) - TERRAIN_BORDER_M
+    upper = np.ceil(corners[:, 2:].max(axis=0)) + TERRAIN_BORDER_M
     bounds = (*lower, *upper)
     flight = Flight(heading=math.radians(70.0), origin=ORIGIN_XY - 250.0)
     folder.mkdir(parents=True, exist_ok=True)

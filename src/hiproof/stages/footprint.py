@@ -74,10 +74,8 @@ def shift_remark(result: Shift, of_row: int = 1) -> str:
     """
     remarks = []
     if result.is_clear:
-        error, row = (
-            float(np.hypot(*result.sigma)),
-            f" with the {of_row} of its row" if of_row > 1 else "",
-        )
+        error = float(np.hypot(*result.sigma))
+        row = f" with the {of_row} of its row" if of_row > 1 else ""
         remarks.append(
             f"its footprint was moved{row} by ({result.xy[0]:.2f}, {result.xy[1]:.2f}) m, within "
             f"{error:.2f} m, onto its roof"

@@ -51,10 +51,8 @@ def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any
     """
     for declared in dataclasses.fields(value):
         if declared.metadata.get("decides", "the result") == decides:
-            inner, result = (
-                f"{name}.{declared.name}" if name else declared.name,
-                getattr(value, declared.name),
-            )
+            inner = f"{name}.{declared.name}" if name else declared.name
+            result = getattr(value, declared.name)
             if dataclasses.is_dataclass(result):
                 yield from named_values(inner, result, decides)
             else:
@@ -86,10 +84,8 @@ def file_stamps(path: Path) -> list[tuple[str, int, int]]:
             sidecars = [path.with_suffix(end) for end in SIDECAR_ENDINGS] + [
                 Path(f"{path}{end}") for end in APPENDED
             ]
-            folder, files = (
-                path.parent,
-                [file for file in {path, *sidecars} if path.is_file() and file.is_file()],
-            )
+            folder = path.parent
+            files = [file for file in {path, *sidecars} if path.is_file() and file.is_file()]
         stamps = [(file.relative_to(folder).as_posix(), file.stat()) for file in files]
         return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stamps)
     return []

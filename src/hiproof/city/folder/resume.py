@@ -197,10 +197,8 @@ def enter(request: Request, ledger: Ledger) -> None:
 
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     """Raise OutputError for a run of another request, which names what differs."""
-    old_inputs, new_inputs = (
-        json.loads(ledger.get("inputs") or "{}"),
-        json.loads(json.dumps(masked_values(inputs), default=str)),
-    )
+    old_inputs = json.loads(ledger.get("inputs") or "{}")
+    new_inputs = json.loads(json.dumps(masked_values(inputs), default=str))
     other = [
         name + find_changed_files(new_inputs.get(name), old_inputs.get(name))
         for name in new_inputs | old_inputs

@@ -54,10 +54,8 @@ class Outlines:
         That is its row, or itself where the row is too long.
         """
         bounds, labels = shapely.bounds(self.polygons), self.labels
-        lower, upper = (
-            np.full((labels.max(initial=0) + 1, 2), np.inf),
-            np.full((labels.max(initial=0) + 1, 2), -np.inf),
-        )
+        lower = np.full((labels.max(initial=0) + 1, 2), np.inf)
+        upper = np.full((labels.max(initial=0) + 1, 2), -np.inf)
         np.fmin.at(lower, labels, bounds[:, :2])
         np.fmax.at(upper, labels, bounds[:, 2:])
         is_short = ((upper - lower).max(axis=1) <= MOST_ROW_M)[labels]

@@ -278,10 +278,8 @@ def load_bundle(
         area = shapely.Polygon() if geometry is None else shapely.geometry.shape(geometry)
         footprint = Footprint(facts["id"], area, {}) if facts["has_footprint"] else None
         job = Job(0, facts["id"], area, footprint, facts["error"] and ErrorReport(*facts["error"]))
-        names, translate = (
-            (str(facts["names"][0]), str(facts["names"][1])),
-            np.array(facts["cityjson_translate"], float),
-        )
+        names = (str(facts["names"][0]), str(facts["names"][1]))
+        translate = np.array(facts["cityjson_translate"], float)
         override = None if facts["override"] is None else read_override(facts["override"])
         terrain = None
         if facts["terrain"] is not None:

@@ -78,10 +78,8 @@ def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
     It is empty where nothing else was seen either.
     """
     bare = list_cells(points.ground)
-    share, share_bare = (
-        points.share(np.setdiff1d(list_cells(points.high), bare)),
-        points.share(bare),
-    )
+    share = points.share(np.setdiff1d(list_cells(points.high), bare))
+    share_bare = points.share(bare)
     none = f"no model: no points of class {' or '.join(map(str, classes))} inside the footprint"
     if share > MOSTLY:
         lie = f"over {100 * share:.0f} % of it {Doubt.POINTS_OF_OTHER_CLASSES.value}"

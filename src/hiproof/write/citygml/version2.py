@@ -183,10 +183,8 @@ def building_element(sheet: Sheet) -> str:
         text.append(with_terrain(sheet, "", []))
         text += installation_elements(sheet)
     else:
-        ids, rings = (
-            surface_ids(solid.faces, name),
-            list_face_rings(solid.faces, in_file(sheet, solid)),
-        )
+        ids = surface_ids(solid.faces, name)
+        rings = list_face_rings(solid.faces, in_file(sheet, solid))
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
         text += installation_elements(sheet)
         if solid is building.solid:

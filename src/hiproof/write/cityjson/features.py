@@ -74,10 +74,8 @@ class CityJSONWriter(BuildingWriter):
     def __init__(self, path: str | os.PathLike[str], head: FileHead, scale: float = SCALE) -> None:
         super().__init__(path)
         self.head = head
-        self.units, self.reference_system = (
-            self.head.units.cityjson,
-            reference_system(self.head.crs_of_files),
-        )
+        self.units = self.head.units.cityjson
+        self.reference_system = reference_system(self.head.crs_of_files)
         self.is_document = str(path).endswith(".json")
         self.scale = scale
         self.translate = head.offset
@@ -119,10 +117,8 @@ class CityJSONWriter(BuildingWriter):
 
     def widen(self, extent: tuple[float, ...] | None) -> None:
         if extent is not None:
-            self.low, self.high = (
-                np.minimum(self.low, extent[:3]),
-                np.maximum(self.high, extent[3:]),
-            )
+            self.low = np.minimum(self.low, extent[:3])
+            self.high = np.maximum(self.high, extent[3:])
 
     def choose_origin(self, building: Building) -> np.ndarray:
         """Return the file's offset (3,), set by the first building.

@@ -71,10 +71,8 @@ class Globe:
                 "expected a CRS, to place the buildings on the globe, got none; say which with "
                 "--crs EPSG:..."
             )
-        units, to_centre = (
-            find_units(crs, "the models"),
-            Transformer.from_crs(GEOGRAPHIC_CRS, GEOCENTRIC_CRS, always_xy=True),
-        )
+        units = find_units(crs, "the models")
+        to_centre = Transformer.from_crs(GEOGRAPHIC_CRS, GEOCENTRIC_CRS, always_xy=True)
         exact = with_heights(crs) if geoid_height_m is None else None
         transformer = exact or find_best_transformer(horizontal_crs(crs), "EPSG:4326")
         if transformer is None:
