@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hiproof.geometry.area_vectors import cross
 from hiproof.geometry.arrays import (
     compute_median,
     copy_row,
@@ -40,8 +39,3 @@ def test_rows_beyond_the_copied_ones_stay(n):
     row = np.full(4, 9.0)
     copy_row(row, np.arange(float(n)))
     assert np.array_equal(row[:n], np.arange(n)) and (row[n:] == 9.0).all()
-
-
-def test_the_vector_product_is_numpys():
-    for a, b in np.random.default_rng(0).normal(size=(20, 2, 3)):
-        assert np.array_equal(cross(a, b), np.cross(a, b))

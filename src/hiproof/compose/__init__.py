@@ -11,13 +11,14 @@ cells             outline, pieces and the lines where the active plane changes a
 zones             places where a solid failed, and what is attempted there
 arrangement       the planar arrangement under them, on an integer grid
 buckets           what lies near a place, for it
-joined            sets that are joined, for it and for the check
+joined            sets that are joined, for it
 tidy              cells without steps a millimetre long
 levels            which heights meet over every vertex of the plan
 flat_corners      corners turned in where rounded heights would fold a face
 shell             roof, wall and ground faces that share them
 check             whether the result is valid by ISO 19107
-check_kernel      its compiled half
+check_faces       its rules for each face by itself
+check_shell       its rules for the shell of sound faces
 bends             which faces are bent (val3dity's 204)
 blocks            LoD1: prisms over the outline
 profile           heights of the terrain along an outline

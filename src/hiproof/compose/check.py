@@ -9,9 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.flat_shell import FlatShell, weld
 from ..model import Solid
 from .bends import bent_faces
-from .check_kernel import SAME_POINT_M, check_faces, check_shell, weld
+from .check_faces import check_faces
+from .check_shell import check_shell
 
 CODES = {
     101: "has a ring with fewer than three points",
@@ -87,15 +89,10 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
         )
     read = tuple(make_finding(code, face) for code, face in solid.defects)
     local = vertices - vertices[index].mean(axis=0)
-    index = weld(local, SAME_POINT_M)[index]
-    rows, normals, offsets, flatness, risky = check_faces(
-        local, index, ring_start, face_start, float(planarity_m)
-    )
-    risky[rows[:, 1]] = False  # what is unsound otherwise cannot be triangulated
-    bent = bent_faces(np.flatnonzero(risky), local, index, ring_start, face_start, normals)
-    rows = [*rows, *((204, face, -1) for face in bent)]
-    if len(rows) == 0:
-        rows = check_shell(local, index, ring_start, face_start, normals, offsets, flatness)
-    return read + tuple(
-        make_finding(int(code), int(face), int(other)) for code, face, other in rows
-    )
+    shell = FlatShell(local, weld(local)[index], ring_start, face_start)
+    rows, planes, may_bend = check_faces(shell, planarity_m)
+    may_bend = np.setdiff1d(may_bend, rows[:, 1])  # what is unsound cannot be triangulated
+    bent = bent_faces(may_bend, local, shell.index, ring_start, face_start, planes.normals)
+    found = [*rows.tolist(), *((204, face, -1) for face in bent.tolist())]
+    found = found or check_shell(shell, planes)
+    return read + tuple(make_finding(code, face, other) for code, face, other in found)

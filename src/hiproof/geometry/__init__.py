@@ -10,5 +10,5 @@ cell_kernel         points and cells, compiled
 thin                one point a cell
 point_grid          which points lie in which polygon
 arrays              sorting and copying in compiled code
-area_vectors        area vectors and enclosed volumes, compiled
+flat_shell          the rings of a closed shell as arrays
 """

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from ..geometry.flat_shell import FlatShell
+
 ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
 CEILING = "OuterCeilingSurface"  # over a passage
 
@@ -46,15 +48,11 @@ class Solid:
     @property
     def volume(self) -> float:
         """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
-        # compiled: who needs no volume does without
-        from ..geometry.area_vectors import enclosed_volume
-
-        return round(
-            enclosed_volume(self.vertices - self.vertices.mean(axis=0), *self.flatten()), 9
-        )
+        local = self.vertices - self.vertices.mean(axis=0)
+        return round(FlatShell(local, *self.flatten()).volume, 9)
 
     def flatten(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the shell as arrays, for compiled code.
+        """Return the shell as arrays; see `FlatShell`.
 
         These are the vertex indices of all rings one after the other, the start of each ring, and
         the first ring of each face.

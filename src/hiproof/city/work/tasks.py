@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from ..folder.ledger import Outcome
 
-MAIN_JOB = ("moves", "planes", "solid", "check", "points", "curves")
+MAIN_JOB = ("moves", "planes", "solid", "points", "curves")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
 ONE_PRIMITIVE = (*MAIN_JOB, "single")

@@ -2,7 +2,7 @@
 
 So several processes can compile at the same time.
 
-    echo check | python -m hiproof.city.work.warm_pieces # prints the names of ready functions
+    echo solid | python -m hiproof.city.work.warm_pieces # prints the names of ready functions
 
 Each piece calls what the main job calls, on next to no data: compiling asks for the types of the
 arguments alone.
@@ -70,17 +70,6 @@ def make_house_scene() -> tuple:
     return plan, make_scene(
         plan, OUTLINE, find_directions(OUTLINE, plan), 1.5, 0.25, list_allowed_shapes(())
     )
-
-
-def check() -> None:
-    """Compile the check of a solid."""
-    from ...compose import check_solid
-    from ...model import Face, Solid
-
-    box = np.array([[x, y, z] for z in (0.0, 3.0) for y in (0.0, 5.0) for x in (0.0, 5.0)])
-    rings = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    faces = tuple(Face((ring,), "WallSurface") for ring in rings)
-    check_solid(Solid(box, faces))
 
 
 def solid() -> None:
@@ -160,7 +149,7 @@ def points() -> None:
 
 PIECES: dict[str, Callable[[], None]] = {
     piece.__name__: piece
-    for piece in (moves, planes, outlines, solid, check, points, single, curves, warm_recognition)
+    for piece in (moves, planes, outlines, solid, points, single, curves, warm_recognition)
 }
 
 

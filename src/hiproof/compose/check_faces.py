@@ -1,0 +1,188 @@
+"""The rules for each face of a shell by itself: val3dity's codes 101 to 208, but 204.
+
+A finding is a row (code, face, -1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..geometry.components import label_components
+from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly, lies_on
+
+SMALLEST_AREA_M2 = 1e-7  # m2; a ring with less is folded to a line
+TOUCH_M = 1e-6  # m; touches of two rings that are closer are one
+KEPT_AXES = np.array([(1, 2), (0, 2), (0, 1)])  # of a projection along each axis
+FLAT_M = 1e-9  # m; a face as flat as this has no bent triangle that is wider
+
+
+@dataclass(frozen=True)
+class FacePlanes:
+    """The best plane of each face: unit normal, offset, and how far corners lie off it.
+
+    `axes` (f, 2) are the coordinates that its projection keeps, and `flat` (n, 2) are the corners
+    there.
+    """
+
+    normals: np.ndarray
+    offsets: np.ndarray
+    flatness: np.ndarray
+    axes: np.ndarray
+    flat: np.ndarray
+
+    def project(self, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return points (k, 3) in the projections of `faces` (k,)."""
+        return np.take_along_axis(points, self.axes[faces], axis=1)
+
+
+def fit_planes(shell: FlatShell, normals: np.ndarray) -> FacePlanes:
+    """Fit a plane to each face by least squares.
+
+    `normals` (f, 3) are about right and are turned to the best; those of areas go far astray where
+    a face is long and thin.
+    """
+    face_of = shell.face_of
+    count = np.maximum(np.bincount(face_of, minlength=shell.faces), 1)[:, None]
+    centres = shell.sum_by_face(shell.corners) / count
+    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), np.finfo(float).tiny)
+    v = np.cross(normals, u)
+    off = shell.corners - centres[face_of]
+    pu, pv, pd = ((off * axis[face_of]).sum(axis=1) for axis in (u, v, normals))
+    products = np.column_stack([pu * pu, pu * pv, pv * pv, pu * pd, pv * pd])
+    uu, uv, vv, ud, vd = shell.sum_by_face(products).T
+    determinant = uu * vv - uv * uv
+    is_wide = determinant > 1e-9 * uu * vv
+    scale = np.where(is_wide, 1.0 / np.where(is_wide, determinant, 1.0), 0.0)
+    turned = normals - (u.T * ((ud * vv - vd * uv) * scale)).T
+    turned -= (v.T * ((vd * uu - ud * uv) * scale)).T
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    normals = turned / np.where(length > 0.0, length, 1.0)
+    flatness = np.zeros(shell.faces)
+    np.maximum.at(flatness, face_of, np.abs((off * normals[face_of]).sum(axis=1)))
+    axes = KEPT_AXES[np.abs(normals).argmax(axis=1)]
+    flat = np.take_along_axis(shell.corners, axes[face_of], axis=1)
+    return FacePlanes(normals, (centres * normals).sum(axis=1), flatness, axes, flat)
+
+
+def check_faces(shell: FlatShell, planarity_m: float) -> tuple[np.ndarray, FacePlanes, np.ndarray]:
+    """Return findings (k, 3), the faces' planes, and the faces (m,) that may be bent."""
+    codes = np.zeros(shell.faces, np.int64)
+    is_twice = shell.index == shell.index[shell.after]
+    codes[shell.face_of[is_twice]] = 102
+    codes[shell.face_of_ring[shell.sizes < 3]] = 101
+    codes[np.diff(shell.face_start) == 0] = 101
+    outer = np.zeros((shell.faces, 3))
+    has_rings = np.diff(shell.face_start) > 0
+    outer[has_rings] = shell.areas[shell.face_start[:-1][has_rings]]
+    size = np.linalg.norm(outer, axis=1)
+    codes[(codes == 0) & (size < SMALLEST_AREA_M2)] = 104
+    is_sound = codes == 0
+    planes = fit_planes(shell, outer / np.where(is_sound, size, 1.0)[:, None])
+    is_planar = planes.flatness <= planarity_m
+    rows = [(code, face) for face, code in enumerate(codes.tolist()) if code]
+    rows += [(203, face) for face in np.flatnonzero(is_sound & ~is_planar).tolist()]
+    corners = np.bincount(shell.face_of, minlength=shell.faces)
+    pairs = find_contacts(shell, planes.flat, is_sound & (corners > 3))
+    crossing = np.unique(shell.face_of[find_crossing(shell, planes.flat, pairs)])
+    is_simple = is_sound.copy()
+    is_simple[crossing] = False
+    rows += [(104, face) for face in crossing.tolist()]
+    for face in np.flatnonzero(is_simple & (np.diff(shell.face_start) > 1)).tolist():
+        rows += [(code, face) for code in check_inner_rings(shell, planes, face, pairs)]
+    may_bend = is_sound & is_planar & (corners > 3) & (planes.flatness > FLAT_M)
+    rows.sort(key=lambda row: row[1])
+    found = np.array([(code, face, -1) for code, face in rows], np.int64).reshape(-1, 3)
+    return found, planes, np.flatnonzero(may_bend)
+
+
+def find_contacts(shell: FlatShell, flat: np.ndarray, is_asked: np.ndarray) -> np.ndarray:
+    """Return the pairs (2, k) of edges of a face that meet, by their first corners.
+
+    Only faces (f,) that are asked for are looked at.
+    """
+    edges = np.flatnonzero(is_asked[shell.face_of])
+    step = np.ptp(flat[:, 0]) + 1.0  # faces are laid side by side, so that they meet no other
+    places = flat + np.column_stack([shell.face_of * step, np.zeros(len(flat))])
+    lines = shapely.linestrings(np.stack([places[edges], places[shell.after[edges]]], axis=1))
+    tree = shapely.STRtree(lines)
+    one, two = edges[tree.query(lines, predicate="dwithin", distance=ON_SEGMENT_M)]
+    return np.array([one, two])[:, one < two]
+
+
+def find_crossing(shell: FlatShell, flat: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """Return edges (k,) of rings that cross, touch or fold back on themselves."""
+    one, two = pairs[:, shell.ring_of[pairs[0]] == shell.ring_of[pairs[1]]]
+    is_next, is_before = shell.after[one] == two, shell.after[two] == one
+    one, two = np.where(is_before, two, one), np.where(is_before, one, two)
+    a, b, c = flat[one], flat[two], flat[shell.after[two]]
+    is_folded = lies_on(c, a, b) | lies_on(a, b, c)
+    return one[np.where(is_next | is_before, is_folded, True)]
+
+
+def check_inner_rings(
+    shell: FlatShell, planes: FacePlanes, face: int, pairs: np.ndarray
+) -> list[int]:
+    """Return the codes of a face's inner rings, at most one a ring."""
+    first, last = shell.face_start[face : face + 2].tolist()
+    numbers = [np.arange(*shell.ring_start[r : r + 2]) for r in range(first, last)]
+    polygons = [shapely.Polygon(planes.flat[corners]) for corners in numbers]
+    vertices = [set(shell.index[corners].tolist()) for corners in numbers]
+    touches = find_touches(shell, planes.flat, pairs[:, shell.face_of[pairs[0]] == face])
+    result, links = [], np.empty((2, 0), np.int64)
+    for r in range(1, last - first):
+        code = 0
+        for s in range(r):
+            points = touches.get((first + s, first + r), set())
+            labels = label_components(last - first, links)
+            if vertices[r] == vertices[s] and len(numbers[r]) == len(numbers[s]):
+                code = 202
+            elif points is None:
+                code = 201
+            elif len(points) > 1 or (points and labels[r] == labels[s]):
+                code = 205
+            elif s == 0 and not is_within(polygons[r], polygons[0]):
+                code = 206
+            elif s > 0 and (
+                is_within(polygons[r], polygons[s]) or is_within(polygons[s], polygons[r])
+            ):
+                code = 207
+            if code:
+                break
+            if points:
+                links = np.column_stack([links, [r, s]])
+        if code == 0 and shell.areas[first + r] @ planes.normals[face] > 0:
+            code = 208
+        result += [code] if code else []
+    return result
+
+
+def is_within(inner: shapely.Polygon, outer: shapely.Polygon) -> bool:
+    """Return whether a ring lies in another one that it does not cross."""
+    return inner.area < outer.area and bool(outer.contains(inner.representative_point()))
+
+
+def find_touches(
+    shell: FlatShell, flat: np.ndarray, pairs: np.ndarray
+) -> dict[tuple[int, int], set[tuple[float, ...]] | None]:
+    """Return where rings touch each other, by their numbers.
+
+    None stands for rings that cross or share a stretch.
+    """
+    one, two = pairs[:, shell.ring_of[pairs[0]] != shell.ring_of[pairs[1]]]
+    a, b, c, d = (flat[k] for k in (one, shell.after[one], two, shell.after[two]))
+    crosses = cross_strictly(a, b, c, d)
+    on = np.stack([lies_on(a, c, d), lies_on(b, c, d), lies_on(c, a, b), lies_on(d, a, b)], axis=1)
+    places = np.round(np.stack([a, b, c, d], axis=1) / TOUCH_M)
+    result: dict[tuple[int, int], set[tuple[float, ...]] | None] = {}
+    for k, key in enumerate(
+        zip(shell.ring_of[one].tolist(), shell.ring_of[two].tolist(), strict=True)
+    ):
+        points = set(map(tuple, places[k][on[k]].tolist()))
+        known = result.get(key, set())
+        is_crossing = known is None or crosses[k] or len(points) > 1
+        result[key] = None if is_crossing or known is None else known | points
+    return result
