@@ -14,7 +14,7 @@ from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work import solve
-from hiproof.city.work.tasks import ALL, make_ready
+from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS, make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
 from hiproof.parametric.run import build_file
@@ -34,7 +34,7 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         news.listener = news.Lines(print)
-        make_ready(ALL)
+        make_ready(WITHOUT_FOOTPRINTS)
 
 
 def pytest_collection_finish():

@@ -69,7 +69,8 @@ def interrupt_compiled_code(*_, **__):
 
 
 @pytest.mark.parametrize(
-    "place", ["work.sort.mask_at", "work.solve.Surroundings", "work.solve.fragments", "run.merge"]
+    "place",
+    ["work.sort.lowest_in_cells", "work.solve.Surroundings", "work.solve.fragments", "run.merge"],
 )
 def test_an_interrupt_within_compiled_code_is_no_failure(
     hiproof, town, tmp_path, monkeypatch, capsys, place

@@ -1,6 +1,4 @@
-"""Sampling and arrangement: the compiled path equals plain NumPy, and the input follows
-the points.
-"""
+"""Sampling and arrangement equal slow ones, and the input follows the points."""
 
 import numpy as np
 import pytest

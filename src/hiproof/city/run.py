@@ -25,7 +25,7 @@ from ..garbage import collect_rarely
 from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
 from ..progress import show_in_notebook
-from ..stages.recognise import asks_network, fits_one
+from ..stages.recognise import fits_one
 from ..status import Doubt
 from ..write.files import save_text
 from ..write.head import FileHead
@@ -48,7 +48,6 @@ from .work.queue import Queue
 from .work.tasks import (
     MAIN_JOB,
     ONE_PRIMITIVE,
-    RECOGNISING,
     WITHOUT_FOOTPRINTS,
     solve_tile,
     sort_cloud,
@@ -197,10 +196,9 @@ def count_processes(request: Request, ledger: Ledger) -> int:
 
 def list_compiled_pieces(request: Request) -> tuple[str, ...]:
     """Return the pieces of compiled code that the run needs."""
-    besides = RECOGNISING if asks_network(request.settings) else ()
     if request.footprints is None:
-        return (*WITHOUT_FOOTPRINTS, *besides)
-    return (*(ONE_PRIMITIVE if fits_one(request.settings) else MAIN_JOB), *besides)
+        return WITHOUT_FOOTPRINTS
+    return ONE_PRIMITIVE if fits_one(request.settings) else MAIN_JOB
 
 
 class Clock:

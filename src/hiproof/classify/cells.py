@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from ..geometry.thin import cell_range
+from ..geometry.grid import cell_range
 
 
 class SquareCells:

@@ -12,8 +12,8 @@ def warm(*, everything: bool = False) -> None:
 
     This takes a minute or two, once for each version.
     """
-    from ..city.work.tasks import ALL, MAIN_JOB, make_ready
+    from ..city.work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS, make_ready
 
     with show_progress("compile"):
-        make_ready(ALL if everything else MAIN_JOB)
+        make_ready(WITHOUT_FOOTPRINTS if everything else MAIN_JOB)
     click.echo("everything is compiled" if everything else "all that most runs use is compiled")

@@ -71,15 +71,9 @@ def raise_horizon(horizon, places, edges, directions):
                     horizon[i, sector] = max(horizon[i, sector], rise)
 
 
-@compiled
-def measure_share(horizon, sector, tangent):
+def measure_share(horizon: np.ndarray, sector: np.ndarray, tangent: np.ndarray) -> np.ndarray:
     """Return the share (t,) of places that see each sun position.
 
     Positions lie in `sector` (t,) at elevations of `tangent` (t,).
     """
-    seen = np.zeros(len(sector))
-    for i in range(len(horizon)):
-        for t in range(len(sector)):
-            if tangent[t] > horizon[i, sector[t]]:
-                seen[t] += 1.0
-    return seen / len(horizon)
+    return (tangent > horizon[:, sector]).mean(axis=0)

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ..geometry.cell_kernel import cell_keys
+from ..geometry.grid import number_cells
 from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import OVERLAY_GRID_M
-from ..geometry.thin import cell_range, occupied_cells
 from ..model import ROOF, Fit, Quality, Solid
 from .distance import point_surface_distances, surface_and_vertical_distances
 
@@ -206,11 +205,9 @@ def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
 
     Most of their points `xy` (n, 2 or 3) lie more than half a metre off.
     """
-    xy = np.ascontiguousarray(xy, float)
-    lower, (columns, rows) = cell_range(xy, CELL_M)
-    _, cell, total = occupied_cells(cell_keys(xy, CELL_M, *lower, columns), columns * rows)
+    cell = number_cells(np.floor(xy[:, :2] / CELL_M))[1]
     counts = np.bincount(cell, weights=dz > UNEXPLAINED_M)
-    return float(np.count_nonzero(counts > total / 2) * CELL_M**2)
+    return float(np.count_nonzero(counts > np.bincount(cell) / 2) * CELL_M**2)
 
 
 def observed_outline(points: np.ndarray) -> shapely.Polygon | None:

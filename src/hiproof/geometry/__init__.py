@@ -6,7 +6,6 @@ point_in_polygon    whether a point lies in rings, compiled
 components          which members of a set are connected by links
 grid                cells of a grid in plan, numbered
 alpha_shape         the outline of a set of points
-cell_kernel         points and cells, compiled
 thin                one point a cell
 point_grid          which points lie in which polygon
 arrays              sorting and copying in compiled code

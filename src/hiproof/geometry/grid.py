@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+
+MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cells
 
 
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -24,10 +28,25 @@ def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     low = cells.min(axis=0)
     column, row = (cells - low).T
     rows = int(row.max()) + 1
-    keys, number = np.unique(column * rows + row, return_inverse=True)
-    return np.column_stack(np.divmod(keys, rows)) + low, number
+    keys = column * rows + row
+    if keys.max() > MOST_CELLS_A_POINT * len(keys):
+        occupied, number = np.unique(keys, return_inverse=True)
+    else:
+        is_occupied = np.bincount(keys) > 0
+        occupied, number = np.flatnonzero(is_occupied), (np.cumsum(is_occupied) - 1)[keys]
+    return np.column_stack(np.divmod(occupied, rows)) + low, number
 
 
 def count_cells(cells: np.ndarray) -> int:
     """Count the distinct cells among `cells` (n, 2) of whole numbers."""
     return len(number_cells(cells)[0])
+
+
+def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return the first cell of the world's grid, and the numbers of cells.
+
+    Both are (column, row). The cells hold `xy` (n, 2 or more), n > 0.
+    """
+    lower = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
+    upper = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
+    return (lower[0], lower[1]), (upper[0] - lower[0] + 1, upper[1] - lower[1] + 1)

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .cell_kernel import cell_keys
+from .grid import cell_range
 from .point_in_polygon import find_inside
-from .thin import cell_range
 
 # of an outline; hardly a building has more corners, and growing it takes a quarter of a second
 MANY_VERTICES = 200
@@ -42,7 +41,8 @@ class PointGrid:
         self.origin, (self.columns, self.rows) = (
             cell_range(self.xy, cell_m) if len(self.xy) else ((0, 0), (1, 1))
         )
-        keys = cell_keys(self.xy, self.cell_m, *self.origin, self.columns)
+        column, row = (np.floor(self.xy[:, :2] / cell_m).astype(np.int64) - self.origin).T
+        keys = row * self.columns + column
         # sorted as 16 bits where they fit: numpy then counts instead of comparing
         keys = keys.astype(np.min_scalar_type(self.rows * self.columns))
         self.order = np.argsort(keys, kind="stable")

@@ -5,17 +5,15 @@ The result depends neither on the order of points nor on tiles.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 
-from .cell_kernel import cell_keys, is_first
+from .grid import number_cells
 
 # sums and comparisons run on whole tenths of a millimetre: integers do not mind their order
 UNITS_PER_M = 10_000
 MOST_COUNTED = 2**16  # cells: numbers of 16 bits NumPy sorts by counting them
-MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cells
 
 
 def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
@@ -52,7 +50,8 @@ def without_repeats(xyz: np.ndarray) -> np.ndarray:
     2
     """
     xyz = np.ascontiguousarray(xyz, float)
-    return xyz.compress(is_first(xyz, hashes(xyz)), axis=0)
+    rows = xyz.view(np.dtype((np.void, xyz.itemsize * xyz.shape[1]))).ravel()
+    return xyz[np.sort(np.unique(rows, return_index=True)[1])]
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
@@ -82,10 +81,8 @@ def rank_in_cells(
     if not len(xyz):
         return np.empty((0, 3))
     xyz, cell_m = np.ascontiguousarray(xyz, float), float(cell_m)
-    lower, size = cell_range(xyz, cell_m)
-    keys = cell_keys(xyz, cell_m, *lower, size[0])
-    occupied, cell_of, counts = occupied_cells(keys, size[0] * size[1])
-    corner = (np.column_stack([occupied % size[0], occupied // size[0]]) + lower) * cell_m
+    occupied, cell_of = number_cells(np.floor(xyz[:, 1::-1] / cell_m))  # row by row
+    counts, corner = np.bincount(cell_of), occupied[:, ::-1] * cell_m
     units = [np.rint((xyz[:, axis] - corner[cell_of, axis]) * UNITS_PER_M) for axis in (0, 1)]
     mean = np.column_stack([np.bincount(cell_of, values) for values in units]) / counts[:, None]
     heights = np.rint(xyz[:, 2] * UNITS_PER_M).astype(np.int64)
@@ -96,27 +93,3 @@ def rank_in_cells(
     ascending = np.sort(order, kind="stable") % span + lowest
     selection = np.cumsum(counts) - counts + np.minimum(rank(counts), counts - 1)
     return np.column_stack([corner + mean / UNITS_PER_M, ascending[selection] / UNITS_PER_M])
-
-
-def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the first cell of the world's grid, and the numbers of cells.
-
-    Both are (column, row). The cells hold `xy` (n, 2 or more), n > 0.
-    """
-    lower = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
-    upper = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
-    return (lower[0], lower[1]), (upper[0] - lower[0] + 1, upper[1] - lower[1] + 1)
-
-
-def occupied_cells(keys: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return np.unique of `keys` (n,) below `cells`, with inverse and counts.
-
-    It uses a table where that is not much larger.
-    """
-    if cells > MOST_CELLS_A_POINT * len(keys):
-        return np.unique(keys, return_inverse=True, return_counts=True)
-    counts = np.bincount(keys)
-    occupied = np.flatnonzero(counts)
-    number = np.empty(len(counts), np.int64)
-    number[occupied] = np.arange(len(occupied))
-    return occupied, number[keys], counts[occupied]

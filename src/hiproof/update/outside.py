@@ -18,7 +18,7 @@ import shapely
 
 from ..city.plan.work_plan import WorkPlan
 from ..geometry.components import label_components
-from ..geometry.thin import occupied_cells
+from ..geometry.grid import number_cells
 from ..model import PointCloud
 from ..settings import ReadSettings
 from ..status import ChangeKind
@@ -107,7 +107,7 @@ def average_cells(
     `points` (n, 4), x y z and the square of z, stand for so many points, `counts` (n,), each; None
     is for one.
     """
-    offset, number = find_lowest(points), list_occupied(find_cells(points))[1]
+    offset, number = points.min(axis=0), number_cells(find_cells(points))[1]
     total = np.bincount(number, weights=counts)
     columns = (values - low for values, low in zip(points.T, offset, strict=True))
     weights = columns if counts is None else (counts * values for values in columns)
@@ -120,30 +120,12 @@ def find_places(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Also returns the number of points (k,) of each.
     """
-    occupied, number = list_occupied(find_cells(points))
+    occupied, number = number_cells(find_cells(points))
     counts = np.bincount(number).astype(float)
     places = np.zeros((len(occupied), 4))
     places[:, :2] = occupied + 0.5
     places[:, 2] = np.bincount(number, weights=points[:, 2]) / counts
     return places, counts
-
-
-def list_occupied(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct `cells` (k, 2) of (n, 2), and the number (n,) of each."""
-    low = find_lowest(cells)
-    column, row = (cells - low).T
-    rows = int(row.max()) + 1
-    keys = column * rows + row
-    occupied, number, _ = occupied_cells(keys, int(keys.max()) + 1)
-    return np.column_stack(np.divmod(occupied, rows)) + low, number
-
-
-def find_lowest(rows: np.ndarray) -> np.ndarray:
-    """Return the lowest value (c,) of each column of rows (n, c).
-
-    NumPy is slow at many rows of a few columns.
-    """
-    return np.array([column.min() for column in rows.T])
 
 
 def find_cells(points: np.ndarray) -> np.ndarray:
@@ -389,8 +371,8 @@ def is_among(cells: np.ndarray, others: np.ndarray) -> np.ndarray:
     result = np.zeros(len(cells), bool)
     if not len(others):
         return result
-    low = find_lowest(others)
-    table = np.zeros(-find_lowest(-others) - low + 1, bool)
+    low = others.min(axis=0)
+    table = np.zeros(np.ptp(others, axis=0) + 1, bool)
     table[tuple((others - low).T)] = True
     column, row = (cells - low).T
     inside = (column >= 0) & (row >= 0) & (column < table.shape[0]) & (row < table.shape[1])

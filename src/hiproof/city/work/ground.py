@@ -14,7 +14,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...compiled import compiled
 from ...geometry.thin import rank_in_cells, thin_to_grid, without_repeats
 from ...read.terrain import Terrain
 from ..plan.work_plan import VOID_REACH_M
@@ -58,6 +57,25 @@ class Cells:
             [table[lower:upper, left:right][mask] for table in (self.x, self.y, self.z)]
         )
 
+    def select_around(self, xy: np.ndarray, reach: int, box: np.ndarray) -> np.ndarray:
+        """Return the cells (n, k, 3) up to `reach` from each of `xy` (n, 2), inside a box.
+
+        They are NaN where no point is, and outside the box.
+        """
+        size = self.z.shape[::-1]
+        steps = np.arange(-reach, reach + 1)
+        lower = np.maximum(box[:2].astype(np.int64) - self.low, 0)
+        upper = np.minimum(box[2:].astype(np.int64) - self.low, size)
+        cell = np.floor(xy).astype(np.int64)[:, :, None] + steps - self.low[:, None]
+        is_in = (cell >= lower[:, None]) & (cell < upper[:, None])
+        if not is_in.any():
+            return np.full((len(xy), len(steps) ** 2, 3), np.nan)
+        column, row = np.clip(cell, 0, np.array(size)[:, None] - 1).swapaxes(0, 1)
+        place = row[:, :, None], column[:, None, :]
+        around = np.stack([self.x[place], self.y[place], self.z[place]], axis=-1)
+        around[~(is_in[:, 1, :, None] & is_in[:, 0, None, :])] = np.nan
+        return around.reshape(len(xy), -1, 3)
+
 
 class GroundAround:
     """Terrain for one building: a plane through the known cells around.
@@ -77,8 +95,15 @@ class GroundAround:
 
         It is NaN where no cell within the last ring is known.
         """
-        xy, cells = np.ascontiguousarray(xy_world, float), self.cells
-        return plane_heights(xy, cells.x, cells.y, cells.z, cells.low, self.box.astype(np.int64))
+        xy = np.asarray(xy_world, float)[:, :2]
+        heights, missing = np.full(len(xy), np.nan), np.arange(len(xy))
+        for reach in RINGS:
+            around = self.cells.select_around(xy[missing], reach, self.box)
+            known = np.isfinite(around[:, :, 2]).sum(axis=1)
+            is_enough = known >= (3 if reach < RINGS[-1] else 1)
+            heights[missing[is_enough]] = fit_planes(xy[missing[is_enough]], around[is_enough])
+            missing = missing[~is_enough]
+        return heights
 
 
 class ModelAround:
@@ -152,8 +177,10 @@ class LowestAround:
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return the height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
-        xy = np.ascontiguousarray(xy_world, float)
-        return lowest_heights(xy, self.cells.z, self.cells.low, self.box.astype(np.int64))
+        xy = np.asarray(xy_world, float)[:, :2]
+        heights = np.sort(self.cells.select_around(xy, RINGS[-1], self.box)[:, :, 2], axis=1)
+        is_many = np.isfinite(heights[:, 9])
+        return np.where(is_many, heights[:, 1], heights[:, 0])
 
 
 class WhereSeen:
@@ -173,106 +200,22 @@ class WhereSeen:
         )
 
 
-@compiled
-def window(x, y, reach, lower, shape, box):
-    """Return rows and columns, [first, end), of a window of a table.
+def fit_planes(position: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Return the heights (n,) at each `position` (n, 2) of planes through cells (n, k, 3).
 
-    The table's corner is cell `lower`. The window reaches at most `reach` from (x, y), inside
-    `box`.
+    Unknown cells are NaN; LEVELLING holds the slope back.
     """
-    column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
-    rows = (
-        max(row - reach, box[1], lower[1]) - lower[1],
-        min(row + reach + 1, box[3], lower[1] + shape[0]) - lower[1],
-    )
-    columns = (
-        max(column - reach, box[0], lower[0]) - lower[0],
-        min(column + reach + 1, box[2], lower[0] + shape[1]) - lower[0],
-    )
-    return rows[0], rows[1], columns[0], columns[1]
-
-
-@compiled
-def plane_heights(xy, x, y, z, lower, box):
-    """Return the heights (n,) at `xy` (n, 2) of weighted planes.
-
-    They go through the known cells of the tables x, y, z inside `box`.
-    """
-    heights = np.full(len(xy), np.nan)
-    for i in range(len(xy)):
-        for reach in RINGS:
-            bounds = window(xy[i, 0], xy[i, 1], reach, lower, z.shape, box)
-            known_count, total, mean_x, mean_y, mean_z = weighted_mean(xy[i], x, y, z, bounds)
-            if known_count >= (3 if reach < RINGS[-1] else 1):
-                slope_x, slope_y = weighted_slope(
-                    xy[i], x, y, z, bounds, total, mean_x, mean_y, mean_z
-                )
-                heights[i] = mean_z - slope_x * mean_x - slope_y * mean_y
-                break
-    return heights
-
-
-@compiled
-def weighted_mean(position, x, y, z, bounds):
-    """Return the known cells in `bounds`, their weight and their mean.
-
-    The mean is their offset from `position` (2,) and height.
-    """
-    count, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
-    for row in range(bounds[0], bounds[1]):
-        for column in range(bounds[2], bounds[3]):
-            if not np.isnan(z[row, column]):
-                dx, dy = x[row, column] - position[0], y[row, column] - position[1]
-                weight = 1.0 / (dx * dx + dy * dy + SOFT_M2)
-                count, total = count + 1, total + weight
-                sum_x, sum_y, sum_z = (
-                    sum_x + weight * dx,
-                    sum_y + weight * dy,
-                    sum_z + weight * z[row, column],
-                )
-    if count == 0:
-        return 0, 0.0, 0.0, 0.0, 0.0
-    return count, total, sum_x / total, sum_y / total, sum_z / total
-
-
-@compiled
-def weighted_slope(position, x, y, z, bounds, total, mean_x, mean_y, mean_z):
-    """Return the slope, along x and y, of the plane through known cells.
-
-    Cells are within `bounds`; LEVELLING holds the slope back.
-    """
-    xx, yy, xy, xz, yz = LEVELLING, LEVELLING, 0.0, 0.0, 0.0
-    for row in range(bounds[0], bounds[1]):
-        for column in range(bounds[2], bounds[3]):
-            if not np.isnan(z[row, column]):
-                dx, dy = x[row, column] - position[0], y[row, column] - position[1]
-                weight = 1.0 / (dx * dx + dy * dy + SOFT_M2) / total
-                dx, dy, rise = dx - mean_x, dy - mean_y, z[row, column] - mean_z
-                xx, yy, xy = xx + weight * dx * dx, yy + weight * dy * dy, xy + weight * dx * dy
-                xz, yz = xz + weight * dx * rise, yz + weight * dy * rise
-    determinant = xx * yy - xy * xy
-    return (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
-
-
-@compiled
-def lowest_heights(xy, z, lower, box):
-    """Return the lowest known height (n,) around `xy` (n, 2) inside `box`.
-
-    It is the second lowest of ten or more cells of the table z.
-    """
-    heights = np.full(len(xy), np.nan)
-    for i in range(len(xy)):
-        bounds = window(xy[i, 0], xy[i, 1], RINGS[-1], lower, z.shape, box)
-        count, lowest, second = 0, np.inf, np.inf
-        for row in range(bounds[0], bounds[1]):
-            for column in range(bounds[2], bounds[3]):
-                current = z[row, column]
-                if not np.isnan(current):
-                    count += 1
-                    lowest, second = min(lowest, current), min(second, max(lowest, current))
-        if count:
-            heights[i] = second if count >= 10 else lowest
-    return heights
+    is_known = np.isfinite(cells[:, :, 2])
+    off = np.where(is_known[:, :, None], cells, 0.0)
+    off[:, :, :2] -= position[:, None]
+    weight = is_known / ((off[:, :, :2] ** 2).sum(axis=2) + SOFT_M2)
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean = np.einsum("nk,nkc->nc", weight, off)
+    off -= mean[:, None]
+    plan, weighted = off[:, :, :2], off[:, :, :2] * weight[:, :, None]
+    normal = plan.swapaxes(1, 2) @ weighted + LEVELLING * np.eye(2)
+    slope = np.linalg.solve(normal, weighted.swapaxes(1, 2) @ off[:, :, 2:])[:, :, 0]
+    return mean[:, 2] - (slope * mean[:, :2]).sum(axis=1)
 
 
 def ground_cells(xyz: np.ndarray) -> Cells:

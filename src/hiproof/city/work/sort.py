@@ -23,7 +23,6 @@ import shapely
 
 from ...errors import OutputError, is_interrupt
 from ...frames import Units
-from ...geometry.cell_kernel import mask_at
 from ...geometry.point_grid import PointGrid
 from ...model import PointCloud
 from ...read.las import is_copc
@@ -80,7 +79,10 @@ class Reach:
 
         It is 0 outside the bounds; boxes exclude upper sides.
         """
-        return mask_at(self.mask, xy, index, *self.bounds[:2])
+        column, row = np.floor(xy[index, :2] - self.bounds[:2]).astype(np.int64).T
+        columns, rows = self.mask.shape
+        is_on = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        return np.where(is_on, self.mask[column.clip(0, columns - 1), row.clip(0, rows - 1)], 0)
 
 
 class Reaches:

@@ -21,11 +21,6 @@ ONE_PRIMITIVE = (*MAIN_JOB, "single")
 WITHOUT_FOOTPRINTS = (*ONE_PRIMITIVE, "outlines")
 """Those of runs without footprints."""
 
-RECOGNISING = ("warm_recognition",)
-"""What runs that ask the network need besides."""
-
-ALL = (*WITHOUT_FOOTPRINTS, *RECOGNISING)
-
 
 WORK = ("hiproof.city.work.sort", "hiproof.city.work.solve", "hiproof.fit.union")
 """Modules that a worker needs."""

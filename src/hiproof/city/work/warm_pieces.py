@@ -110,13 +110,6 @@ def curves() -> None:
     find_circle(xyz, 3.0, xyz[:, 2] == 3.0)
 
 
-def warm_recognition() -> None:
-    """Compile the arrangement of a cloud for the network."""
-    from ...segment.arrange import Layout, arrange
-
-    arrange(house(), Layout())
-
-
 def outlines() -> None:
     """Compile what runs without footprints draw.
 
@@ -148,8 +141,7 @@ def points() -> None:
 
 
 PIECES: dict[str, Callable[[], None]] = {
-    piece.__name__: piece
-    for piece in (moves, planes, outlines, solid, points, single, curves, warm_recognition)
+    piece.__name__: piece for piece in (moves, planes, outlines, solid, points, single, curves)
 }
 
 
