@@ -1,9 +1,7 @@
-"""Every kind of output file, declared once.
-
-A declaration has its name, its content, and the module of `write` that makes it.
+"""Every kind of output file, declared once in data/formats.toml.
 
 A run, its merge, `hiproof build`, `hiproof convert`, help and documents derive from FORMATS: a new
-format is a module and a line here. A module has either
+format is a module and a table there. A module has either
 
     writer(path, head, **given)         the incremental writer (a write.writer.BuildingWriter)
     write_models(path, buildings, crs)  of 3D viewers, which draw a write.meshes.viewed.ViewedModel;
@@ -18,9 +16,9 @@ Modules are imported when a file of theirs is asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tomllib
 from dataclasses import dataclass, field
-from importlib import import_module
+from importlib import import_module, resources
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -28,131 +26,24 @@ from typing import Any
 from .settings import Settings, WriteSettings
 
 
-def is_always(write: WriteSettings) -> bool:
-    return True
-
-
-def citygml2(write: WriteSettings) -> bool:
-    return write.citygml != "3.0"
-
-
-def citygml3(write: WriteSettings) -> bool:
-    return write.citygml != "2.0"
-
-
-def parquet(write: WriteSettings) -> bool:
-    return write.parquet
-
-
 @dataclass(frozen=True)
 class Format:
-    """A kind of output file.
-
-    It has its `file` name, `what` it holds, and the `module` of `write` that makes it, with
-    `given`.
-
-    `fragment` is the module that makes a building's part of it, empty for a format of `hiproof
-    convert` alone; `asked` whether a run of these settings writes it; `tile_ending` that of the
-    files of work tiles, empty where they have none.
-    """
+    """A kind of output file, as data/formats.toml declares it."""
 
     file: str
     what: str
     module: str
     fragment: str = ""
-    asked: Callable[[WriteSettings], bool] = is_always
+    when: dict[str, list[Any]] = field(default_factory=dict)
     tile_ending: str = ""
     given: dict[str, Any] = field(default_factory=dict)
 
 
 FORMATS = {
-    "citygml2": Format(
-        file="buildings.gml",
-        what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection "
-        "curves, roofType",
-        module="citygml.version2",
-        fragment="citygml.version2",
-        asked=citygml2,
-        tile_ending=".gml",
-    ),
-    "citygml3": Format(
-        file="buildings.citygml3.gml",
-        what="CityGML 3.0 with the same content (`--citygml 3.0` or `both`)",
-        module="citygml.version3",
-        fragment="citygml.version3",
-        asked=citygml3,
-        tile_ending=".citygml3.gml",
-    ),
-    "cityjsonseq": Format(
-        file="buildings.city.jsonl",
-        what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG "
-        "use (`rf_...`)",
-        module="cityjson.features",
-        fragment="cityjson.features",
-        tile_ending=".city.jsonl",
-    ),
-    "parameters": Format(
-        file="parameters.jsonl",
-        what="the parametric models, of which `hiproof build` makes all other files again",
-        module="parameters",
-        fragment="parameters",
-    ),
-    "gpkg": Format(
-        file="buildings.gpkg",
-        what="outlines, parts and roof surfaces as tables, for QGIS",
-        module="tables.geopackage",
-        fragment="tables.geopackage",
-    ),
-    "parquet": Format(
-        file="buildings.parquet",
-        what="the outlines as GeoParquet (`--parquet`)",
-        module="tables.geoparquet",
-        fragment="tables.geopackage",
-        asked=parquet,
-    ),
-    "parquet_parts": Format(
-        file="parts.parquet",
-        what="the parts as GeoParquet (`--parquet`)",
-        module="tables.geoparquet",
-        fragment="tables.geopackage",
-        asked=parquet,
-        given={"layer": "parts"},
-    ),
-    "parquet_surfaces": Format(
-        file="roof_surfaces.parquet",
-        what="the roof surfaces as GeoParquet (`--parquet`)",
-        module="tables.geoparquet",
-        fragment="tables.geopackage",
-        asked=parquet,
-        given={"layer": "roof_surfaces"},
-    ),
-    "cityjson": Format(
-        file="buildings.city.json",
-        what="CityJSON 2.0 in one document, for programs that read no sequence",
-        module="cityjson.features",
-    ),
-    "fgb": Format(
-        file="buildings.fgb", what="the outlines as FlatGeobuf", module="tables.flatgeobuf"
-    ),
-    "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="meshes.gltf"),
-    "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="meshes.obj"),
-    "stl": Format(file="buildings.stl", what="binary STL, for printing", module="meshes.stl"),
-    "3dtiles": Format(
-        file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="meshes.tiles"
-    ),
-    "ifc": Format(
-        file="buildings.ifc", what="IFC4X3 with map conversion (extra `ifc`)", module="meshes.ifc"
-    ),
-    "dxf": Format(
-        file="buildings.dxf",
-        what="DXF: 3D faces and outlines on layers, for CAD (extra `dxf`)",
-        module="meshes.dxf",
-    ),
-    "3dm": Format(
-        file="buildings.3dm",
-        what="meshes on layers, for Rhino and Grasshopper (extra `rhino`)",
-        module="meshes.rhino",
-    ),
+    name: Format(**row)
+    for name, row in tomllib.loads(
+        (resources.files("hiproof") / "data" / "formats.toml").read_text(encoding="utf-8")
+    ).items()
 }
 CONVERTED = {name: format for name, format in FORMATS.items() if name != "parameters"}
 """What `hiproof convert` writes: the parameters are what it reads."""
@@ -220,7 +111,10 @@ def requested_fragments(write: WriteSettings) -> list[str]:
 def requested_formats(write: WriteSettings) -> dict[str, Format]:
     """Return the formats of a run, as whole files or by work tile."""
     return {
-        name: format for name, format in FORMATS.items() if format.fragment and format.asked(write)
+        name: format
+        for name, format in FORMATS.items()
+        if format.fragment
+        and all(getattr(write, setting) in values for setting, values in format.when.items())
     }
 
 
