@@ -1,12 +1,14 @@
-"""Every setting once: default, unit, bounds, help.
+"""Every setting once: its type and default here, unit, bounds and help in data/settings.toml.
 
-Command line, TOML file and error texts derive from here.
+Command line, TOML file and error texts derive from both.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import tomllib
 from dataclasses import dataclass, field, fields
+from importlib import resources
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -16,135 +18,47 @@ from .errors import SettingsError
 LARGEST_INTEGER = 10**15  # no number of a setting without bounds is larger
 
 
-def setting(
-    default: Any,
-    help: str,
-    unit: str = "",
-    lower: float | None = None,
-    upper: float | None = None,
-    choices: tuple[Any, ...] = (),
-    minimum: int = 0,
-    option: str = "",
-    names: str = "",
-) -> Any:
-    """Declare one setting of a section.
+SETTING_ROWS = tomllib.loads(
+    (resources.files("hiproof") / "data" / "settings.toml").read_text(encoding="utf-8")
+)
+UNDECLARED = {
+    **dict.fromkeys(("unit", "option", "names"), ""),
+    **dict.fromkeys(("low", "high")),
+    "choices": (),
+    "fewest": 0,
+}
+"""What stands for the entries that a setting does not have in data/settings.toml."""
 
-    `lower` and `upper` are inclusive bounds, `choices` the allowed values.
 
-    Of a setting of several values they hold for each, and there are at least `minimum`. With an
-    `option` (such as "--roofs") the command line has it, its help and default made of this. One
-    that `names` "files" is another where other bytes stand in them.
-    """
-    metadata = {
-        "help": help,
-        "unit": unit,
-        "low": lower,
-        "high": upper,
-        "choices": choices,
-        "fewest": minimum,
-    }
-    return field(default=default, metadata=metadata | {"option": option, "names": names})
+class Section:
+    """A section of settings, each of which is a field with its row of data/settings.toml."""
+
+    def __init_subclass__(cls) -> None:
+        for name, row in SETTING_ROWS[cls.__name__.removesuffix("Settings").lower()].items():
+            setattr(cls, name, field(default=getattr(cls, name), metadata=UNDECLARED | row))
 
 
 @dataclass(frozen=True)
-class ReadSettings:
+class ReadSettings(Section):
     """[read] which points count, units, surveys, passages, heights without points."""
 
-    building_classes: tuple[int, ...] = setting(
-        (6,),
-        "LAS classes of roof points (ASPRS 6; IGN uses 67)",
-        "",
-        0,
-        255,
-        minimum=1,
-        option="--building-class",
-    )
-    ground_classes: tuple[int, ...] = setting(
-        (2,), "LAS classes of terrain points", "", 0, 255, option="--ground-class"
-    )
-    roofs: str = setting(
-        "auto",
-        "how roof points are found: class takes the building classes; shape looks for roofs among "
-        "all points that may be roofs; alone takes all of these but leaves, for clouds cut to "
-        "their roofs; auto takes class, or shape where no point has a building class, or alone "
-        "where nothing looks like ground",
-        choices=("auto", "class", "shape", "alone"),
-        option="--roofs",
-    )
-    crs: str = setting(
-        "",
-        'CRS of the clouds, such as "EPSG:7415"; empty takes that of their files',
-        option="--crs",
-    )
-    unit: str = setting(
-        "auto",
-        "unit of the clouds' coordinates; auto takes that of their CRS, or metres without a CRS",
-        choices=("auto", "metre", "foot", "us-survey-foot"),
-        option="--unit",
-    )
-    overture_catalogue: str = setting(
-        "https://stac.overturemaps.org/catalog.json",
-        "address of Overture Maps' STAC catalogue, whose latest release `--footprints overture` "
-        "reads, or of the catalogue of one release",
-    )
-    override_columns: tuple[str, ...] = setting(
-        (),
-        'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" '
-        "(docs/overrides.md)",
-    )
-    fallback_roof_height: str = setting(
-        "",
-        "column of the footprints with roof heights (m) for buildings without usable points; "
-        "+COLUMN means above the ground",
-        option="--fallback-roof-height",
-    )
-    fallback_ground_height: str = setting(
-        "",
-        "column of the footprints with ground heights (m) for these where no terrain is known",
-        option="--fallback-ground-height",
-    )
-    clearance_column: str = setting(
-        "clearance",
-        "column of --underpasses that holds the height of the passage over the ground, in metres",
-        option="--clearance-column",
-    )
-    raised_column: str = setting(
-        "",
-        "column of the footprints that holds how high a building stands over the ground, in "
-        "metres, such as one on columns or over a road; empty for none",
-        option="--raised-column",
-    )
-    shift: str = setting(
-        "auto",
-        "how far a new survey lies beside the earlier one, or of surveys (--epoch) each older one "
-        "beside the newest: auto estimates it, off takes none off, EAST,NORTH,UP gives it in "
-        "metres",
-        option="--shift",
-    )
-    largest_shift_m: float = setting(
-        1.0, "longest shift between surveys that is estimated and taken off", "m", 0.0, 100.0
-    )
-    year_column: str = setting(
-        "",
-        "column of the footprints that holds the year of construction; of surveys (--epoch), those "
-        "before that year are not taken",
-        option="--year-column",
-    )
-    split_gap_m: float = setting(
-        0.0,
-        "without footprints: clear space that separates buildings; 0 adapts it to the density",
-        "m",
-        0.0,
-        20.0,
-    )
-    split_houses: bool = setting(
-        True,
-        "without footprints: split touching houses where a step or another ridge or eave runs "
-        "across the block",
-    )
-    split_min_points: int = setting(
-        30, "without footprints: groups of fewer points are not buildings", "", 3, 100000
-    )
+    building_classes: tuple[int, ...] = (6,)
+    ground_classes: tuple[int, ...] = (2,)
+    roofs: str = "auto"
+    crs: str = ""
+    unit: str = "auto"
+    overture_catalogue: str = "https://stac.overturemaps.org/catalog.json"
+    override_columns: tuple[str, ...] = ()
+    fallback_roof_height: str = ""
+    fallback_ground_height: str = ""
+    clearance_column: str = "clearance"
+    raised_column: str = ""
+    shift: str = "auto"
+    largest_shift_m: float = 1.0
+    year_column: str = ""
+    split_gap_m: float = 0.0
+    split_houses: bool = True
+    split_min_points: int = 30
 
     @property
     def by_class(self) -> bool:
@@ -156,241 +70,82 @@ class ReadSettings:
 
 
 @dataclass(frozen=True)
-class FitSettings:
+class FitSettings(Section):
     """[fit] roof types to choose among, and how they are fitted."""
 
-    types: tuple[str, ...] = setting(
-        (), "roof types to choose among; empty means the whole catalogue", option="--types"
-    )
-    objective: str = setting(
-        "likelihood",
-        "objective that the fit minimises",
-        choices=("likelihood", "paper"),
-        option="--objective",
-    )
-    side_softness_m: tuple[float, ...] = setting(
-        (0.1, 0.04, 0.015, 0.006),
-        "softness of the roof's sides tried at last, the most likely kept",
-        "m",
-        0.001,
-        1.0,
-        minimum=1,
-    )
-    parts: str = setting(
-        "compound",
-        "primitives of a building: compound fits as many as the points support, one fits a single "
-        "one (extra `network`, unless --network never)",
-        choices=("compound", "one"),
-        option="--parts",
-    )
+    types: tuple[str, ...] = ()
+    objective: str = "likelihood"
+    side_softness_m: tuple[float, ...] = (0.1, 0.04, 0.015, 0.006)
+    parts: str = "compound"
 
 
 @dataclass(frozen=True)
-class CompoundSettings:
+class CompoundSettings(Section):
     """[compound] how much detail roofs of several parts have."""
 
-    detail: str = setting(
-        "full",
-        "how much structure a model has: fine keeps small dormers and steps, main leaves out "
-        "dormers and small parts, full lies between",
-        choices=("fine", "full", "main"),
-        option="--detail",
-    )
-    tolerance_m: float = setting(
-        0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0
-    )
-    evidence_points: float = setting(
-        1.0, "points that one unit of structure must explain at least", "", 0.1, 100.0
-    )
-    evidence_area_m2: float = setting(
-        0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0
-    )
+    detail: str = "full"
+    tolerance_m: float = 0.25
+    evidence_points: float = 1.0
+    evidence_area_m2: float = 0.25
 
 
 @dataclass(frozen=True)
-class SegmentSettings:
+class SegmentSettings(Section):
     """[segment] recognising roof types with the network."""
 
-    network: str = setting(
-        "auto",
-        "buildings whose roof type the network recognises (extra `network`): auto, those to which "
-        "one primitive is fitted; always, all buildings, and the types are written; never, none",
-        choices=("auto", "always", "never"),
-        option="--network",
-    )
-    weights: str = setting(
-        "", "ONNX file with the network's weights; empty means the shipped ones", names="files"
-    )
-    device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
+    network: str = "auto"
+    weights: str = ""
+    device: str = "cpu"
 
 
 @dataclass(frozen=True)
-class ComposeSettings:
+class ComposeSettings(Section):
     """[compose] from fitted roof to solid."""
 
-    snap_m: float = setting(0.001, "plan vertices closer than this are one", "m", 0.001, 0.05)
-    min_face_area_m2: float = setting(0.01, "smaller roof faces join a neighbour", "m2", 0.0, 10.0)
-    min_face_width_m: float = setting(
-        0.25, "thinner roof faces, which nobody draws, join a neighbour", "m", 0.0, 1.0
-    )
-    ground_clearance_m: float = setting(
-        0.1, "the ground lies at least this far below the lowest eave", "m", 0.01, 10.0
-    )
-    chord_tolerance_m: float = setting(
-        0.1,
-        "facets of cones, domes, onions and vaults lie within this of the curve",
-        "m",
-        0.02,
-        1.0,
-    )
-    planarity_m: float = setting(
-        0.001, "vertices of a face lie within this of its plane", "m", 0.0005, 0.05
-    )
+    snap_m: float = 0.001
+    min_face_area_m2: float = 0.01
+    min_face_width_m: float = 0.25
+    ground_clearance_m: float = 0.1
+    chord_tolerance_m: float = 0.1
+    planarity_m: float = 0.001
 
 
 @dataclass(frozen=True)
-class ReconstructSettings:
+class ReconstructSettings(Section):
     """[reconstruct] moved footprints, walls, overhangs, chimneys, bare ground."""
 
-    align: str = setting(
-        "auto",
-        "auto moves footprints that clearly lie beside their roofs; off leaves them in place",
-        choices=("auto", "off"),
-        option="--align",
-    )
-    footprint_trust: str = setting(
-        "points",
-        "bare ground inside a footprint, such as a yard: points cuts it out of the footprint; full "
-        "roofs it over and adds a remark",
-        choices=("points", "full"),
-        option="--footprint-trust",
-    )
-    empty_footprints: str = setting(
-        "skip",
-        "footprints whose points all lie on the ground: skip gives them the status no_building and "
-        "no model; model fits whatever points they have",
-        choices=("skip", "model"),
-        option="--empty-footprints",
-    )
-    walls: str = setting(
-        "level",
-        "lower end of walls: level ends them at one height, the lowest terrain along the outline; "
-        "terrain lets them reach down to the terrain everywhere",
-        choices=("level", "terrain"),
-        option="--walls",
-    )
-    installations: bool = setting(
-        False,
-        "also find chimneys and other objects on roofs, and write them as building installations",
-        option="--installations",
-    )
-    footprint_kind: str = setting(
-        "walls",
-        "what footprints outline, for --lods 2.3: walls, which roofs reach beyond as far as their "
-        "points show; roof, within which walls stand by --assumed-overhang; auto takes roof where "
-        "points end at three quarters of a footprint",
-        choices=("walls", "roof", "auto"),
-        option="--footprint-kind",
-    )
-    assumed_overhang_m: float = setting(
-        0.0,
-        "distance of walls from footprints of roofs, for --lods 2.3",
-        "m",
-        0.0,
-        3.0,
-        option="--assumed-overhang",
-    )
-    roof_thickness_m: float = setting(
-        0.2,
-        "thickness of roofs beyond walls, measured upright, for --lods 2.3",
-        "m",
-        0.02,
-        2.0,
-        option="--roof-thickness",
-    )
+    align: str = "auto"
+    footprint_trust: str = "points"
+    empty_footprints: str = "skip"
+    walls: str = "level"
+    installations: bool = False
+    footprint_kind: str = "walls"
+    assumed_overhang_m: float = 0.0
+    roof_thickness_m: float = 0.2
 
 
 @dataclass(frozen=True)
-class CitySettings:
+class CitySettings(Section):
     """[city] many buildings, their files and failures."""
 
-    max_points_a_building: int = setting(
-        20000,
-        "a building with more points is thinned to so many, evenly and by a fixed rule",
-        "",
-        1000,
-        10**7,
-    )
-    models: str = setting(
-        "merged",
-        "merged writes one CityGML and one CityJSONSeq file; tiles writes a pair for each work "
-        "tile into models/ as soon as it is solved; both writes both",
-        choices=("merged", "tiles", "both"),
-        option="--models",
-    )
-    keep_failures: bool = setting(
-        True,
-        "keep the points, outline and settings of up to 20 buildings with an internal error in "
-        "OUT/failures, to be sent with a report (`hiproof repro` runs them again)",
-        option="--keep-failures",
-    )
+    max_points_a_building: int = 20000
+    models: str = "merged"
+    keep_failures: bool = True
 
 
 @dataclass(frozen=True)
-class WriteSettings:
+class WriteSettings(Section):
     """[write] LoDs, building parts, CityGML versions, tables, CRS, OpenStreetMap tags."""
 
-    lods: tuple[str, ...] = setting(
-        ("2.2",),
-        "levels of detail: 0 is footprint and roof edge, 1.2 one block, 1.3 a block for each "
-        "building part, 2.2 the roof, 2.3 the roof with overhangs; CityJSON always has the "
-        "footprint, and CityGML has only the finer LoD1 and LoD2",
-        choices=("0", "1.2", "1.3", "2.2", "2.3"),
-        minimum=1,
-        option="--lods",
-    )
-    parts_as: str = setting(
-        "one",
-        "one writes one solid for each building; buildingparts makes building parts, each with its "
-        "own solid, of roofs that meet only at walls",
-        choices=("one", "buildingparts"),
-        option="--parts-as",
-    )
-    roof_codes: str = setting(
-        "sig3d",
-        "code list of roofType in CityGML: that of SIG3D or of AdV",
-        choices=("sig3d", "adv"),
-        option="--roof-codes",
-    )
-    citygml: str = setting(
-        "2.0", "version of CityGML, or both", choices=("2.0", "3.0", "both"), option="--citygml"
-    )
-    osm_tags: bool = setting(
-        False,
-        "also write OpenStreetMap's Simple 3D tags as attributes: roof:shape, roof:height, "
-        "roof:direction, roof:angle, height; they replace attributes of the input with these names",
-        option="--osm-tags",
-    )
-    parquet: bool = setting(
-        False, "also write the tables as GeoParquet (extra `parquet`)", option="--parquet"
-    )
-    out_crs: str = setting(
-        "",
-        'CRS of the coordinates in all files but parameters.jsonl, such as "EPSG:25832"; empty '
-        "takes that of the clouds; heights change only if it has a vertical CRS",
-        option="--out-crs",
-    )
-    terrain_intersection: bool = setting(
-        True,
-        "write the line along which walls meet the terrain into CityGML",
-        option="--terrain-intersection",
-    )
-    gml_surfaces: bool = setting(
-        True,
-        "also write the surfaces of each solid into CityGML by value, as the last geometry, for "
-        "GDAL and QGIS, which follow no links",
-        option="--gml-surfaces",
-    )
+    lods: tuple[str, ...] = ("2.2",)
+    parts_as: str = "one"
+    roof_codes: str = "sig3d"
+    citygml: str = "2.0"
+    osm_tags: bool = False
+    parquet: bool = False
+    out_crs: str = ""
+    terrain_intersection: bool = True
+    gml_surfaces: bool = True
 
     @property
     def has_lod2(self) -> bool:
@@ -399,55 +154,18 @@ class WriteSettings:
 
 
 @dataclass(frozen=True)
-class EnrichSettings:
+class EnrichSettings(Section):
     """[enrich] party walls, sun, weather and thermal zones of finished models."""
 
-    touch_m: float = setting(
-        0.3,
-        "distance in metres up to which walls of neighbours touch",
-        "m",
-        0.0,
-        2.0,
-        option="--touch",
-    )
-    use_attribute: str = setting(
-        "",
-        "attribute of the footprints that names the use of a building, such as residential or "
-        "office; empty takes all buildings as residential",
-        option="--use-attribute",
-    )
-    sun: bool = setting(False, "add the sun on every roof surface (extra `sun`)", option="--sun")
-    weather: str = setting(
-        "",
-        "weather of a typical year (EPW, TMY3 or PVGIS), for --sun; empty takes a clear sky",
-        option="--weather",
-        names="files",
-    )
-    horizon: str = setting(
-        "",
-        "horizon file of PVGIS, which shades all buildings, for --sun: heights in degrees at equal "
-        "angles, clockwise from the north",
-        option="--horizon",
-        names="files",
-    )
-    shading_terrain: str = setting(
-        "",
-        "terrain model (GeoTIFF; extra `terrain`), which shades up to 20 km away, for --sun; "
-        "`hiproof reconstruct --enrich --sun` takes that of the run",
-        names="files",
-    )
-    sun_on_walls: bool = setting(
-        False, "also add the sun on every outer wall, for --sun", option="--sun-on-walls"
-    )
-    energy_ade: bool = setting(
-        False,
-        "also write thermal zones and their boundaries into CityGML 2.0, as the Energy ADE 1.0 has "
-        "them",
-        option="--energy-ade",
-    )
-    albedo: float = setting(
-        0.2, "share of light that the ground reflects, for --sun", "", 0.0, 1.0, option="--albedo"
-    )
+    touch_m: float = 0.3
+    use_attribute: str = ""
+    sun: bool = False
+    weather: str = ""
+    horizon: str = ""
+    shading_terrain: str = ""
+    sun_on_walls: bool = False
+    energy_ade: bool = False
+    albedo: float = 0.2
 
 
 @dataclass(frozen=True)
@@ -484,8 +202,6 @@ class Settings:
 
         Raises SettingsError when it cannot be read.
         """
-        import tomllib  # few runs have such a file
-
         try:
             values = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         # undecodable, no TOML, or a number of 5,000 digits

@@ -66,7 +66,7 @@ def test_tiles_change_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(raster, "TILE_PX", 16)
     tiled = read_terrain(path)
     assert np.array_equal(tiled.height_at(inside(2000, margin=0)), whole)
-    assert len(tiled.tiles) <= raster.TILES_KEPT
+    assert tiled.tile.cache_info().currsize <= raster.TILES_KEPT
 
 
 def test_a_raster_in_another_crs_is_asked_there(tmp_path):

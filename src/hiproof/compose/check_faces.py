@@ -13,8 +13,8 @@ import shapely
 from ..geometry.components import label_components
 from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly, lies_on
 
-SMALLEST_AREA_M2 = 1e-7  # m2; a ring with less is folded to a line
-TOUCH_M = 1e-6  # m; touches of two rings that are closer are one
+SMALLEST_RING_M2 = 1e-7  # m2; a ring with less is folded to a line
+SAME_TOUCH_M = 1e-6  # m; touches of two rings that are closer are one
 KEPT_AXES = np.array([(1, 2), (0, 2), (0, 1)])  # of a projection along each axis
 FLAT_M = 1e-9  # m; a face as flat as this has no bent triangle that is wider
 
@@ -79,7 +79,7 @@ def check_faces(shell: FlatShell, planarity_m: float) -> tuple[np.ndarray, FaceP
     has_rings = np.diff(shell.face_start) > 0
     outer[has_rings] = shell.areas[shell.face_start[:-1][has_rings]]
     size = np.linalg.norm(outer, axis=1)
-    codes[(codes == 0) & (size < SMALLEST_AREA_M2)] = 104
+    codes[(codes == 0) & (size < SMALLEST_RING_M2)] = 104
     is_sound = codes == 0
     planes = fit_planes(shell, outer / np.where(is_sound, size, 1.0)[:, None])
     is_planar = planes.flatness <= planarity_m
@@ -176,7 +176,7 @@ def find_touches(
     a, b, c, d = (flat[k] for k in (one, shell.after[one], two, shell.after[two]))
     crosses = cross_strictly(a, b, c, d)
     on = np.stack([lies_on(a, c, d), lies_on(b, c, d), lies_on(c, a, b), lies_on(d, a, b)], axis=1)
-    places = np.round(np.stack([a, b, c, d], axis=1) / TOUCH_M)
+    places = np.round(np.stack([a, b, c, d], axis=1) / SAME_TOUCH_M)
     result: dict[tuple[int, int], set[tuple[float, ...]] | None] = {}
     for k, key in enumerate(
         zip(shell.ring_of[one].tolist(), shell.ring_of[two].tolist(), strict=True)

@@ -14,7 +14,7 @@ from ..geometry.components import label_components
 from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly
 from .check_faces import FacePlanes
 
-SLACK_M = 2e-4  # m; besides its flatness, how far off a face still counts as on it
+OFF_PLANE_M = 2e-4  # m; besides its flatness, how far off a face still counts as on it
 
 
 def check_shell(shell: FlatShell, planes: FacePlanes) -> list[tuple[int, int, int]]:
@@ -71,7 +71,7 @@ def check_intersections(shell: FlatShell, planes: FacePlanes) -> list[tuple[int,
     starts = shell.ring_start[shell.face_start[:-1]]
     low = np.minimum.reduceat(shell.corners, starts)
     high = np.maximum.reduceat(shell.corners, starts)
-    slack = planes.flatness + SLACK_M
+    slack = planes.flatness + OFF_PLANE_M
     wide = slack[:, None]
     boxes = shapely.box(*(low - wide)[:, :2].T, *(high + wide)[:, :2].T)
     face, other = shapely.STRtree(boxes).query(boxes)

@@ -12,7 +12,6 @@ fit         one primitive fitted to points
 building    models and buildings
 shown       where each part of a roof shows from above
 heights     heights of roofs at many points, compiled
-roof_levels levels below which a share of a roof lies, compiled
 roof_figures  heights, slopes, ridge and volume of a solid
 """
 

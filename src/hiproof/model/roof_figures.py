@@ -9,6 +9,7 @@ triangulation.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ import numpy as np
 from .building import Building
 from .solid import GROUND, ROOF, Solid
 
+LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is level
 LEVEL_RIDGE_M = 0.05  # ends of a ridge differ in height by less
 # a face below drains but does not slope to the eye; it has no azimuth worth telling
 FLAT_SLOPE_DEG = 3.0
@@ -127,8 +129,6 @@ def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, 
     A share of the roof's area lies below these two. Triangles are given by their corners' heights
     `z` (t, 3) over `z_origin`, in order, and their areas in plan (t,).
     """
-    from .roof_levels import find_level  # compiled, as above
-
     heights = {"h_min": z[:, 0].min(), "h_max": z[:, 2].max()}
     heights |= {
         name: find_level(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))
@@ -278,3 +278,45 @@ def find_eave_height(edges: RoofEdges) -> float:
     return float(
         height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)]
     )
+
+
+def measure_area_below(level: float, z: np.ndarray, plan: np.ndarray) -> float:
+    """Return the plan area of triangles at or below `level`.
+
+    They have sorted heights `z` (t, 3) and signed plan areas `plan` (t,).
+    """
+    low, middle, high = z.T
+    lower, upper = np.maximum(middle - low, 1e-12), np.maximum(high - middle, 1e-12)
+    rising = np.clip(level - low, 0.0, lower) ** 2 / lower
+    falling = upper - np.clip(high - level, 0.0, upper) ** 2 / upper
+    share = np.where(
+        high - low < LEVEL_TRIANGLE_M, low <= level, (rising + falling) / (lower + upper)
+    )
+    return float((plan * share).sum())
+
+
+def find_level(share: float, z: np.ndarray, plan: np.ndarray) -> float:
+    """Return the level below which `share` of the roof's plan area lies.
+
+    Between corner heights the area below a level is quadratic in the level, at the height of a
+    level triangle it jumps: both are solved exactly.
+    """
+    target = share * plan.sum()
+    # so that rounding does not decide where the share ends just at a level part
+    is_enough = target * (1 - 1e-12)
+    knots = np.unique(z).tolist()
+    first = bisect_left(knots, is_enough, key=lambda knot: measure_area_below(knot, z, plan))
+    if first == 0:
+        return knots[0]
+    count, upper = first - 1, min(first, len(knots) - 1)
+    span = knots[upper] - knots[count]
+    start = measure_area_below(knots[count], z, plan)
+    middle = measure_area_below(knots[count] + 0.5 * span, z, plan)
+    is_below = z[:, 0] < knots[upper]  # just below that knot: no triangle lies level in it
+    end = measure_area_below(knots[upper], z[is_below], plan[is_below])
+    if end < is_enough:
+        return knots[upper]
+    curvature = 2 * (start + end - 2 * middle)
+    linear, missing = end - start - curvature, target - start
+    t = 2 * missing / (linear + np.sqrt(max(linear**2 + 4 * curvature * missing, 0.0)))
+    return knots[count] + min(t, 1.0) * span

@@ -2,16 +2,13 @@
 
 Values that the file calls no data are no heights, nor are values that stand for no data without
 being declared so.
-
-What its file calls no data, and values that stand for no data without its saying so, are no
-heights.
 """
 
 from __future__ import annotations
 
+import functools
 import warnings
-from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,6 +19,7 @@ from pyproj import CRS
 from ..errors import DamagedRaster, InputError, InputWarning
 from ..extras import import_extra
 from ..frames import Units
+from ..geometry.grid import number_cells
 from ..masking import mask, remember
 from .crs import (
     find_units,
@@ -112,7 +110,7 @@ class RasterTerrain:
         remember(str(path))
         self.path, self.source = str(path), f"terrain model {Path(mask(str(path))).name}"
         self.crs = parse_crs(crs)
-        self.tiles: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
+        self.tile = functools.lru_cache(TILES_KEPT)(self.read_tile)
         refuse_without_position(self.dataset, self.path)
         self.band = height_band(self.dataset, self.path)
         self.alpha = alpha_band(self.dataset)
@@ -139,13 +137,12 @@ class RasterTerrain:
 
     def __getstate__(self) -> dict:
         """Leave out the open file and tiles, so that a worker opens its own."""
-        return {
-            **{k: v for k, v in vars(self).items() if k not in ("dataset", "transformer")},
-            "tiles": OrderedDict(),
-        }
+        opened = ("dataset", "transformer", "tile")
+        return {name: value for name, value in vars(self).items() if name not in opened}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
+        self.tile = functools.lru_cache(TILES_KEPT)(self.read_tile)
         self.transformer = self.make_transformer()
 
     @property
@@ -204,14 +201,7 @@ class RasterTerrain:
         # centre's value.
         column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
         row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
-        result = np.full(len(row), np.nan)
-        for tile, current in by_tile(row, column):
-            result[current] = bilinear(
-                self.tile(*tile),
-                row[current] - tile[0] * TILE_PX,
-                column[current] - tile[1] * TILE_PX,
-            )
-        heights[inside] = result
+        heights[inside] = bilinear(self.take, row, column)
         return heights
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
@@ -221,16 +211,25 @@ class RasterTerrain:
         """
         row, column, inside = self.pixels_at(xy_world)
         coded = np.zeros(len(row), bool)
-        column = np.clip(np.floor(column[inside]), 0, self.dataset.width - 1).astype(int)
-        row = np.clip(np.floor(row[inside]), 0, self.dataset.height - 1).astype(int)
-        result = np.zeros(len(row), bool)
-        for tile, current in by_tile(row, column):
-            pixels = self.tile(*tile)
-            result[current] = np.isinf(
-                pixels[row[current] - tile[0] * TILE_PX, column[current] - tile[1] * TILE_PX]
-            )
-        coded[inside] = result
+        column = np.floor(column[inside]).astype(int)
+        row = np.floor(row[inside]).astype(int)
+        coded[inside] = np.isinf(self.take(row, column))
         return coded
+
+    def take(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Return the heights (n,) of pixels, or of the last ones before the raster's end.
+
+        They are NaN without data, and infinite where the stored value is no height.
+        """
+        row = np.minimum(row, self.dataset.height - 1)
+        column = np.minimum(column, self.dataset.width - 1)
+        places = np.column_stack([row, column])
+        tiles, index = number_cells(places // TILE_PX)
+        result = np.empty(len(row))
+        for k, tile in enumerate(tiles.tolist()):
+            selection = index == k
+            result[selection] = self.tile(*tile)[tuple((places[selection] % TILE_PX).T)]
+        return result
 
     def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the rows and columns (n,) at `xy_world` (n, 2) of the raster.
@@ -266,22 +265,16 @@ class RasterTerrain:
         sample = np.asarray(xy_world)[inside][index.ravel() % step == 0]
         return bool(np.isfinite(self.height_at(sample)).any())
 
-    def tile(self, row: int, column: int) -> np.ndarray:
-        """Return the heights (m) of a tile and one more row and column.
+    def read_tile(self, row: int, column: int) -> np.ndarray:
+        """Return the heights (m) of a tile.
 
         They are NaN without data, and infinite where the stored value is no height.
         """
-        key = (row, column)
-        if key not in self.tiles:
-            stored, heights = self.stored_and_heights(row, column)
-            is_code = np.isin(stored, NODATA_CODES) & np.isfinite(heights)
-            if is_code.any():
-                heights[is_code & np.isin(stored, self.codes)] = np.inf
-            self.tiles[key] = heights
-        self.tiles.move_to_end(key)
-        if len(self.tiles) > TILES_KEPT:
-            self.tiles.popitem(last=False)
-        return self.tiles[key]
+        stored, heights = self.stored_and_heights(row, column)
+        is_code = np.isin(stored, NODATA_CODES) & np.isfinite(heights)
+        if is_code.any():
+            heights[is_code & np.isin(stored, self.codes)] = np.inf
+        return heights
 
     def stored_and_heights(self, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the stored values of a tile, and their heights in metres.
@@ -292,8 +285,8 @@ class RasterTerrain:
         from rasterio.errors import RasterioError
         from rasterio.windows import Window
 
-        height = min(TILE_PX + 1, self.dataset.height - row * TILE_PX)
-        width = min(TILE_PX + 1, self.dataset.width - column * TILE_PX)
+        height = min(TILE_PX, self.dataset.height - row * TILE_PX)
+        width = min(TILE_PX, self.dataset.width - column * TILE_PX)
         window = Window(column * TILE_PX, row * TILE_PX, width, height)
         try:
             stored = (
@@ -328,18 +321,6 @@ class RasterTerrain:
         return tuple(code for code in NODATA_CODES if is_isolated(heights, stored == code))
 
 
-def by_tile(row: np.ndarray, column: np.ndarray) -> Iterator[tuple[tuple[int, int], np.ndarray]]:
-    """Yield (tile, indices) of all tiles in which rows and columns (n,) lie."""
-    places = np.column_stack([row, column]) // TILE_PX
-    tiles, index = np.unique(places.astype(int), axis=0, return_inverse=True)
-    order = np.argsort(index.ravel(), kind="stable")
-    ends = np.cumsum(np.bincount(index.ravel(), minlength=len(tiles)))
-    for tile, current in (
-        zip(tiles.tolist(), np.split(order, ends[:-1]), strict=True) if len(tiles) else ()
-    ):
-        yield (tile[0], tile[1]), current
-
-
 def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
     """Return a sample of the tiles of a raster, evenly spread.
 
@@ -364,18 +345,18 @@ def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
     return int((mask & ~is_coded).sum()) < MOST_BETWEEN * coded
 
 
-def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+def bilinear(
+    take: Callable[[np.ndarray, np.ndarray], np.ndarray], row: np.ndarray, column: np.ndarray
+) -> np.ndarray:
     """Return the weighted mean (n,) of the four pixels around each position.
 
-    Pixels that are not finite are left out. It is NaN where all are.
+    `take` returns the pixels of rows and columns. Those that are not finite are left out. It is NaN
+    where all are.
     """
     row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
-    row1 = np.minimum(row0 + 1, pixels.shape[0] - 1)
-    column1 = np.minimum(column0 + 1, pixels.shape[1] - 1)
     down, right = row - row0, column - column0
-    values = np.stack(
-        [pixels[row0, column0], pixels[row0, column1], pixels[row1, column0], pixels[row1, column1]]
-    )
+    corners = ((0, 0), (0, 1), (1, 0), (1, 1))
+    values = np.stack([take(row0 + i, column0 + j) for i, j in corners])
     weights = np.stack(
         [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
     )

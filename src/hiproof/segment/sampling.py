@@ -65,7 +65,7 @@ def describe_points(xyz, surface, spacing, count):
 
     There are points (s, 3) and their `surface` (s, 7), repeated to `count`.
     """
-    cosine, sine = find_canonical_axes(*xyz[:, :2].T, surface)
+    cosine, sine = find_canonical_axes(xyz[:, 0], xyz[:, 1], surface)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     features = np.column_stack(
         [

@@ -10,7 +10,6 @@ roof_figures           heights, slopes, ridge and volume of a solid
 surfaces               faces that are one surface, such as the facets of a cone
 terrain_figures        heights of the terrain along an outline
 installations          codes of chimneys and other objects on roofs
-roof_levels            heights below which a share of a roof lies, compiled
 osm_tags               a roof as OpenStreetMap tags it
 shapes                 LoD0, blocks and building parts, as far as requested
 colours                one colour a roof type

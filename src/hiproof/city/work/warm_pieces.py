@@ -123,20 +123,12 @@ def outlines() -> None:
 
 
 def points() -> None:
-    """Compile the sorting of points, and what a building needs of them.
-
-    These are those of one building, the ground around it, and whether its footprint lies off.
-    """
+    """Compile which points a building gets, and whether its footprint lies off."""
     from ...fit.align import find_shift
     from ...geometry.point_grid import PointGrid
-    from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
-    from .sort import Reach
 
-    xyz, boxes = house(), np.array([[0.0, 0.0, 9.0, 7.0]])
-    Reach(boxes, boxes).bits(xyz, np.arange(len(xyz)))
+    xyz = house()
     PointGrid(xyz).inside(OUTLINE)
-    GroundAround(ground_cells(xyz), boxes[0]).height_at(xyz[:, :2])
-    LowestAround(Cells(lowest_in_cells(xyz)), boxes[0]).height_at(xyz[:, :2])
     find_shift(xyz[:, :2], shapely.box(1.0, 0.5, 10.0, 7.5))
 
 
