@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -21,7 +22,6 @@ from hiproof.enrich.run import enrich_run
 from hiproof.progress import ignore_progress
 from hiproof.settings import EnrichSettings
 from hiproof.simulate import demo_files
-from hiproof.simulate.changes import CHANGES, change_building
 from hiproof.simulate.neighbourhood import DEMO_SEED, ORIGIN_XY, SCAN, neighbourhood
 from hiproof.simulate.scene import building_bodies
 from hiproof.simulate.survey import Flight, divide_into_patches, survey, write_laz
@@ -68,6 +68,9 @@ def make_tiles(folder: Path) -> Path:
 
 def scan_later(path: Path) -> None:
     """Write the cloud of the second survey."""
+    sys.path.append(str(Path(__file__).parents[1]))
+    from benchmarks.building_changes import CHANGES, change_building
+
     lots, terrain = neighbourhood()
     rng, waiting = np.random.default_rng(DEMO_SEED), list(CHANGES)
     for place in rng.permutation(len(lots)):
