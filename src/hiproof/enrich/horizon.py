@@ -1,4 +1,4 @@
-"""The horizon that buildings make around places on roofs, compiled.
+"""The horizon that buildings make around places on roofs.
 
 Models have upright walls and nothing below their roofs, so whatever lies under a roof's edge is
 dark: a ray from a place is free where it passes over every roof edge that it crosses in plan. One
@@ -8,8 +8,6 @@ ray is cast in the middle of each of SECTORS directions, and the horizon there i
 from __future__ import annotations
 
 import numpy as np
-
-from ..compiled import compiled
 
 SECTORS = 180  # directions of rays around a place, 2 degrees apart
 LIFT_M = 0.01  # height (m) of a place over its roof, so that rounding does not hide it
@@ -26,49 +24,29 @@ def find_horizon(places: np.ndarray, edges: np.ndarray) -> np.ndarray:
     >>> round(float(horizon[0, 0]), 3), float(horizon[0, 90])
     (0.5, 0.0)
     """
-    middles = (np.arange(SECTORS) + 0.5) * (2 * np.pi / SECTORS)
-    directions = np.column_stack([np.sin(middles), np.cos(middles)])
+    width = 2 * np.pi / SECTORS
     horizon = np.zeros((len(places), SECTORS))
-    raise_horizon(horizon, np.ascontiguousarray(places), np.ascontiguousarray(edges), directions)
+    ends = edges - places[:, None, None]
+    place, edge = np.nonzero(ends[:, :, :, 2].max(axis=2) > 0.0)
+    a, b = ends[place, edge].swapaxes(0, 1)
+    first, last = (np.arctan2(end[:, 0], end[:, 1]) for end in (a, b))
+    turn = (last - first + np.pi) % (2 * np.pi) - np.pi
+    low = np.minimum(first, first + turn)
+    start = np.ceil(low / width - 0.5).astype(np.int64)
+    end = np.floor((low + np.abs(turn)) / width - 0.5).astype(np.int64)
+    # one row for each edge and each ray that crosses it
+    counts = np.maximum(end - start + 1, 0)
+    row = np.repeat(np.arange(len(counts)), counts)
+    sector = (np.arange(len(row)) + (start - np.cumsum(counts) + counts)[row]) % SECTORS
+    angle = (sector + 0.5) * width
+    ray, a, way = np.array([np.sin(angle), np.cos(angle)]), a[row].T, (b - a)[row].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (ray[1] * a[0] - ray[0] * a[1]) / (ray[0] * way[1] - ray[1] * way[0])
+        distance = (ray * (a[:2] + share * way[:2])).sum(axis=0)
+        rise = (a[2] + share * way[2]) / distance
+    ahead = distance > 1e-6
+    np.maximum.at(horizon, (place[row][ahead], sector[ahead]), rise[ahead])
     return horizon
-
-
-@compiled
-def raise_horizon(horizon, places, edges, directions):
-    """Raise the tangents `horizon` (n, s) around `places` by edges (m, 2, 3).
-
-    Rays run in `directions` (s, 2), the middles of s equal sectors, clockwise from the north.
-    """
-    count = len(directions)
-    width = 2.0 * np.pi / count
-    for i in range(len(places)):
-        x, y, z = places[i, 0], places[i, 1], places[i, 2]
-        for e in range(len(edges)):
-            az, bz = edges[e, 0, 2] - z, edges[e, 1, 2] - z
-            if az <= 0.0 and bz <= 0.0:
-                continue
-            ax, ay = edges[e, 0, 0] - x, edges[e, 0, 1] - y
-            bx, by = edges[e, 1, 0] - x, edges[e, 1, 1] - y
-            first = np.arctan2(ax, ay)
-            turn = np.arctan2(bx, by) - first
-            if turn > np.pi:
-                turn -= 2.0 * np.pi
-            elif turn < -np.pi:
-                turn += 2.0 * np.pi
-            low = first if turn > 0.0 else first + turn
-            start = int(np.ceil(low / width - 0.5))
-            end = int(np.floor((low + abs(turn)) / width - 0.5))
-            for k in range(start, end + 1):
-                sector = k % count
-                dx, dy = directions[sector, 0], directions[sector, 1]
-                along = dx * (by - ay) - dy * (bx - ax)
-                if along == 0.0:
-                    continue
-                u = -(dx * ay - dy * ax) / along
-                distance = dx * (ax + u * (bx - ax)) + dy * (ay + u * (by - ay))
-                if distance > 1e-6:
-                    rise = (az + u * (bz - az)) / distance
-                    horizon[i, sector] = max(horizon[i, sector], rise)
 
 
 def measure_share(horizon: np.ndarray, sector: np.ndarray, tangent: np.ndarray) -> np.ndarray:
