@@ -88,7 +88,7 @@ def test_a_building_that_kills_dask_workers_is_left_out_alone(
     # one death is enough to blame a task here: each costs the start of a worker
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
     monkeypatch.setattr("hiproof.city.work.queue.MOST_LOSSES", 1)
-    monkeypatch.setattr("hiproof.city.work.quarantine.TRIES", 1)
+    monkeypatch.setattr("hiproof.city.work.queue.TRIES", 1)
     summary = reconstruct_area(
         Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address)
     )

@@ -11,7 +11,7 @@ import shapely
 
 from hiproof.city.folder.ledger import Ledger, Outcome
 from hiproof.city.plan.work_plan import Job, cut_into_tiles, neighbourhood
-from hiproof.city.work import quarantine
+from hiproof.city.work import queue
 from hiproof.city.work.executors import InProcess
 from hiproof.city.work.ground import (
     FAR_STEP_M,
@@ -252,9 +252,7 @@ def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypat
     """Building 2 ends its process; no task is tried more often than may be chance, and none that is
     known to be deadly.
     """
-    monkeypatch.setattr(
-        quarantine, "load_plan", lambda folder: SimpleNamespace(tiles={"tile": members})
-    )
+    monkeypatch.setattr(queue, "load_plan", lambda folder: SimpleNamespace(tiles={"tile": members}))
     attempts = []
 
     def run(function, tasks):
@@ -264,6 +262,6 @@ def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypat
             yield task, None if died else task[3], died
 
     executor = SimpleNamespace(run=run)
-    assert quarantine.solve_in_quarantine(executor, None, ("folder", "tile", None)) == ((2,), None)
-    by_one = [((2, 3),), *[((1, 3),)] * quarantine.TRIES, ((1, 2),)] if len(members) > 1 else []
-    assert attempts == [*[()] * quarantine.TRIES, *by_one, ((2,),)]
+    assert queue.solve_in_quarantine(executor, None, ("folder", "tile", None)) == ((2,), None)
+    by_one = [((2, 3),), *[((1, 3),)] * queue.TRIES, ((1, 2),)] if len(members) > 1 else []
+    assert attempts == [*[()] * queue.TRIES, *by_one, ((2,),)]

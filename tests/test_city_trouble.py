@@ -52,7 +52,7 @@ def test_a_building_that_ends_its_process_is_left_out_alone(
 ):
     monkeypatch.setattr(city_run, "solve_tile", solve)
     monkeypatch.setattr("hiproof.city.work.queue.MOST_LOSSES", 1)
-    monkeypatch.setattr("hiproof.city.work.quarantine.TRIES", 1)
+    monkeypatch.setattr("hiproof.city.work.queue.TRIES", 1)
     summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
     assert summary.exit_code == 1
     assert [id for id, _ in summary.failures] == [planted.DEADLY]

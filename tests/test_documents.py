@@ -60,6 +60,7 @@ def read_sources():
     """
     folders = ("src", "benchmarks", "experiments", "tests", "examples")
     files = [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
+    files += sorted((ROOT / "src" / "hiproof" / "data").glob("*.toml"))
     return "\n".join(file.read_text() for file in files if file != Path(__file__))
 
 

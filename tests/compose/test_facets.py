@@ -5,7 +5,7 @@ import pytest
 
 import hiproof
 from hiproof.compose import check_solid, compose
-from hiproof.compose.facets import draw_facets
+from hiproof.compose.solid import draw_facets
 from hiproof.frames import LocalFrame
 from hiproof.model import ROOF, Roof
 from hiproof.parametric.run import build_file

@@ -9,7 +9,7 @@ from lxml import etree
 
 from hiproof.cli.app import app
 from hiproof.enrich import run as enrich_module
-from hiproof.enrich import write as write_module
+from hiproof.enrich import run as write_module
 from hiproof.enrich.run import enrich_run
 from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.parametric.finished import open_run

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hiproof.enrich.answer import answer
+from hiproof.enrich.answer import answer, count_storeys, measure_floors, storey_heights
 from hiproof.enrich.run import enrich_run
-from hiproof.enrich.storeys import count_storeys, measure_floors, storey_heights
 from hiproof.errors import InputError
 from hiproof.parametric.building import build
 from hiproof.settings import EnrichSettings

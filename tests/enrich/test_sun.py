@@ -9,10 +9,8 @@ from click.testing import CliRunner
 from hiproof.cli.app import app
 from hiproof.enrich.answer import answer
 from hiproof.enrich.areas import area_vectors, measure_faces
-from hiproof.enrich.cadastre import Cadastre
+from hiproof.enrich.cadastre import Cadastre, locate, measure_panels
 from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
-from hiproof.enrich.panels import measure_panels
-from hiproof.enrich.place import locate
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sky import make_sky
 from hiproof.enrich.sun import irradiate, measure_sky, sample_face

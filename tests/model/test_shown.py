@@ -20,7 +20,7 @@ from hiproof.model.roof_figures import roof_figures
 from hiproof.model.shown import share_surface
 from hiproof.status import Status
 from hiproof.write import write_all
-from hiproof.write.osm_tags import osm_tags
+from hiproof.write.building_attributes import osm_tags
 from hiproof.write.tables.rows import table_rows
 from roof_zoo import FRAME, KINDS, generate_roof
 

@@ -17,9 +17,9 @@ from hiproof.parametric.schema import schema
 from hiproof.primitives import CATALOGUE
 from hiproof.segment import combine
 from hiproof.simulate import ScanSettings, random_building, scan, training_sample
-from hiproof.write.citygml.roof_codes import roof_type_code
+from hiproof.write.building_attributes import osm_shape
+from hiproof.write.citygml.version2 import roof_type_code
 from hiproof.write.colours import ROOF_COLOURS, type_colour
-from hiproof.write.osm_tags import osm_shape
 from hiproof.write.parameters import building_record
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "new_primitive.py"

@@ -2,7 +2,7 @@
 
 import shapely
 
-from hiproof.update.identity import Successor, match_outlines
+from hiproof.update.members import Successor, match_outlines
 
 
 def box(x, width=10.0, y=0.0):

@@ -11,7 +11,7 @@ from hiproof import InputError, SettingsError
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.parametric.run import build_file
-from hiproof.update.rates import find_largest_chance
+from hiproof.update.before import find_largest_chance
 from hiproof.update.refine import combine_sigmas
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area

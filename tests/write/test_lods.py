@@ -31,8 +31,7 @@ from hiproof.write import (
     write_cityjson,
     write_parameters,
 )
-from hiproof.write.citygml.roof_codes import CODE_SPACES
-from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter
+from hiproof.write.citygml.version2 import CODE_SPACES, NAMESPACES, CityGMLWriter
 from hiproof.write.citygml.version3 import CityGML3Writer
 from hiproof.write.colours import ROOF_COLOURS, list_legend, type_colour
 from hiproof.write.tables.styles import STYLES, TABLE

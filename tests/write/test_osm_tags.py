@@ -13,8 +13,7 @@ from hiproof.model import ROOF
 from hiproof.model.roof_figures import roof_figures
 from hiproof.primitives import CATALOGUE
 from hiproof.write.attribute_list import TABLES
-from hiproof.write.building_attributes import building_attributes
-from hiproof.write.osm_tags import ONE_ENDED, osm_tags
+from hiproof.write.building_attributes import ONE_ENDED, building_attributes, osm_tags
 
 # The values that OpenStreetMap's page of roof:shape documents for roofs of planes.
 DOCUMENTED = {

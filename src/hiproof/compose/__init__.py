@@ -5,14 +5,12 @@ Plan cells become levels, levels a closed shell, and every solid is checked.
 settle            the roof made of exactly the numbers that are written of it
 simpler           parts given up one by one, where a roof cannot become a valid solid
 readable          whether a file of parameters can hold a roof
-facets            facets of curved parts, by the tolerance of chords
 solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 zones             places where a solid failed, and what is attempted there
 arrangement       the planar arrangement under them, on an integer grid
 buckets           what lies near a place, for it
 joined            sets that are joined, for it
-tidy              cells without steps a millimetre long
 levels            which heights meet over every vertex of the plan
 flat_corners      corners turned in where rounded heights would fold a face
 shell             roof, wall and ground faces that share them
@@ -24,7 +22,6 @@ blocks            LoD1: prisms over the outline
 profile           heights of the terrain along an outline
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls
-inner_walls       walls inside the outline of a roof that overhangs them
 eaves             a model with overhangs
 valid_eaves       as many overhangs as make a valid solid
 finish            a model with the underside that it is to have

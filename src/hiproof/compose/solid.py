@@ -9,13 +9,30 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
-from ..model import Roof, Solid
+from ..model import Part, Roof, Solid
+from ..primitives.catalogue import CATALOGUE
 from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
-from .facets import draw_facets
 from .shell import Saddles, raise_shell
 from .zones import WHOLE_PLAN, Zone, add_zones, frame_places, list_reaches
+
+
+def draw_facets(roof: Roof, chord_m: float) -> Roof:
+    """Return the roof with facets of its curved parts within a tolerance (m)."""
+    parts = tuple(draw_part_facets(part, chord_m) for part in roof.parts)
+    return replace(roof, parts=parts)
+
+
+def draw_part_facets(part: Part, chord_m: float) -> Part:
+    """Return a part with other facets, or as it is where it is not curved."""
+    refine = CATALOGUE[part.type].refine if part.type in CATALOGUE else None
+    if refine is None or not part.parameters:
+        return part
+    shape = refine(part.parameters, chord_m)
+    planes = shape.planes_at(shape.to_theta(part.parameters, part.kappa, part.translation))
+    return replace(part, pieces=shape.make_pieces(part.outlines, planes))
+
 
 # val3dity's default planarity: steep planes cannot meet within less where vertices moved a
 # centimetre

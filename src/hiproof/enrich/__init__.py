@@ -7,19 +7,13 @@ cut         a solid whose walls are cut along their party walls
 town        the buildings of a run with their walls and where these touch
 areas       areas of outer walls, party walls, roofs and grounds
 house_type  the type of a house by the houses that it touches, its size, and its use
-storeys     storeys and floor areas, as intervals
-ridge       the direction of a roof's ridge
 horizon     the horizon that buildings make around places on roofs, compiled
 far         the horizon of a terrain model, or of a file as PVGIS has it
 weather     the irradiance of a typical year: EPW, TMY3, PVGIS, or a clear sky
 sky         the sun and the sky of a year at a place, from pvlib
 sun         the sun on a face: irradiation by month
-shade       the roof edges around a building that may shade it
-panels      the area of a roof face that panels may cover, and what they yield
-place       where on Earth the buildings of a run stand
 cadastre    the sun on every roof and wall of a building
 energy      thermal zones and their boundaries in the Energy ADE
 answer      all answers about one building
-write       a building's answers as texts for the files of a run
 run         `hiproof enrich`: every building of a run, in parallel
 """

@@ -4,22 +4,130 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from typing import Any, NamedTuple
 
+import numpy as np
 import shapely
 
-from ..model import Building, Solid
-from ..model.roof_figures import find_ground_height, roof_figures
+from ..model import ROOF, Building, Solid
+from ..model.roof_figures import LEVEL_RIDGE_M, find_ground_height, make_triangles, roof_figures
 from ..write.attribute_list import OWN
 from ..write.values import plain_text, round_value
-from .areas import OF_3DBAG, measure_areas
+from .areas import OF_3DBAG, area_vectors, measure_areas
 from .cadastre import Cadastre
 from .cut import Region, cut_walls
 from .house_type import is_residential, name_house_type, name_tabula_class
 from .party import Contact
-from .ridge import find_ridge_direction
-from .storeys import count_storeys, measure_floors, storey_heights
 from .town import Town
+
+RESIDENTIAL_STOREY_M, OTHER_STOREY_M = (2.5, 3.3), (3.0, 5.0)
+"""Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling
+that building codes allow to that of old town houses; of other uses up to that of shops and halls.
+"""
+HIGHEST_PLINTH_M = 0.6  # height (m) of a ground floor over the ground that houses seldom exceed
+HEADROOM_M = 1.5  # height (m) below the roof from which a floor counts as area
+
+
+def storey_heights(is_residential: bool) -> tuple[float, float]:
+    return RESIDENTIAL_STOREY_M if is_residential else OTHER_STOREY_M
+
+
+def count_storeys(eave_m: float, heights: tuple[float, float]) -> tuple[int, int]:
+    """Return the least and the greatest number of full storeys below the eaves.
+
+    `eave_m` is the height of the eaves over the ground, `heights` those of a storey. An attic is
+    none of them. Where no number of storeys fills a height, both are the most that fit below it.
+
+    >>> count_storeys(5.6, RESIDENTIAL_STOREY_M), count_storeys(4.5, RESIDENTIAL_STOREY_M)
+    ((2, 2), (1, 1))
+    """
+    low, high = heights
+    greatest = max(1, math.floor(eave_m / low + 1e-9))
+    least = max(1, math.ceil((eave_m - HIGHEST_PLINTH_M) / high - 1e-9))
+    return min(least, greatest), greatest
+
+
+def measure_floors(
+    solid: Solid, z_ground: float, eave_m: float, heights: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the least and the greatest gross floor area (m2), attics included.
+
+    They are those of the least and the greatest number of storeys. A floor is as large as the plan
+    in which the roof is at least HEADROOM_M above it.
+    """
+    low, high = heights
+    least, greatest = count_storeys(eave_m, heights)
+    height = min(max((eave_m - HIGHEST_PLINTH_M) / least, low), high)
+    levels = RoofLevels(solid)
+    z_eave = z_ground + eave_m
+    return (
+        sum_floors(
+            levels, z_ground + HIGHEST_PLINTH_M + height * np.arange(least + 1), z_eave, high
+        ),
+        sum_floors(levels, z_ground + low * np.arange(greatest + 1), z_eave, low),
+    )
+
+
+def sum_floors(levels: RoofLevels, z_floors: np.ndarray, z_eave: float, storey_m: float) -> float:
+    """Return the area (m2) of full storeys and of the attics above them.
+
+    `z_floors` are the heights of the storeys' floors and of the last one's ceiling.
+    """
+    attics = np.arange(max(z_eave, z_floors[-1]), levels.z_top, storey_m)
+    floors = np.concatenate([z_floors[:-1], attics]) + HEADROOM_M
+    floors[0] = min(floors[0], z_eave, levels.z_top)  # low sheds, too, have a floor
+    return float(sum(map(levels.measure_above, floors)))
+
+
+class RoofLevels:
+    """The plan areas of a roof above any height."""
+
+    def __init__(self, solid: Solid) -> None:
+        triangles = make_triangles(solid, solid.vertices.mean(axis=0))
+        roof = np.array([face.kind == ROOF for face in solid.faces])[triangles.face_of]
+        self.plan = triangles.vectors[roof, 2]
+        self.z = np.sort(solid.vertices[triangles.fan[roof], 2], axis=1)
+        self.z_top = float(self.z.max())
+
+    def measure_above(self, z: float) -> float:
+        """Return the plan area (m2) where the roof is at least as high as `z`."""
+        low, middle, high = self.z.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tip = (high - z) ** 2 / ((high - low) * (high - middle))
+            base = (z - low) ** 2 / ((high - low) * (middle - low))
+        share = np.where(z > middle, tip, 1.0 - base)
+        share = np.where(z <= low, 1.0, np.where(z > high, 0.0, share))
+        return float(self.plan @ share)
+
+
+def find_ridge_direction(solid: Solid) -> float | None:
+    """Return the compass direction (degrees, 0 to 180) of the longest level ridge.
+
+    A ridge is an edge from which the roof faces on both sides fall away. None without one.
+    """
+    vectors = area_vectors(solid)
+    sides: dict[tuple[int, int], int] = {}
+    for number, face in enumerate(solid.faces):
+        if face.kind == ROOF:
+            for ring in face.rings:
+                pairs = zip(ring, (*ring[1:], ring[0]), strict=True)
+                sides |= {(start, end): number for start, end in pairs}
+    best, direction = 0.0, None
+    for (start, end), left in sides.items():
+        other = sides.get((end, start))
+        along = solid.vertices[end] - solid.vertices[start]
+        length = round(float(np.hypot(along[0], along[1])), 3)
+        if other is None or start > end or abs(along[2]) >= LEVEL_RIDGE_M or length <= best:
+            continue
+        if tell_fall(vectors[left], along) and tell_fall(vectors[other], -along):
+            best, direction = length, float(np.degrees(np.arctan2(along[0], along[1])) % 180.0)
+    return direction
+
+
+def tell_fall(vector: np.ndarray, along: np.ndarray) -> bool:
+    """Return whether a face left of an edge falls away from it, by its vector area."""
+    return bool(vector[1] * along[0] - vector[0] * along[1] > 1e-9)
 
 
 class Answers(NamedTuple):

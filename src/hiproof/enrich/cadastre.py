@@ -3,28 +3,140 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
+import shapely
 
+from ..compose.boxes import make_box
 from ..errors import InputError
-from ..model import ROOF, Solid
+from ..model import ROOF, Building, Solid
+from ..read.crs import find_units, horizontal_crs, parse_crs
 from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
+from ..write.head import FileHead
 from ..write.values import round_value
 from .areas import measure_faces
 from .far import TerrainHorizon, open_terrain, read_horizon
 from .horizon import SECTORS
-from .panels import estimate_yield, measure_panels
-from .place import locate
-from .records import Records
-from .shade import ShadingEdges, list_objects
+from .records import MOST_KEPT, Records
 from .sky import Sky, make_sky
 from .sun import Irradiation, irradiate, sample_face, sample_wall
 from .town import Town
 from .walls import find_walls
 from .weather import import_pvlib, name_sky
+
+SHADE_REACH_M = 200.0  # distance (m) up to which buildings shade
+# Elevation (degrees) below which buildings count as none: the sun is weak there, and trees and
+# terrain hide it.
+LOWEST_HORIZON_DEG = 1.0
+
+
+class ShadingEdges:
+    """The roof edges of every building of a town, found once."""
+
+    def __init__(self, town: Town) -> None:
+        self.town = town
+        self.list_edges = functools.lru_cache(MOST_KEPT)(self.find_edges)
+
+    def find_edges(self, number: int) -> np.ndarray:
+        building = self.town.read(number)
+        if building.built is None:
+            return np.empty((0, 2, 3))
+        return np.concatenate([*map(roof_edges, (building.solid, *list_objects(building)))])
+
+    def find_shading_edges(self, number: int, z_low: float) -> np.ndarray:
+        """Return the edges (m, 2, 3) that shade places of building `number`.
+
+        The lowest of these places is at `z_low`.
+        """
+        numbers = [number, *self.town.records.find_near(number, SHADE_REACH_M)]
+        edges = np.concatenate([self.list_edges(k) for k in numbers])
+        low_x, low_y, high_x, high_y = self.town.records.index.boxes[number]
+        start, end = edges[:, 0], edges[:, 1]
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        aside = [
+            np.maximum(np.maximum(low[:, axis] - upper, lower - high[:, axis]), 0.0)
+            for axis, lower, upper in ((0, low_x, high_x), (1, low_y, high_y))
+        ]
+        distance = np.hypot(*aside)
+        rise = high[:, 2] - z_low
+        return edges[rise > np.tan(np.radians(LOWEST_HORIZON_DEG)) * distance]
+
+
+def list_objects(building: Building) -> list[Solid]:
+    """Return the chimneys and other objects on a building's roof, in the world."""
+    origin = building.roof.frame.origin
+    return [make_box(item).move(origin) for item in building.model.installations]
+
+
+def roof_edges(solid: Solid) -> np.ndarray:
+    """Return the edges (m, 2, 3) of a solid's roof faces, each once."""
+    pairs = {
+        (min(start, end), max(start, end))
+        for face in solid.faces
+        if face.kind == ROOF
+        for ring in face.rings
+        for start, end in zip(ring, (*ring[1:], ring[0]), strict=True)
+    }
+    return solid.vertices[np.array(sorted(pairs), int).reshape(-1, 2)]
+
+
+PANEL_MARGIN_M = 0.3  # width (m) that panels leave free along the edges of a roof face
+PANEL_WIDTH_M = 1.0  # width (m) of a panel: where less is free none fits
+# Share of the irradiation that becomes electricity: modules of 20 %, and 0.8 for heat, cables and
+# inverters.
+PANEL_EFFICIENCY, PERFORMANCE_RATIO = 0.20, 0.80
+
+
+def measure_panels(
+    solid: Solid, face: int, normal: np.ndarray, objects: Sequence[Solid] = ()
+) -> float:
+    """Return the area (m2) of a roof face that panels may cover.
+
+    It is PANEL_MARGIN_M or more from its edges and from `objects` on the roof, and nowhere narrower
+    than PANEL_WIDTH_M. The face is laid flat: plan coordinates are stretched along its slope.
+    """
+    covered = [item.project_face(top) for item in objects for top in item.select_faces(ROOF)]
+    free = shapely.difference(solid.project_face(solid.faces[face]), shapely.union_all(covered))
+    flat = float(np.hypot(normal[0], normal[1]))
+    down = normal[:2] / flat if flat > 0 else np.array([1.0, 0.0])
+    axes = np.column_stack([down / normal[2], (-down[1], down[0])])
+    outline = shapely.transform(free, lambda xy: xy @ axes)
+    half = PANEL_WIDTH_M / 2
+    core = shapely.buffer(outline, -(PANEL_MARGIN_M + half), join_style="mitre")
+    grown = shapely.buffer(core, half, join_style="mitre")
+    inner = shapely.buffer(outline, -PANEL_MARGIN_M, join_style="mitre")
+    return float(shapely.intersection(grown, inner).area)
+
+
+def estimate_yield(area_m2: float, sun_kwh_m2: float) -> float:
+    """Return the yield (kWh) of panels in a year."""
+    return area_m2 * sun_kwh_m2 * PANEL_EFFICIENCY * PERFORMANCE_RATIO
+
+
+def locate(head: FileHead, x: float, y: float) -> tuple[float, float, float]:
+    """Return longitude, latitude and true north at a place, in degrees.
+
+    The place is in world metres, the direction clockwise from the axis that points north. Raises
+    InputError where the run has no CRS.
+    """
+    from pyproj import Transformer
+
+    crs = parse_crs(head.crs)
+    if crs is None:
+        raise InputError(
+            "expected a run with a CRS for --sun, got one without; run `hiproof reconstruct` with "
+            "--crs"
+        )
+    to_globe = Transformer.from_crs(horizontal_crs(crs), "EPSG:4326", always_xy=True)
+    there = find_units(crs, unit_name=head.unit).from_metres(np.array([[x, y]]))[0]
+    longitude, latitude = to_globe.transform(*there)
+    step = to_globe.transform(longitude, latitude + 1e-3, direction="INVERSE")
+    north = np.degrees(np.arctan2(step[0] - there[0], step[1] - there[1]))
+    return float(longitude), float(latitude), float(north)
+
 
 SKY_CELL_M = 10_000.0  # side (m) of a square that has one sky: its sun differs by 0.1 degrees
 LEVEL_ROOF = 1e-3  # least share of a roof face that plan shows: steeper ones are walls

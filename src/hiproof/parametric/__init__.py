@@ -5,9 +5,6 @@ The parameters are the model: they are enough to build it again, by hand or by p
 file        parameters.jsonl read line by line, its head and its errors by line and column
 schema      the JSON schema of that file
 record      the JSON object of one building checked, and its parts made
-underside   how the building of an object ends below
-installations  those of an object
-overhangs   the overhangs of an object
 building    the object built: composed, checked, measured, as a run does
 run         a file of parameters into the files of a run
 finished    finished models read building by building, of any file

@@ -3,16 +3,153 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from ..compose.settle import DIGITS, PLAN_DIGITS, round_number
 from ..errors import InputError
-from ..model import ONE_LEVEL, Building, Model, Roof, Underside
+from ..geometry.outline_edges import list_outline_edges
+from ..model import (
+    ONE_LEVEL,
+    Building,
+    Eaves,
+    Installation,
+    Model,
+    Overhang,
+    Passage,
+    Roof,
+    Underside,
+)
+from ..model.installation import CHIMNEY, ROOF_OBJECT
+from ..model.overhang import ROOF_EDGE, WALLS
+from ..read.damage import excerpt
 from ..settings import ComposeSettings, Settings
-from .installations import read_installations
-from .overhangs import read_eaves
-from .record import read_building, require_mapping
-from .underside import read_underside
+from ..write.attribute_list import TABLES
+from .record import (
+    figure,
+    list_at,
+    measure,
+    number,
+    numbers_by_name,
+    on_grid,
+    place,
+    polygon,
+    read_building,
+    refuse_other_keys,
+    require_mapping,
+    round_values,
+)
+
+
+def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
+    """Read the lower end of a building's solid, in the frame of its `roof`.
+
+    Raises InputError for what makes none.
+    """
+    walls = record.get("walls", "level")
+    if walls not in ("level", "terrain"):
+        raise InputError(f"expected walls of level or terrain, got {excerpt(walls)}; choose one")
+    lines = building.terrain_intersection if walls == "terrain" else ()
+    return Underside(
+        terrain=tuple(line - roof.frame.origin for line in lines),
+        passages=tuple(
+            read_passage(item, f"passage {k}", float(roof.frame.origin[2]))
+            for k, item in enumerate(list_at(record, "passages"))
+        ),
+    )
+
+
+def read_passage(record: Any, label: str, z_origin: float) -> Passage:
+    """Read a passage; its ceiling is in the world, `z_origin` the height of the frame."""
+    refuse_other_keys(require_mapping(record, label), TABLES["passage"].names, label)
+    outline = on_grid(polygon(record.get("outline"), f"the outline of {label}"))
+    ceiling = measure(record.get("ceiling"), f"the ceiling of {label}")
+    return Passage(outline, round_number(ceiling, PLAN_DIGITS) - z_origin)
+
+
+MOST_OVERHANG_M = 10.0  # longer ones are typing errors
+
+
+def read_eaves(record: Mapping[str, Any], roof: Roof) -> Eaves | None:
+    """Read the overhangs of a building's object, None where it has no list of them.
+
+    Raises InputError for one that its `roof` cannot have.
+    """
+    if record.get("overhangs") is None:
+        return None
+    kind = record.get("footprint_kind", WALLS)
+    if kind not in (WALLS, ROOF_EDGE):
+        raise InputError(
+            f"expected a footprint_kind of {WALLS} or {ROOF_EDGE}, got {excerpt(kind)}; choose one"
+        )
+    thickness = number(record.get("roof_thickness", 0.2), "roof_thickness")
+    if not 0.0 < thickness <= MOST_OVERHANG_M:
+        raise InputError(
+            f"expected a roof_thickness over 0 m and up to {MOST_OVERHANG_M:g} m, got {thickness:g}"
+        )
+    count = len(list_outline_edges(roof.outline).starts)
+    overhangs = tuple(
+        read_overhang(item, f"overhang {k}", count)
+        for k, item in enumerate(list_at(record, "overhangs"))
+    )
+    return Eaves(overhangs, round_number(thickness, DIGITS), kind)
+
+
+def read_overhang(record: Any, label: str, count: int) -> Overhang:
+    """Read an overhang at one of `count` edges."""
+    refuse_other_keys(require_mapping(record, label), TABLES["overhang"].names, label)
+    edge = record.get("edge")
+    if not isinstance(edge, int) or not 0 <= edge < count:
+        raise InputError(
+            f"expected an edge from 0 to {count - 1} of {label}, got {excerpt(edge)}; count the "
+            "edges of the outline"
+        )
+    length = number(record.get("length"), f"length of {label}")
+    if not 0.0 < length <= MOST_OVERHANG_M:
+        raise InputError(
+            f"expected a length over 0 m and up to {MOST_OVERHANG_M:g} m of {label}, got {length:g}"
+        )
+    sigma = figure(record, "sigma")
+    return Overhang(edge, round_number(length, DIGITS), round_number(sigma, DIGITS))
+
+
+BOX_SIZES = ("length", "width", "height")
+
+
+def read_installations(record: Mapping[str, Any]) -> tuple[Installation, ...]:
+    """Read the installations of a building's object.
+
+    Raises InputError for one that makes no box.
+    """
+    items = list_at(record, "installations")
+    return tuple(read_installation(item, f"installation {k}") for k, item in enumerate(items))
+
+
+def read_installation(record: Any, label: str) -> Installation:
+    refuse_other_keys(require_mapping(record, label), TABLES["installation"].names, label)
+    kind = record.get("type")
+    if kind not in (CHIMNEY, ROOF_OBJECT):
+        raise InputError(
+            f"expected {CHIMNEY} or {ROOF_OBJECT} as the type of {label}, got {excerpt(kind)}"
+        )
+    sizes = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
+    if sorted(sizes) != sorted(BOX_SIZES) or min(sizes.values()) <= 0:
+        raise InputError(
+            f"expected {', '.join(BOX_SIZES)} over 0 as the parameters of {label}, got "
+            f"{excerpt(record.get('parameters'))}"
+        )
+    position = place(record.get("position"), f"position of {label}", measure)
+    return Installation(
+        str(kind),
+        round_number(sizes["length"]),
+        round_number(sizes["width"]),
+        round_number(sizes["height"]),
+        math.radians(round_number(number(record.get("rotation", 0.0), f"rotation of {label}"))),
+        np.asarray(round_values(position, DIGITS)),
+    )
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:

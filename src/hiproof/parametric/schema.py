@@ -16,7 +16,7 @@ from ..read.crs import NAMED_UNITS
 from ..status import Change, ChangeKind, Grade, Status
 from ..write.attribute_list import TABLES, Attribute
 from ..write.parameters import VERSION
-from .installations import BOX_SIZES
+from .building import BOX_SIZES
 
 RECORDS = (
     *("head", "update", "roof_outside", "building", "part", "passage", "installation"),

@@ -3,11 +3,8 @@
 pointcloud    points of any kind of file, in chunks; `read_points`
 remote        files by address
 las           LAS, LAZ and COPC, checked against what their headers say
-las_points    the points of such a file, decoded by laspy
 las_header    whether what such a file says of itself is possible
-geokeys       the reference system of its GeoTIFF keys
 las_crs       the one that its records define
-copc          nodes of a COPC file that meet a box
 runs          where the points of a file lie, run by run
 lax           LAStools' index beside a file
 ply           PLY files
@@ -22,14 +19,10 @@ footprints    building polygons; `read_footprints`
 attribute_columns  their attributes as they are declared
 sql           names in SQL
 vector_file   features of a vector file, by GDAL
-layers        the layers of a vector file
-features      a layer's features, odd attributes as text
 wkb           its geometries, surfaces in space among them
 polygons      polygons put right
 database      footprints from PostGIS
 geoparquet    GeoParquet files, of which only the row groups around an extent are fetched
-parquet_table footprints from such a file
-stac          static STAC catalogues
 overture      footprints of an Overture Maps release
 positions     positions in a CRS: reprojected, doubted, described
 terrain       how high the ground is

@@ -123,7 +123,7 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     if is_database(path):
         return plan_crs(table_crs(str(path)), path)
     if is_parquet(path):
-        from .parquet_table import parquet_crs
+        from .geoparquet import parquet_crs
 
         return plan_crs(parquet_crs(path), path)
     from .vector_file import vector_file_crs  # GDAL, which takes long to load
@@ -177,7 +177,7 @@ def read_file(
     `make_box` gives the box to read in the file's CRS.
     """
     if is_parquet(path):
-        from .parquet_table import read_parquet
+        from .geoparquet import read_parquet
 
         return read_parquet(path, layer, where, make_box)
     from .vector_file import read_vector_file  # GDAL, which takes long to load

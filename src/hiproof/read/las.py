@@ -9,21 +9,144 @@ is held against the header.
 from __future__ import annotations
 
 import functools
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
+import laspy
+import lazrs
 import numpy as np
+from laspy import DecompressionSelection, LazBackend
 
 from ..errors import InputError, InputWarning
 from ..log import count_things
-from .copc import check_nodes, copc_points
-from .las_header import LasFacts, check_all_points, check_points, read_facts
-from .las_points import Decoded, read_points
+from .las_header import LasFacts, Octree, check_all_points, check_points, read_facts
 from .plausible import Implausible
 from .remote import is_url, open_binary
 from .runs import compute_run_boxes
+
+Box = tuple[float, float, float, float]
+
+
+def copc_points(
+    file: BinaryIO, facts: LasFacts, octree: Octree, box: Box
+) -> tuple[np.ndarray, Decoded]:
+    """Return the nodes that meet `box`, and the points in all of them.
+
+    `box` is (xmin, ymin, xmax, ymax). The nodes' points follow one another.
+    """
+    nodes = find_nodes(facts, octree, box)
+    chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
+    file.seek(0)
+    form = laspy.LasHeader.read_from(file, read_evlrs=False).point_format
+    points = laspy.PackedPointRecord.zeros(int(nodes["points"].sum()), form)
+    if len(nodes):
+        compressed = np.frombuffer(
+            b"".join(read_node_bytes(file, node) for node in nodes), np.uint8
+        )
+        laszip = np.frombuffer(facts.laszip, np.uint8)
+        content, selection = points.array.view(np.uint8), SELECTION.to_lazrs()
+        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, selection)
+    return nodes, take_fields(points, facts)
+
+
+def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:
+    file.seek(int(node["start"]))
+    return file.read(int(node["bytes"]))
+
+
+def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
+    """Return the nodes that hold points and meet `box` in plan.
+
+    They are in the order in which they stand in the file.
+    """
+    lower, upper = cubes(facts, octree, octree.nodes)
+    meets = (lower[:, :2] <= box[2:]).all(axis=1) & (upper[:, :2] >= box[:2]).all(axis=1)
+    result = octree.nodes[meets]
+    return result[np.argsort(result["start"], kind="stable")]
+
+
+def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower and upper corners (n, 3) of the nodes' cubes.
+
+    Cubes are wider by what rounding may move a point.
+    """
+    level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
+    side = np.ldexp(2 * octree.half, -level)
+    lower = octree.centre - octree.half + place * side
+    return lower - facts.rounding, lower + side + facts.rounding
+
+
+def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
+    """Raise Implausible where a node's points leave its cube.
+
+    The nodes' points follow one another in `xyz` (n, 3).
+    """
+    if not len(nodes):
+        return
+    starts = np.cumsum([0, *nodes["points"][:-1]])
+    lower, upper = cubes(facts, octree, nodes)
+    outside = (np.minimum.reduceat(xyz, starts) < lower) | (
+        np.maximum.reduceat(xyz, starts) > upper
+    )
+    if outside.any():
+        level, *place = nodes["key"][np.argmax(outside.any(axis=1))].tolist()
+        raise Implausible(
+            f"its octree's node {place} of level {level} has points outside its bounds; it is "
+            "damaged"
+        )
+
+
+SELECTION = (
+    DecompressionSelection.XY_RETURNS_CHANNEL
+    | DecompressionSelection.Z
+    | DecompressionSelection.CLASSIFICATION
+    | DecompressionSelection.FLAGS
+)
+"""What is decompressed of points of formats 6 to 10; older formats come whole."""
+
+
+class Decoded(NamedTuple):
+    """Coordinates (n, 3), classes (n,), and whether a point is withheld (n,)."""
+
+    xyz: np.ndarray
+    classes: np.ndarray
+    is_withheld: np.ndarray
+
+
+def read_points(
+    file: BinaryIO, facts: LasFacts, runs: list[tuple[int, int]], chunk_points: int
+) -> Iterator[Decoded]:
+    """Yield the points of the `runs`, [first, end), at most `chunk_points` at once.
+
+    Raises what laspy and lazrs raise where a file ends too early or is damaged.
+    """
+    # threads need points in chunks, which files of before 2011 have not
+    is_chunked = facts.compressed and struct.unpack_from("<H", facts.laszip)[0] >= 2
+    file.seek(0)
+    reader = laspy.LasReader(
+        file,
+        closefd=False,
+        laz_backend=LazBackend.LazrsParallel if is_chunked else LazBackend.Lazrs,
+        read_evlrs=False,
+        decompression_selection=SELECTION,
+    )
+    for first, end in runs:
+        if first:
+            reader.seek(first)
+        for start in range(first, end, chunk_points):
+            yield take_fields(reader.read_points(min(chunk_points, end - start)), facts)
+
+
+def take_fields(points: laspy.PackedPointRecord, facts: LasFacts) -> Decoded:
+    """Take from the records of points what hiproof needs."""
+    xyz = np.column_stack([points.X, points.Y, points.Z]) * facts.scales + facts.offsets
+    classes = np.array(points.classification, np.uint8)
+    return Decoded(xyz, classes, np.array(points.withheld, bool))
+
 
 # xyz (n, 3) float64, classification (n,) uint8 or None
 Chunk = tuple[np.ndarray, np.ndarray | None]

@@ -5,11 +5,227 @@ It is WKT, or GeoTIFF keys where there is no WKT that can be understood.
 
 from __future__ import annotations
 
+import functools
+import struct
+from dataclasses import dataclass
+from typing import Any
+
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from .crs import UnknownCRS, combine, explain_crs_error, names_heights_alone, vertical_crs
-from .geokeys import DIRECTORY, DOUBLES, TEXTS, decode_crs
+
+DIRECTORY, DOUBLES, TEXTS = 34735, 34736, 34737
+"""Records that hold the keys: the directory, and where it points to for decimals and for texts."""
+
+MODEL, CITATION = 1024, 1026
+"""Keys of the kind of CRS and of its name."""
+
+GEODETIC_CRS = 2048
+"""Key of the code of a CRS in degrees, or of the base of a projected one."""
+
+PROJECTED_CRS, PROJECTED_CITATION, PLAN_UNIT, PLAN_UNIT_SIZE = 3072, 3073, 3076, 3077
+"""Keys of the code of a projected CRS, of its name, of its unit and of the length of a unit without
+a code.
+"""
+
+VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099
+"""Keys of the codes of a height system and of its unit."""
+
+UNDEFINED, USER_DEFINED = 0, 32767
+"""Codes that stand for nothing, and for something of the file's own."""
+
+EPSG_CODES = range(1024, USER_DEFINED)
+"""Codes that are EPSG's."""
+
+PROJECTED, GEOGRAPHIC, GEOCENTRIC = 1, 2, 3
+"""Values of the key MODEL."""
+
+GEOTIFF_HEIGHTS = {5101: 5701, 5102: 5702, 5103: 5703, 5104: 5736, 5105: 5705, 5106: 5611}
+"""EPSG's code by GeoTIFF 1.0's own code of a height system (section 6.3.4.1 there)."""
+
+ELLIPSOIDAL = range(5001, 5034)
+"""GeoTIFF 1.0's codes of heights above an ellipsoid."""
+
+
+@dataclass(frozen=True)
+class GeoKeys:
+    """The values of a key directory by their number."""
+
+    values: dict[int, Any]
+
+    @classmethod
+    def of(cls, directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> GeoKeys:
+        """Decode the three records. Raises CRSError for a directory that is damaged.
+
+        >>> GeoKeys.of(struct.pack("<8H", 1, 1, 0, 1, 3072, 0, 1, 28992)).values
+        {3072: 28992}
+        """
+        count = struct.unpack_from("<4H", directory)[3] if len(directory) >= 8 else 0
+        if (
+            (count == 0 and any(directory[8:]))
+            or len(directory) < 8 + 8 * count
+            or directory[:2] != b"\1\0"
+        ):
+            raise CRSError(f"a key directory of {len(directory)} bytes that tells of {count} keys")
+        entries = struct.iter_unpack("<4H", directory[8 : 8 + 8 * count])
+        return cls(
+            {
+                key: value_at(place, length, position, doubles, texts)
+                for key, place, length, position in entries
+            }
+        )
+
+    def code(self, key: int) -> int:
+        """Return the value of a key that holds a code, UNDEFINED if it is missing."""
+        value = self.values.get(key, UNDEFINED)
+        return value if isinstance(value, int) else UNDEFINED
+
+    def plan(self) -> CRS | None:
+        """Return the CRS of the plan, a local one if only its unit is defined.
+
+        Raises CRSError where even that is not.
+        """
+        code, model = self.code(PROJECTED_CRS), self.code(MODEL)
+        if code in EPSG_CODES:
+            return with_unit(CRS.from_epsg(code), self.plan_unit())
+        if code == USER_DEFINED or model == PROJECTED:
+            return self.local_plan()
+        geodetic = self.code(GEODETIC_CRS)
+        if geodetic in EPSG_CODES:
+            return CRS.from_epsg(geodetic)
+        if geodetic == USER_DEFINED or model in (GEOGRAPHIC, GEOCENTRIC):
+            return CRS.from_epsg(4978 if model == GEOCENTRIC else 4326)
+        return self.local_plan() if self.code(PLAN_UNIT) else None
+
+    def local_plan(self) -> CRS:
+        """Return a local CRS in the unit of a projection of the file's own."""
+        name, unit = self.citation(), self.plan_unit()
+        if unit is None:
+            raise CRSError(f"{name}, a projection of its own without a unit")
+        return local_crs(name, *unit)
+
+    def citation(self) -> str:
+        """Return the file's name for its projection."""
+        citation = self.values.get(PROJECTED_CITATION) or self.values.get(CITATION)
+        return str(citation or "a projection of its own").replace('"', "'")
+
+    def plan_unit(self) -> tuple[str, float] | None:
+        """Name and length (m) of the unit in plan, None where no key names it."""
+        code = self.code(PLAN_UNIT)
+        if code == USER_DEFINED:
+            size = self.values.get(PLAN_UNIT_SIZE)
+            return ("unit of its own", float(size)) if isinstance(size, float) else None
+        return None if code == UNDEFINED else decode_unit(code)
+
+    def heights(self) -> CRS | None:
+        """Return the CRS of the heights, None without any.
+
+        Where code and unit disagree the unit counts.
+        """
+        code, unit = self.code(VERTICAL_CRS), self.code(VERTICAL_UNIT)
+        vertical_crs = decode_vertical_crs(code) if code in EPSG_CODES else None
+        if unit in (UNDEFINED, USER_DEFINED):
+            return vertical_crs
+        name, factor = decode_unit(unit)
+        if (
+            vertical_crs is not None
+            and abs(vertical_crs.axis_info[0].unit_conversion_factor / factor - 1) < 1e-9
+        ):
+            return vertical_crs
+        return heights_in("height" if vertical_crs is None else vertical_crs.name, name, factor)
+
+
+def value_at(place: int, length: int, position: int, doubles: bytes, texts: bytes) -> Any:
+    """Return the value of one entry of a directory.
+
+    It is None where the entry points beyond its record.
+    """
+    if place == 0:
+        return position
+    if place == DOUBLES and 8 * (position + 1) <= len(doubles):
+        return struct.unpack_from("<d", doubles, 8 * position)[0]
+    if place == TEXTS and position < len(texts):
+        return texts[position : position + length].decode("latin-1").split("\0")[0].strip("| ")
+    return None
+
+
+def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CRS | None:
+    """Return the CRS of plan and heights that the keys define.
+
+    It is that of the heights alone where there is no plan, and None without either. Raises CRSError
+    for keys that cannot be understood.
+
+    Raises CRSError where the keys define one that cannot be understood.
+    """
+    keys = GeoKeys.of(directory, doubles, texts)
+    plan, heights = keys.plan(), keys.heights()
+    return heights if plan is None else combine(plan, heights)
+
+
+def decode_vertical_crs(code: int) -> CRS:
+    """Return a vertical CRS by EPSG's code or by one of GeoTIFF 1.0's own."""
+    if code in GEOTIFF_HEIGHTS:
+        return CRS.from_epsg(GEOTIFF_HEIGHTS[code])
+    if code in ELLIPSOIDAL:
+        return heights_in("ellipsoidal height", "metre", 1.0)
+    named_crs = CRS.from_epsg(code)
+    if not named_crs.is_vertical:
+        raise CRSError(f"EPSG:{code} ({named_crs.name}) in place of a height system")
+    return named_crs
+
+
+@functools.cache
+def linear_units() -> dict[int, tuple[str, float]]:
+    """Name and length (m) of every unit of length by EPSG's code."""
+    from pyproj.database import get_units_map
+
+    units = get_units_map(auth_name="EPSG", category="linear", allow_deprecated=True).values()
+    exact = {9003: 1200 / 3937}  # which the data base has to 15 digits
+    return {
+        int(unit.code): (unit.name, exact.get(int(unit.code), unit.conv_factor)) for unit in units
+    }
+
+
+def decode_unit(code: int) -> tuple[str, float]:
+    """Return the name and length (m) of a unit.
+
+    Raises CRSError for a code that is no unit of length.
+    """
+    if code not in linear_units():
+        raise CRSError(f"a unit of the code {code}, which is no unit of length")
+    return linear_units()[code]
+
+
+def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
+    """Return a projected CRS whose coordinates are in `unit` (name, metres).
+
+    The unit overrides that of the CRS's code.
+    """
+    if unit is None or abs(crs.axis_info[0].unit_conversion_factor / unit[1] - 1) < 1e-9:
+        return crs
+    name, factor = unit
+    definition = crs.to_json_dict()
+    for axis in definition["coordinate_system"]["axis"]:
+        axis["unit"] = {"type": "LinearUnit", "name": name, "conversion_factor": factor}
+    definition.pop("id", None)
+    return CRS.from_json_dict({**definition, "name": f"{crs.name} ({name})"})
+
+
+def local_crs(name: str, unit: str, factor: float) -> CRS:
+    """Make a local CRS of axes east and north in a unit of `factor` metres."""
+    return CRS.from_wkt(
+        f'LOCAL_CS["{name}",LOCAL_DATUM["unknown",0],UNIT["{unit}",{factor!r}],AXIS["X",EAST],AXIS["Y",NORTH]]'
+    )
+
+
+def heights_in(name: str, unit: str, factor: float) -> CRS:
+    """Make a vertical CRS in a unit of `factor` metres."""
+    return CRS.from_wkt(
+        f'VERT_CS["{name} '
+        f'({unit})",VERT_DATUM["{name}",2005],UNIT["{unit}",{factor!r}],AXIS["Up",UP]]'
+    )
+
 
 WKT = 2112
 """Number of the record that holds a WKT."""

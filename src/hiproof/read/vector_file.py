@@ -5,20 +5,157 @@ GDAL reads GeoPackage, GeoJSON, Shapefile and others.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pyogrio
-from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
+from pyogrio.util import vsi_path
 
 from ..errors import InputError, InputWarning
 from .attribute_columns import make_known_condition, restore_declared_types
-from .features import read_layer
-from .layers import find_source, list_layers
 from .wkb import decode_geometries
+
+SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")
+"""How GDAL writes a date as text."""
+
+READ_ERRORS = (ValueError, OverflowError, FieldError)
+"""What pyogrio raises for a value that it cannot represent; text that is no UTF-8 is a ValueError,
+too.
+"""
+
+
+def read_layer(
+    path: str, layer: str | int | None, **chosen: Any
+) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray], list[str]]:
+    """Read pyogrio's metadata, numbers, WKB and columns of a layer.
+
+    The names of the attributes that were read as text come with them.
+
+    `chosen` are pyogrio's own options that choose among the features.
+    """
+    read = partial(
+        pyogrio.raw.read, path, layer=layer, return_fids=True, datetime_as_string=True, **chosen
+    )
+    try:
+        return (*read(), [])
+    except READ_ERRORS as error:
+        info = pyogrio.read_info(path, layer=layer)
+        odd = (
+            []
+            if "SQL" in str(error)
+            else [name for name in info["fields"] if not is_readable(path, layer, name)]
+        )
+        if not odd:
+            raise
+    meta, numbers, wkb, columns = read(columns=[name for name in info["fields"] if name not in odd])
+    columns_by_name = dict(
+        zip(meta["fields"], zip(columns, meta["dtypes"], strict=True), strict=True)
+    )
+    columns_by_name |= {
+        name: (column_as_text(path, info["layer_name"], name, numbers), "object") for name in odd
+    }
+    names = [name for name in info["fields"] if name in columns_by_name]
+    meta = {**meta, "fields": names, "dtypes": [columns_by_name[name][1] for name in names]}
+    return meta, numbers, wkb, [columns_by_name[name][0] for name in names], odd
+
+
+def is_readable(path: str, layer: str | int | None, name: str) -> bool:
+    """Return whether pyogrio can represent every value of an attribute."""
+    try:
+        pyogrio.raw.read(
+            path, layer=layer, columns=[name], read_geometry=False, datetime_as_string=True
+        )
+    except READ_ERRORS:
+        return False
+    return True
+
+
+def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.ndarray:
+    """Return an attribute (n,) of the features with these numbers as text.
+
+    Bytes that are no UTF-8 become replacement characters.
+    """
+    source = virtual_layer(path, layer, text=name)
+    try:
+        _, _, _, columns = pyogrio.raw.read(
+            source, fids=numbers, read_geometry=False, encoding="latin-1"
+        )
+    except (*READ_ERRORS, DataSourceError, FeatureError):
+        columns = []
+    if not columns:
+        return np.full(len(numbers), None, dtype=object)
+    return np.array([tidy_value(value) for value in columns[0]], dtype=object)
+
+
+def tidy_value(value: str | None) -> str | None:
+    """Decode text that was read as Latin-1, and write dates in ISO's way.
+
+    >>> tidy_value("1950/00/00"), tidy_value("Stra\\u00c3\\u009fe")
+    ('1950-00-00', 'Straße')
+    """
+    if value is None:
+        return None
+    body = value.encode("latin-1", "replace")
+    try:
+        text = body.decode()
+    except UnicodeDecodeError:
+        text = body.decode("utf-8", "replace")
+    return SLASHED_DATE.sub(r"\1-\2-\3", text)
+
+
+OF_GEOPACKAGE = "select table_name, geometry_type_name from gpkg_geometry_columns"
+
+
+def list_layers(path: str) -> list[tuple[str, str | None]]:
+    """Name and kind of geometry of every layer, None for a table without geometry."""
+    try:
+        return [(str(name), kind) for name, kind in pyogrio.list_layers(path)]
+    except GeometryError:
+        pass
+    try:
+        _, _, _, (names, kinds) = pyogrio.raw.read(path, sql=OF_GEOPACKAGE, read_geometry=False)
+    except (DataSourceError, ValueError, RuntimeError):
+        return [(Path(path).stem, "surfaces")]
+    return list(zip(names.tolist(), kinds.tolist(), strict=True))
+
+
+def find_source(path: str, layer: str | int | None) -> tuple[str, str | int | None]:
+    """Return what pyogrio can open in place of `path`, and the layer there."""
+    try:
+        pyogrio.read_info(path, layer=layer)
+    except GeometryError:
+        names = [name for name, _ in list_layers(path)]
+        name = names[layer or 0] if not isinstance(layer, str) else layer
+        return virtual_layer(path, name, geometry="wkbUnknown"), None
+    return path, layer
+
+
+def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> str:
+    """Return GDAL's virtual format of one layer.
+
+    The layer's `geometry` is declared anew, or it has one attribute alone, as text.
+
+    `path` may be what this function made.
+    """
+    if path.startswith("<"):
+        root = ElementTree.fromstring(path)
+        path = root.findtext(".//SrcDataSource", "")
+    root = ElementTree.Element("OGRVRTDataSource")
+    of_layer = ElementTree.SubElement(root, "OGRVRTLayer", name=layer)
+    ElementTree.SubElement(of_layer, "SrcDataSource").text = vsi_path(path)
+    if geometry:
+        ElementTree.SubElement(of_layer, "GeometryType").text = geometry
+    if text:
+        ElementTree.SubElement(of_layer, "Field", name=text, type="String")
+    return ElementTree.tostring(root, encoding="unicode")
+
 
 Features = tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]
 """Metadata (fields and crs), feature numbers, geometries and columns of a layer."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-UPRIGHT = 1e-12  # least climb of a beam out of a half-space; with less it runs along the side
+LEAST_CLIMB = 1e-12  # least climb of a beam out of a half-space; with less it runs along the side
 
 
 def select_passing(
@@ -49,10 +49,10 @@ def cast_convex(
         room = rows[:, 3] - xy0[near] @ rows[:, :2].T
         with np.errstate(divide="ignore", invalid="ignore"):
             heights = room / climb
-        entries = np.where(climb > UPRIGHT, heights, np.inf)
+        entries = np.where(climb > LEAST_CLIMB, heights, np.inf)
         z_in, side = entries.min(axis=1), entries.argmin(axis=1)
-        z_out = np.where(climb < -UPRIGHT, heights, -np.inf).max(axis=1)
-        is_beside = ((np.abs(climb) <= UPRIGHT) & (room < 0.0)).any(axis=1)
+        z_out = np.where(climb < -LEAST_CLIMB, heights, -np.inf).max(axis=1)
+        is_beside = ((np.abs(climb) <= LEAST_CLIMB) & (room < 0.0)).any(axis=1)
         hits = np.isfinite(z_in) & (z_in > z_out) & (z_in > z_hit[near]) & ~is_beside
         z_hit[near[hits]], face[near[hits]] = z_in[hits], starts[body] + side[hits]
 

@@ -204,14 +204,16 @@ def first_hits(
     """
     z_hit = scene.terrain.hit(xy0, slope)
     source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
-    for cast, bodies, sources, labels in (
-        (cast_convex, (scene.halfspaces, scene.starts, scene.discs), scene.source, scene.label),
-        (cast_triangles, (scene.triangles,), scene.triangle_source, scene.triangle_label),
+    bodies = scene.halfspaces, scene.starts, scene.discs
+    convex, triangle = np.full((2, len(xy0)), -1)
+    cast_convex(xy0, slope, *bodies, z_hit, convex)
+    cast_triangles(xy0, slope, scene.triangles, z_hit, triangle)
+    for face, sources, labels in (
+        (convex, scene.source, scene.label),
+        (triangle, scene.triangle_source, scene.triangle_label),
     ):
-        if len(sources):
-            face = np.full(len(xy0), -1)
-            cast(xy0, slope, *bodies, z_hit, face)
-            hit = face >= 0
+        hit = face >= 0
+        if hit.any():
             source[hit], label[hit] = sources[face[hit]], labels[face[hit]]
     return z_hit, source, label
 

@@ -7,7 +7,6 @@ earlier    the earlier run: its parameters, settings and clouds
 dates      when the new points were surveyed
 members    the buildings of an update: earlier ones, and those of new footprints
 plan       the plan of the update, from the earlier buildings
-identity   which earlier building each of new footprints is
 register   the common shift between the two surveys
 residuals  heights of points over the earlier roof
 cells      both surveys compared in cells of a metre
@@ -25,14 +24,12 @@ epochs     the surveys, and the points of both in a work tile
 refine     parameters of unchanged buildings, estimated by the points of both surveys
 solve      a work tile brought up to date
 tile       that, by name, for processes that have imported nothing yet
-rates      false alarms controlled over all buildings, before tiles are brought up to date
 named      surveys as the user names them for a run of several
 several    such a run: its surveys registered, and its tiles solved
 best       the best survey of each building, and the model made of it
 run        the steps above, one after the other
 change_tables  changes.csv and changes.gpkg: what is not unchanged
 before_after   the report on buildings that changed, before and after
-change_scenes  these in 3D, packed
 
 Earlier and new points are compared with each other wherever the earlier clouds still exist: what
 the earlier model left out, such as a chimney, then is no change. Otherwise the new points are

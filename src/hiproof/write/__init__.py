@@ -8,9 +8,7 @@ attribute_list         every attribute and table, declared once
 building_attributes    the attributes of one building
 roof_figures           heights, slopes, ridge and volume of a solid
 surfaces               faces that are one surface, such as the facets of a cone
-terrain_figures        heights of the terrain along an outline
 installations          codes of chimneys and other objects on roofs
-osm_tags               a roof as OpenStreetMap tags it
 shapes                 LoD0, blocks and building parts, as far as requested
 colours                one colour a roof type
 values                 numbers and text as every format holds them

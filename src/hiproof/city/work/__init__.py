@@ -18,7 +18,6 @@ executors     where tasks run: this process, processes, a Dask cluster
 processes     the second of these
 workers       how worker processes begin and end
 cores         how many processes pay on this machine
-quarantine    a task that kills its process, found by trying it alone
 warm          what tasks call, compiled before they start
 warm_pieces   that, in pieces which processes compile side by side
 """

@@ -1,4 +1,8 @@
-"""The open tasks of a run, worked off by an executor."""
+"""The open tasks of a run, worked off by an executor.
+
+A task whose process keeps dying goes into quarantine: it is run in a process of its own, and of a
+work tile the buildings that kill that process are found and left out.
+"""
 
 from __future__ import annotations
 
@@ -15,11 +19,57 @@ from ...status import Status
 from ..folder.ledger import Ledger
 from ..merge.join import write_tile
 from ..plan.from_cloud import Progress
-from ..plan.work_plan import WorkPlan
+from ..plan.overrides import load_redo
+from ..plan.work_plan import WorkPlan, load_plan
 from . import solved
 from .executors import Executor
-from .quarantine import is_loss, run_isolated, solve_in_quarantine
-from .tasks import Arguments
+from .tasks import Arguments, WorkerLost
+
+# deaths of its process, alone, until a task is taken for their cause: memory may run out by chance
+TRIES = 3
+
+
+def run_isolated(single: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
+    """Return (result, error) of `function(*task)` in an isolated executor.
+
+    It is tried again when its process dies.
+    """
+    for _ in range(TRIES):
+        ((_, result, error),) = single.run(function, [task])
+        if not is_loss(error):
+            break
+    return result, error
+
+
+def is_loss(error: Exception | None) -> bool:
+    """Return whether a task ended with its process or for want of memory."""
+    return isinstance(error, (WorkerLost, MemoryError))
+
+
+def solve_in_quarantine(
+    single: Any, function: Callable, task: tuple
+) -> tuple[Any, Exception | None]:
+    """Solve a tile without the buildings that kill their process.
+
+    `task` (folder, tile, terrain) are the arguments of `solve_tile`, whose rows are returned. Such
+    buildings become internal errors.
+
+    Where the tile as a whole kills its process even alone, its buildings are tried one by one.
+    """
+    result, error = run_isolated(single, function, task)
+    if not is_loss(error):
+        return result, error
+    folder, tile, _ = task
+    members = load_redo(Path(folder)).get(tile) or load_plan(Path(folder)).tiles[tile]
+
+    def is_deadly(index: int) -> bool:
+        selected_members = tuple(i for i in members if i != index)
+        return not selected_members or is_loss(
+            run_isolated(single, function, (*task, selected_members))[1]
+        )
+
+    return run_isolated(single, function, (*task, tuple(filter(is_deadly, members))))
+
 
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 
@@ -119,7 +169,7 @@ class Queue:
             LOGGER.info("%s is done: %s", name, count_things(len(result), "building"))
 
     def run_isolated(self, name: str, function: Callable[..., Any]) -> None:
-        """Run a task whose process kept dying in a process of its own; see quarantine.py."""
+        """Run a task whose process kept dying in a process of its own."""
         times = count_things(self.ledger.losses(name), "time")
         LOGGER.warning("%s was lost %s and is now tried alone", name, times)
         run = solve_in_quarantine if name.startswith("solve:") else run_isolated

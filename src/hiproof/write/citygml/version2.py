@@ -18,6 +18,7 @@ import numpy as np
 
 from ...model import GROUND, Building, Face, Solid
 from ...model.roof_figures import RoofFigures, find_ground_height
+from ...primitives.catalogue import CATALOGUE
 from ...settings import WriteSettings
 from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
 from ..fragments import Fragment, Sheet
@@ -28,7 +29,6 @@ from ..shapes import PartShape
 from ..values import WIDEST
 from ..writer import BuildingWriter
 from ..xml_text import format_attribute_set, generic_attribute, xml_attribute, xml_text
-from .roof_codes import CODE_SPACES, roof_type_code
 from .surfaces import (
     boundary_surfaces,
     list_face_rings,
@@ -41,6 +41,35 @@ from .surfaces import (
     surface_members,
     terrain_element,
 )
+
+CODE_SPACES = {
+    "sig3d": "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml",
+    "adv": "https://repository.gdi-de.org/schemas/adv/citygml/Codelisten/RoofTypeTypeAdV.xml",
+}
+MIXED = {"sig3d": "1130", "adv": "5000"}
+"""Roofs of several forms, and of a form that the list does not know."""
+
+
+def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
+    """Return the code of roof parts of `types`.
+
+    It is their own where all have the same, else that of a mixed roof.
+
+    >>> roof_type_code(["gable", "asymmetric_gable"]), roof_type_code(["gable",
+    ...     "hip"]), roof_type_code(["hip"], "adv")
+    ('1030', '1130', '3200')
+    """
+    codes = {find_code(name, code_list) for name in types}
+    return codes.pop() if len(codes) == 1 else MIXED[code_list]
+
+
+def find_code(name: str, code_list: str) -> str:
+    """Return the code of one roof type."""
+    if name not in CATALOGUE:
+        return MIXED[code_list]
+    shape = CATALOGUE[name]
+    return shape.citygml_code if code_list == "sig3d" else shape.adv_code
+
 
 NAMESPACES = {
     "bldg": "http://www.opengis.net/citygml/building/2.0",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..glb import INDICES, GlbDocument
+from ..gltf import INDICES, GlbDocument
 from .meshes import TileMesh
 from .properties import EXTENSION, Property, add_table, make_schema
 

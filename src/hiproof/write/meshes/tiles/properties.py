@@ -16,7 +16,7 @@ import numpy as np
 
 from ...attribute_list import TABLES
 from ...naming import UniqueNames
-from ..glb import GlbDocument
+from ..gltf import GlbDocument
 
 EXTENSION = "EXT_structural_metadata"
 CLASS = "building"
