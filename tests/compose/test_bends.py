@@ -10,6 +10,7 @@ from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
 from hiproof.compose.bends import bent_faces
 from hiproof.compose.zones import ATTEMPTS, WHOLE_PLAN, Zone
+from hiproof.geometry.flat_shell import FlatShell
 from hiproof.model import Face, Solid
 from hiproof.settings import Settings
 from roof_zoo import KINDS, generate_roof
@@ -120,5 +121,6 @@ def test_a_face_that_no_triangles_fill_is_bent_and_the_others_are_told_apart():
     vertices = np.concatenate(rings)
     ring_start = np.array([0, 4, 9, 13])
     normals = np.array([[-0.4, -0.4, 0.8], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
-    bent = bent_faces(np.arange(3), vertices, np.arange(13), ring_start, np.arange(4), normals)
+    shell = FlatShell(vertices, np.arange(13), ring_start, np.arange(4))
+    bent = bent_faces(shell, np.arange(3), normals)
     assert bent.tolist() == [0, 1]

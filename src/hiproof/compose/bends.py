@@ -5,81 +5,53 @@ The triangles are those of their constrained Delaunay triangulation (val3dity's 
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import shapely
+
+from ..geometry.flat_shell import FlatShell
 
 # val3dity's limit of 20 degrees, and half of it, below which no pair needs to be compared
 FLAT_COSINE, SURELY_FLAT_COSINE = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(10.0))
 
 
-def bent_faces(
-    faces: np.ndarray,
-    vertices: np.ndarray,
-    index: np.ndarray,
-    ring_start: np.ndarray,
-    face_start: np.ndarray,
-    normals: np.ndarray,
-) -> np.ndarray:
-    """Return those of `faces` (k,) that are bent, or that no triangles fill.
+def bent_faces(shell: FlatShell, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return those of ascending `faces` (k,) that are bent, or that no triangles fill.
 
-    The solid is flattened as for `check_faces`, and `normals` (f, 3) are those of its best planes.
+    `normals` (f, 3) are those of the best planes of all faces.
 
-    >>> saddle = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1,
-    ...     0]]), np.arange(4), np.array([0, 4]), np.array([0, 1])
-    >>> bent_faces(np.array([0]), *saddle, np.array([[-0.4, -0.4, 0.8]])).tolist()
+    >>> places = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]])
+    >>> saddle = FlatShell(places, np.arange(4), np.array([0, 4]), np.array([0, 1]))
+    >>> bent_faces(saddle, np.array([0]), np.array([[-0.4, -0.4, 0.8]])).tolist()
     [0]
     """
     if len(faces) == 0:
         return faces
-    corners, flat, start = lay_into_planes(faces, vertices, index, ring_start, face_start, normals)
-    polygons = []
-    for face, lower in zip(faces, start[:-1], strict=True):
-        bounds = ring_start[face_start[face] : face_start[face + 1] + 1]
-        outer, *holes = (flat[lower + a : lower + b] for a, b in pairwise(bounds - bounds[0]))
-        polygons.append(shapely.Polygon(outer, holes))
-    collections = triangulate(polygons)
+    place, corner = shell.pair_with_corners(faces)
+    corners, face_normals = shell.corners[corner], normals[faces]
+    u = np.cross(face_normals, np.eye(3)[np.abs(face_normals).argmin(axis=1)])
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    axes = u, np.cross(face_normals, u)
+    flat = np.zeros((len(shell.index), 2))
+    flat[corner] = np.column_stack([(corners * axis[place]).sum(axis=1) for axis in axes])
+    collections = triangulate(shell.draw_faces(faces, flat))
     triangles, owner = shapely.get_parts(collections, return_index=True)
     places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
-    face_normals = normals[faces]
-    triangle_normals = measure_triangle_normals(places, owner, corners, flat, start, face_normals)
+    start = np.append(0, np.cumsum(np.bincount(place)))
+    triangle_normals = measure_triangle_normals(
+        places, owner, corners, flat[corner], start, face_normals
+    )
     bent = are_bent(triangle_normals, owner, face_normals)
     return faces[bent | shapely.is_missing(collections)]
 
 
-def triangulate(polygons: list[shapely.Polygon]) -> np.ndarray:
+def triangulate(polygons: np.ndarray) -> np.ndarray:
     """Triangulate each of the polygons, None for one that GEOS finds no triangles of."""
     try:
         return np.asarray(shapely.constrained_delaunay_triangles(polygons), object)
     except shapely.GEOSException:
         if len(polygons) == 1:
             return np.array([None], object)
-        return np.concatenate([triangulate([polygon]) for polygon in polygons])
-
-
-def lay_into_planes(
-    faces: np.ndarray,
-    vertices: np.ndarray,
-    index: np.ndarray,
-    ring_start: np.ndarray,
-    face_start: np.ndarray,
-    normals: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the vertices (m, 3) of `faces`, and the same (m, 2) in their planes.
-
-    They are those of all rings; each face's start comes with them.
-    """
-    lower, upper = ring_start[face_start[faces]], ring_start[face_start[faces + 1]]
-    owner = np.repeat(np.arange(len(faces)), upper - lower)
-    start = np.concatenate([[0], np.cumsum(upper - lower)])
-    corners = vertices[index[np.arange(start[-1]) + (lower - start[:-1])[owner]]]
-    normals = normals[faces]
-    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    axes = u, np.cross(normals, u)
-    flat = np.column_stack([(corners * axis[owner]).sum(axis=1) for axis in axes])
-    return corners, flat, start
+        return np.concatenate([triangulate(polygons[k : k + 1]) for k in range(len(polygons))])
 
 
 def measure_triangle_normals(

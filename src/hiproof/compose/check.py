@@ -92,7 +92,7 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
     shell = FlatShell(local, weld(local)[index], ring_start, face_start)
     rows, planes, may_bend = check_faces(shell, planarity_m)
     may_bend = np.setdiff1d(may_bend, rows[:, 1])  # what is unsound cannot be triangulated
-    bent = bent_faces(may_bend, local, shell.index, ring_start, face_start, planes.normals)
+    bent = bent_faces(shell, may_bend, planes.normals)
     found = [*rows.tolist(), *((204, face, -1) for face in bent.tolist())]
     found = found or check_shell(shell, planes)
     return read + tuple(make_finding(code, face, other) for code, face, other in found)

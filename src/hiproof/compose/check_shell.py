@@ -5,8 +5,6 @@ A finding is a row (code, face, other face or -1).
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import shapely
 
@@ -157,13 +155,8 @@ def measure_depth(
     """
     result = np.full(len(face), -np.inf)
     numbers, which = np.unique(face[is_asked], return_inverse=True)
-    polygons = []
-    for number in numbers.tolist():
-        bounds = shell.ring_start[slice(*shell.face_start[number : number + 2] + [0, 1])]
-        outer, *holes = (planes.flat[a:b] for a, b in pairwise(bounds))
-        polygons.append(shapely.Polygon(outer, holes))
-    if polygons:
-        places, areas = shapely.points(points[is_asked]), np.array(polygons)
+    if len(numbers):
+        areas, places = shell.draw_faces(numbers, planes.flat), shapely.points(points[is_asked])
         depth = shapely.distance(shapely.boundary(areas)[which], places)
         result[is_asked] = np.where(shapely.intersects(areas[which], places), depth, -depth)
     return result

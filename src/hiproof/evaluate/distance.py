@@ -1,4 +1,4 @@
-"""Exact distances from points to bounded planar polygons, compiled.
+"""Exact distances from points to bounded planar polygons.
 
 All residual figures build on them.
 
@@ -14,9 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..compiled import compiled
 from ..errors import InputError
-from ..geometry.point_in_polygon import flips
+from ..geometry.point_in_polygon import mark_inside
 from ..model import as_xyz
 
 Ring = np.ndarray
@@ -38,8 +37,7 @@ def point_surface_distances(
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [3.0, 5.0]
     """
-    points = checked_points(points)
-    return nearest_distances(points, *flatten_polygons(polygons))
+    return measure_nearest(as_xyz(points), list_polygons(polygons))
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
@@ -51,175 +49,86 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [2.0, inf]
     """
-    points = checked_points(points)
-    return vertical_gaps(points, *flatten_polygons(polygons))
+    return measure_vertically(as_xyz(points), list_polygons(polygons))
 
 
-def surface_and_vertical_distances(
-    points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return surface distances and vertical distances of the same points.
-
-    They are as from `point_surface_distances` and `vertical_distances`.
-    """
-    points, flat = checked_points(points), flatten_polygons(polygons)
-    return nearest_distances(points, *flat), vertical_gaps(points, *flat)
-
-
-def checked_points(points: np.ndarray) -> np.ndarray:
-    """Convert points to the form that compiled code takes."""
-    return np.ascontiguousarray(as_xyz(points))
-
-
-def flatten_polygons(
-    polygons: Sequence[Ring | Sequence[Ring]],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return all vertices (m, 3), ring starts and polygon starts.
-
-    Rings start in the vertices, polygons in the rings (both with the end).
-    """
-    rings: list[np.ndarray] = []
-    polygon_start = [0]
+def list_polygons(polygons: Sequence[Ring | Sequence[Ring]]) -> list[list[np.ndarray]]:
+    """Return the rings of each polygon. Raises InputError for arrays of another shape."""
+    result = []
     for polygon in polygons:
         single = isinstance(polygon, np.ndarray) and polygon.ndim == 2
-        for ring in (polygon,) if single else polygon:
-            ring = np.asarray(ring, float)
+        rings = [np.asarray(ring, float) for ring in ((polygon,) if single else polygon)]
+        for ring in rings:
             if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
                 raise InputError(
                     f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
                 )
-            rings.append(ring)
-        polygon_start.append(len(rings))
-    vertices = np.concatenate(rings) if rings else np.empty((0, 3))
-    ring_start = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])]).astype(np.int64)
-    return np.ascontiguousarray(vertices), ring_start, np.array(polygon_start, np.int64)
+        result.append(rings)
+    return result
 
 
-@compiled
-def nearest_distances(points, vertices, ring_start, polygon_start):
-    """Return the distance (n,) of each point (n, 3) to the nearest polygon.
-
-    Polygons are as from `flatten_polygons`.
-    """
-    nearest = np.full(points.shape[0], np.inf)
-    for polygon in range(polygon_start.shape[0] - 1):
-        rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
-        normal, origin, is_flat = fit_ring_plane(vertices, rings)
-        first, second = plan_axes(normal)
-        for i in range(points.shape[0]):
-            p = points[i]
-            height = 0.0
-            if is_flat:
-                height = (
-                    (p[0] - origin[0]) * normal[0]
-                    + (p[1] - origin[1]) * normal[1]
-                    + (p[2] - origin[2]) * normal[2]
-                )
-                if abs(height) >= nearest[i]:
-                    continue
-                x, y = p[first] - height * normal[first], p[second] - height * normal[second]
-                if contains(vertices, rings, first, second, x, y):
-                    nearest[i] = abs(height)
-                    continue
-            nearest[i] = min(nearest[i], edge_distance(vertices, rings, p))
+def measure_nearest(points: np.ndarray, polygons: list[list[np.ndarray]]) -> np.ndarray:
+    """Return the distance (n,) of each point (n, 3) to the nearest of the polygons."""
+    nearest = np.full(len(points), np.inf)
+    for rings in polygons:
+        normal, origin, near = *fit_ring_plane(rings[0]), np.arange(len(points))
+        if normal.any():
+            heights = (points - origin) @ normal
+            near = np.flatnonzero(np.abs(heights) < nearest)
+            heights = heights[near]
+            feet = points[near] - heights[:, None] * normal
+            kept = np.arange(3) != np.abs(normal).argmax()
+            inside = contains(rings, kept, feet)
+            nearest[near[inside]] = np.abs(heights[inside])
+            near = near[~inside]
+        for ring in rings:
+            for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+                nearest[near] = np.minimum(nearest[near], edge_distance(points[near], start, end))
     return nearest
 
 
-@compiled
-def vertical_gaps(points, vertices, ring_start, polygon_start):
+def measure_vertically(points: np.ndarray, polygons: list[list[np.ndarray]]) -> np.ndarray:
     """Return the least height (n,) between points (n, 3) and polygons.
 
     Polygons count that lie over or under the point; it is inf where there is none.
     """
-    nearest = np.full(points.shape[0], np.inf)
-    for polygon in range(polygon_start.shape[0] - 1):
-        rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
-        normal, origin, is_flat = fit_ring_plane(vertices, rings)
-        if not is_flat or abs(normal[2]) < 1e-6:
+    nearest = np.full(len(points), np.inf)
+    for rings in polygons:
+        normal, origin = fit_ring_plane(rings[0])
+        if abs(normal[2]) < 1e-6:
             continue
-        for i in range(points.shape[0]):
-            x, y = points[i, 0], points[i, 1]
-            height = (
-                origin[2] - ((x - origin[0]) * normal[0] + (y - origin[1]) * normal[1]) / normal[2]
-            )
-            gap = abs(points[i, 2] - height)
-            if gap < nearest[i] and contains(vertices, rings, 0, 1, x, y):
-                nearest[i] = gap
+        gaps = np.abs((points - origin) @ normal / normal[2])
+        near = np.flatnonzero(gaps < nearest)
+        near = near[contains(rings, np.array([True, True, False]), points[near])]
+        nearest[near] = gaps[near]
     return nearest
 
 
-@compiled
-def fit_ring_plane(vertices, rings):
-    """Return unit normal (Newell) and centroid of the outer ring.
+def fit_ring_plane(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit normal (Newell) and centroid of a ring.
 
-    The flag is false for a ring without area.
+    The normal is zero for a ring without area.
     """
-    origin, normal = np.zeros(3), np.zeros(3)
-    begin, end = rings[0], rings[1]
-    for i in range(begin, end):
-        origin += vertices[i]
-    origin /= end - begin
-    for i in range(begin, end):
-        a = vertices[i] - origin
-        b = vertices[i + 1 if i + 1 < end else begin] - origin
-        normal[0] += a[1] * b[2] - a[2] * b[1]
-        normal[1] += a[2] * b[0] - a[0] * b[2]
-        normal[2] += a[0] * b[1] - a[1] * b[0]
-    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    if length < 1e-12:
-        return normal, origin, False
-    return normal / length, origin, True
+    origin = ring.mean(axis=0)
+    spokes = ring - origin
+    normal = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
+    length = np.linalg.norm(normal)
+    return (normal / length if length >= 1e-12 else np.zeros(3)), origin
 
 
-@compiled
-def plan_axes(normal):
-    """Return the two axes onto which a polygon projects with most area.
+def contains(rings: list[np.ndarray], kept: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return whether points (n, 3) lie in a polygon, seen along the axis that is not `kept` (3,).
 
-    `normal` is the polygon's.
+    Holes are outside.
     """
-    largest = np.argmax(np.abs(normal))
-    return (largest + 1) % 3, (largest + 2) % 3
+    starts = np.concatenate(rings)[:, kept]
+    ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])[:, kept]
+    x, y = np.ascontiguousarray(points[:, kept].T)
+    return mark_inside(x, y, starts, ends)
 
 
-@compiled
-def contains(vertices, rings, first, second, x, y):
-    """Return whether a place is inside by the even-odd rule over all rings.
-
-    Holes are outside. A point on a shared edge belongs to one side only.
-    """
-    inside = False
-    for ring in range(rings.shape[0] - 1):
-        j = rings[ring + 1] - 1
-        for i in range(rings[ring], rings[ring + 1]):
-            if flips(
-                vertices[i, first],
-                vertices[i, second],
-                vertices[j, first],
-                vertices[j, second],
-                x,
-                y,
-            ):
-                inside = not inside
-            j = i
-    return inside
-
-
-@compiled
-def edge_distance(vertices, rings, p):
-    """Return the distance of the point `p` (3,) to the nearest edge of all rings."""
-    nearest_squared = np.inf
-    for ring in range(rings.shape[0] - 1):
-        j = rings[ring + 1] - 1
-        for i in range(rings[ring], rings[ring + 1]):
-            ex = vertices[i, 0] - vertices[j, 0]
-            ey = vertices[i, 1] - vertices[j, 1]
-            ez = vertices[i, 2] - vertices[j, 2]
-            dx, dy, dz = p[0] - vertices[j, 0], p[1] - vertices[j, 1], p[2] - vertices[j, 2]
-            length_squared = ex * ex + ey * ey + ez * ez
-            t = 0.0
-            if length_squared > 0.0:
-                t = min(1.0, max(0.0, (dx * ex + dy * ey + dz * ez) / length_squared))
-            squared = (dx - t * ex) ** 2 + (dy - t * ey) ** 2 + (dz - t * ez) ** 2
-            nearest_squared = min(nearest_squared, squared)
-            j = i
-    return np.sqrt(nearest_squared)
+def edge_distance(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return the distance of points (n, 3) to an edge."""
+    along, off = end - start, points - start
+    share = np.clip(off @ along / max(float(along @ along), np.finfo(float).tiny), 0.0, 1.0)
+    return np.linalg.norm(off - share[:, None] * along, axis=1)

@@ -16,7 +16,7 @@ from ..geometry.grid import number_cells
 from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import OVERLAY_GRID_M
 from ..model import ROOF, Fit, Quality, Solid
-from .distance import point_surface_distances, surface_and_vertical_distances
+from .distance import point_surface_distances, vertical_distances
 
 NEAR_M = 0.2
 """A point within this vertical distance of the roof counts as explained well (the field's share
@@ -139,7 +139,8 @@ def quality(
         figures["nodata_share"] = nodata_share(points, outline)
     if len(points) and polygons:
         inner = inner or well_inside(points, plan_outline(polygons) if outline is None else outline)
-        distances, dz = surface_and_vertical_distances(points, polygons)
+        distances = point_surface_distances(points, polygons)
+        dz = vertical_distances(points, polygons)
         figures |= {
             "psd_mean": float(distances.mean()),
             "psd_std": float(distances.std()),

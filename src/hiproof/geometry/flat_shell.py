@@ -79,6 +79,13 @@ class FlatShell:
         place = np.repeat(np.arange(len(faces)), counts)
         return place, np.arange(len(place)) + (first - np.cumsum(counts) + counts)[place]
 
+    def draw_faces(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
+        """Return the polygons of ascending `faces` (k,), whose corners are at `flat` (n, 2)."""
+        corners = np.flatnonzero(np.isin(self.face_of, faces))
+        numbers, ring_of = np.unique(self.ring_of[corners], return_inverse=True)
+        rings = shapely.linearrings(flat[corners], indices=ring_of)
+        return shapely.polygons(rings, indices=np.searchsorted(faces, self.face_of_ring[numbers]))
+
     def sum_by_face(self, values: np.ndarray) -> np.ndarray:
         """Sum values (n,) or (n, k) of corners by face."""
         columns = values.reshape(len(values), -1).T

@@ -11,7 +11,7 @@ overhang    how far a roof reaches beyond its walls
 fit         one primitive fitted to points
 building    models and buildings
 shown       where each part of a roof shows from above
-heights     heights of roofs at many points, compiled
+heights     heights of roofs at many points
 roof_figures  heights, slopes, ridge and volume of a solid
 """
 
