@@ -3,6 +3,7 @@ data, --where and --bbox.
 """
 
 import dataclasses
+import re
 
 import numpy as np
 import pyogrio
@@ -20,6 +21,7 @@ from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
 from run_records import by_id
+from tiny_town import write_cloud
 
 PARAMETERS = {p.name: p for p in app.commands["reconstruct"].params}
 OPTIONED = [p for p in PARAMETERS.values() if getattr(p, "setting", None)]
@@ -36,6 +38,25 @@ def houses(tmp_path):
         path, geometry, columns, ["id", "year"], geometry_type="Polygon", crs="EPSG:28992"
     )
     return path
+
+
+@pytest.mark.parametrize(
+    "with_footprints, error, text",
+    [
+        (True, InputError, r"of the buildings \(id, year\) as --use-attribute, got 'use'"),
+        (False, SettingsError, "expected footprints with --use-attribute, got none"),
+    ],
+)
+def test_a_use_that_no_footprint_has_is_refused_before_the_run(
+    houses, with_footprints, error, text, tmp_path
+):
+    cloud = write_cloud(tmp_path / "a.laz", np.array([[1.0, 1.0, 3.0], [2.0, 2.0, 3.0]]), [6, 6])
+    words = [str(cloud), "--enrich", "--use-attribute", "use", "--out", str(tmp_path / "out")]
+    words += ["--footprints", str(houses)] if with_footprints else []
+    result = CliRunner().invoke(app, ["reconstruct", *words])
+    assert isinstance(result.exception, error)
+    assert re.search(text, str(result.exception))
+    assert not list((tmp_path / "out").glob("buildings*"))
 
 
 def test_every_option_of_a_setting_is_there_and_tells_what_the_setting_tells():

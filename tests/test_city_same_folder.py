@@ -40,7 +40,7 @@ from hiproof.write.run_files import fragments
 from run_records import records
 
 REQUEST = Request(("a.laz",), Path("out"))
-NO_MATTER = {"out", "overrides", "processes", "scheduler", "restart"}
+NO_MATTER = {"out", "overrides", "processes", "scheduler", "restart", "use_attribute"}
 WHICH = {"footprints", "layer", "id_attribute", "where", "bbox", "underpasses"}
 
 

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from click.testing import CliRunner
 
-from hiproof import InputError
+from hiproof import InputError, SettingsError
 from hiproof.cli.app import app
 from hiproof.edit.points import RunPoints
 from hiproof.evaluate.run import evaluate_run
@@ -156,6 +156,15 @@ def test_bad_surveys_are_refused_in_a_sentence(surveys, tmp_path):
             choose_clouds((), epochs)
     with pytest.raises(InputError, match="expected clouds or --epoch"):
         choose_clouds(("tile.laz",), [first])
+
+
+def test_a_shift_without_surveys_is_refused(surveys, tmp_path):
+    cloud = next(path for path in (surveys / "2014").iterdir() if path.suffix == ".laz")
+    words = [str(cloud), "--shift", "off", "--out", str(tmp_path / "o")]
+    result = CliRunner().invoke(app, ["reconstruct", *words])
+    assert isinstance(result.exception, SettingsError)
+    assert "expected surveys (--epoch) with --shift" in str(result.exception)
+    assert not (tmp_path / "o").exists()
 
 
 @pytest.mark.parametrize("crs", ["EPSG:25832", "EPSG:2225"])  # another place; feet

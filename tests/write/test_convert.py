@@ -312,6 +312,19 @@ def test_global_ids_stay_when_another_building_leaves(gone, run, outputs, tmp_pa
     assert found == {id: ids[id] for id in ids if id != name}
 
 
+@pytest.mark.parametrize("number", range(3))
+def test_global_ids_stay_when_a_building_crosses_a_kilometre_line(number, run, outputs, tmp_path):
+    first = [line for line in read_lines(run)[1:] if line.get("parts")][number]
+    x = hiproof.build(first).solid.vertices[:, 0]
+    to_line = 1_000.0 - (x.min() + x.max()) / 2 % 1_000.0
+    sides = []
+    for name, beside in (("before", -0.5), ("behind", 0.5)):
+        town = write_town(tmp_path / name, read_lines(run), east=to_line + beside)
+        convert(town, tmp_path / f"{name}.ifc") if outputs("ifc") else None
+        sides.append(read_global_ids(tmp_path / f"{name}.ifc")[0])
+    assert sides[0] == sides[1]
+
+
 @pytest.mark.parametrize("changes", [{"east": 25_000.0}, {"crs": "EPSG:25831"}])
 def test_two_towns_share_no_global_id(changes, run, outputs, tmp_path):
     convert(write_town(tmp_path / "a", read_lines(run), **changes), tmp_path / "a.ifc")

@@ -26,7 +26,7 @@ class Request:
     `overrides` a file of what is known better, `underpasses` a layer of polygons; `processes` work
     on this machine (None: as many as pay, see cores.py), or those of the Dask `scheduler`;
     `restart` begins anew in a folder that holds another run. `epochs` names the survey of each of
-    the clouds, where there are several.
+    the clouds, where there are several. `use_attribute` is one that the footprints need to have.
 
     >>> from pathlib import Path
     >>> Request(("tile.laz",), Path("models"), footprints="footprints.gpkg").settings.fit.objective
@@ -49,6 +49,8 @@ class Request:
     bbox: Box | None = field(default=None, metadata=WHICH)
     underpasses: str | None = field(default=None, metadata=WHICH | FILES_FIELD)
     epochs: tuple[str, ...] = ()
+    # of what follows the run, and checked before it
+    use_attribute: str | None = field(default=None, metadata=NO_MATTER)
 
     def __post_init__(self) -> None:
         remember(*self.clouds, self.footprints, self.terrain, self.overrides, self.scheduler)

@@ -56,6 +56,12 @@ def reconstruct(
     if not enrich and "enrich" in (changes or {}):
         raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
 
+    if not epoch and "shift" in (changes or {}).get("read", {}):
+        raise SettingsError(
+            "expected surveys (--epoch) with --shift, which puts one on another, got none; name "
+            "each with --epoch DATE=CLOUD, or leave out --shift"
+        )
+
     @functools.cache
     def read_settings() -> Settings:
         paths = [text.partition("=")[2] for text in epoch or ()]
@@ -73,6 +79,7 @@ def reconstruct(
         return Request(
             clouds=found,
             epochs=epochs,
+            use_attribute=settings.enrich.use_attribute or None if enrich else None,
             out=out,
             footprints=footprints,
             layer=layer,

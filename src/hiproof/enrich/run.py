@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import __version__
+from ..city.plan.checks import refuse_missing_use
 from ..city.work.cores import as_many_as_pay
 from ..city.work.executors import make_executor
 from ..errors import HiproofError, InputError, OutputError, report_error
@@ -173,7 +174,8 @@ def enrich_run(
     refuse_own_folder(out)
     waiting = make_waiting_folder(out, parameters, settings)
     index = index_records(parameters)
-    refuse_missing_use(index, settings.use_attribute)
+    if len(index.offsets):
+        refuse_missing_use(index.attributes, settings.use_attribute)
     with atomic_file(waiting / "index.npz") as file:
         np.savez(file, **index._asdict())
     records = Records(parameters, index)
@@ -201,15 +203,6 @@ def enrich_run(
     write_record(parameters.parent, out, settings, result)
     shutil.rmtree(waiting.parent, ignore_errors=True)
     return result
-
-
-def refuse_missing_use(index: Index, name: str) -> None:
-    """Raise InputError for an attribute of the use that no building has."""
-    if name and len(index.offsets) and name not in index.attributes:
-        raise InputError(
-            f"expected an attribute of the buildings ({', '.join(index.attributes) or 'none'}) as "
-            f"--use-attribute, got {name!r}; name one of these"
-        )
 
 
 def refuse_own_folder(out: Path) -> None:

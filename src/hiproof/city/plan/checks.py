@@ -6,6 +6,7 @@ What is wrong is reported at once, and not after an hour.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ def refuse_unusable(request: Any) -> None:
             "process a core "
             "is enough, as it is without this option"
         )
-    for name in ("layer", "where", "id_attribute"):
+    for name in ("layer", "where", "id_attribute", "use_attribute"):
         if getattr(request, name) is not None and request.footprints is None:
             option = "--" + name.replace("_", "-")
             raise SettingsError(
@@ -41,6 +42,16 @@ def refuse_unusable(request: Any) -> None:
     outputs = [*list_requested_files(request.settings, out).values(), out / "run.json"]
     refuse_overwriting(outputs, list_inputs(request))
     refuse_missing_packages(request)
+
+
+def refuse_missing_use(attributes: Iterable[str], name: str | None) -> None:
+    """Raise InputError for an attribute of the use that is none of the buildings' `attributes`."""
+    names = list(dict.fromkeys(attributes))
+    if name and name not in names:
+        raise InputError(
+            f"expected an attribute of the buildings ({', '.join(names) or 'none'}) as "
+            f"--use-attribute, got {name!r}; name one of these"
+        )
 
 
 def list_inputs(request: Any) -> list[str]:

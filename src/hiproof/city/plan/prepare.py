@@ -19,6 +19,7 @@ from ...write.naming import FileUnits
 from ...write.reprojected import choose_file_crs
 from ...write.tables.geopackage import attributes_with_a_column
 from ..request import Box, Request
+from .checks import refuse_missing_use
 from .classes import settle_classes
 from .from_cloud import Progress, jobs_from_cloud
 from .from_overture import with_overture
@@ -202,6 +203,10 @@ def jobs_from_footprints(
     from .registration import register_footprints
 
     footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
+    if footprints:
+        refuse_missing_use(
+            (name for f in footprints for name in f.attributes), request.use_attribute
+        )
     check_number_columns(footprints, settings.read)
     footprints = add_passages(footprints, request, frame)
     if request.bbox and not footprints:

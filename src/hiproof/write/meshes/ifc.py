@@ -28,8 +28,9 @@ IFC_SCHEMA = "IFC4X3"
 PROPERTY_SET = "hiproof"
 # of GlobalIds, which follow from ids and places: the same building has the same one in every file
 NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
-# Sides (m) of squares of the plan, within which an id names one building, and a file one town.
-BUILDING_SQUARE_M, TOWN_SQUARE_M = 1_000.0, 10_000.0
+# Side (m) of the squares of the plan within which an id names one building, and a file one town: a
+# building that is remodelled may cross a line between them, which few stand near.
+TOWN_SQUARE_M = 10_000.0
 FIXED_TIME = "2000-01-01T00:00:00"  # in place of the clock's, for files that do not depend on it
 PRECISION_M = 1e-4  # of coordinates, as all formats have them
 
@@ -117,7 +118,7 @@ class IfcModel:
         if self.origin is None:
             self.origin = np.floor(model.solid.vertices.min(axis=0))
         middle = (model.solid.vertices.min(axis=0) + model.solid.vertices.max(axis=0)) / 2
-        key = self.keys.take(f"{model.id} {self.name_square(middle, BUILDING_SQUARE_M)}")
+        key = self.keys.take(f"{model.id} {self.name_square(middle)}")
         building = self.make_rooted(
             "IfcBuilding",
             key,
@@ -225,9 +226,9 @@ class IfcModel:
         kind = IFC_VALUES.get(type(value), "IfcText")
         return self.make(kind, value if type(value) in IFC_VALUES else json.dumps(value))
 
-    def name_square(self, place: np.ndarray, side_m: float) -> str:
+    def name_square(self, place: np.ndarray) -> str:
         """Return the CRS and the square of the plan that a place (3,) lies in."""
-        x, y = np.floor(place[:2] / side_m).astype(int).tolist()
+        x, y = np.floor(place[:2] / TOWN_SQUARE_M).astype(int).tolist()
         return f"{self.crs_name} {x} {y}"
 
     def finish(self) -> None:
@@ -242,7 +243,7 @@ class IfcModel:
             )
         )
         units = self.make("IfcUnitAssignment", Units=[metre, square, cube, radian])
-        town = self.name_square(np.zeros(3) if self.origin is None else self.origin, TOWN_SQUARE_M)
+        town = self.name_square(np.zeros(3) if self.origin is None else self.origin)
         project = self.make_rooted(
             "IfcProject",
             town,
