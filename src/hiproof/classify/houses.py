@@ -11,6 +11,7 @@ cut is made, then both sides are looked at again. A row of equal houses stays on
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import NamedTuple
@@ -18,9 +19,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ..compiled import compiled
 from ..fit.direction import measure_support, quarter_gap
-from ..geometry.arrays import measure_range
+from ..geometry.grid import expand
 from ..geometry.rings import OVERLAY_GRID_M, with_area
 from .surfaces import Surfaces, find_surfaces
 
@@ -344,8 +344,8 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
     if not len(bonds.state):
         return []
     normal = np.array([math.cos(angle), math.sin(angle)])
-    crossed, first, start = crossings(bonds.ends, bonds.state, bonds.weight, normal, lines_m)
-    crossed *= is_between(bonds.points, bonds.ends, normal, lines_m, first, start, crossed[0])
+    crossed, first, start = crossings(bonds, normal, lines_m)
+    crossed *= is_between(bonds, normal, lines_m, first, start, crossed.shape[1:])
     line, runs = find_runs(crossed, start, strictness * LEAST_APART)
     length = runs[:, 1] - runs[:, 0]
     is_long = (
@@ -356,87 +356,67 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
     return [Cut(normal, (first + k) * lines_m, runs[line == k]) for k in np.unique(line[is_long])]
 
 
-@compiled
-def crossings(ends, state, weight, normal, lines_m):
+def crossings(bonds: Bonds, normal: np.ndarray, lines_m: float) -> tuple[np.ndarray, int, float]:
     """Count the bonds of each state that cross each stretch of each line.
 
-    Returns counts (3, lines, stretches) by `weight` (b,), the first line's number, and where the
-    first stretch begins along it.
+    Returns counts (3, lines, stretches) by the bonds' weight, the first line's number, and where
+    the first stretch begins along it.
     """
-    n, c, s = len(ends), normal[0] / lines_m, normal[1] / lines_m
-    v, u, along = np.empty((2, n)), np.empty((2, n)), lines_m / STRETCH_M
-    for e in range(2):
-        x, y, across, position_along = ends[:, e, 0], ends[:, e, 1], v[e], u[e]
-        for b in range(n):
-            across[b], position_along[b] = c * x[b] + s * y[b], (c * y[b] - s * x[b]) * along
-    (v0, v1), (v2, v3) = measure_range(v[0]), measure_range(v[1])
-    (u0, u1), (u2, u3) = measure_range(u[0]), measure_range(u[1])
-    first, start = math.floor(min(v0, v2)), math.floor(min(u0, u2))
-    lines, stretches = math.floor(max(v1, v3)) - first + 1, math.floor(max(u1, u3)) - start + 1
-    crossed = np.zeros((3, int(lines), int(stretches)))
-    for b in range(n):
-        lower, upper = (0, 1) if v[0, b] < v[1, b] else (1, 0)
-        v_low, u_low = v[lower, b], u[lower, b]
-        slope = (u[upper, b] - u_low) / max(v[upper, b] - v_low, 1e-9)
-        for line in range(math.ceil(v_low), math.floor(v[upper, b]) + 1):
-            crossed[state[b], int(line - first), int(u_low + (line - v_low) * slope - start)] += (
-                weight[b]
-            )
+    x, y = bonds.ends[:, :, 0], bonds.ends[:, :, 1]
+    c, s = normal / lines_m
+    v, u = c * x + s * y, (c * y - s * x) * (lines_m / STRETCH_M)
+    first, start = math.floor(v.min()), math.floor(u.min())
+    order = np.argsort(v, axis=1)
+    (v_low, v_high), (u_low, u_high) = (np.take_along_axis(w, order, axis=1).T for w in (v, u))
+    slope = (u_high - u_low) / np.maximum(v_high - v_low, 1e-9)
+    begin = np.ceil(v_low).astype(np.int64)
+    bond, step = expand(np.maximum(np.floor(v_high).astype(np.int64) - begin + 1, 0))
+    line = begin[bond] + step
+    stretch = (u_low[bond] + (line - v_low[bond]) * slope[bond] - start).astype(np.int64)
+    size = math.floor(v.max()) - first + 1, math.floor(u.max()) - start + 1
+    crossed = np.zeros((3, *size))
+    np.add.at(crossed, (bonds.state[bond], line - first, stretch), bonds.weight[bond])
     return crossed, first, start * STRETCH_M
 
 
-@compiled
-def is_between(points, ends, normal, lines_m, first, start, template):
+def is_between(
+    bonds: Bonds, normal: np.ndarray, lines_m: float, first: int, start: float, shape: Sequence[int]
+) -> np.ndarray:
     """Return whether points lie on both sides of each line in each stretch.
 
-    The table (lines, stretches) has the shape of `template`. Along the border of a block there is
-    nothing to be cut.
+    The table (lines, stretches) has a `shape`. Along the border of a block there is nothing to be
+    cut.
     """
-    n_points = 0
-    for b in range(len(points)):
-        n_points = max(n_points, points[b, 0] + 1, points[b, 1] + 1)
-    near_line = np.zeros((2, *template.shape), np.bool_)
-    is_visited = np.zeros(n_points, np.bool_)
-    for b in range(len(ends)):
-        for e in range(2):
-            if is_visited[points[b, e]]:
-                continue
-            is_visited[points[b, e]] = True
-            v = ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]
-            stretch = int(
-                (ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1] - start) / STRETCH_M
-            )
-            for side in range(2):
-                lower = v - AWAY_M - BOND_REACH_M if side else v + AWAY_M
-                last = math.floor((lower + BOND_REACH_M) / lines_m) - first
-                for line in range(
-                    max(math.ceil(lower / lines_m) - first, 0), min(last + 1, template.shape[0])
-                ):
-                    near_line[side, int(line), stretch] = True
+    x, y = bonds.ends.reshape(-1, 2)[np.unique(bonds.points, return_index=True)[1]].T
+    v = x * normal[0] + y * normal[1]
+    stretch = ((y * normal[0] - x * normal[1] - start) / STRETCH_M).astype(np.int64)
+    near_line = np.zeros((2, *shape), bool)
+    for side, lower in enumerate((v + AWAY_M, v - AWAY_M - BOND_REACH_M)):
+        begin = np.maximum(np.ceil(lower / lines_m).astype(np.int64) - first, 0)
+        end = np.floor((lower + BOND_REACH_M) / lines_m).astype(np.int64) - first + 1
+        point, step = expand(np.maximum(np.minimum(end, shape[0]) - begin, 0))
+        near_line[side, begin[point] + step, stretch[point]] = True
     return near_line[0] & near_line[1]
 
 
-@compiled
-def find_runs(crossed, start, least_apart):
+def find_runs(
+    crossed: np.ndarray, start: float, least_apart: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the runs of stretches that bonds cross.
 
     Returns for each its line (m,), and low, high, whether hardly any bond holds, and gain (m, 4). A
     run goes on beyond a single stretch that none crosses.
     """
-    line, runs, m = np.empty(crossed[0].size, np.int64), np.empty((crossed[0].size, 4)), 0
-    for k in range(crossed.shape[1]):
-        lower, upper, count, gap, gain = -1, -1, 0, 0, 0.0
-        for stretch in range(crossed.shape[2] + 2):
-            if stretch < crossed.shape[2] and crossed[:, k, stretch].sum() > 0.0:
-                fixed, loose, unknown = crossed[:, k, stretch]
-                lower, upper, count = stretch if count == 0 else lower, stretch + 1, count + 1
-                gain += STRETCH_M * (loose - HOLD * fixed) / (fixed + loose + unknown)
-                gap += loose > HOLD * fixed
-            elif count > 0 and stretch > upper:
-                line[m], runs[m, 2], runs[m, 3] = k, gap >= least_apart * count, gain
-                runs[m, 0], runs[m, 1] = start + lower * STRETCH_M, start + upper * STRETCH_M
-                lower, upper, count, gap, gain, m = -1, -1, 0, 0, 0.0, m + 1
-    return line[:m], runs[:m]
+    line, stretch = np.nonzero(crossed.sum(axis=0) > 0.0)
+    held, loose, unknown = crossed[:, line, stretch]
+    is_first = np.append(True, (np.diff(line) > 0) | (np.diff(stretch) > 2))[: len(line)]
+    begins = np.flatnonzero(is_first)
+    run = np.cumsum(is_first) - 1
+    count, gaps = np.bincount(run), np.bincount(run, loose > HOLD * held)
+    gain = np.bincount(run, STRETCH_M * (loose - HOLD * held) / (held + loose + unknown))
+    last = stretch[np.append(begins[1:], len(line)) - 1]
+    low, high = start + stretch[begins] * STRETCH_M, start + (last + 1) * STRETCH_M
+    return line[begins], np.column_stack([low, high, gaps >= least_apart * count, gain])
 
 
 def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..geometry.grid import expand
+
 SECTORS = 180  # directions of rays around a place, 2 degrees apart
 LIFT_M = 0.01  # height (m) of a place over its roof, so that rounding does not hide it
 
@@ -35,9 +37,8 @@ def find_horizon(places: np.ndarray, edges: np.ndarray) -> np.ndarray:
     start = np.ceil(low / width - 0.5).astype(np.int64)
     end = np.floor((low + np.abs(turn)) / width - 0.5).astype(np.int64)
     # one row for each edge and each ray that crosses it
-    counts = np.maximum(end - start + 1, 0)
-    row = np.repeat(np.arange(len(counts)), counts)
-    sector = (np.arange(len(row)) + (start - np.cumsum(counts) + counts)[row]) % SECTORS
+    row, step = expand(np.maximum(end - start + 1, 0))
+    sector = (start[row] + step) % SECTORS
     angle = (sector + 0.5) * width
     ray, a, way = np.array([np.sin(angle), np.cos(angle)]), a[row].T, (b - a)[row].T
     with np.errstate(divide="ignore", invalid="ignore"):

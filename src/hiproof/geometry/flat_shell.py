@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from .components import label_components
+from .grid import expand
 
 SAME_POINT_M = 1e-3  # m; val3dity's snap tolerance
 ON_SEGMENT_M = 1e-9  # m; numerically on the segment
@@ -74,10 +75,8 @@ class FlatShell:
 
     def pair_with_corners(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return each place in `faces` (k,) with each corner of the face there, as pairs."""
-        counts = np.bincount(self.face_of, minlength=self.faces)[faces]
-        first = self.ring_start[self.face_start[faces]]
-        place = np.repeat(np.arange(len(faces)), counts)
-        return place, np.arange(len(place)) + (first - np.cumsum(counts) + counts)[place]
+        member, place = expand(np.bincount(self.face_of, minlength=self.faces)[faces])
+        return member, self.ring_start[self.face_start[faces]][member] + place
 
     def draw_faces(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
         """Return the polygons of ascending `faces` (k,), whose corners are at `flat` (n, 2)."""

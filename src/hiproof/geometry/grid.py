@@ -50,3 +50,13 @@ def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[in
     lower = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
     upper = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
     return (lower[0], lower[1]), (upper[0] - lower[0] + 1, upper[1] - lower[1] + 1)
+
+
+def expand(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return for members with so many items each, `counts` (n,), the member and place of each item.
+
+    >>> expand(np.array([2, 0, 1]))
+    (array([0, 0, 2]), array([0, 1, 0]))
+    """
+    member = np.repeat(np.arange(len(counts)), counts)
+    return member, np.arange(len(member)) - (np.cumsum(counts) - counts)[member]

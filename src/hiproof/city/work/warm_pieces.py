@@ -111,14 +111,9 @@ def curves() -> None:
 
 
 def outlines() -> None:
-    """Compile what runs without footprints draw.
-
-    Touching houses are separated, and each gets an outline.
-    """
-    from ...classify.houses import separate_houses
+    """Compile what runs without footprints draw: an outline for each house."""
     from ...fit.outline import estimate_outline
 
-    separate_houses(house(), OUTLINE, 1.0)
     estimate_outline(house(), 0.3)
 
 
