@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..geometry.point_in_polygon import mark_inside
+from ..geometry.rings import ring_normal
 from ..model import as_xyz
 
 Ring = np.ndarray
@@ -109,11 +110,9 @@ def fit_ring_plane(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     The normal is zero for a ring without area.
     """
-    origin = ring.mean(axis=0)
-    spokes = ring - origin
-    normal = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
+    normal = ring_normal(ring)
     length = np.linalg.norm(normal)
-    return (normal / length if length >= 1e-12 else np.zeros(3)), origin
+    return (normal / length if length >= 1e-12 else np.zeros(3)), ring.mean(axis=0)
 
 
 def contains(rings: list[np.ndarray], kept: np.ndarray, points: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from ..model import Building, Part, Roof, as_xyz
 from ..primitives.catalogue import CATALOGUE, CURVED
 from ..primitives.parameters import SIDED, refuse_no_shape
 from ..write.parameters import building_record
+from .change import from_lowest_eave
 from .edit import rebuild
 
 # parameters, or beginnings of their names
@@ -370,15 +371,10 @@ def with_values(
     """
     parameters = {name: values.get(name, value) for name, value in part["parameters"].items()}
     x, y, z = part["position"]
-    z = values.get(Z, z)
-    eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
-    if eaves:
-        smallest = min(parameters[name] for name in eaves)
-        parameters |= {
-            name: parameters[name] - smallest for name in (*eaves, "height") if name in parameters
-        }
-        z += smallest
-    return {**part, "parameters": parameters, "position": [x, y, z], "sigma": sigma}
+    position = [x, y, values.get(Z, z)]
+    return from_lowest_eave(
+        {**part, "parameters": parameters, "position": position, "sigma": sigma}
+    )
 
 
 def measure_building(building: Building, points_local: np.ndarray) -> Building:

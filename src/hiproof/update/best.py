@@ -19,7 +19,6 @@ from ..city.plan.work_plan import Job, WorkPlan, load_plan
 from ..city.work.bundles import keep_failure
 from ..city.work.solve import (
     KeepFailure,
-    Surroundings,
     open_terrain,
     solve_buildings,
     solve_one,
@@ -83,11 +82,7 @@ class TileSurveys:
         self.names, self.plan, self.shifts = names, load_plan(root), load_shifts(root)
         steps = {name: self.shifts.get(name, SurveyShift()).clear_xyz for name in names}
         model = open_terrain(self.plan, terrain)
-        self.points = SurveyPoints.load(root, tile, model, steps, self.plan)
-
-    def unite(self, names: tuple[str, ...]) -> Surroundings:
-        """Return the points of some surveys together."""
-        return self.points.unite(names)
+        self.unite = SurveyPoints.load(root, tile, model, steps, self.plan).unite
 
     def select_roof(self, name: str, job: Job) -> np.ndarray:
         """Return the roof points (n, 3) of a building in a survey."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
-from ..city.folder.ledger import Outcome
+from ..city.work.tasks import call
 
 
 def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
@@ -43,30 +44,6 @@ def sort_earlier_cloud(epochs: tuple[str, ...], folder: str, number: int, addres
     return sort_epoch(epochs, folder, number, address)
 
 
-def solve_best_tile(
-    names: tuple[str, ...],
-    folder: str,
-    tile: str,
-    terrain: str | None = None,
-    avoid: tuple[int, ...] = (),
-) -> list[Outcome]:
-    """Reconstruct a work tile from several surveys; see best.py."""
-    from . import best
-
-    return best.solve_best_tile(names, folder, tile, terrain, avoid)
-
-
-def update_tile(
-    folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
-) -> list[Outcome]:
-    """Bring a work tile up to date; see solve.py."""
-    from . import solve
-
-    return solve.update_tile(folder, tile, terrain, avoid)
-
-
-def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float]:
-    """Return the chances of a work tile's buildings that were tested; see solve.py."""
-    from . import solve
-
-    return solve.judge_tile(folder, tile, terrain)
+solve_best_tile = functools.partial(call, "update.best.solve_best_tile")
+update_tile = functools.partial(call, "update.solve.update_tile")
+judge_tile = functools.partial(call, "update.solve.judge_tile")

@@ -6,11 +6,10 @@ compiled code, the network and the readers of points.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, TypeAlias
-
-from ..folder.ledger import Outcome
 
 MAIN_JOB = ("moves", "planes", "solid", "points", "curves")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
@@ -36,20 +35,14 @@ class WorkerLost(Exception):
     """The process that ran the task died (killed, out of memory)."""
 
 
-def sort_cloud(folder: str, number: int, address: str) -> dict:
-    """Sort a point file; see sort.py."""
-    from . import sort
+def call(function: str, *arguments: Any) -> Any:
+    """Call the function of a name within hiproof, imported where the call runs."""
+    module, _, name = function.rpartition(".")
+    return getattr(import_module(f"hiproof.{module}"), name)(*arguments)
 
-    return sort.sort_cloud(folder, number, address)
 
-
-def solve_tile(
-    folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
-) -> list[Outcome]:
-    """Solve a work tile; see solve.py."""
-    from . import solve
-
-    return solve.solve_tile(folder, tile, terrain, avoid)
+sort_cloud = functools.partial(call, "city.work.sort.sort_cloud")
+solve_tile = functools.partial(call, "city.work.solve.solve_tile")
 
 
 def import_work() -> None:
