@@ -153,14 +153,6 @@ def read_override(record: Mapping[str, Any]) -> Override:
     )
 
 
-def possible_range(key: str) -> tuple[float, float] | None:
-    """Return the least and largest possible value of a key.
-
-    It is None where the key is no number.
-    """
-    return RANGES.get(key)
-
-
 def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
     """Return the number that `record` has of `key`, None without one.
 

@@ -44,17 +44,14 @@ def write_parameters(
     What stands in them is listed in docs/attributes.md. All lengths are metres, `origin` too, also
     where the files' CRS counts in feet; angles are degrees. What cannot be told is null.
     """
-    with ParametersWriter(path, head or FileHead(crs)) as writer:
-        for building in buildings:
-            writer.add(building)
+    ParametersWriter(path, head or FileHead(crs)).add_all(buildings)
 
 
 class ParametersWriter(BuildingWriter):
     """Incremental form of `write_parameters`."""
 
     def __init__(self, path: str | os.PathLike[str], head: FileHead | None = None) -> None:
-        super().__init__(path)
-        self.head = head or FileHead()
+        super().__init__(path, head or FileHead())
 
     def begin(self, stack: ExitStack) -> None:
         self.file.write(dump(head_record(self.head)) + b"\n")

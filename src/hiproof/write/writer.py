@@ -7,13 +7,18 @@ from __future__ import annotations
 
 import os
 from abc import abstractmethod
+from collections.abc import Iterable
 from contextlib import AbstractContextManager, ExitStack
 from typing import Any, BinaryIO, Self
 
 from ..model import Building
 from ..model.roof_figures import RoofFigures
+from .building_attributes import building_attributes, measure_figures
 from .files import atomic_file
-from .fragments import Fragment
+from .fragments import Fragment, Sheet
+from .head import FileHead
+from .naming import UniqueNames, gml_name
+from .values import plain_text
 
 
 class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
@@ -27,8 +32,15 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
 
     file: BinaryIO
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = path
+    def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
+        self.path, self.head, self.units = path, head, head.units.gml
+        self.names, self.gml_names = UniqueNames(), UniqueNames()
+
+    def add_all(self, buildings: Iterable[Building]) -> None:
+        """Write the file with all these buildings."""
+        with self:
+            for building in buildings:
+                self.add(building)
 
     def begin(self, stack: ExitStack) -> None:
         """Write what comes before the first building.
@@ -36,7 +48,6 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
         `stack` closes what the format opens beside the file.
         """
 
-    @abstractmethod
     def add(
         self,
         building: Building,
@@ -47,6 +58,17 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
 
         `figures` are those of its solid, and `attributes` its own, if the caller has them already.
         """
+        figures = figures or measure_figures(building)
+        if attributes is None:
+            osm = self.head.write.osm_tags
+            attributes = building_attributes(building, figures, self.head.prefix, self.units, osm)
+        name = self.names.take(plain_text(building.id))
+        in_gml = self.gml_names.take(gml_name(building.id))
+        self.add_sheet(Sheet(building, figures, attributes, name, in_gml, self.head))
+
+    def add_sheet(self, sheet: Sheet) -> None:
+        """Write one building with all from which its text is made."""
+        raise NotImplementedError
 
     @abstractmethod
     def put(self, fragment: Fragment) -> None:

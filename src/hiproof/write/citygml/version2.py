@@ -20,11 +20,11 @@ from ...model import GROUND, Building, Face, Solid
 from ...model.roof_figures import RoofFigures, find_ground_height
 from ...primitives.catalogue import CATALOGUE
 from ...settings import WriteSettings
-from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
+from ..building_attributes import OWN, PREFIX
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..installations import FUNCTION_SPACE, FUNCTIONS
-from ..naming import UniqueNames, gml_name, srs_name
+from ..naming import srs_name
 from ..shapes import PartShape
 from ..values import WIDEST
 from ..writer import BuildingWriter
@@ -97,9 +97,7 @@ def write_citygml(
     OutputError when the file cannot be written.
     """
     head = FileHead(crs, write=write or WriteSettings(), prefix=prefix, creation_date=creation_date)
-    with CityGMLWriter(path, head) as writer:
-        for building in buildings:
-            writer.add(building)
+    CityGMLWriter(path, head).add_all(buildings)
 
 
 class CityGMLWriter(BuildingWriter):
@@ -108,11 +106,9 @@ class CityGMLWriter(BuildingWriter):
     namespaces, root_id = NAMESPACES, ""
 
     def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
-        super().__init__(path)
-        self.head = head
+        super().__init__(path, head)
         self.srs_name = srs_name(self.head.crs_of_files)
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
-        self.names = UniqueNames()
 
     def begin(self, stack: ExitStack) -> None:
         declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in self.namespaces.items())
@@ -124,26 +120,8 @@ class CityGMLWriter(BuildingWriter):
         self.envelope_length = len(self.envelope(np.full(3, WIDEST), np.full(3, WIDEST)))
         self.file.write(b" " * self.envelope_length)
 
-    def add(
-        self,
-        building: Building,
-        figures: RoofFigures | None = None,
-        attributes: dict[str, Any] | None = None,
-    ) -> None:
-        figures = figures or measure_figures(building)
-        if attributes is None:
-            osm = self.head.write.osm_tags
-            attributes = building_attributes(
-                building, figures, self.head.prefix, self.head.units.gml, osm
-            )
-        name = self.names.take(gml_name(building.id))
-        self.add_member(
-            fragment(Sheet(building, figures, attributes, building.id, name, self.head))
-        )
-
-    def add_member(self, member: Fragment) -> None:
-        """Write a building, told in CityGML 2.0."""
-        self.put(member)
+    def add_sheet(self, sheet: Sheet) -> None:
+        self.put(fragment(sheet))
 
     def put(self, fragment: Fragment) -> None:
         if fragment.extent is not None:

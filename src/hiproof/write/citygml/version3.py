@@ -52,9 +52,7 @@ def write_citygml3(
 ) -> None:
     """Write `buildings` to `path` as CityGML 3.0; all else as `write_citygml`."""
     head = FileHead(crs, prefix=prefix, creation_date=creation_date)
-    with CityGML3Writer(path, head) as writer:
-        for building in buildings:
-            writer.add(building)
+    CityGML3Writer(path, head).add_all(buildings)
 
 
 class CityGML3Writer(CityGMLWriter):
@@ -62,8 +60,8 @@ class CityGML3Writer(CityGMLWriter):
 
     namespaces, root_id = NAMESPACES_3, ' gml:id="city"'
 
-    def add_member(self, member: Fragment) -> None:
-        self.put(upgrade_member(member))
+    def add_sheet(self, sheet: Sheet) -> None:
+        self.put(upgrade_member(version2.fragment(sheet)))
 
 
 writer = CityGML3Writer

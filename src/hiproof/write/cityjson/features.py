@@ -17,17 +17,16 @@ from typing import Any
 import numpy as np
 
 from ...model import Building
-from ...model.roof_figures import RoofFigures
 from ...settings import WriteSettings
-from ..building_attributes import OWN, PREFIX, building_attributes, measure_figures
+from ..building_attributes import OWN, PREFIX
 from ..files import scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..installations import FUNCTIONS
 from ..json_text import dump
-from ..naming import UniqueNames, reference_system
+from ..naming import reference_system
 from ..shapes import PartShape
-from ..values import WIDEST, metres, plain_text
+from ..values import WIDEST, metres
 from ..writer import BuildingWriter
 from .boundaries import (
     LOD_OVERHANGS,
@@ -63,24 +62,20 @@ def write_cityjson(
     be written; an older file then stays.
     """
     head = FileHead(crs, write=write or WriteSettings(), prefix=prefix)
-    with CityJSONWriter(path, head, scale) as writer:
-        for building in buildings:
-            writer.add(building)
+    CityJSONWriter(path, head, scale).add_all(buildings)
 
 
 class CityJSONWriter(BuildingWriter):
     """Incremental form of `write_cityjson`."""
 
     def __init__(self, path: str | os.PathLike[str], head: FileHead, scale: float = SCALE) -> None:
-        super().__init__(path)
-        self.head = head
+        super().__init__(path, head)
         self.units = self.head.units.cityjson
         self.reference_system = reference_system(self.head.crs_of_files)
         self.is_document = str(path).endswith(".json")
         self.scale = scale
         self.translate = head.offset
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
-        self.ids = UniqueNames()
         self.vertex_count = self.object_count = 0
 
     def begin(self, stack: ExitStack) -> None:
@@ -91,20 +86,8 @@ class CityJSONWriter(BuildingWriter):
         if self.is_document:
             self.waiting = stack.enter_context(scratch(self.path))
 
-    def add(
-        self,
-        building: Building,
-        figures: RoofFigures | None = None,
-        attributes: dict[str, Any] | None = None,
-    ) -> None:
-        figures = figures or measure_figures(building)
-        name = self.ids.take(plain_text(building.id))
-        vertices = Vertices(self.choose_origin(building), self.scale, self.units)
-        if attributes is None:
-            attributes = building_attributes(
-                building, figures, self.head.prefix, self.units, self.head.write.osm_tags
-            )
-        sheet = Sheet(building, figures, attributes, name, "", self.head)
+    def add_sheet(self, sheet: Sheet) -> None:
+        vertices = Vertices(self.choose_origin(sheet.building), self.scale, self.units)
         if self.is_document:
             self.add_to_document(city_objects(sheet, vertices), vertices)
         else:

@@ -15,9 +15,7 @@ from contextlib import ExitStack
 from typing import Any
 
 from ...model import Building
-from ...model.roof_figures import RoofFigures
 from ..attribute_list import PREFIX, TABLES
-from ..building_attributes import building_attributes, measure_figures
 from ..files import atomic, scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
@@ -57,9 +55,7 @@ def write_attributes(
     Geometries are in the unit of `crs`. Of thousands of attributes the last have no column
     (MOST_COLUMNS). Raises OutputError when the file cannot be written.
     """
-    with AttributesWriter(path, FileHead(crs, prefix=prefix)) as writer:
-        for building in buildings:
-            writer.add(building)
+    AttributesWriter(path, FileHead(crs, prefix=prefix)).add_all(buildings)
 
 
 def attributes_with_a_column() -> int:
@@ -77,8 +73,8 @@ class AttributesWriter(BuildingWriter):
     reserved: tuple[str, ...] = ("fid", "geom")  # names of columns that the format has itself
 
     def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
-        super().__init__(path)
-        self.head, self.plan_wkt = head, plan_wkt(head.crs_of_files)
+        super().__init__(path, head)
+        self.plan_wkt = plan_wkt(head.crs_of_files)
 
     def open(self, stack: ExitStack) -> None:
         self.hidden = stack.enter_context(atomic(self.path))
@@ -87,17 +83,8 @@ class AttributesWriter(BuildingWriter):
             for layer in self.layers
         }
 
-    def add(
-        self,
-        building: Building,
-        figures: RoofFigures | None = None,
-        attributes: dict[str, Any] | None = None,
-    ) -> None:
-        figures, units = figures or measure_figures(building), self.head.units
-        if attributes is None:
-            osm = self.head.write.osm_tags
-            attributes = building_attributes(building, figures, self.head.prefix, units.gml, osm)
-        self.put(Fragment(table_rows(building, figures, attributes, units.table).to_text()))
+    def add_sheet(self, sheet: Sheet) -> None:
+        self.put(fragment(sheet))
 
     def put(self, fragment: Fragment) -> None:
         lines = split_lines(fragment.text)
