@@ -69,7 +69,7 @@ class Names(BuildingWriter):
 
 def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     module = ModuleType("hiproof.write.names")
-    module.writer = lambda path, head: Names(path)
+    module.writer = lambda path, head: Names(path, head)
     module.fragment = lambda sheet: Fragment(f"{sheet.building.id}\n".encode())
     monkeypatch.setitem(sys.modules, "hiproof.write.names", module)
     monkeypatch.setitem(

@@ -92,6 +92,11 @@ class Roof:
     frame: LocalFrame
 
     @property
+    def world_outline(self) -> shapely.Polygon:
+        """The outline in world coordinates."""
+        return shapely.transform(self.outline, self.frame.to_world)
+
+    @property
     def pieces(self) -> tuple[Piece, ...]:
         return tuple(piece for part in self.parts for piece in part.pieces)
 

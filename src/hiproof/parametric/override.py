@@ -295,9 +295,7 @@ def remark_given_ground(building: Building, z_ground: float | None, terrain: Any
     """
     if z_ground is None or terrain is None or building.built is None:
         return ""
-    heights, source = query_terrain(
-        terrain, building.roof.frame.to_world(shapely.get_coordinates(building.roof.outline))
-    )
+    heights, source = query_terrain(terrain, shapely.get_coordinates(building.roof.world_outline))
     if (
         not np.isfinite(heights).any()
         or abs(gap := z_ground - float(np.nanmin(heights))) < FAR_GIVEN_GROUND_M

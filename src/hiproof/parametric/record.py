@@ -56,7 +56,7 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
     status = read_status(record, bool(parts))
     roof = read_roof(parts, outline, origin) if parts else None
-    world = outline if roof is None else shapely.transform(roof.outline, roof.frame.to_world)
+    world = outline if roof is None else roof.world_outline
     ground = (
         figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
     )

@@ -97,9 +97,8 @@ class TileSurveys:
         )
         steps = [self.shifts[survey] for survey in (name, other) if survey in self.shifts]
         shift = max(steps, key=lambda step: step.noise.roof, default=SurveyShift())
-        z_ground = building.z_ground - roof.frame.origin[2]
         verdict = judge_building(
-            roof, old, new, z_ground, shift.noise, shift.sigma[2], SIGNIFICANCE
+            roof, old, new, building.local_ground, shift.noise, shift.sigma[2], SIGNIFICANCE
         )
         return verdict.change is Change.UNCHANGED
 

@@ -59,7 +59,7 @@ def move_building(
         result.roof,
         old,
         points[1],
-        earlier.z_ground - roof.frame.origin[2],
+        earlier.local_ground,
         surveys.shift.noise,
         surveys.shift.sigma[2],
         surveys.largest_chance,

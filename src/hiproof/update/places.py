@@ -75,7 +75,7 @@ def move_to_frame(roof: Roof, target: Roof) -> Roof:
 
 def end_building(earlier: Building) -> Building:
     """Return the building without its model: its ground lies bare."""
-    outline = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
+    outline = earlier.roof.world_outline
     return Building(
         earlier.id,
         Status.NO_BUILDING,
@@ -96,7 +96,7 @@ def end_model(record: dict[str, Any], survey: str) -> list[dict[str, Any]]:
     if not record.get("parts"):
         return history
     earlier = build(record)
-    outline = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
+    outline = earlier.roof.world_outline
     rounded = shapely.transform(outline, lambda xy: np.round(xy, PLACE_DIGITS))
     ended = {
         "id": earlier.id,
@@ -123,7 +123,7 @@ def place_new(new: Building, was_bare: bool) -> list[dict[str, Any]]:
     """Return the place of a new building, where its ground was bare before."""
     if not was_bare:
         return []
-    area = shapely.transform(new.roof.outline, new.roof.frame.to_world)
+    area = new.roof.world_outline
     height = float(np.median(new.solid.vertices[:, 2]) - new.z_ground)
     return record_places([Difference(ChangeKind.BUILT, height, math.nan, area.area, area, (-1, 0))])
 

@@ -152,7 +152,7 @@ class Updater:
         lines = tuple(read_terrain_lines(member.record))
         earlier = dataclasses.replace(earlier, terrain_intersection=lines)
         earlier = with_model(earlier, roof, self.plan.settings.compose)
-        lost = LostParts.find(verdict, roof, earlier.z_ground - roof.frame.origin[2])
+        lost = LostParts.find(verdict, roof, earlier.local_ground)
         result = self.follow_verdict(job, member, earlier, verdict, lost)
         return result if lost is None else lost.doubt(result)
 
@@ -245,9 +245,8 @@ class Updater:
             places = self.name_places(earlier, moved, verdict)
             return self.mark(moved, verdict, places, member, list(range(len(moved.parts))))
         new = self.reconstruct(job, member, lost)
-        z_ground = earlier.z_ground - frame.origin[2]
         if new.built is None or not explains(
-            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, z_ground
+            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, earlier.local_ground
         ):
             places = self.name_places(earlier, None, verdict)
             if {place["kind"] for place in places} == {ChangeKind.PART_REMOVED.code}:
@@ -285,8 +284,7 @@ class Updater:
         `result` is its new model, None where no new model explains the points.
         """
         roof = None if result is None else move_to_frame(result.roof, earlier.roof)
-        z_ground = earlier.z_ground - earlier.roof.frame.origin[2]
-        sigma = self.surveys.shift.sigma[2]
+        sigma, z_ground = self.surveys.shift.sigma[2], earlier.local_ground
         found = name_differences(verdict, earlier.roof, roof, z_ground, sigma)
         return record_places(found, earlier.roof.frame)
 
@@ -307,7 +305,7 @@ class Updater:
         result, lineage = continue_parts(earlier, new, self.near_m, points)
         is_changed = verdict.change is Change.CHANGED
         places = self.name_places(earlier, result, verdict) if is_changed else []
-        before = shapely.transform(earlier.roof.outline, earlier.roof.frame.to_world)
+        before = earlier.roof.world_outline
         apart = shapely.symmetric_difference(before, job.area)
         outline = Difference(
             ChangeKind.OUTLINE_CHANGED, math.nan, math.nan, job.area.area - before.area, apart

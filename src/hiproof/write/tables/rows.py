@@ -98,10 +98,7 @@ def find_outline(building: Building) -> shapely.Geometry | None:
 
     It is the modelled one, else the one requested, else None.
     """
-    if building.built is None:
-        return building.footprint
-    roof = building.roof
-    return shapely.transform(roof.outline, roof.frame.to_world)
+    return building.footprint if building.built is None else building.roof.world_outline
 
 
 def history_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
