@@ -3,20 +3,27 @@ one, or nothing moves.
 """
 
 import json
+import re
+import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
+from benchmarks.registration import SETS, read_set, shift_polygons
 
 from hiproof.city.plan.prepare import make_plan
+from hiproof.city.plan.registration import is_suspected
 from hiproof.city.plan.work_plan import WorkPlan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputWarning
+from hiproof.fit.registration import register
 from hiproof.settings import Settings
 from tiny_town import ORIGIN, Town, write_cloud, write_footprints
 
+SHARED = Path(__file__).parents[2] / "shared" / "data"
 OFF = Settings.from_dict({"reconstruct": {"align": "off"}})
 SHIFT = np.array([1.2, -0.8])
 
@@ -125,6 +132,32 @@ def test_footprints_in_place_stay_and_align_off_looks_for_nothing(tmp_path, shif
     assert not plan.registration.is_clear and plan.registration.length < 0.1
     assert all(job.area.equals(job.footprint.polygon) for job in plan.jobs)
     assert make_plan(replace(shifted_request, settings=OFF)).registration is None
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (1.0, 0.5), (-2.0, 1.5)])
+def test_a_shift_of_too_few_footprints_is_told_and_not_taken_off(shift, tmp_path):
+    town = move_town(scattered_houses(3, 3), -np.array(shift))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        plan = make_plan(make_request(tmp_path, town))
+    assert not plan.registration.is_clear
+    said = [str(one.message) for one in told if "seem to lie" in str(one.message)]
+    assert len(said) == any(shift)
+    if said:
+        beside = np.array(re.search(r"lie \((.*?), (.*?)\) m", said[0]).groups(), float)
+        assert beside == pytest.approx(-np.array(shift), abs=0.3)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
+@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("distance", [0.0, 1.0, 2.0, 3.0])
+def test_known_shifts_of_real_footprints_are_found_or_told(name, distance):
+    polygons, points = read_set(name)
+    turn = np.random.default_rng(len(polygons)).uniform(0, 2 * np.pi)
+    vector = distance * np.array([np.cos(turn), np.sin(turn)])
+    result = register([(points[:, :2], shift_polygons(polygons, vector))])
+    assert np.hypot(*(result.xy + vector)) < 0.3
+    assert (result.is_clear or is_suspected(result)) == (distance > 0)
 
 
 def read_records(out) -> dict[str, dict]:

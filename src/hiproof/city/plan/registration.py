@@ -18,7 +18,13 @@ import numpy as np
 import shapely
 
 from ...errors import InputWarning, is_interrupt
-from ...fit.registration import FARTHEST_SHIFT_M, Registration, register
+from ...fit.registration import (
+    FARTHEST_SHIFT_M,
+    LEAST_FOOTPRINTS,
+    SIGMAS,
+    Registration,
+    register,
+)
 from ...frames import Units
 from ...geometry.grid import number_cells
 from ...masking import mask
@@ -36,6 +42,9 @@ ENOUGH_FOOTPRINTS, MOST_CELLS, MOST_FILES = 400, 16, 8
 
 The others bound what is read for it.
 """
+
+SUSPECTED_M = 0.5
+"""Length (m) of an unclear shift from which on it is told: sound outlines lie 0.1 to 0.3 m off."""
 
 CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
 """How far (m) around a square footprints bear on its points."""
@@ -90,8 +99,26 @@ def find_registration(
     return dataclasses.replace(result, footprints=sum(number_of[cell] for cell in selected_cells))
 
 
+def is_suspected(registration: Registration) -> bool:
+    """Return whether footprints seem to lie beside their roofs, though they are not moved."""
+    return (
+        not registration.is_clear
+        and registration.footprints >= LEAST_FOOTPRINTS
+        and registration.length >= SUSPECTED_M
+        and registration.length > SIGMAS * max(registration.sigma)
+    )
+
+
 def warn_if_moved(registration: Registration, path: str) -> None:
-    """Warn (InputWarning) where the footprints at `path` are moved."""
+    """Warn (InputWarning) where the footprints at `path` are moved, or perhaps should be."""
+    if is_suspected(registration):
+        (x, y), sigma = registration.xy, max(registration.sigma)
+        warnings.warn(
+            f"{mask(path)}: all footprints seem to lie ({-x:.2f}, {-y:.2f}) m beside their roofs, "
+            f"with a standard deviation of {sigma:.2f} m, but {registration.footprints} of them "
+            "show too little to move them; check the CRS of footprints and clouds",
+            InputWarning,
+        )
     if registration.is_clear:
         (x, y), sigma = registration.xy, max(registration.sigma)
         warnings.warn(
