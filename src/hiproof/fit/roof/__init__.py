@@ -32,15 +32,16 @@ from ..union.scene import Scene
 from ..union.sides import choose_sides
 from ..union.unite import gather_ends
 from .accept import improve
+from .beside import estimate_shift
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
 from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
-from .price import Site
-from .prices import compute_unit
+from .price import Site, price_roof
+from .prices import UNKNOWN_UNITS, compute_unit
 from .regions import list_places
 from .site import make_site
 from .start import make_roof
-from .tables import Tables, make_tables_like
+from .tables import Tables, copy_tables, make_tables_like
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -69,8 +70,26 @@ def name_volumes(
     plan_outline = shapely.transform(outline, plan.frame.uv_plan)
     site = make_site(scene, plan_outline, compute_unit(plan.density, settings.compound))
     roof = start_roof(volumes, outline, plan, scene)
-    improve(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
+    roof, site = improve_beside(roof, site)
     return read_parts(roof, site, plan_outline, plan, settings.fit.types)
+
+
+def improve_beside(roof: Tables, site: Site) -> tuple[Tables, Site]:
+    """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
+
+    Returns the roof and the site that it explains.
+    """
+    trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
+    improve(roof, trial, site, drawing)
+    shift = estimate_shift(roof, site)
+    if not shift.any():
+        return roof, site
+    moved = site._replace(x=site.x - shift[0], y=site.y - shift[1])
+    other = make_tables_like(roof)
+    copy_tables(roof, other)
+    improve(other, trial, moved, drawing)
+    cost = price_roof(other, drawing, moved) + 2 * UNKNOWN_UNITS * site.unit
+    return (other, moved) if cost < price_roof(roof, drawing, site) else (roof, site)
 
 
 def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:

@@ -43,7 +43,8 @@ from .tables import (
     TILT,  # the level plane b of volume a rises from its side c
     MAKE_LEVEL,  # plane b of volume a becomes level
     ADD_BAY,  # a level volume over bay a of the outline
-) = range(15)
+    ONE_PLANE,  # plane b of volume a becomes plane d of volume c
+) = range(16)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
@@ -111,6 +112,7 @@ def list_moves(roof, site, asked, moves):
         for j in range(roof.counts[VOLUME_COUNT]):
             if j != k and roof.n_planes[j] > 0 and (j < k or not asked[j]):
                 count = list_merges(roof, j, k, moves, count)
+                count = list_equal_planes(roof, site, j, k, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
         count = write_move(moves, count, ADD_BAY, bay, 0, 0, 0)
     return list_shares(roof, asked, moves, count)
@@ -134,6 +136,31 @@ def list_merges(roof, j, k, moves, count):
         if roof.n_planes[j] != roof.n_planes[k] or not has_alike(roof, j, k):
             count = write_move(moves, count, MERGE, j, k, 0, 0)
             count = write_move(moves, count, MERGE, k, j, 0, 0)
+    return count
+
+
+@compiled
+def list_equal_planes(roof, site, j, k, moves, count):
+    """Write the planes of volumes j and k that are nearly one."""
+    if not is_near(roof, j, k):
+        return count
+    x, y = find_centre(roof, k, site)
+    for p in range(roof.n_planes[j]):
+        for q in range(roof.n_planes[k]):
+            a, b = roof.planes[j, p], roof.planes[k, q]
+            is_one = roof.heights[j, p] == roof.heights[k, q] and (
+                roof.slopes[j, p] == roof.slopes[k, q]
+                and roof.plane_lines[j, p] == roof.plane_lines[k, q]
+            )
+            gap = abs((a[0] - b[0]) * x + (a[1] - b[1]) * y + a[2] - b[2])
+            if (
+                not is_one
+                and min(roof.slopes[j, p], roof.slopes[k, q]) >= 0
+                and np.hypot(a[0] - b[0], a[1] - b[1]) < ALIKE_SLOPES
+                and gap < ALIKE_HEIGHTS_M
+            ):
+                count = write_move(moves, count, ONE_PLANE, j, p, k, q)
+                count = write_move(moves, count, ONE_PLANE, k, q, j, p)
     return count
 
 
@@ -313,6 +340,11 @@ def apply_move(roof, move, site, changed):
         is_possible = face_planes(roof, a, b, site)
     elif kind == TURN:
         roof.replaces[a] = 1 - roof.replaces[a]
+    elif kind == ONE_PLANE:
+        is_possible = b < roof.n_planes[a] and d < roof.n_planes[c]
+        if is_possible:
+            roof.plane_lines[a, b], roof.heights[a, b] = roof.plane_lines[c, d], roof.heights[c, d]
+            roof.slopes[a, b] = roof.slopes[c, d]
     elif kind == LEVEL_EAVES:
         is_possible = level_eaves(roof, a, b, c, site)
     else:
@@ -499,15 +531,12 @@ def level_eaves(roof, k, one_slope, walls, site):
     """Let all sloping planes of volume k rise from its sides at one height. Returns if any did."""
     face_planes(roof, k, FACE_SIDES, site)
     place_volume(roof, k)
-    height, slope, count, lowest, total = -1, -1, 0, 0.0, 0.0
+    count = 0
     for p in range(roof.n_planes[k]):
-        if roof.slopes[k, p] >= 0:
-            count += 1
-            lowest += roof.values[roof.heights[k, p]]
-            total += roof.values[roof.slopes[k, p]]
+        count += int(roof.slopes[k, p] >= 0)
     if count == 0 or (count == 1 and walls == 0):
         return False
-    height, slope = add_unknown(roof, lowest / count), add_unknown(roof, total / count)
+    height, slope = choose_unknown(roof, k, roof.heights), choose_unknown(roof, k, roof.slopes)
     for p in range(roof.n_planes[k]):
         if roof.slopes[k, p] >= 0:
             roof.heights[k, p] = height
@@ -519,6 +548,23 @@ def level_eaves(roof, k, one_slope, walls, site):
                 signed = add_line(roof, line[0], line[1], line[2])
                 add_plane(roof, k, signed, height, slope)
     return True
+
+
+@compiled
+def choose_unknown(roof, k, column):
+    """Return the unknown that most planes use of those in a `column` of volume k's sloping planes.
+
+    It is a new one with their mean if each is one plane's own.
+    """
+    chosen, most, total, count = -1, 1, 0.0, 0
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] >= 0:
+            users = count_users(roof, column[k, p])
+            if users > most:
+                chosen, most = column[k, p], users
+            total += roof.values[column[k, p]]
+            count += 1
+    return chosen if chosen >= 0 else add_unknown(roof, total / count)
 
 
 @compiled

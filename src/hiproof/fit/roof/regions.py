@@ -23,11 +23,12 @@ def list_places(
 ) -> list[tuple[int, list[shapely.Polygon], bool]]:
     """List the volumes of a drawn roof, each with the polygons that make one part.
 
-    A volume is several parts where steps keep the places apart in which it is visible. Level
-    volumes at one height that touch are one part, of the largest. The last value says whether a
-    part has other ends than its volume.
+    A volume is several parts where steps keep the places apart in which it is visible, and inside
+    another, as dormers are: a person sees several. What crosses another is one, because it stands
+    out of it on both sides. Level volumes at one height that touch are one part, of the largest.
+    The last value says whether a part has other ends than its volume.
     """
-    regions = draw_regions(roof, outline)
+    regions, visible = draw_regions(roof, outline), draw_visible(drawing)
     groups: dict[tuple, dict[int, list[int]]] = {}
     first = join_fragments(roof, drawing)
     for f in range(drawing.count[0]):
@@ -37,24 +38,56 @@ def list_places(
         groups.setdefault(key, {}).setdefault(int(first[f]), []).append(f)
     places = []
     for places_of_one in groups.values():
-        areas = {
-            g: shapely.union_all(
-                [shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in fragments],
-                grid_size=OVERLAY_GRID_M,
-            )
-            for g, fragments in places_of_one.items()
-        }
-        large = [area for area in areas.values() if area.area > LEAST_PLACE_M2]
         owners = sorted({int(drawing.owners[f, 0]) for of in places_of_one.values() for f in of})
         owner = max(owners, key=lambda k: sum(p.area for p in regions[k]))
         whole = [p for k in owners for p in regions[k]]
         if len(owners) > 1:
             whole = list_polygons(shapely.union_all(whole, grid_size=OVERLAY_GRID_M))
-        if len(large) < 2:
-            places.append((owner, whole, len(owners) > 1))
+        areas = [unite_fragments(drawing, fragments) for fragments in places_of_one.values()]
+        if is_inside(visible, owner):
+            areas = list_polygons(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
+        large = [area for area in areas if area.area > LEAST_PLACE_M2]
+        is_one = len(large) < 2 or crosses(visible, owner, shapely.union_all(large).convex_hull)
+        if is_one:
+            places.append((owner, whole, len(owners) > 1 or len(large) > 1))
         else:
             places += [(owner, p, True) for p in split_region(whole, large, outline) if p]
     return places
+
+
+def draw_visible(drawing: Drawing) -> dict[int, shapely.Geometry]:
+    """Return where each volume is visible."""
+    fragments: dict[int, list[int]] = {}
+    for f in range(drawing.count[0]):
+        fragments.setdefault(int(drawing.owners[f, 0]), []).append(f)
+    return {k: unite_fragments(drawing, of_one) for k, of_one in fragments.items()}
+
+
+def unite_fragments(drawing: Drawing, numbers: list[int]) -> shapely.Geometry:
+    rings = [shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in numbers]
+    return shapely.union_all(rings, grid_size=OVERLAY_GRID_M)
+
+
+def is_inside(visible: dict[int, shapely.Geometry], k: int) -> bool:
+    """Return whether another volume is visible all around volume k, as around a dormer."""
+    return any(
+        j != k and shapely.convex_hull(area).contains(visible[k]) for j, area in visible.items()
+    )
+
+
+def crosses(visible: dict[int, shapely.Geometry], k: int, hull: shapely.Geometry) -> bool:
+    """Return whether volume k and one that hides its middle stand out of each other on both sides.
+
+    `hull` is that of the places in which volume k is visible.
+    """
+    return any(
+        j != k and count_large(subtract(hull, area)) > 1 and count_large(subtract(area, hull)) > 1
+        for j, area in visible.items()
+    )
+
+
+def count_large(area: shapely.Geometry) -> int:
+    return sum(polygon.area > LEAST_PLACE_M2 for polygon in list_polygons(area))
 
 
 def split_region(

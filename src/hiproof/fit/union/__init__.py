@@ -142,7 +142,8 @@ def fit_building(
     >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
     (['flat', 'gable'], 0.0)
     """
-    return fit_by(name_volumes, points_local, outline, settings or Settings())
+    from .. import roof as new
+    return fit_by(new.name_volumes, points_local, outline, settings or Settings())
 
 
 def fit_by(
