@@ -34,7 +34,7 @@ def begin_roof(kind, seed=0):
     plan = lay_out_plan(points, outline)
     volumes, _, scene = find_volumes(plan, outline, settings)
     plan_outline = shapely.transform(outline, plan.frame.uv_plan)
-    site = make_site(scene, plan_outline, compute_unit(plan.density, settings))
+    site = make_site(scene, plan_outline, compute_unit(plan.density, settings), plan.border)
     roof = start_roof(volumes, outline, plan, scene)
     fit_roof(roof, site, 2)
     return roof, site, plan_outline, (volumes, outline, plan, scene)

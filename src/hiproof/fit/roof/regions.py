@@ -44,11 +44,12 @@ def list_places(
         if len(owners) > 1:
             whole = list_polygons(shapely.union_all(whole, grid_size=OVERLAY_GRID_M))
         areas = [unite_fragments(drawing, fragments) for fragments in places_of_one.values()]
-        if is_inside(visible, owner):
+        inside = is_inside(visible, owner)
+        if inside:
             areas = list_polygons(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
         large = [area for area in areas if area.area > LEAST_PLACE_M2]
-        is_one = len(large) < 2 or crosses(visible, owner, shapely.union_all(large).convex_hull)
-        if is_one:
+        hull = shapely.union_all(large).convex_hull
+        if len(large) < 2 or (not inside and crosses(visible, owner, hull)):
             places.append((owner, whole, len(owners) > 1 or len(large) > 1))
         else:
             places += [(owner, p, True) for p in split_region(whole, large, outline) if p]

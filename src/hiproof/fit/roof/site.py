@@ -20,15 +20,21 @@ BAY_POINTS = 3  # Fewer points show no height.
 CONVEX_PART_M2 = 1e-6  # Area (m2) of the smallest part.
 
 
-def make_site(scene, outline: shapely.Polygon, unit: float) -> Site:
-    """Return the site of an `outline` (plan coordinates) with the points of a scene."""
-    order = np.concatenate(
-        [np.argsort(scene.U[0, : scene.n], kind="stable"), np.arange(scene.n, len(scene.z))]
-    )
-    x, y, z, weight, shade = (
-        np.ascontiguousarray(values[order])
-        for values in (scene.U[0], scene.V[0], scene.z, scene.weight, scene.shade)
-    )
+def make_site(scene, outline: shapely.Polygon, unit: float, border: np.ndarray) -> Site:
+    """Return the site of an `outline` (plan coordinates) with the points of a scene.
+
+    Of the points (3, b) beside the `border`, which may be on walls, those in bays count.
+    """
+    points = np.array([scene.U[0, : scene.n], scene.V[0, : scene.n], scene.z[: scene.n]])
+    bays, heights, in_bay = list_bays(outline, np.hstack([points, border]).T)
+    points = np.hstack([points, border[:, in_bay[scene.n :]]])
+    points = points[:, np.argsort(points[0], kind="stable")]
+    n, cells = points.shape[1], slice(scene.n, None)
+    x = np.concatenate([points[0], scene.U[0, cells]])
+    y = np.concatenate([points[1], scene.V[0, cells]])
+    z = np.concatenate([points[2], scene.z[cells]])
+    weight = np.concatenate([np.ones(n), scene.weight[cells]])
+    shade = np.concatenate([np.zeros(n), scene.shade[cells]])
     rings = split_convex(outline)
     parts, sizes = np.zeros((len(rings), RING_CORNERS, 2)), np.array([len(r) for r in rings])
     for part, ring in zip(parts, rings, strict=True):
@@ -41,7 +47,7 @@ def make_site(scene, outline: shapely.Polygon, unit: float) -> Site:
         z,
         weight,
         shade,
-        scene.n,
+        n,
         scene.low,
         scene.high,
         scene.dead,
@@ -51,7 +57,8 @@ def make_site(scene, outline: shapely.Polygon, unit: float) -> Site:
         sizes,
         boxes,
         list_outline_lines(outline),
-        *list_bays(outline, np.column_stack([x, y, z])[: scene.n]),
+        bays,
+        heights,
         np.array([x0, x1, y0, y1]),
     )
 
@@ -89,11 +96,15 @@ def list_outline_lines(outline: shapely.Polygon) -> np.ndarray:
     return np.ascontiguousarray(np.column_stack([normal, c, middle, is_edge]))
 
 
-def list_bays(outline: shapely.Polygon, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def list_bays(
+    outline: shapely.Polygon, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """List the places that the line of a wall cuts off an outline, a bay or a corner.
 
-    Returns their four sides (b, 4, 3), and the median height (b,) of their points (n, 3).
+    Returns their four sides (b, 4, 3), the median height (b,) of their points (n, 3), and which
+    points (n,) lie in one.
     """
+    in_bay = np.zeros(len(points), bool)
     ring = shapely.get_coordinates(shapely.orient_polygons(outline).exterior)
     reach = np.hypot(*np.ptp(ring, axis=0))
     sides, heights = [], []
@@ -116,6 +127,7 @@ def list_bays(outline: shapely.Polygon, points: np.ndarray) -> tuple[np.ndarray,
             inside = shapely.contains_xy(bay, points[:, :2])
             if inside.sum() < BAY_POINTS:
                 continue
+            in_bay |= inside
             places = shapely.get_coordinates(bay) @ along
             sides.append(
                 [
@@ -126,7 +138,7 @@ def list_bays(outline: shapely.Polygon, points: np.ndarray) -> tuple[np.ndarray,
                 ]
             )
             heights.append(float(np.median(points[inside, 2])))
-    return np.array(sides).reshape(-1, 4, 3), np.array(heights)
+    return np.array(sides).reshape(-1, 4, 3), np.array(heights), in_bay
 
 
 def split_convex(polygon: shapely.Polygon) -> list[np.ndarray]:
