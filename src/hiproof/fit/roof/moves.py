@@ -44,7 +44,9 @@ from .tables import (
     MAKE_LEVEL,  # plane b of volume a becomes level
     ADD_BAY,  # a level volume over bay a of the outline
     ONE_PLANE,  # plane b of volume a becomes plane d of volume c
-) = range(16)
+    COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves
+    TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
+) = range(18)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
@@ -55,6 +57,8 @@ LINE_COSINE = 0.94  # Cosine of the angle between a side and the line to which i
 SAME_DIRECTION = 0.97  # The same of sides of volumes that merge.
 FACING_COSINE = 0.9  # The same of a plane and the side that it faces.
 BESIDE_CORNER_M = 0.1  # Distance (m) outside a volume of the middle of a wall over its corner.
+BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is meant to be its own.
+COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume is drawn out.
 MOST_LINES = 7  # Most lines to which a side is moved.
 RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
@@ -96,6 +100,9 @@ def list_moves(roof, site, asked, moves):
                 count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
             if roof.slopes[k, p] >= 0:
                 count = write_move(moves, count, MAKE_LEVEL, k, p, 0, 0)
+                for q in range(roof.n_planes[k]):
+                    if roof.slopes[k, q] >= 0 and roof.heights[k, q] != roof.heights[k, p]:
+                        count = write_move(moves, count, TO_EAVE, k, p, roof.heights[k, q], 0)
             elif roof.n_planes[k] == 1:
                 for s in range(N_SIDES):
                     count = write_move(moves, count, TILT, k, p, s, 0)
@@ -226,6 +233,14 @@ def list_side_moves(roof, site, k, moves, count):
             count = write_move(moves, count, int(near[q, 1]), k, s, int(near[q, 2]), 0)
         for step in range(len(RUN_ON_STEPS_M)):
             count = write_move(moves, count, RUN_ON, k, s, step, 0)
+        for m in range(len(site.lines)):
+            line = site.lines[m]
+            if (
+                line[5] > 0.0
+                and half[0] * line[0] + half[1] * line[1] > LINE_COSINE
+                and line[0] * x + line[1] * y + line[2] > COVER_M
+            ):
+                count = write_move(moves, count, COVER, k, s, m + 1, 0)
     return count
 
 
@@ -273,7 +288,7 @@ def list_new_planes(roof, site, k, moves, count):
             if not is_faced(roof, k, roof.half_planes[k, s, 0], roof.half_planes[k, s, 1]):
                 count = write_move(moves, count, GIVE, k, s, roof.slopes[k, p], roof.heights[k, p])
         for m in range(len(site.lines)):
-            if cuts_corner(roof, k, site.lines[m]):
+            if stands_in(roof, k, site.lines[m]):
                 count = write_move(
                     moves, count, GIVE_WALL, k, m, roof.slopes[k, p], roof.heights[k, p]
                 )
@@ -282,15 +297,22 @@ def list_new_planes(roof, site, k, moves, count):
 
 @compiled
 def cuts_corner(roof, k, line):
-    """Return whether an edge of the outline cuts a corner of volume k off, and has no plane yet."""
+    """Return whether a wall cuts a corner of volume k off, and has no plane yet."""
+    for s in range(N_SIDES):
+        half = roof.half_planes[k, s]
+        if abs(half[0] * line[0] + half[1] * line[1]) > LINE_COSINE:
+            return False
+    return stands_in(roof, k, line)
+
+
+@compiled
+def stands_in(roof, k, line):
+    """Return whether an edge of the outline stands in volume k, and has no plane yet."""
     if line[5] == 0.0 or is_faced(roof, k, line[0], line[1]):
         return False
     for s in range(N_SIDES):
         half = roof.half_planes[k, s]
-        if (
-            half[0] * line[3] + half[1] * line[4] + half[2] < -BESIDE_CORNER_M
-            or abs(half[0] * line[0] + half[1] * line[1]) > LINE_COSINE
-        ):
+        if half[0] * line[3] + half[1] * line[4] + half[2] < -BESIDE_CORNER_M:
             return False
     return True
 
@@ -345,6 +367,10 @@ def apply_move(roof, move, site, changed):
         if is_possible:
             roof.plane_lines[a, b], roof.heights[a, b] = roof.plane_lines[c, d], roof.heights[c, d]
             roof.slopes[a, b] = roof.slopes[c, d]
+    elif kind == COVER:
+        roof.sides[a, b] = find_new_side(roof, TO_OUTLINE, a, b, c, site)
+        place_volume(roof, a)
+        is_possible = level_eaves(roof, a, 1, 1, site)
     elif kind == LEVEL_EAVES:
         is_possible = level_eaves(roof, a, b, c, site)
     else:
@@ -385,6 +411,8 @@ def change_plane(roof, move, site):
     elif kind == TILT and is_level:
         roof.heights[k, b] = add_unknown(roof, roof.values[roof.heights[k, b]])
         roof.plane_lines[k, b], roof.slopes[k, b] = roof.sides[k, c], add_unknown(roof, 0.0)
+    elif kind == TO_EAVE and not is_level:
+        return put_on_eave(roof, k, b, c, site)
     elif kind == MAKE_LEVEL and not is_level:
         x, y = find_centre(roof, k, site)
         row = roof.planes[k, b]
@@ -393,6 +421,40 @@ def change_plane(roof, move, site):
     else:
         return False
     return True
+
+
+@compiled
+def put_on_eave(roof, k, p, height, site):
+    """Let plane p of volume k rise from where it has another's `height`, and its side lie there.
+
+    It rises from a wall that is near there. What rises from a wall stays there.
+    """
+    slope = roof.values[roof.slopes[k, p]]
+    a, b, c = read_line(roof, roof.plane_lines[k, p])
+    if abs(slope) < ALIKE_SLOPES or find_wall(site, a, b, c) >= 0:
+        return False
+    c += (roof.values[roof.heights[k, p]] - roof.values[height]) / slope
+    m = find_wall(site, a, b, c)
+    if m >= 0:
+        a, b, c = site.lines[m, 0], site.lines[m, 1], site.lines[m, 2]
+    line = add_line(roof, a, b, c)
+    for s in range(N_SIDES):
+        d, e, _ = read_line(roof, roof.sides[k, s])
+        if a * d + b * e > FACING_COSINE:
+            roof.sides[k, s] = line
+    roof.plane_lines[k, p], roof.heights[k, p] = line, height
+    return True
+
+
+@compiled
+def find_wall(site, a, b, c):
+    """Return the wall whose middle is near a line that faces as it does, -1 if none is."""
+    for m in range(len(site.lines)):
+        line = site.lines[m]
+        is_near = abs(a * line[3] + b * line[4] + c) < BESIDE_WALL_M
+        if line[5] > 0.0 and is_near and a * line[0] + b * line[1] > LINE_COSINE:
+            return m
+    return -1
 
 
 @compiled
