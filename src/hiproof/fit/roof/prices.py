@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from ..union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
 
+DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs nothing.
 VOLUME_UNITS = 0.5  # A visible volume.
 UNKNOWN_UNITS = 0.45  # A height or a slope, however many planes share it.
 CORNER_UNITS = 0.5  # A corner of the drawn roof, at any level.

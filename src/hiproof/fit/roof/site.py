@@ -9,6 +9,7 @@ import shapely
 
 from .draw import RING_CORNERS
 from .price import Site
+from .prices import DEAD_M
 
 SHORTEST_EDGE_M = 0.7  # Shortest edge (m) of an outline along whose line a volume may end.
 SHORTEST_CHORD_M = 1.5  # Shortest line (m) between two corners.
@@ -50,7 +51,7 @@ def make_site(scene, outline: shapely.Polygon, unit: float, border: np.ndarray) 
         n,
         scene.low,
         scene.high,
-        scene.dead,
+        DEAD_M,
         scene.width,
         unit,
         parts,
