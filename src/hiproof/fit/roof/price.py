@@ -22,6 +22,7 @@ from .prices import (
 from .tables import UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
+SMALL_GAPS = 0.002  # What a difference that costs nothing costs (points): it decides between equals.
 DAMPING = 0.05  # Points that hold an unknown at its value.
 
 Site = namedtuple(
@@ -78,7 +79,9 @@ def price_misfit(roof, site, view, points):
         i = points[m]
         if i < site.n:
             height, _, _ = compute_height(roof, view, site.x[i], site.y[i], OVER_M)
+            gap = min(abs(site.z[i] - height), site.dead) / site.dead
             total += compute_point_cost(site.z[i], height, site.dead, site.width)
+            total += SMALL_GAPS * gap * gap
         else:
             height, _, _ = compute_height(roof, view, site.x[i], site.y[i], 0.0)
             total += compute_cell_cost(height, site.weight[i], site.shade[i], site.low, site.high)
