@@ -30,7 +30,7 @@ LOOSE_POINTS = 1e-6  # Weight (points) of an unknown that no point determines.
 
 def find_anchored(roof: Tables, site) -> np.ndarray:
     """Return which lines (l,) of a roof are lines of the outline."""
-    lines = roof.lines[: roof.counts[LINE_COUNT], None]
+    lines = roof.lines[: roof.counts[LINE_COUNT], None, :3]
     gaps = [np.abs(lines - sign * site.lines[None, :, :3]).max(axis=2) for sign in (1.0, -1.0)]
     return (np.minimum(*gaps) < ONE_LINE).any(axis=1)
 

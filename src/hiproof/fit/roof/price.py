@@ -19,10 +19,10 @@ from .prices import (
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
-from .tables import UNKNOWN_COUNT, VOLUME_COUNT, place_planes
+from .tables import LINE_COUNT, N_SIDES, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
-SMALL_GAPS = 0.002  # What a difference that costs nothing costs (points): it decides between equals.
+SMALL_GAPS = 0.025  # What a difference that costs nothing costs (points): it decides between equals.
 DAMPING = 0.05  # Points that hold an unknown at its value.
 
 Site = namedtuple(
@@ -99,12 +99,18 @@ def price_drawing(roof, drawing, view, site, box):
 
 @compiled
 def price_tables(roof):
-    """Return the units of all volumes and unknowns."""
+    """Return the units of all volumes, lines and unknowns."""
     total, is_used = 0.0, np.zeros(roof.counts[UNKNOWN_COUNT], np.bool_)
+    is_side = np.zeros(roof.counts[LINE_COUNT], np.bool_)
     for k in range(roof.counts[VOLUME_COUNT]):
         if roof.n_planes[k] == 0:
             continue
         total += VOLUME_UNITS
+        for s in range(N_SIDES):
+            line = abs(roof.sides[k, s]) - 1
+            if not is_side[line]:
+                is_side[line] = True
+                total += roof.lines[line, 3]
         for p in range(roof.n_planes[k]):
             height, slope = roof.heights[k, p], roof.slopes[k, p]
             if not is_used[height]:

@@ -36,7 +36,7 @@ Tables = namedtuple(
 """A roof, as arrays with room for more.
 
 - counts (3,): volumes, lines and unknowns in use.
-- lines (l, 3), values (u,).
+- lines (l, 4): a, b, c, and what the line costs (units). values (u,).
 - sides (v, 4): signed lines. n_planes (v,): 0 for a volume that was left out.
 - plane_lines, heights, slopes (v, VOLUME_PLANES): a signed line and unknowns.
 - replaces (v,).
@@ -50,7 +50,7 @@ def make_tables(volumes: int, lines: int, unknowns: int) -> Tables:
     """Return empty tables with room for so many rows."""
     return Tables(
         np.zeros(3, np.int64),
-        np.zeros((lines, 3)),
+        np.zeros((lines, 4)),
         np.zeros(unknowns),
         np.zeros((volumes, N_SIDES), np.int64),
         np.zeros(volumes, np.int64),
@@ -106,8 +106,8 @@ def read_line(roof, signed):
 
 
 @compiled
-def add_line(roof, a, b, c):
-    """Add a line, or find it among those that there are. Returns its signed number."""
+def add_line(roof, a, b, c, units=0.0):
+    """Add a line that costs so many units, or find it. Returns its signed number."""
     count = roof.counts[LINE_COUNT]
     for k in range(count):
         for sign in (1, -1):
@@ -118,6 +118,7 @@ def add_line(roof, a, b, c):
             ):
                 return sign * (k + 1)
     roof.lines[count, 0], roof.lines[count, 1], roof.lines[count, 2] = a, b, c
+    roof.lines[count, 3] = units
     roof.counts[LINE_COUNT] = count + 1
     return count + 1
 

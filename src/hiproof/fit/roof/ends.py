@@ -1,0 +1,88 @@
+"""Compiled: where the points say that a volume ends.
+
+On one side of a line points lie on a volume, on the other they do not. The line that tells most of
+them apart is where it ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .tables import N_SIDES, measure_middle
+
+REACH_M = 2.5  # Distance (m) from a side within which it may lie instead.
+FEWEST = 4  # Fewest points on either side of a line that points show.
+MOST = 300  # Most points that are asked. Of more, every k-th is.
+LEANS = 15  # Ways to lean to either side.
+LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
+
+
+@compiled
+def find_end(roof, k, s, leans, site):
+    """Return a, b, c of the line along which side s of volume k tells most points apart.
+
+    It may lean, up to so many steps to either side. All are 0 where points do not say.
+    """
+    x, y, length = measure_middle(roof, k, s, site.bounds)
+    if length == 0.0:
+        return 0.0, 0.0, 0.0
+    a, b, c = roof.half_planes[k, s]
+    across, along, is_on, count = list_near(roof, k, s, x, y, site)
+    n_on = is_on[:count].sum()
+    if n_on < FEWEST or count - n_on < FEWEST:
+        return 0.0, 0.0, 0.0
+    best, best_lean, best_end = -1, 0.0, 0.0
+    for turn in range(2 * leans + 1):
+        step = (turn + 1) // 2 * (1 if turn % 2 else -1)
+        lean = step * LEAN_STEP
+        places = across[:count] - lean * along[:count]
+        order = np.argsort(places)
+        right = n_on
+        for i in range(count - 1):
+            right += -1 if is_on[order[i]] else 1
+            if right > best:
+                best, best_lean = right, lean
+                best_end = 0.5 * (places[order[i]] + places[order[i + 1]])
+    # across - lean * along = end, with along = b (x - x0) - a (y - y0) in plan
+    d, e = a - best_lean * b, b + best_lean * a
+    norm = np.sqrt(d * d + e * e)
+    f = c - best_end + best_lean * (b * x - a * y)
+    return d / norm, e / norm, f / norm
+
+
+@compiled
+def list_near(roof, k, s, x, y, site):
+    """List the points near side s of volume k and between its other sides.
+
+    Returns their distances from the side and along it from x, y, whether they lie on the volume,
+    and their number.
+    """
+    box, half = roof.boxes[k], roof.half_planes[k, s]
+    first = np.searchsorted(site.x[: site.n], box[0] - REACH_M)
+    last = np.searchsorted(site.x[: site.n], box[1] + REACH_M)
+    numbers, count = np.empty(last - first, np.int64), 0
+    for i in range(first, last):
+        u, v = site.x[i], site.y[i]
+        is_near = abs(half[0] * u + half[1] * v + half[2]) < REACH_M
+        for t in range(N_SIDES):
+            if t != s:
+                other = roof.half_planes[k, t]
+                is_near &= other[0] * u + other[1] * v + other[2] >= 0.0
+        if is_near:
+            numbers[count] = i
+            count += 1
+    step = 1 + max(count - 1, 0) // MOST
+    numbers = numbers[:count:step]
+    across, along = np.empty(len(numbers)), np.empty(len(numbers))
+    is_on = np.zeros(len(numbers), np.bool_)
+    for m in range(len(numbers)):
+        u, v = site.x[numbers[m]], site.y[numbers[m]]
+        across[m] = half[0] * u + half[1] * v + half[2]
+        along[m] = half[1] * (u - x) - half[0] * (v - y)
+        lowest = np.inf
+        for p in range(roof.n_planes[k]):
+            row = roof.planes[k, p]
+            lowest = min(lowest, row[0] * u + row[1] * v + row[2])
+        is_on[m] = abs(site.z[numbers[m]] - lowest) < site.dead + site.width
+    return across, along, is_on, len(numbers)
