@@ -19,10 +19,10 @@ LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
 
 @compiled
-def find_end(roof, k, s, leans, site):
+def find_end(roof, k, s, site):
     """Return a, b, c of the line along which side s of volume k tells most points apart.
 
-    It may lean, up to so many steps to either side. All are 0 where points do not say.
+    All are 0 where points do not say.
     """
     x, y, length = measure_middle(roof, k, s, site.bounds)
     if length == 0.0:
@@ -33,7 +33,7 @@ def find_end(roof, k, s, leans, site):
     if n_on < FEWEST or count - n_on < FEWEST:
         return 0.0, 0.0, 0.0
     best, best_lean, best_end = -1, 0.0, 0.0
-    for turn in range(2 * leans + 1):
+    for turn in range(2 * LEANS + 1):
         step = (turn + 1) // 2 * (1 if turn % 2 else -1)
         lean = step * LEAN_STEP
         places = across[:count] - lean * along[:count]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .draw import meets
-from .ends import LEANS, find_end
+from .ends import find_end
 from .prices import LEAN_UNITS
 from .tables import (
     LINE_COUNT,
@@ -48,7 +48,7 @@ from .tables import (
     ONE_PLANE,  # plane b of volume a becomes plane d of volume c
     COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
-    TO_POINTS,  # side b of volume a where points say that it ends, leaning if c
+    TO_POINTS,  # side b of volume a where points say that it ends, as it leans
 ) = range(19)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # Planes face square to their sides, along the axis between two sides, or square to either.
@@ -238,7 +238,6 @@ def list_side_moves(roof, site, k, moves, count):
             count = write_move(moves, count, RUN_ON, k, s, step, 0)
         if find_wall(site, half[0], half[1], half[2]) < 0:
             count = write_move(moves, count, TO_POINTS, k, s, 0, 0)
-            count = write_move(moves, count, TO_POINTS, k, s, 1, 0)
         for m in range(len(site.lines)):
             line = site.lines[m]
             if (
@@ -374,10 +373,10 @@ def apply_move(roof, move, site, changed):
             roof.plane_lines[a, b], roof.heights[a, b] = roof.plane_lines[c, d], roof.heights[c, d]
             roof.slopes[a, b] = roof.slopes[c, d]
     elif kind == TO_POINTS:
-        d, e, f = find_end(roof, a, b, LEANS if c else 0, site)
+        d, e, f = find_end(roof, a, b, site)
         is_possible = d != 0.0 or e != 0.0
         if is_possible:
-            roof.sides[a, b] = add_line(roof, d, e, f, LEAN_UNITS if c else 0.0)
+            roof.sides[a, b] = add_line(roof, d, e, f, LEAN_UNITS)
     elif kind == COVER:
         roof.sides[a, b] = find_new_side(roof, TO_OUTLINE, a, b, c, site)
         place_volume(roof, a)
