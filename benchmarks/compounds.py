@@ -23,7 +23,7 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from hiproof.fit.union import BuildingFit, fit_building
+from hiproof.fit.roof import BuildingFit, fit_building
 from hiproof.model import Part, Roof
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, SimBuilding, random_compound, scan
 from hiproof.simulate.scene import Defects

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.model.heights import find_highest
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import ROUND

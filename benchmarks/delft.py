@@ -28,7 +28,7 @@ import shapely
 
 from hiproof.compose import check_solid, compose
 from hiproof.errors import HiproofError
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.frames import LocalFrame
 from hiproof.geometry.point_grid import assign_points
 from hiproof.model import ROOF, Building, Footprint, Model, Roof

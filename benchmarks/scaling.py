@@ -20,7 +20,7 @@ import shapely
 
 from hiproof.compose import compose
 from hiproof.errors import HiproofError
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 

@@ -7,7 +7,7 @@ import shapely
 from hiproof.errors import FitError, InputError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit import fit_roof
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.fit.union.clamp import CLAMP_M, LEAST_EXCESS_M2, MISSED_SPACINGS, clamp_parts
 from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings

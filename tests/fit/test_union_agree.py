@@ -3,26 +3,11 @@
 A house that bends ends its wings on one line.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union import clusters, fit_building
-from hiproof.fit.union.agree import agree_planes
-from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.finish import (
-    find_visible_points,
-    fit_design,
-    read_volume_planes,
-    take_points,
-)
-from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.risen import measure_misfits, restore_risen_planes
-from hiproof.fit.union.scene import make_scene
-from hiproof.fit.union.sides import Side
-from hiproof.fit.union.volumes import LEVEL, N_PLANES, OFFSET0, SLOPE0, U0, V1, make_base
+from hiproof.fit.roof import fit_building
 from hiproof.model import Roof
 from points_of_roofs import sample_heights
 
@@ -66,22 +51,6 @@ def test_wings_of_two_heights_keep_them(lower):
         fit_building(sample_heights(make_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE)
     )
     assert upper - low == pytest.approx(lower, abs=0.04)
-
-
-def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
-    """Without a proper common fit, the wings keep their own planes.
-
-    They took any planes before, and pitches became negative.
-    """
-    fit = fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
-    lower, upper = list_ridge_heights(fit)
-    assert upper - lower < 1e-4
-    monkeypatch.setattr(clusters, "is_proper", lambda *_: False)
-    lower, upper = list_ridge_heights(
-        fit_building(sample_heights(make_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
-    )
-    assert upper - lower > 1e-3
-    assert (lower, upper) == pytest.approx((8.0, 8.0), abs=0.15)
 
 
 def make_bent_house(angle_deg):
@@ -130,46 +99,3 @@ def make_grid(outline):
     return np.stack(np.meshgrid(np.arange(x0, x1, 0.25), np.arange(y0, y1, 0.25)), axis=-1).reshape(
         -1, 2
     )
-
-
-def test_a_hidden_volume_does_not_rise_above_those_that_explain_the_points():
-    """Of a church, the gable over a third of the nave rose above the other's points."""
-    outline = shapely.box(0.0, 0.0, 20.0, 8.0)
-    points = sample_heights(lambda x, y: 5.0 + 0.0 * x, outline, 5.0, 0.02)
-    plan = lay_out_plan(points, outline)
-    scene = make_scene(plan, outline, [0.0], 3.0, 0.2, list_allowed_shapes(()))
-    volumes = np.repeat(make_base(5.0 - plan.frame.origin[2]), 3, axis=0)
-    volumes[0, OFFSET0 + LEVEL] -= 9.0
-    volumes[1, OFFSET0 + LEVEL] -= 0.01  # over all of it, hidden
-    result = [read_volume_planes(volume, scene) for volume in volumes]
-    risen = replace(result[1], rows=result[1].rows + [0.0, 0.0, 0.4])
-    with_risen = [result[0], risen, result[2]]
-    assert measure_misfits(volumes, with_risen, scene)[0].sum() > 0.5 * scene.n
-    _, misfits = restore_risen_planes(volumes, with_risen, scene)
-    assert np.array_equal(misfits, measure_misfits(volumes, result, scene)[0])
-    shifted = replace(result[2], rows=result[2].rows + [0.0, 0.0, 0.02])
-    planes, _ = restore_risen_planes(volumes, [*result[:2], shifted], scene)
-    assert planes[2] is shifted
-
-
-@pytest.mark.parametrize(("bend", "n_planes"), [(0.0, 1), (0.25, 2)])
-def test_planes_that_face_a_degree_apart_are_one_where_the_points_are(bend, n_planes):
-    outline = shapely.box(0.0, 0.0, 20.0, 8.0)
-    points = sample_heights(
-        lambda x, y: 5.0 + 0.6 * y + bend * (x > 12.0) * (x - 12.0), outline, 5.0, 0.02
-    )
-    plan = lay_out_plan(points, outline)
-    scene = make_scene(plan, outline, [0.0], 3.0, 0.2, list_allowed_shapes(()))
-    volumes = np.repeat(make_base(-9.0), 3, axis=0)
-    volumes[1:, OFFSET0 : OFFSET0 + N_PLANES] = np.inf
-    volumes[1:, U0 : V1 + 1] = (-4, 4, -2, 10), (-4, 4, -10, -2)  # u is y - 4, and v is 10 - x
-    volumes[1:, OFFSET0], volumes[1:, SLOPE0] = 7.4 - plan.frame.origin[2], 0.6
-    planes = [read_volume_planes(volume, scene) for volume in volumes]
-    for k, lean in ((1, 0.0), (2, 0.02)):  # the planes rise from the left
-        design = np.zeros((5, 3, 2))
-        design[0] = [[0.0, 1.0], [0.0, lean], [1.0, 0.0]]
-        own = take_points(volumes[k], find_visible_points(volumes, scene)[k], scene)
-        planes[k] = fit_design(planes[k], design, own, scene)
-    sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
-    first, second = (one.rows[0] for one in agree_planes(volumes, sides, planes, scene).planes[1:])
-    assert len({tuple(np.round(rows, 9)) for rows in (first, second)}) == n_planes

@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from shapely import box
 
-from hiproof.fit.union import fit_building
-from hiproof.fit.union.bays import LEAST_BAY_M2, MOST_BAY_M2, MOST_BAY_SHARE, list_small_pieces
+from hiproof.fit.roof import fit_building
 
 HOUSE = box(0, 0, 16, 12)
 BUMPS = {
@@ -82,27 +79,3 @@ def test_returns_of_its_walls_are_no_roof_of_a_bay():
     walls = scan_roof(rng, along, lambda x, y: rng.uniform(0.0, 7.5, len(x)), density=150.0)
     assert len(walls) > 8
     assert len(fit_building(np.vstack([roof, walls]), outline).roof_parts) == 1
-
-
-@settings(max_examples=60, deadline=None)
-@given(st.integers(0, 10_000))
-def test_pieces_are_what_lines_of_walls_cut_off(seed):
-    """Each lies within the outline, is simple, and has one line inside the outline."""
-    rng = np.random.default_rng(seed)
-    parts = [
-        box(*(lower := rng.uniform(0, 8, 2)), *(lower + rng.uniform(1, 8, 2))) for _ in range(3)
-    ]
-    outline = max(shapely.get_parts(shapely.union_all(parts)), key=lambda polygon: polygon.area)
-    outline = shapely.Polygon(outline.exterior)
-    for ring in list_small_pieces(outline):
-        piece = shapely.Polygon(ring)
-        assert piece.is_valid and piece.exterior.is_ccw
-        assert LEAST_BAY_M2 <= piece.area <= min(MOST_BAY_M2, MOST_BAY_SHARE * outline.area) + 1e-9
-        assert piece.difference(outline).area < 1e-9
-        inner = piece.exterior.difference(outline.exterior.buffer(1e-6))
-        assert len(shapely.get_parts(shapely.line_merge(inner))) == 1
-        assert inner.length == pytest.approx(inner.convex_hull.length, abs=1e-4)
-
-
-def test_a_rectangle_has_no_pieces():
-    assert list_small_pieces(HOUSE) == []

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from shapely import box
 
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from points_of_roofs import sample_heights
 
 

@@ -14,7 +14,7 @@ from shapely import affinity
 
 import hiproof
 from hiproof.compose import check_solid
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.parametric.arrange import merged_parts, split_part
 from hiproof.primitives.catalogue import CATALOGUE, CURVED
 from points_of_roofs import sample_heights

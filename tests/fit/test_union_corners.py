@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from hiproof.compose import compose
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.frames import LocalFrame
 from hiproof.model import ROOF, Roof
 from points_of_roofs import sample_heights

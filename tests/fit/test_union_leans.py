@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.fit.union.around import measure_context
 from hiproof.fit.union.facings import face_walls, turn_plane
 from hiproof.fit.union.objective import compute_objective

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof import fit_building
+from hiproof.fit.roof import fit_building
 from points_of_roofs import sample_heights
 
 # West, south, east, north (m) of the boxes at one level, above a lower one all around.

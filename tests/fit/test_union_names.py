@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hiproof.fit.union.names import find_visible_planes, regularise
+from hiproof.fit.roof.parts import find_visible_planes, regularise
 
 SLOPE, EAVE = 0.8, 3.0
 

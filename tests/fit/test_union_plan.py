@@ -8,28 +8,12 @@ import pytest
 import shapely
 
 from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.apart import split_volumes
-from hiproof.fit.union.cants import fit_planes, list_walls
-from hiproof.fit.union.finish import (
-    fit_volume_planes,
-    invert_matrix,
-    solve_least_squares,
-    sum_moments,
-    sum_point_costs,
-)
 from hiproof.fit.union.larger import combine_parts
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.regions import PlanSite, cut_regions, sketch_regions
 from hiproof.fit.union.scene import make_scene
-from hiproof.fit.union.sides import Side, choose_sides, find_corners
-from hiproof.fit.union.unite import gather_ends
+from hiproof.fit.union.sides import Side, choose_sides, gather_lines
 from hiproof.fit.union.volumes import (
-    LEVEL,
-    OFFSET0,
-    REPLACES,
-    SLOPE0,
     U0,
-    V0,
     V1,
     compute_roof_heights,
     make_base,
@@ -37,7 +21,7 @@ from hiproof.fit.union.volumes import (
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
-from union_scenes import OUTLINES, draw_volume, list_corners
+from union_scenes import OUTLINES, list_corners
 
 
 def lay_out_scene(rng, outline, volumes=None):
@@ -55,104 +39,10 @@ def lay_out_scene(rng, outline, volumes=None):
     return plan, scene
 
 
-def draw_level_volumes(rng, count):
-    """Draw a base and `count` volumes of one direction, some with level tops.
-
-    Their rectangles are random.
-    """
-    rows = [draw_volume(rng, replacing=0.3) for _ in range(count)]
-    for row in rows:
-        row[0] = 0.0
-        row[OFFSET0 + LEVEL] = min(row[OFFSET0 + LEVEL], 4.0)
-    return np.vstack([make_base(-1.0), *rows])
-
-
 # --- regions --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("base", [False, True])
-@pytest.mark.parametrize("seed", range(8))
-def test_regions_cover_the_outline_and_nothing_else(seed, base):
-    rng = np.random.default_rng(seed)
-    outline = OUTLINES[seed % len(OUTLINES)]
-    volumes = draw_level_volumes(rng, 1 + seed % 4)
-    plan, scene = lay_out_scene(rng, outline, volumes)
-    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
-    planes = fit_planes(volumes, sides, list_walls(outline, plan), scene, {})
-    site = PlanSite(outline, plan, scene, {})
-    sketch = sketch_regions(volumes, planes, sides, site, base)
-    regions = cut_regions(volumes, sketch, sides, site)
-    assert len(regions) == len(volumes)
-    polygons = [polygon for item in regions for polygon in item]
-    assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
-    united = shapely.union_all(polygons)
-    assert united.difference(outline.buffer(1e-5)).area < 1e-9
-    # No gap wider than composing closes.
-    assert shapely.buffer(outline.difference(united), -1e-4).is_empty
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
-    rng = np.random.default_rng(seed)
-    outline, volumes = OUTLINES[0], draw_level_volumes(rng, 3)
-    volumes[-1, U0 : V1 + 1] = -3.0, 1.0, -2.0, 2.0
-    volumes[-1, REPLACES] = 1.0
-    plan, scene = lay_out_scene(rng, outline, volumes)
-    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
-    planes = fit_planes(volumes, sides, list_walls(outline, plan), scene, {})
-    site = PlanSite(outline, plan, scene, {})
-    sketch = sketch_regions(volumes, planes, sides, site, True)
-    regions = cut_regions(volumes, sketch, sides, site)
-    recess = shapely.union_all(regions[-1])
-    assert recess.area > 1.0
-    assert all(
-        polygon.intersection(recess).area < 1e-3 for item in regions[:-1] for polygon in item
-    )
-
-
 # --- sides ----------------------------------------------------------------------------------------
-
-
-def test_a_side_lies_on_the_line_of_the_outline_that_it_all_but_follows():
-    """Of a front out of square by three degrees, the side takes its line.
-
-    The other three sides take their own lines.
-    """
-    lean = math.tan(math.radians(3.0))
-    outline = shapely.Polygon([(-6, -4 - 6 * lean), (6, -4 + 6 * lean), (6, 4), (-6, 4)])
-    volumes = np.vstack([make_base(-5.0), make_base(2.0)])
-    volumes[1, U0 : V1 + 1] = -6.0, 6.0, -4.0, 4.0
-    plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
-    corners = (
-        shapely.get_coordinates(outline)[:-1] - plan.frame.origin[:2]
-    ) @ plan.frame.rotation.T
-    volumes[1, U0 : V1 + 1] = (
-        corners[:, 0].min(),
-        corners[:, 0].max(),
-        corners[:, 1].min() + 0.3,
-        corners[:, 1].max(),
-    )
-    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)[1]
-    assert all(side.anchored for side in sides)
-    result = shapely.Polygon(plan.frame.xy_local(find_corners(sides)))
-    assert result.symmetric_difference(outline).area < 1e-6
-
-
-def test_sides_meet_in_the_corners_of_their_rectangle():
-    corners = find_corners([Side(-2.0), Side(3.0), Side(-1.0), Side(4.0)])
-    assert corners.tolist() == [[-2.0, -1.0], [3.0, -1.0], [3.0, 4.0], [-2.0, 4.0]]
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_corners_lie_on_both_of_their_sides(seed):
-    rng = np.random.default_rng(seed)
-    sides = [
-        Side(positions, lean)
-        for positions, lean in zip((-3.0, 3.0, -2.0, 2.0), rng.uniform(-0.2, 0.2, 4), strict=True)
-    ]
-    for (u, v), (i, j) in zip(find_corners(sides), ((0, 2), (1, 2), (1, 3), (0, 3)), strict=True):
-        assert u == pytest.approx(sides[i].offset + sides[i].lean * v)
-        assert v == pytest.approx(sides[j].offset + sides[j].lean * u)
 
 
 def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
@@ -160,31 +50,8 @@ def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
     volumes = np.vstack([make_base(-5.0), make_base(2.0)])
     volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
     plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
-    side = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)[1][1]
-    assert side == Side(1.3, sigma=side.sigma)
-    assert 0.0 < side.sigma < 0.2  # the gap between the points on either side
-
-
-def make_tooth(lower, upper, offset):
-    """Make a volume of one plane that rises from v = `lower` to `upper`."""
-    row = make_base(0.0)[0]
-    row[U0 : V1 + 1] = -11.0, 11.0, lower, upper
-    row[OFFSET0 + LEVEL], row[OFFSET0 + 2], row[SLOPE0 + 2] = np.inf, offset, 0.26
-    return row
-
-
-def test_a_strip_by_which_what_is_hidden_ran_too_far_is_no_part():
-    """A tooth continues under the next one and shows beyond it.
-
-    The roof is nearly as high there.
-    """
-    outline = shapely.box(-10.0, -7.0, 10.0, 7.0)
-    base, hiding = make_base(-1.6)[0], make_tooth(-4.8, -0.3, 0.93)
-    _, scene = lay_out_scene(
-        np.random.default_rng(0), outline, np.array([base, make_tooth(-0.3, 4.0, -0.23), hiding])
-    )
-    result = split_volumes(np.array([base, make_tooth(-5.2, 4.0, -0.23), hiding]), scene)
-    assert result[:, V0].tolist() == pytest.approx([base[V0], -0.3, -4.8])
+    side = choose_sides(volumes, gather_lines(outline, plan, scene.turn), scene)[1][1]
+    assert side == Side(1.3)
 
 
 # --- larger shapes --------------------------------------------------------------------------------
@@ -397,69 +264,3 @@ def test_a_gable_beside_a_truncated_gable_is_no_gambrel():
         "gable",
         "truncated_gable",
     ]
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_moments_are_the_sums_over_the_points_of_each_plane(seed):
-    rng = np.random.default_rng(seed)
-    rows = np.full((5, 3), np.nan)
-    is_present = rng.permutation(5)[:3]
-    rows[is_present] = rng.uniform(-1.0, 1.0, (3, 3))
-    points = rng.uniform(-2.0, 2.0, (3, 60))
-    positions = np.vstack([points[:2], np.ones(60)])
-    heights = np.where(np.isfinite(rows[:, 2:]), np.nan_to_num(rows) @ positions, np.inf)
-    remainder = points[2] - heights.min(axis=0)
-    weight = np.clip(1.0 - (remainder / 0.8) ** 2, 0.0, None) ** 2
-    moments, products, total, misfit = sum_moments(rows, points, 0.8)
-    for k in range(5):
-        item = weight * (heights.argmin(axis=0) == k)
-        assert moments[k] == pytest.approx((positions * item) @ positions.T, abs=1e-9)
-        assert products[k] == pytest.approx(positions @ (item * points[2]), abs=1e-9)
-    assert (total, misfit) == pytest.approx((weight.sum(), (weight * remainder**2).sum()))
-    plain = np.clip((np.abs(remainder) - 0.05) / 0.3, 0.0, 1.0) ** 2
-    assert sum_point_costs(rows, points, 0.05, 0.3) == pytest.approx(plain.sum())
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_least_squares_find_planes_that_explain_all_points(seed):
-    """Two planes with a common slope and exact points give back the unknowns.
-
-    Nothing is left to vary.
-    """
-    rng = np.random.default_rng(seed)
-    unknowns = np.array([*rng.uniform(4.0, 6.0, 2), rng.uniform(0.3, 1.0)])
-    design = np.zeros((5, 3, 3))
-    design[0, 2, 0] = design[1, 2, 1] = design[0, 0, 2] = 1.0
-    design[1, 0, 2] = -1.0
-    rows = design @ unknowns
-    rows[2:] = np.nan
-    uv = rng.uniform(-4.0, 4.0, (2, 200))
-    points = np.vstack([uv, np.nanmin(rows @ np.vstack([uv, np.ones(200)]), axis=0)])
-    result, covariance, cost = solve_least_squares(
-        rows + rng.normal(0.0, 0.02, rows.shape), design, points, 0.03, 0.2
-    )
-    assert result[:2] == pytest.approx(rows[:2], abs=1e-5) and np.isnan(result[2:]).all()
-    assert np.abs(covariance).max() < 1e-9 and cost == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("size", [1, 2, 6])
-def test_the_inverse_of_a_symmetric_matrix_is_numpys(size):
-    root = np.random.default_rng(size).normal(size=(size, size))
-    matrix = root @ root.T
-    assert invert_matrix(matrix, 0.1) == pytest.approx(
-        np.linalg.inv(matrix + 0.1 * np.eye(size)), rel=1e-9
-    )
-
-
-def test_planes_of_a_volume_whose_sides_are_one_line_are_fitted():
-    """Where both sides take one line of the outline, no pyramid lies between them."""
-    outline = shapely.box(0, 0, 10, 6)
-    volumes = np.concatenate([make_base(-9.0), make_base(5.0)])
-    volumes[1, U0 : V1 + 1] = (-5.0, 5.0, -3.0, 3.0)
-    volumes[1, OFFSET0 : OFFSET0 + LEVEL] = 7.0
-    volumes[1, OFFSET0 + LEVEL] = np.inf
-    volumes[1, SLOPE0 : SLOPE0 + LEVEL] = 0.5
-    _, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
-    sides = [Side(5.0), Side(5.0), Side(-3.0), Side(3.0)]
-    planes = fit_volume_planes(volumes[1], sides, scene, np.arange(scene.n))
-    assert planes.rows[:LEVEL, 2] == pytest.approx(np.full(LEVEL, 7.0), abs=0.05)

@@ -6,16 +6,14 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.apart import is_in_row
 from hiproof.fit.union.candidates import list_candidates
 from hiproof.fit.union.grow import prepare_growth, regrow_volumes
 from hiproof.fit.union.objective import compute_objective
 from hiproof.fit.union.plan import lay_out_plan, measure_emptiness
 from hiproof.fit.union.planes import Cloud
 from hiproof.fit.union.scene import find_directions, make_scene
-from hiproof.fit.union.volumes import U0, V0, V1, make_base
 from hiproof.model import Roof
 from roof_zoo import FRAME
 from union_scenes import draw_scene, draw_volumes
@@ -105,14 +103,6 @@ def test_cells_are_as_empty_as_a_plain_count_says(seed):
             count = ((np.abs(i - a) <= 1) & (np.abs(j - b) <= 1)).sum()
             usual = expected[max(a - 1, 0) : a + 2, max(b - 1, 0) : b + 2].sum()
             assert result[a, b] == pytest.approx(min(max(1.0 - 2.0 * count / usual, 0.0), 1.0))
-
-
-def test_what_hides_a_row_is_as_deep_as_the_outline_lets_it_be():
-    item, higher = (make_base(5.0)[0] for _ in range(2))
-    item[U0 : V1 + 1], higher[U0 : V1 + 1] = (0.0, 18.0, 0.0, 8.0), (6.0, 12.0, -0.6, 8.7)
-    y = np.linspace(0.1, 7.9, 20)
-    assert is_in_row(item, higher[None], V0, y)
-    assert not is_in_row(item, higher[None], V0, np.linspace(-1.0, 9.0, 20))
 
 
 def test_houses_beside_a_higher_one_are_told_apart():

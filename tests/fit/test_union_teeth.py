@@ -8,7 +8,7 @@ import pytest
 import shapely
 from benchmarks.compounds import draw_compound
 
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.fit.union.larger import combine_parts
 from hiproof.fit.union.regions import unite_outlines
 from hiproof.fit.union.shown import absorb_slivers

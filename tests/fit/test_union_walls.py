@@ -6,11 +6,9 @@ import shapely
 from scipy.spatial import cKDTree
 
 from hiproof.fit.union.plan import FACADE_BORDER_M, find_roof_points, measure_depth, ring_edges
-from hiproof.fit.union.slivers import FEWEST_SEEN, drop_specks
-from hiproof.fit.union.volumes import V1, compute_roof_heights
 from hiproof.fit.walls import STEEPEST_ROOF, WALL_REACH_SPACINGS
 from hiproof.fit.walls import on_walls as found_on_walls
-from union_scenes import OUTLINES, draw_scene, draw_volumes
+from union_scenes import OUTLINES
 
 
 def scan_hip(rng, outline, density, pitch):
@@ -78,23 +76,3 @@ def test_too_few_points_lose_none():
     points = np.array([[5.95, 0.0, 3.0], [0.0, 3.95, 0.0], [0.0, 0.0, 5.0]])
     depth = np.array([0.05, 0.05, 4.0])
     assert find_roof_points(points, depth, 96.0).all()
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_no_volume_of_several_is_a_speck(seed):
-    rng = np.random.default_rng(seed)
-    volumes, scene = draw_volumes(rng), draw_scene(rng)
-    remainder = drop_specks(volumes.copy(), scene)
-    visible, original = (
-        np.bincount(
-            compute_roof_heights(rows, scene.U, scene.V, scene.order)[1][: scene.n],
-            minlength=len(rows),
-        )[1:]
-        for rows in (remainder, volumes)
-    )
-    assert len(remainder) == 2 or visible.min() >= FEWEST_SEEN
-    if original.min() >= FEWEST_SEEN:
-        assert (remainder == volumes).all()
-    else:
-        assert len(remainder) < len(volumes) or len(volumes) == 2
-    assert (remainder[1:, V1] <= volumes[:, V1].max()).all()

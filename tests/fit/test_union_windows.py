@@ -6,7 +6,7 @@ import shapely
 
 from hiproof import reconstruct
 from hiproof.compose import check_solid
-from hiproof.fit.union import fit_building
+from hiproof.fit.roof import fit_building
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from hiproof.fit.union.box import EMPTY_BOX

@@ -61,7 +61,7 @@ def fit_several(
 
     The network's opinion of the whole building does not matter to them.
     """
-    from ..fit.union import fit_building
+    from ..fit.roof import fit_building
 
     building = fit_building(points, outline, settings)
     return Fitted(

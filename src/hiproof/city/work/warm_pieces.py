@@ -40,7 +40,7 @@ def moves() -> None:
 
     Moves come first, so that `planes` is ready elsewhere when it is needed.
     """
-    from ...fit.union import fit_building
+    from ...fit.roof import fit_building
     from ...fit.union.improve import improve, simplify
     from ...fit.union.objective import compute_objective
     from ...fit.union.volumes import make_base

@@ -18,24 +18,35 @@ names       from volumes to named parts of the family of roof shapes
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 
-from ...model import Part
+from ...errors import FitError
+from ...model import Part, Piece, as_xyz
+from ...primitives.family import name_among
+from ...read.plausible import is_plausible
 from ...settings import Settings
-from ..union import fit_by
+from ..union.clamp import clamp_parts
+from ..union.curved import fit_curved_shapes
 from ..union.fit import BuildingFit
-from ..union.names import name_planes
+from ..union.larger import combine_parts
 from ..union.objective import is_base_visible
-from ..union.plan import Plan
+from ..union.outline import draw_outline
+from ..union.own import fit_custom_shapes
+from ..union.plan import Plan, lay_out_plan
+from ..union.regions import exclude_parts, list_polygons
 from ..union.scene import Scene
-from ..union.sides import choose_sides
-from ..union.unite import gather_ends
+from ..union.search import find_volumes
+from ..union.shown import find_highest, keep_visible
+from ..union.sides import choose_sides, gather_lines
 from .accept import improve
 from .beside import estimate_shift
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
 from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
+from .parts import name_planes
 from .price import Site, price_roof
 from .prices import UNKNOWN_UNITS, compute_unit
 from .regions import list_places
@@ -51,7 +62,14 @@ def fit_building(
     outline: shapely.Polygon | None = None,
     settings: Settings | None = None,
 ) -> BuildingFit:
-    """Fit the roof of one building, with the arguments, errors and outcome of the fit in use.
+    """Fit the roof of one building to `points_local` (n, 3) over `outline`.
+
+    Both are in metres of one local frame. Without an outline, it is estimated from the points. With
+    one, points outside it do not count. Where `settings.fit.types` names types, all parts have one
+    of these types or are flat.
+
+    Raises FitError if nothing can be fitted: if no points lie inside the outline, if it has no
+    area, or if the points span no area. Raises InputError for points of another shape.
 
     >>> x, y = np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4))
     >>> z = np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)
@@ -60,7 +78,29 @@ def fit_building(
     >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
     (['flat', 'gable'], 0.0)
     """
-    return fit_by(name_volumes, points_local, outline, settings or Settings())
+    points_local = as_xyz(points_local)
+    points_local = points_local[is_plausible(points_local)]
+    outline = draw_outline(points_local) if outline is None else outline
+    outline = select_largest_polygon(outline)
+    plan = lay_out_plan(points_local, outline)
+    if len(plan.cloud.u) == 0:
+        raise FitError(
+            "expected roof points inside the outline, got none; "
+            "add a cloud that covers the building"
+        )
+    settings = settings or Settings()
+    types = settings.fit.types
+    volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
+    visible = keep_visible(name_volumes(volumes, outline, plan, scene, settings), plan, scene)
+    parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
+    parts = fit_curved_shapes(parts, plan.points, outline, settings)
+    parts = [restrict_type(part, types, points_local) for part in parts]
+    z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
+    parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
+    if exclude_parts(parts, visible):  # new ones may hide others
+        parts = keep_visible(parts, plan, scene, widest_m2=0.0)
+    unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
+    return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
 
 
 def name_volumes(
@@ -95,7 +135,7 @@ def improve_beside(roof: Tables, site: Site) -> tuple[Tables, Site]:
 
 def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:
     """Return the tables of the search's volumes along walls."""
-    sides = choose_sides(volumes, gather_ends(outline, plan, scene).lines, scene)
+    sides = choose_sides(volumes, gather_lines(outline, plan, scene.turn), scene)
     return make_roof(volumes, sides, scene.turn, is_base_visible(volumes, scene))
 
 
@@ -117,3 +157,43 @@ def read_parts(
         local_axes = axes @ plan.frame.rotation
         parts.append(name_planes(planes, sides, local_axes, local, plan.frame, types))
     return parts
+
+
+def select_largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
+    """Return the largest polygon of an outline, made valid.
+
+    Raises FitError for an outline without area.
+    """
+    is_finite = math.isfinite(outline.area)
+    polygons = list_polygons(shapely.make_valid(outline)) if is_finite else []
+    if not polygons:
+        raise FitError(
+            f"expected an outline with an area, got a {outline.geom_type} without; give a polygon"
+        )
+    return max(polygons, key=lambda polygon: polygon.area)
+
+
+def measure_unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
+    """Return the share of points further than `tolerance_m` from the highest part."""
+    xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
+    z, _ = find_highest(parts, xy)
+    return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
+
+
+def restrict_type(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
+    """Return the part, or a flat one if its type is none of `types`.
+
+    The flat part lies at the median height of its `points` (n, 3).
+    """
+    if name_among(part.type, types) or part.type == "flat":
+        return part
+    inside = np.any(
+        [shapely.contains_xy(p.outline, points[:, 0], points[:, 1]) for p in part.pieces], axis=0
+    )
+    z = points[inside, 2] if inside.any() else np.array([part.translation[2]])
+    level = np.array([[0.0, 0.0, float(np.sort(z)[len(z) // 2])]])
+    pieces = tuple(Piece(outline, level) for outline in part.outlines)
+    size: dict[str, float] = {
+        name: part.parameters[name] for name in ("width", "length") if name in part.parameters
+    }
+    return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], level[0, 2]]))

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .draw import meets
-from .moves import MOVE_COLUMNS, SHARE, apply_move, list_moves
+from .moves import MOVE_COLUMNS, SHARE, TO_POINTS, apply_move, list_moves
 from .price import (
     fit_unknowns,
     list_points,
@@ -33,7 +33,8 @@ HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay befo
 LOOP_ROUNDS = 30  # Most rounds of the loop.
 MOST_MOVES = 20_000  # Most moves in a round.
 FIRST_JUDGES = 400  # Most points of a box that judge a move first. Of more, every k-th does.
-SHARE_UNITS = 1.5  # What they say of unknowns that are shared, which save half a unit, errs by this.
+# What they say errs by so much (units): more than what a move saves that changes little.
+SMALL_UNITS = 1.5
 KEPT_BOXES = 32  # Boxes whose price is kept.
 
 Known = namedtuple("Known", "boxes samples sizes weights misfits units next")
@@ -171,7 +172,8 @@ def improve(roof, trial, site, drawing):
         count = list_moves(roof, site, asked, moves)
         for m in range(count):
             gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, False)
-            if moves[m, 0] == SHARE and abs(gains[m]) < SHARE_UNITS * site.unit:
+            is_small = moves[m, 0] == SHARE or moves[m, 0] == TO_POINTS
+            if is_small and abs(gains[m]) < SMALL_UNITS * site.unit:
                 gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, True)
         trials += count
         order, has_improved = np.argsort(-gains[:count]), False

@@ -5,15 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ...geometry.arrays import measure_range
 from ..union.objective import compute_point_cost
-from ..union.sides import (
-    FEWEST_NEEDED,
-    LEAST_NEED,
-    MOVED_M,
-    MOVES,
-    SHOWN_M,
-    weigh_places,
-)
 from .draw import compute_height
 from .price import (
     OVER_M,
@@ -25,6 +18,14 @@ from .price import (
 from .tables import FAR_M, LINE_COUNT, N_SIDES, Tables, copy_tables
 
 ONE_LINE = 1e-4  # Lines whose coefficients differ less (m, radians) are one.
+SHOWN_M = 0.5  # Distance (m) next to a side in which points need its volume, unless it is hidden.
+MOVED_M = 1.0  # Furthest (m) that a side is moved to see how well points determine its place.
+MOVES = 50  # Steps in which it is moved each way.
+NATS_A_POINT = 3.0  # Log-likelihood that a point makes if it is explained.
+LEAST_NEED = 0.3  # A point that costs so much more without a volume needs it.
+FEWEST_NEEDED = 3  # Fewer such points show nothing.
+POINT_SIGMA_M = 0.03  # Standard deviation (m) of points in plan, of their swath and in their beam.
+LEAST_KNOWN = 0.05  # A place so likely at the end of the way is not determined.
 LOOSE_POINTS = 1e-6  # Weight (points) of an unknown that no point determines.
 
 
@@ -94,3 +95,15 @@ def move_side(roof, copy, k, s, out):
     box = copy.boxes[k]
     box[0], box[1] = box[0] - MOVED_M, box[1] + MOVED_M
     box[2], box[3] = box[2] - MOVED_M, box[3] + MOVED_M
+
+
+@compiled
+def weigh_places(cost, moved):
+    """Return the standard deviation (m) of a side by what it costs (points) where it is moved.
+
+    `cost` and `moved` (m) are (n,). It is infinite if the side may lie at either end of these.
+    """
+    weight = np.exp(-NATS_A_POINT * (cost - measure_range(cost)[0]))
+    if max(weight[0], weight[-1]) > LEAST_KNOWN * measure_range(weight)[1]:
+        return np.inf
+    return np.sqrt((weight * moved**2).sum() / weight.sum() + POINT_SIGMA_M**2)

@@ -13,9 +13,9 @@ from .tables import N_SIDES, measure_middle
 
 REACH_M = 2.5  # Distance (m) from a side within which it may lie instead.
 FEWEST = 4  # Fewest points on either side of a line that points show.
-MOST = 300  # Most points that are asked. Of more, every k-th is.
-LEANS = 15  # Ways to lean to either side.
-LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
+MOST = 600  # Most points that are asked. Of more, every k-th is.
+LEANS = 25  # Ways to lean to either side.
+LEAN_STEP = 0.01  # Steps (rise over run) in which a line leans.
 
 
 @compiled

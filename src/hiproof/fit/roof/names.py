@@ -11,10 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..union.finish import OutlineWall, Planes
-from ..union.names import GIVEN_M, STRAIGHT
 from ..union.sides import Side
 from ..union.volumes import LEVEL
+from .parts import GIVEN_M, STRAIGHT, OutlineWall, Planes
 from .tables import N_SIDES, UNKNOWN_COUNT, Tables, read_line
 
 FACED = 0.9  # Cosine of the angle up to which a plane faces one of four axes.
@@ -52,7 +51,7 @@ def read_planes(roof: Tables, k: int, axes: np.ndarray, covariance: np.ndarray) 
         if roof.slopes[k, p] >= 0:
             design[place, :, roof.slopes[k, p]] += [u, v, c]
     used = np.flatnonzero(design.any(axis=(0, 1)))
-    return Planes(rows, 0.0, design[:, :, used], covariance[np.ix_(used, used)], tuple(walls))
+    return Planes(rows, design[:, :, used], covariance[np.ix_(used, used)], tuple(walls))
 
 
 def find_place(u: float, v: float) -> tuple[int, float]:

@@ -22,7 +22,8 @@ from .prices import (
 from .tables import LINE_COUNT, N_SIDES, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
-SMALL_GAPS = 0.015  # What a difference that costs nothing costs (points): it decides between equals.
+# What the largest difference that costs nothing else costs (points). It decides between equals.
+SMALL_GAPS = 0.015
 DAMPING = 0.05  # Points that hold an unknown at its value.
 
 Site = namedtuple(

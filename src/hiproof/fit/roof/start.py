@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..union.finish import group_slopes
 from ..union.volumes import (
+    ALL_EQUAL,
     DIRECTION,
     LEAN0,
     LEVEL,
     OFFSET0,
+    OPPOSITE,
     REPLACES,
     SLOPE0,
+    TIE,
 )
 from .tables import (
     FAR_M,
@@ -71,3 +73,10 @@ def add_planes(roof: Tables, row: int, volume: np.ndarray, sides: list, axes: np
         line = add_line(roof, *(normal @ axes), -float(normal @ place))
         height = add_unknown(roof, z + slope * float(rise @ place))
         add_plane(roof, row, line, height, slopes[tie])
+
+
+def group_slopes(volume: np.ndarray) -> list[int]:
+    """Return which slopes are equal under the volume's tie."""
+    if volume[TIE] == ALL_EQUAL:
+        return [0, 0, 0, 0]
+    return [0, 0, 2, 2] if volume[TIE] == OPPOSITE else [0, 1, 2, 3]

@@ -1,4 +1,4 @@
-"""Run the passes after the search on groups of volumes of a large roof.
+"""Run a pass on groups of volumes of a large roof.
 
 A pass over all volumes at once costs their number times all points. In a window around a few of
 them it costs as much as on a house. What does not belong to the group returns as it was.
@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+import shapely
 
 from .add import MOST_VOLUMES
 from .box import Box, enclose_boxes
-from .regions import PlanSite
+from .plan import Plan
 from .scene import Scene
 from .volumes import SETTLED
 from .whole import POSITION, Whole
@@ -26,11 +27,13 @@ GROUP_POINTS = 6000  # Most points of a group's window.
 Pass = Callable[[np.ndarray, Scene], np.ndarray]
 
 
-def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarray:
+def run_in_groups(
+    change: Pass, volumes: np.ndarray, scene: Scene, plan: Plan, outline: shapely.Polygon
+) -> np.ndarray:
     """Let a pass change the volumes: all at once if they are few, else group by group."""
     if len(volumes) <= MOST_VOLUMES:
-        return change(volumes, site.scene)
-    whole = Whole(site.scene, site.plan, site.outline, volumes)
+        return change(volumes, scene)
+    whole = Whole(scene, plan, outline, volumes)
     for places in [
         [whole.volumes[k, POSITION].tobytes() for k in group] for group in group_volumes(whole)
     ]:
@@ -38,10 +41,10 @@ def run_in_groups(change: Pass, volumes: np.ndarray, site: PlanSite) -> np.ndarr
         view = open_group(whole, group) if group else None
         if view is None:
             continue
-        scene, numbers = view
+        window, numbers = view
         rows, unmoved = whole.volumes[numbers], [k for k in numbers[1:] if k not in group]
         rows[np.isin(numbers, [0, *unmoved]), SETTLED] = np.inf
-        new_rows = restore_volumes(change(rows, scene).copy(), whole.volumes, unmoved)
+        new_rows = restore_volumes(change(rows, window).copy(), whole.volumes, unmoved)
         whole.replace(numbers[1:], new_rows[1:])
     return forget_digests(whole.volumes)
 

@@ -19,7 +19,6 @@ from .moves import ALMOST_LEVEL
 from .objective import compute_objective
 from .plan import Plan
 from .prices import LARGE_ROOF_M2, compute_unit_points
-from .regions import PlanSite
 from .run_on import extend_ends
 from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
@@ -49,8 +48,8 @@ def find_volumes(
     )
     # Otherwise, the search of a house uses every point.
     if outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
-        site = PlanSite(outline, plan, full_scene, {})
-        volumes = run_in_groups(trim_and_extend, find_in_windows(plan, outline, full_scene), site)
+        volumes = find_in_windows(plan, outline, full_scene)
+        volumes = run_in_groups(trim_and_extend, volumes, full_scene, plan, outline)
         return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)

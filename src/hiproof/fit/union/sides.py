@@ -10,13 +10,12 @@ line leans where its points show that.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from ...compiled import compiled
-from ...geometry.arrays import measure_range
 from ...geometry.rings import is_convex
 from .around import compute_roof_everywhere, measure_context
 from .objective import compute_cell_cost, compute_point_cost
@@ -35,25 +34,8 @@ SHORTEST_LINE_M = 0.7  # Shortest length (m) of a line.
 CHORD_END_M = 0.6  # Distance (m) beyond a side of the ends of a line between corners.
 MOST_CHORD_CORNERS = 40  # Most corners of an outline with such lines.
 SHARED_M = 0.3  # A side takes its neighbour's line within this distance (m).
-SHOWN_M = 0.5  # Distance (m) next to a side in which points need its volume, unless it is hidden.
-MOVED_M = 1.0  # Furthest (m) that a side is moved to see how well points determine its place.
 LEANING_STEPS_M = (0.2, 0.04)  # Steps (m) in which the ends of a leaning side are sought.
 LEANING_PLACES = 5  # Places each way in which each end is tried.
-MOVES = 50  # Steps in which it is moved each way.
-# Reach (m) beyond a volume's edges, where its sides do not lean.
-SIDE_REACH_M = max(MOST_OFFSET_M, MOVED_M)
-NATS_A_POINT = 3.0  # Log-likelihood that a point makes if it is explained.
-LEAST_NEED = 0.3  # A point that costs so much more without a volume needs it.
-FEWEST_NEEDED = 3  # Fewer such points show nothing.
-POINT_SIGMA_M = 0.03  # Standard deviation (m) of points in plan, of their swath and in their beam.
-# The sides that meet in each corner, in order around a volume.
-CORNER_SIDES = (
-    (0, 2),
-    (1, 2),
-    (1, 3),
-    (0, 3),
-)
-LEAST_KNOWN = 0.05  # A place so likely at the end of the way is not determined.
 
 
 class SideLines(NamedTuple):
@@ -87,6 +69,12 @@ class Side:
     lean: float = 0.0
     anchored: bool = False
     sigma: float = 0.0
+
+
+def gather_lines(outline: shapely.Polygon, plan: Plan, turns: np.ndarray) -> list[list[SideLines]]:
+    """List the lines of an outline that sides may take, by direction, across u and across v."""
+    edges = list_edges(outline, plan)
+    return list_lines(edges, list_chords(outline, plan), turns, edges)
 
 
 def list_lines(
@@ -123,17 +111,8 @@ def choose_sides(
     """
     sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
     for k in range(1, len(volumes)):
-        offsets, lean, anchored, sigma = choose_volume_sides(
-            volumes, k, *lines[int(volumes[k, DIRECTION])], scene
-        )
-        sides.append(
-            [
-                Side(*side)
-                for side in zip(
-                    offsets.tolist(), lean.tolist(), anchored.tolist(), sigma.tolist(), strict=True
-                )
-            ]
-        )
+        chosen = choose_volume_sides(volumes, k, *lines[int(volumes[k, DIRECTION])], scene)
+        sides.append([Side(*side) for side in zip(*(x.tolist() for x in chosen), strict=True)])
     return share_lines(volumes, sides)
 
 
@@ -199,7 +178,7 @@ def select_lines(
 def choose_volume_sides(volumes, k, across_u, across_v, scene):
     """Choose each side of volume k on the cheapest of the lines across u and across v.
 
-    Returns the four values of `Side`, as arrays (4,).
+    Returns the first three values of `Side`, as arrays (4,).
     """
     direction = int(volumes[k, DIRECTION])
     numbers = find_near_places(volumes[k], across_u, scene.U[direction], scene.V[direction])
@@ -209,12 +188,7 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
         if numbers[q] >= scene.n:
             points_gain[q] = 0.0
     uv = scene.U[direction][numbers], scene.V[direction][numbers]
-    offsets, lean, anchored, sigma = (
-        volumes[k, U0 : V1 + 1].copy(),
-        np.zeros(4),
-        np.zeros(4, np.bool_),
-        np.zeros(4),
-    )
+    offsets, lean, anchored = volumes[k, U0 : V1 + 1].copy(), np.zeros(4), np.zeros(4, np.bool_)
     for edge in range(4):
         lines = across_u if edge < 2 else across_v
         m = find_cheapest_line(volumes[k], edge, lines, uv, gain, scene.evidence)
@@ -225,9 +199,7 @@ def choose_volume_sides(volumes, k, across_u, across_v, scene):
             offsets[edge], lean[edge] = find_leaning_line(
                 volumes[k], edge, lines, uv, points_gain, price
             )
-        line = (offsets[edge], lean[edge])
-        sigma[edge] = estimate_side_sigma(volumes[k], edge, lines, uv, gain, line, m >= 0)
-    return offsets, lean, anchored, sigma
+    return offsets, lean, anchored
 
 
 @compiled
@@ -240,8 +212,8 @@ def find_near_places(volume, across_u, u, v):
     least_v, most_v = across_u.y_extent[0], across_u.y_extent[1]
     wide, deep = volume[U0 + 1] - volume[U0], volume[V1] - volume[V0]
     reach_u, reach_v = (
-        SIDE_REACH_M + 0.5 * MOST_SIDE_LEAN * deep,
-        SIDE_REACH_M + 0.5 * MOST_SIDE_LEAN * wide,
+        MOST_OFFSET_M + 0.5 * MOST_SIDE_LEAN * deep,
+        MOST_OFFSET_M + 0.5 * MOST_SIDE_LEAN * wide,
     )
     u0, u1 = min(volume[U0], most_u) - reach_u, max(volume[U0 + 1], least_u) + reach_u
     v0, v1 = min(volume[V0], most_v) - reach_v, max(volume[V1], least_v) + reach_v
@@ -372,66 +344,6 @@ def move_ends(x, share, gain, price):
 
 
 @compiled
-def estimate_side_sigma(volume, edge, lines, uv, gain, line, anchored):
-    """Estimate the `sigma` of a side on a `line`, which is 0 if it is `anchored`."""
-    if not is_needed_at(volume, edge, lines, uv, gain):
-        return np.inf
-    return 0.0 if anchored else estimate_place_sigma(volume, edge, uv, gain, line)
-
-
-@compiled
-def is_needed_at(volume, edge, lines, uv, gain):
-    """Return whether points next to an edge of the volume need the volume.
-
-    Beyond the outline, points next to the outline count.
-    """
-    axis, sign = edge // 2, -1.0 if edge % 2 == 0 else 1.0
-    place = min(max(volume[U0 + edge], lines.x_extent[0]), lines.x_extent[1])
-    x, y = uv[axis], uv[1 - axis]
-    count = 0
-    for i in range(len(x)):
-        is_near = (
-            volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis]
-            and -SHOWN_M < sign * (x[i] - place) <= 0.0
-        )
-        count += int(is_near and gain[i] < -LEAST_NEED)
-    return count >= FEWEST_NEEDED
-
-
-@compiled
-def estimate_place_sigma(volume, edge, uv, gain, line):
-    """Estimate the standard deviation (m) of the place of a volume's edge on a `line`.
-
-    It follows from what the edge's points would cost with the line elsewhere within MOVED_M. It is
-    infinite if they do not determine the place, or if another place is better.
-    """
-    axis = edge // 2
-    sign = -1.0 if edge % 2 == 0 else 1.0
-    y = uv[1 - axis]
-    x = uv[axis] - line[0] - line[1] * y
-    moved = (np.arange(2 * MOVES + 1) - MOVES) * MOVED_M / MOVES
-    cost = np.zeros(len(moved))
-    for i in range(len(x)):
-        is_beside = volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis]
-        if gain[i] != 0.0 and is_beside and abs(x[i]) < MOVED_M:
-            for m in range(len(cost)):
-                cost[m] += gain[i] if sign * x[i] <= moved[m] else 0.0
-    return weigh_places(cost, moved)
-
-
-@compiled
-def weigh_places(cost, moved):
-    """Return the standard deviation (m) of a side by what it costs (points) where it is moved.
-
-    `cost` and `moved` (m) are (n,). It is infinite if the side may lie at either end of these.
-    """
-    weight = np.exp(-NATS_A_POINT * (cost - measure_range(cost)[0]))
-    if max(weight[0], weight[-1]) > LEAST_KNOWN * measure_range(weight)[1]:
-        return np.inf
-    return np.sqrt((weight * moved**2).sum() / weight.sum() + POINT_SIGMA_M**2)
-
-
-@compiled
 def is_near_side(lines, m, place, y_low, y_high):
     """Return whether line m is near the side x = `place` from `y_low` to `y_high`."""
     start, lean = lines.start[m], lines.lean[m]
@@ -491,24 +403,3 @@ def take_shared_line(side: Side, lines: list[Side], middle: float) -> Side:
     gaps = [abs(line.offset + line.lean * middle - side.offset) for line in lines]
     nearest = lines[gaps.index(min(gaps))]
     return Side(nearest.offset, nearest.lean) if min(gaps) < SHARED_M else side
-
-
-def find_corners(sides: list[Side]) -> np.ndarray:
-    """Return the corners (4, 2) where a volume's sides meet, in its direction's axes.
-
-    They are those of CORNER_SIDES.
-    """
-    corners = []
-    for i, j in CORNER_SIDES:
-        a, b = sides[i], sides[j]
-        corners.append(cross_lines(a.offset, a.lean, b.offset, b.lean))
-    return np.array(corners)
-
-
-def cross_lines(offset: Any, lean: Any, other_offset: Any, other_lean: Any) -> tuple[Any, Any]:
-    """Return x and y where the lines of two sides cross, as numbers or arrays.
-
-    They are x = offset + lean y, and y = other_offset + other_lean x.
-    """
-    x = (offset + lean * other_offset) / (1.0 - lean * other_lean)
-    return x, other_offset + other_lean * x

@@ -1,11 +1,11 @@
-"""Name volumes as parts: each is a member of the family of roof shapes."""
+"""Name planes and sides as parts: each is a member of the family of roof shapes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -13,11 +13,8 @@ import shapely
 from ...frames import PlanFrame
 from ...model import Part
 from ...primitives.family import AXIS, SIGN, Member, name_among
-from .finish import OutlineWall, Planes
-from .plan import Plan
-from .scene import Scene
-from .sides import Side
-from .volumes import DIRECTION, LEVEL, N_SIDES
+from ..union.sides import Side
+from ..union.volumes import LEVEL, N_SIDES
 
 EACH = np.arange(N_SIDES)
 LEVEL_EAVE_M = 0.5  # An eave that would be level with its side so little (m) further out is level.
@@ -35,22 +32,35 @@ RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # A plane (3, 1) changed by t
 PROBE_M = 0.01  # Distance (m) that an end is moved to see which parameters depend on it.
 
 
-def name_part(
-    volume: np.ndarray,
-    planes: Planes,
-    sides: list[Side],
-    regions: list[shapely.Polygon],
-    plan: Plan,
-    scene: Scene,
-    allowed: tuple[str, ...] = (),
-) -> Part:
-    """Name the volume over its `regions` (local coordinates) as a part of the family.
+class OutlineWall(NamedTuple):
+    """A wall of the outline in a volume's axes.
 
-    It has a name of `allowed` types if possible.
+    `facing` is the way that it faces outwards (rad), and `offset` how far out that way from the
+    origin it lies (m).
     """
-    c, s = scene.turn[int(volume[DIRECTION])]
-    axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
-    return name_planes(planes, sides, axes, regions, plan.frame, allowed)
+
+    facing: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Planes:
+    """A volume's planes by place: left, right, front, back, top, over each of `walls`.
+
+    `rows` (k, 3) are a, b, c of z = a u + b v + c, NaN where it has none. They are `design`
+    (k, 3, p) times p unknowns with this `covariance` (p, p).
+    """
+
+    rows: np.ndarray
+    design: np.ndarray
+    covariance: np.ndarray
+    walls: tuple[OutlineWall, ...] = ()
+
+    @property
+    def modes(self) -> np.ndarray:
+        """Independent changes (k, 3, p) of the rows, of one standard deviation each."""
+        variances, axes = np.linalg.eigh(self.covariance)
+        return self.design @ (axes * np.sqrt(np.maximum(variances, 0.0)))
 
 
 def name_planes(
