@@ -9,8 +9,8 @@ walls          which points lie on walls
 tables         the catalogue as arrays
 kernel         the likelihood with gradient and Hessian, minimised; compiled
 paper          the objective of the paper, as published
-union          `fit_building`: a roof as a union of few volumes
-roof           the same by one price and one loop, not in use yet
+roof           `fit_building`: a roof of few volumes, drawn by one price and one loop
+union          the search for these volumes, and larger and curved shapes
 outline        the outline of a building that comes without one
 align          how far a footprint lies beside its roof
 registration   how far all footprints of a data set do

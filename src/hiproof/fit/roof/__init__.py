@@ -7,13 +7,16 @@ tables      the state
 prices      the table of prices
 draw        compiled: the exact plan of a roof, its corners and low steps
 price       compiled: the price of a roof in a box, and the fit of its unknowns
+ends        compiled: where the points say that a volume ends
 moves       compiled: moves of a roof, which propose and do not judge
 accept      compiled: the one place that judges, and the loop
 site        what a roof has to explain: points, cells, the outline and its lines
 start       the tables of the volumes that the search found
+beside      how far the points lie beside the outline
 deviations  compiled: how well points determine unknowns and sides
 regions     which polygons each volume roofs
-names       from volumes to named parts of the family of roof shapes
+names       from volumes to planes and sides by place
+parts       from these to named parts of the family of roof shapes
 """
 
 from __future__ import annotations

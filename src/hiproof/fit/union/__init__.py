@@ -1,7 +1,6 @@
-"""Fit a building's roof as a union of parametric volumes.
+"""Search a building's roof as a union of parametric volumes, and fit larger and curved shapes.
 
-Structure must be worth its price in points, and all points share in the fit of the result. The roof
-is
+Structure must be worth its price in points. The roof is
 
     z(x, y) = max over volumes whose rectangle contains (x, y)  of  min over its at most five planes
 

@@ -28,11 +28,6 @@ def compute_point_cost(z_point, z_roof, dead, width):
     return r if r < 1.0 else 1.0
 
 
-def compute_misfits(z: np.ndarray, height: np.ndarray | float, scene) -> np.ndarray:
-    """Return what each point at `z` (n,) costs under a roof at `height` (n,)."""
-    return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
-
-
 @compiled
 def compute_cell_cost(z_roof, weight, shade, z_low, z_high):
     return (

@@ -35,10 +35,7 @@ Residuals of neighbouring points are not independent, the less so the denser the
 """
 
 DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
-"""Price of structure by detail: the ends of the curve that `benchmarks.curve` draws.
-
-Below a half every chimney is a part, above four even wings go.
-"""
+"""Price of structure by detail: below a half every chimney is a part, above four even wings go."""
 
 
 def compute_unit_points(density: float, area_m2: float, settings) -> float:
@@ -65,9 +62,7 @@ EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loo
 (lower than `low_step`, in metres), more in line with no corner, less where it ends in one.
 """
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # in this order
-LOW_STEP_COST_A_METRE = EDGE_PRICES.a_metre + EDGE_PRICES.low_a_metre  # of the drawn roof, too
 
-CORNER_COST = 0.5  # a corner of the drawn roof; above, recall and the share of points fall
 LOOSE_COST, UNSUPPORTED_COST, FAR_COST_A_METRE = 1.2, 0.3, 0.1
 """A side along no line of the outline, one with no wall below, each metre off the line."""
 
@@ -79,23 +74,9 @@ KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
 REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
 LEANING_SIDE_UNITS = 1.0  # a side that leans as its points say, along no line of the outline
-SHAPE_UNITS = 0.5  # the base in a gap, instead of the volume beside it
-BAY_UNITS = 1.0
-"""A level volume over a bay, of a common house's points.
-
-The Hague's even places at 2 and 5 points/m2: 84.3, 86.8 %; at 0.6 84.5, 86.8; at 1.5 84.3, 86.7.
-"""
-
-COPY_UNITS = 1.5
-"""A copy of a small volume.
-
-Vienna's even places: 82.0, 81.9, 81.8 % at 1, 2 and 3 units, 81.7 without copies.
-"""
 
 # What a change may cost that a draughtsman would make, in units.
 
-SLIVER_UNITS = 3.0  # dropping a plane or a volume of which hardly anything is visible
-FOLD_UNITS = 2.0  # a fold line that ends in a corner: nobody draws the short edge
 SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
 
 # How far above the best a change may begin and still become the best, in units.
@@ -109,9 +90,6 @@ Of 334 best additions 324 are still found.
 
 LEFT_OUT_UNITS, LEFT_OUT_SHARE = 4.0, 0.1  # leaving a volume out; besides, a share of the points
 CUT_UNITS = 10.0  # cutting a volume short, before its neighbours are drawn out
-ALONG_AXES_UNITS = 2.0  # fewer volumes along the axes, besides what planes that face walls gain
-FITTING_UNITS = 2.0  # that fitting may still gain
-REPAIR_UNITS = 2.5  # a repair, by its points alone: but for low steps, it may save no more
 
 # How much the points of a place must cost for a volume to be looked for.
 

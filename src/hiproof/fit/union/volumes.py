@@ -142,15 +142,6 @@ def measure_run(row, k, u, v):
     return (x if k % 2 == 0 else -x) + row[LEAN0 + k] * y
 
 
-def measure_runs(row: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return the runs (4, n) of a volume's four inclined planes at u, v (n,).
-
-    They are in metres from the axes' origin.
-    """
-    lean = row[LEAN0 : LEAN0 + N_SIDES]
-    return np.stack([u + lean[0] * v, -u + lean[1] * v, v + lean[2] * u, -v + lean[3] * u])
-
-
 @compiled
 def compute_roof_heights(volumes, U, V, order):
     """Return the height (n,) of the roof and the visible volume (n,) at U, V.
