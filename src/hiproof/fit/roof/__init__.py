@@ -50,7 +50,7 @@ from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
 from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
 from .parts import name_planes
-from .price import Site, price_roof
+from .price import Site
 from .prices import UNKNOWN_UNITS, compute_unit
 from .regions import list_places
 from .site import make_site
@@ -124,16 +124,15 @@ def improve_beside(roof: Tables, site: Site) -> tuple[Tables, Site]:
     Returns the roof and the site that it explains.
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
-    improve(roof, trial, site, drawing)
+    cost = improve(roof, trial, site, drawing)
     shift = estimate_shift(roof, site)
     if not shift.any():
         return roof, site
     moved = site._replace(x=site.x - shift[0], y=site.y - shift[1])
     other = make_tables_like(roof)
     copy_tables(roof, other)
-    improve(other, trial, moved, drawing)
-    cost = price_roof(other, drawing, moved) + 2 * UNKNOWN_UNITS * site.unit
-    return (other, moved) if cost < price_roof(roof, drawing, site) else (roof, site)
+    other_cost = improve(other, trial, moved, drawing) + 2 * UNKNOWN_UNITS * site.unit
+    return (other, moved) if other_cost < cost else (roof, site)
 
 
 def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:

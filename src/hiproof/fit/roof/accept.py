@@ -21,6 +21,7 @@ from .price import (
     list_view,
     price_drawing,
     price_misfit,
+    price_roof,
     price_tables,
 )
 from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes
@@ -159,13 +160,12 @@ def fit_roof(roof, site, rounds):
 
 @compiled
 def improve(roof, trial, site, drawing):
-    """Improve a roof by moves until none saves. Returns the number of trials."""
+    """Improve a roof by moves until none saves. Returns its price (points)."""
     known = make_known()
     size = len(roof.sides)
     asked, changed, box = np.ones(size, np.bool_), np.zeros(size, np.bool_), np.empty(4)
     touched = np.zeros(size, np.bool_)
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
-    trials = 0
     for _ in range(LOOP_ROUNDS):
         fit_roof(roof, site, FIT_ROUNDS)
         known.boxes[:] = np.nan
@@ -175,15 +175,12 @@ def improve(roof, trial, site, drawing):
             is_small = moves[m, 0] == SHARE or moves[m, 0] == TO_POINTS
             if is_small and abs(gains[m]) < SMALL_UNITS * site.unit:
                 gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, True)
-        trials += count
         order, has_improved = np.argsort(-gains[:count]), False
         touched[:] = False
         for q in range(count):
             m = order[q]
             if gains[m] <= LEAST_UNITS * site.unit:
                 break
-            if has_improved:
-                trials += 1
             gain = try_move(roof, trial, moves[m], site, drawing, known, changed, box, True)
             if gain <= LEAST_UNITS * site.unit:
                 continue
@@ -201,4 +198,4 @@ def improve(roof, trial, site, drawing):
                 asked[place] = touched[k]
                 place += 1
         pack(roof)
-    return trials
+    return price_roof(roof, drawing, site)

@@ -16,14 +16,16 @@ from .draw import compute_height, count_corners, draw, measure_low_steps, meets
 from .prices import (
     CORNER_UNITS,
     LOW_STEP_UNITS,
+    SKEW_UNITS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
-from .tables import LINE_COUNT, N_SIDES, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
+from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
 # What the largest difference that costs nothing else costs (points). It decides between equals.
 SMALL_GAPS = 0.015
+MOST_SKEW = 0.4  # Sine of the angle from which on a plane is meant to face another way.
 DAMPING = 0.05  # Points that hold an unknown at its value.
 
 Site = namedtuple(
@@ -120,7 +122,23 @@ def price_tables(roof):
             if slope >= 0 and not is_used[slope]:
                 is_used[slope] = True
                 total += UNKNOWN_UNITS
+        total += SKEW_UNITS * count_skew_planes(roof, k)
     return total
+
+
+@compiled
+def count_skew_planes(roof, k):
+    """Count the planes of volume k that are nearly, but not quite, square to the first."""
+    count, is_first, a, b = 0, True, 0.0, 0.0
+    for p in range(roof.n_planes[k]):
+        if roof.slopes[k, p] < 0:
+            continue
+        line = roof.lines[abs(roof.plane_lines[k, p]) - 1]
+        if is_first:
+            a, b, is_first = line[0], line[1], False
+        off = min(abs(a * line[0] + b * line[1]), abs(a * line[1] - b * line[0]))
+        count += int(ONE_PLANE < off < MOST_SKEW)
+    return count
 
 
 @compiled

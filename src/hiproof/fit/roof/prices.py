@@ -13,6 +13,7 @@ from ..union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
 DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs nothing.
 VOLUME_UNITS = 0.5  # A visible volume.
 UNKNOWN_UNITS = 0.45  # A height or a slope, however many planes share it.
+SKEW_UNITS = 0.1  # A plane that is not square to the first of its volume, but nearly.
 LEAN_UNITS = 1.0  # A line with a direction of its own.
 CORNER_UNITS = 0.5  # A corner of the drawn roof, at any level.
 LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
