@@ -15,6 +15,8 @@ HEAD = """# Roof types and their parameters
 
 `docs/draw_primitives.py` draws these figures from the shapes themselves.
 
+- The report, `hiproof view` and `hiproof evaluate` name types in words; files have the names of the
+  headings.
 - Lengths are in metres and pitches in degrees. Heights count from the lowest eave.
 - The front is the long side before a roof, and the back lies behind it. Left and right are the
   ends, seen from the front.

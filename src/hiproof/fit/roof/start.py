@@ -30,7 +30,7 @@ ROOM = 2  # Room for so many times the volumes that there are.
 
 
 def make_roof(volumes: np.ndarray, sides: list, turns: np.ndarray, with_base: bool) -> Tables:
-    """Return the tables of volumes along their `sides`, the base among them `with_base`, or alone."""
+    """Return the tables of volumes along their `sides`. The base is one `with_base`, or alone."""
     numbers = [k for k in range(len(volumes)) if k > 0 or with_base or len(volumes) == 1]
     size = ROOM * len(numbers) + 8
     roof = make_tables(size, 8 * size, 8 * size)
