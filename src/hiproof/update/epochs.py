@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import json
 from dataclasses import dataclass
@@ -156,7 +155,5 @@ def compare_ground(ground: np.ndarray, new: Surroundings, job: Job) -> np.ndarra
     `ground` (n, 3) is the earlier one. The terrain model of an update is that of no survey, so it
     does not count.
     """
-    by_points = copy.copy(new)
-    by_points.model = None
-    rise = TerrainChain(by_points.find_grounds(job)).height_at(ground) - ground[:, 2]
+    rise = TerrainChain(new.without_model().find_grounds(job)).height_at(ground) - ground[:, 2]
     return np.column_stack([ground[:, :2], rise])[np.isfinite(rise)]

@@ -121,9 +121,20 @@ class Surroundings:
 
     def without_moving(self) -> Surroundings:
         """Return the same surroundings, where footprints stay in place."""
-        result = copy.copy(self)
+        result = self.share_cells()
         result.plan = dataclasses.replace(self.plan, settings=self.settings)
         return result
+
+    def without_model(self) -> Surroundings:
+        """Return the same surroundings without their terrain model."""
+        result = self.share_cells()
+        result.model = None
+        return result
+
+    def share_cells(self) -> Surroundings:
+        """Return a copy with the cells of this one: a copy would find its own, again and again."""
+        _ = self.ground, self.low
+        return copy.copy(self)
 
     def find_row_shift(self, job: Job) -> Shift:
         """Return the shift of a job's area from its roof, that of its whole row."""
