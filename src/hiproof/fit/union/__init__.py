@@ -22,7 +22,6 @@ facings     compiled: moves that turn its planes
 improve     compiled: all moves in turn
 add, grow   volumes added one by one to a level base, and the first of them grown anew
 trim        hidden edges drawn in
-run_on      ends that stand out of a neighbour a little, moved until they are hidden in it
 search      these in order, and the simplification that a draughtsman would make
 large       roofs of more than 200 m2, searched in windows of bounded size
 box         upright boxes in the plan's axes

@@ -19,7 +19,6 @@ from .moves import ALMOST_LEVEL
 from .objective import compute_objective
 from .plan import Plan
 from .prices import LARGE_ROOF_M2, compute_unit_points
-from .run_on import extend_ends
 from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
 
@@ -49,7 +48,7 @@ def find_volumes(
     # Otherwise, the search of a house uses every point.
     if outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
         volumes = find_in_windows(plan, outline, full_scene)
-        volumes = run_in_groups(trim_and_extend, volumes, full_scene, plan, outline)
+        volumes = run_in_groups(trim_hidden, volumes, full_scene, plan, outline)
         return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
@@ -59,12 +58,9 @@ def find_volumes(
         volumes, lenient, compute_objective(volumes, lenient, np.inf), ALMOST_LEVEL
     )
     volumes, value = settle_volumes(volumes, full_scene)
-    volumes, value = trim(volumes, full_scene, value)
-    volumes, value = extend_ends(volumes, full_scene, value)
-    return volumes, value, full_scene
+    return *trim(volumes, full_scene, value), full_scene
 
 
-def trim_and_extend(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """Draw hidden edges in, and extend ends that stand out of a neighbour into it."""
-    volumes, value = trim(volumes, scene, compute_objective(volumes, scene, np.inf))
-    return extend_ends(volumes, scene, value)[0]
+def trim_hidden(volumes: np.ndarray, scene: Scene) -> np.ndarray:
+    """Draw hidden edges in."""
+    return trim(volumes, scene, compute_objective(volumes, scene, np.inf))[0]
