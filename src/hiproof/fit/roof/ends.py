@@ -9,41 +9,52 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from .prices import LEAN_UNITS
 from .tables import N_SIDES, measure_middle
 
 REACH_M = 2.5  # Distance (m) from a side within which it may lie instead.
 FEWEST = 4  # Fewest points on either side of a line that points show.
 MOST = 600  # Most points that are asked. Of more, every k-th is.
-LEANS = 25  # Ways to lean to either side.
-LEAN_STEP = 0.01  # Steps (rise over run) in which a line leans.
+LEANS = 12  # Ways to lean to either side.
+LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
 
 @compiled
 def find_end(roof, k, s, site):
     """Return a, b, c of the line along which side s of volume k tells most points apart.
 
-    All are 0 where points do not say.
+    All are 0 where points do not say so clearly that it pays.
     """
     x, y, length = measure_middle(roof, k, s, site.bounds)
     if length == 0.0:
         return 0.0, 0.0, 0.0
     a, b, c = roof.half_planes[k, s]
-    across, along, is_on, count = list_near(roof, k, s, x, y, site)
-    n_on = is_on[:count].sum()
+    across, along, is_on, step = list_near(roof, k, s, x, y, site)
+    count = len(is_on)
+    n_on = is_on.sum()
     if n_on < FEWEST or count - n_on < FEWEST:
         return 0.0, 0.0, 0.0
-    best, best_lean, best_end = -1, 0.0, 0.0
-    for turn in range(2 * LEANS + 1):
-        step = (turn + 1) // 2 * (1 if turn % 2 else -1)
-        lean = step * LEAN_STEP
-        places = across[:count] - lean * along[:count]
+    best, best_lean, best_end = 0, 0.0, 0.0
+    for i in range(count):
+        best += int(is_on[i] == (across[i] >= 0.0))
+    best += int(LEAN_UNITS * site.unit / step)  # what it costs, if it leans
+    is_better, middle = False, 0.0
+    for turn in range(2 * LEANS + 3):
+        lean = (turn + 1) // 2 * (LEAN_STEP if turn % 2 else -LEAN_STEP)
+        if turn == 2 * LEANS + 1:
+            middle = best_lean
+        if turn > 2 * LEANS:  # at last, beside the best
+            lean = middle + (0.5 if turn % 2 else -0.5) * LEAN_STEP
+        places = across - lean * along
         order = np.argsort(places)
         right = n_on
         for i in range(count - 1):
             right += -1 if is_on[order[i]] else 1
             if right > best:
-                best, best_lean = right, lean
+                best, best_lean, is_better = right, lean, True
                 best_end = 0.5 * (places[order[i]] + places[order[i + 1]])
+    if not is_better:
+        return 0.0, 0.0, 0.0
     # across - lean * along = end, with along = b (x - x0) - a (y - y0) in plan
     d, e = a - best_lean * b, b + best_lean * a
     norm = np.sqrt(d * d + e * e)
@@ -56,7 +67,7 @@ def list_near(roof, k, s, x, y, site):
     """List the points near side s of volume k and between its other sides.
 
     Returns their distances from the side and along it from x, y, whether they lie on the volume,
-    and their number.
+    and that each of them stands for so many.
     """
     box, half = roof.boxes[k], roof.half_planes[k, s]
     first = np.searchsorted(site.x[: site.n], box[0] - REACH_M)
@@ -85,4 +96,4 @@ def list_near(roof, k, s, x, y, site):
             row = roof.planes[k, p]
             lowest = min(lowest, row[0] * u + row[1] * v + row[2])
         is_on[m] = abs(site.z[numbers[m]] - lowest) < site.dead + site.width
-    return across, along, is_on, len(numbers)
+    return across, along, is_on, step

@@ -64,6 +64,7 @@ BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is 
 COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume is drawn out.
 MOST_LINES = 7  # Most lines to which a side is moved.
 RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
+MOST_SHARED_M = 40.0  # Unknowns are shared within so wide a part (m) of a roof: it is priced whole.
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
 ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
 
@@ -125,7 +126,7 @@ def list_moves(roof, site, asked, moves):
                 count = list_equal_planes(roof, site, j, k, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
         count = write_move(moves, count, ADD_BAY, bay, 0, 0, 0)
-    return list_shares(roof, asked, moves, count)
+    return list_shares(roof, site, asked, moves, count)
 
 
 @compiled
@@ -175,8 +176,8 @@ def list_equal_planes(roof, site, j, k, moves, count):
 
 
 @compiled
-def list_shares(roof, asked, moves, count):
-    """Write the pairs of unknowns nearly alike, of volumes near each other, the nearest first."""
+def list_shares(roof, site, asked, moves, count):
+    """Write the pairs of unknowns nearly alike, of volumes that lie in one part of the roof."""
     n = roof.counts[UNKNOWN_COUNT]
     kinds, boxes, is_asked = np.zeros(n, np.int64), np.zeros((n, 4)), np.zeros(n, np.bool_)
     for k in range(roof.counts[VOLUME_COUNT]):
@@ -206,7 +207,13 @@ def list_shares(roof, asked, moves, count):
                 box[3] + NEIGHBOUR_M,
             )
             alike = ALIKE_HEIGHTS_M if kinds[a] == 1 else ALIKE_SLOPES
-            if gap < (alike if is_close else SAME_FAR):
+            wide = min(max(boxes[a, 1], box[1]), site.bounds[1]) - max(
+                min(boxes[a, 0], box[0]), site.bounds[0]
+            )
+            deep = min(max(boxes[a, 3], box[3]), site.bounds[3]) - max(
+                min(boxes[a, 2], box[2]), site.bounds[2]
+            )
+            if max(wide, deep) < MOST_SHARED_M and gap < (alike if is_close else SAME_FAR):
                 count = write_move(moves, count, SHARE, a, b, 0, 0)
     return count
 

@@ -13,9 +13,7 @@ from .allowed import list_allowed_shapes
 from .block import settle_volumes
 from .groups import run_in_groups
 from .grow import grow
-from .improve import simplify
 from .large import find_in_windows
-from .moves import ALMOST_LEVEL
 from .objective import compute_objective
 from .plan import Plan
 from .prices import LARGE_ROOF_M2, compute_unit_points
@@ -23,8 +21,6 @@ from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
 
 SEARCH_POINTS = 600  # Points in which structure is searched. All of them settle it.
-LENIENT_DEAD_M = 0.1  # Difference (m) that a person would leave out.
-LENIENT_SOFT_M = 0.18  # Distance (m) over which larger differences grow to the cost of a point.
 
 
 def find_volumes(
@@ -52,11 +48,6 @@ def find_volumes(
         return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
-    volumes, value = settle_volumes(volumes, full_scene)
-    lenient = scene._replace(dead=LENIENT_DEAD_M, width=LENIENT_SOFT_M)
-    volumes, _ = simplify(
-        volumes, lenient, compute_objective(volumes, lenient, np.inf), ALMOST_LEVEL
-    )
     volumes, value = settle_volumes(volumes, full_scene)
     return *trim(volumes, full_scene, value), full_scene
 
