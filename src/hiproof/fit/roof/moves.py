@@ -31,7 +31,7 @@ from .tables import (
 (
     LEAVE_OUT,  # volume a
     LEAVE_PLANE,  # plane b of volume a
-    SHARE,  # unknown b becomes a
+    SHARE,  # unknown b becomes a, which keeps its value if c
     TO_OUTLINE,  # side b of volume a on line c of the outline
     TO_LINE,  # side b of volume a on line c of the roof
     RUN_ON,  # side b of volume a, by step c
@@ -64,7 +64,9 @@ BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is 
 COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume is drawn out.
 MOST_LINES = 7  # Most lines to which a side is moved.
 RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
-MOST_SHARED_M = 40.0  # Unknowns are shared within so wide a part (m) of a roof: it is priced whole.
+MOST_SHARED_M = (
+    40.0  # A part of a roof so wide (m) is priced whole. What lies beyond keeps its value.
+)
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
 ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
 
@@ -213,9 +215,20 @@ def list_shares(roof, site, asked, moves, count):
             deep = min(max(boxes[a, 3], box[3]), site.bounds[3]) - max(
                 min(boxes[a, 2], box[2]), site.bounds[2]
             )
-            if max(wide, deep) < MOST_SHARED_M and gap < (alike if is_close else SAME_FAR):
+            if gap >= (alike if is_close else SAME_FAR):
+                continue
+            if max(wide, deep) < MOST_SHARED_M:
                 count = write_move(moves, count, SHARE, a, b, 0, 0)
+            elif measure_box_area(boxes[a]) > measure_box_area(box):
+                count = write_move(moves, count, SHARE, a, b, 1, 0)
+            else:
+                count = write_move(moves, count, SHARE, b, a, 1, 0)
     return count
+
+
+@compiled
+def measure_box_area(box):
+    return (box[1] - box[0]) * (box[3] - box[2])
 
 
 @compiled
@@ -349,7 +362,7 @@ def apply_move(roof, move, site, changed):
     kind, a, b, c, d = move[0], move[1], move[2], move[3], move[4]
     changed[:] = False
     if kind == SHARE:
-        return share(roof, a, b, changed)
+        return share(roof, a, b, c, changed)
     if kind == ADD_BAY:
         k = add_bay(roof, site, a)
         changed[k] = True
@@ -498,14 +511,14 @@ def add_bay(roof, site, bay):
 
 
 @compiled
-def share(roof, a, b, changed):
-    """Let unknown `a` stand for `b`, too."""
+def share(roof, a, b, keeps, changed):
+    """Let unknown `a` stand for `b`, too. It `keeps` its value, or takes the mean of both."""
     n_a, n_b = 0, 0
     for k in range(roof.counts[VOLUME_COUNT]):
         for p in range(roof.n_planes[k]):
             if roof.heights[k, p] == a or roof.slopes[k, p] == a:
                 n_a += 1
-                changed[k] = True
+                changed[k] |= not keeps
             if roof.heights[k, p] == b:
                 roof.heights[k, p] = a
                 n_b += 1
@@ -516,7 +529,8 @@ def share(roof, a, b, changed):
                 changed[k] = True
     if n_a == 0 or n_b == 0:
         return False
-    roof.values[a] = (n_a * roof.values[a] + n_b * roof.values[b]) / (n_a + n_b)
+    if not keeps:
+        roof.values[a] = (n_a * roof.values[a] + n_b * roof.values[b]) / (n_a + n_b)
     for k in range(roof.counts[VOLUME_COUNT]):
         if changed[k]:
             place_volume(roof, k)
