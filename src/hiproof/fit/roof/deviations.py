@@ -54,11 +54,12 @@ def estimate_side_sigmas(roof, inner, outer, site, k, anchored):
     """Return the standard deviations (4,) of the places of volume k's sides.
 
     A side is hidden, and has an infinite one, if no points next to it need its volume. One that is
-    `anchored` (4,) to the outline has none. `inner` and `outer` are room for copies of the roof.
+    `anchored` (4,) to the outline has none, nor has an end out of sight, which is the outline's.
+    `inner` and `outer` are room for copies of the roof.
     """
     sigmas = np.full(N_SIDES, np.inf)
     if roof.boxes[k, 1] - roof.boxes[k, 0] >= FAR_M:
-        return sigmas
+        return np.zeros(N_SIDES)
     box = roof.boxes[k] + np.array([-MOVED_M, MOVED_M, -MOVED_M, MOVED_M])
     view, points = list_view(roof, box), list_points(site, box)
     moved = (np.arange(2 * MOVES + 1) - MOVES) * MOVED_M / MOVES

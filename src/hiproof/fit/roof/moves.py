@@ -13,6 +13,7 @@ from .draw import meets
 from .ends import find_end
 from .prices import LEAN_UNITS
 from .tables import (
+    FAR_M,
     LINE_COUNT,
     N_SIDES,
     NO_UNKNOWN,
@@ -439,8 +440,12 @@ def change_plane(roof, move, site):
     if kind == LEAVE_PLANE and roof.n_planes[k] > 1:
         drop_plane(roof, k, b)
     elif kind == TILT and is_level:
+        line, (x, y) = roof.sides[k, c], find_centre(roof, k, site)
+        d, e, f = read_line(roof, line)
+        if f > 0.5 * FAR_M:  # an end out of sight: it rises from its middle
+            line = add_line(roof, d, e, -d * x - e * y)
         roof.heights[k, b] = add_unknown(roof, roof.values[roof.heights[k, b]])
-        roof.plane_lines[k, b], roof.slopes[k, b] = roof.sides[k, c], add_unknown(roof, 0.0)
+        roof.plane_lines[k, b], roof.slopes[k, b] = line, add_unknown(roof, 0.0)
     elif kind == TO_EAVE and not is_level:
         return put_on_eave(roof, k, b, c, site)
     elif kind == MAKE_LEVEL and not is_level:
