@@ -112,7 +112,7 @@ def name_volumes(
     """Draw the search's volumes, improve them until no move saves, and name them as parts."""
     plan_outline = shapely.transform(outline, plan.frame.uv_plan)
     unit = compute_unit(plan.density, settings.compound)
-    site = make_site(scene, plan_outline, unit, plan.border)
+    site = make_site(scene, plan_outline, unit, plan.border, bool(settings.fit.types))
     roof = start_roof(volumes, outline, plan, scene)
     roof, site = improve_beside(roof, site)
     return read_parts(roof, site, plan_outline, plan, settings.fit.types)

@@ -103,14 +103,14 @@ def list_moves(roof, site, asked, moves):
             continue
         count = write_move(moves, count, LEAVE_OUT, k, 0, 0, 0)
         for p in range(roof.n_planes[k]):
-            if roof.n_planes[k] > 1:
+            if roof.n_planes[k] > 1 and not site.keeps_shapes:
                 count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
             if roof.slopes[k, p] >= 0:
                 count = write_move(moves, count, MAKE_LEVEL, k, p, 0, 0)
                 for q in range(roof.n_planes[k]):
                     if roof.slopes[k, q] >= 0 and roof.heights[k, q] != roof.heights[k, p]:
                         count = write_move(moves, count, TO_EAVE, k, p, roof.heights[k, q], 0)
-            elif roof.n_planes[k] == 1:
+            elif roof.n_planes[k] == 1 and not site.keeps_shapes:
                 for s in range(N_SIDES):
                     count = write_move(moves, count, TILT, k, p, s, 0)
         for way in range(FACE_SIDES, FACE_SECOND + 1):
@@ -121,11 +121,11 @@ def list_moves(roof, site, asked, moves):
         cuts = 0
         for m in range(len(site.lines)):
             cuts += int(cuts_corner(roof, k, site.lines[m]))
-        for way in range(4 if cuts > 0 else 2):
+        for way in range(4 if cuts > 0 and not site.keeps_shapes else 2):
             count = write_move(moves, count, LEVEL_EAVES, k, way % 2, way // 2, 0)
         for j in range(roof.counts[VOLUME_COUNT]):
             if j != k and roof.n_planes[j] > 0 and (j < k or not asked[j]):
-                count = list_merges(roof, j, k, moves, count)
+                count = list_merges(roof, site, j, k, moves, count)
                 count = list_equal_planes(roof, site, j, k, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
         count = write_move(moves, count, ADD_BAY, bay, 0, 0, 0)
@@ -133,7 +133,7 @@ def list_moves(roof, site, asked, moves):
 
 
 @compiled
-def list_merges(roof, j, k, moves, count):
+def list_merges(roof, site, j, k, moves, count):
     if roof.replaces[j] != roof.replaces[k] or not is_near(roof, j, k):
         return count
     first, second, third = (
@@ -145,8 +145,9 @@ def list_merges(roof, j, k, moves, count):
     across = abs(first[0] * third[0] + first[1] * third[1])
     if max(along, across) >= SAME_DIRECTION:
         for way in range(FACE_SECOND + 1):
-            count = write_move(moves, count, MERGE, j, k, way, 1)
-            count = write_move(moves, count, MERGE, k, j, way, 1)
+            if not site.keeps_shapes or has_alike(roof, j, k):
+                count = write_move(moves, count, MERGE, j, k, way, 1)
+                count = write_move(moves, count, MERGE, k, j, way, 1)
         if roof.n_planes[j] != roof.n_planes[k] or not has_alike(roof, j, k):
             count = write_move(moves, count, MERGE, j, k, 0, 0)
             count = write_move(moves, count, MERGE, k, j, 0, 0)
@@ -263,6 +264,7 @@ def list_side_moves(roof, site, k, moves, count):
             line = site.lines[m]
             if (
                 line[5] > 0.0
+                and not site.keeps_shapes
                 and half[0] * line[0] + half[1] * line[1] > LINE_COSINE
                 and line[0] * x + line[1] * y + line[2] > COVER_M
             ):
@@ -298,7 +300,7 @@ def note_line(half, x, y, a, b, c, kind, number, near, found):
 @compiled
 def list_new_planes(roof, site, k, moves, count):
     """Write planes over further sides of volume k, and over walls that cut its corners off."""
-    if roof.n_planes[k] >= VOLUME_PLANES:
+    if roof.n_planes[k] >= VOLUME_PLANES or site.keeps_shapes:
         return count
     for p in range(roof.n_planes[k]):
         if roof.slopes[k, p] < 0:

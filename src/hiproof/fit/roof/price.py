@@ -31,7 +31,7 @@ DAMPING = 0.05  # Points that hold an unknown at its value.
 Site = namedtuple(
     "Site",
     "x y z weight shade n low high dead width unit parts part_sizes part_boxes lines bays "
-    "bay_heights bounds",
+    "bay_heights bounds keeps_shapes",
 )
 """What the roof of a building has to explain.
 
@@ -43,6 +43,7 @@ Site = namedtuple(
 - lines (m, 6): lines of the outline, as `site.list_outline_lines` says.
 - bays (b, 4, 3), bay_heights (b,): sides and heights of places that a wall cuts off.
 - bounds (4,): least and greatest x and y of the outline.
+- keeps_shapes: whether no move may change which planes a volume has, because types are given.
 """
 
 

@@ -21,7 +21,9 @@ BAY_POINTS = 3  # Fewer points show no height.
 CONVEX_PART_M2 = 1e-6  # Area (m2) of the smallest part.
 
 
-def make_site(scene, outline: shapely.Polygon, unit: float, border: np.ndarray) -> Site:
+def make_site(
+    scene, outline: shapely.Polygon, unit: float, border: np.ndarray, keeps_shapes: bool = False
+) -> Site:
     """Return the site of an `outline` (plan coordinates) with the points of a scene.
 
     Of the points (3, b) beside the `border`, which may be on walls, those in bays count.
@@ -61,6 +63,7 @@ def make_site(scene, outline: shapely.Polygon, unit: float, border: np.ndarray) 
         bays,
         heights,
         np.array([x0, x1, y0, y1]),
+        keeps_shapes,
     )
 
 
