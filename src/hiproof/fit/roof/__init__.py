@@ -44,18 +44,18 @@ from ..union.scene import Scene
 from ..union.search import find_volumes
 from ..union.shown import find_highest, keep_visible
 from ..union.sides import choose_sides, gather_lines
-from .accept import FIT_ROUNDS, fit_roof, improve
+from .accept import improve
 from .beside import estimate_shift
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
 from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
 from .parts import name_planes
 from .price import Site
-from .prices import compute_unit
+from .prices import UNKNOWN_UNITS, compute_unit
 from .regions import list_places
 from .site import make_site
 from .start import make_roof
-from .tables import Tables, make_tables_like
+from .tables import Tables, copy_tables, make_tables_like
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -119,15 +119,20 @@ def name_volumes(
 
 
 def improve_beside(roof: Tables, site: Site) -> tuple[Tables, Site]:
-    """Improve a roof with its points moved to where its eaves are level.
+    """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
 
     Returns the roof and the site that it explains.
     """
-    fit_roof(roof, site, FIT_ROUNDS)
+    trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
+    cost = improve(roof, trial, site, drawing)
     shift = estimate_shift(roof, site)
-    site = site._replace(x=site.x - shift[0], y=site.y - shift[1])
-    improve(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
-    return roof, site
+    if not shift.any():
+        return roof, site
+    moved = site._replace(x=site.x - shift[0], y=site.y - shift[1])
+    other = make_tables_like(roof)
+    copy_tables(roof, other)
+    other_cost = improve(other, trial, moved, drawing) + 2 * UNKNOWN_UNITS * site.unit
+    return (other, moved) if other_cost < cost else (roof, site)
 
 
 def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:

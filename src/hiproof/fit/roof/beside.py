@@ -1,8 +1,8 @@
 """Estimate how far a building's points lie beside its outline.
 
 Clouds lie some centimetres beside their outlines. Then planes that rise from walls at one height
-seem to rise at several, and their hips and valleys end beside the outline's corners. With the
-points moved back, equal eaves are equal.
+seem to rise at several, and their hips and valleys end beside the outline's corners. Two numbers
+that all planes share say so: with the points moved back, equal eaves are equal.
 """
 
 from __future__ import annotations
