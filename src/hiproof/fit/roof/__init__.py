@@ -28,6 +28,7 @@ import shapely
 
 from ...errors import FitError
 from ...model import Part, Piece, as_xyz
+from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
@@ -112,7 +113,9 @@ def name_volumes(
     """Draw the search's volumes, improve them until no move saves, and name them as parts."""
     plan_outline = shapely.transform(outline, plan.frame.uv_plan)
     unit = compute_unit(plan.density, settings.compound)
-    site = make_site(scene, plan_outline, unit, plan.border, bool(settings.fit.types))
+    types = settings.fit.types
+    keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
+    site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
     roof = start_roof(volumes, outline, plan, scene)
     roof, site = improve_beside(roof, site)
     return read_parts(roof, site, plan_outline, plan, settings.fit.types)

@@ -43,7 +43,7 @@ Site = namedtuple(
 - lines (m, 6): lines of the outline, as `site.list_outline_lines` says.
 - bays (b, 4, 3), bay_heights (b,): sides and heights of places that a wall cuts off.
 - bounds (4,): least and greatest x and y of the outline.
-- keeps_shapes: whether no move may change which planes a volume has, because types are given.
+- keeps_shapes: whether volumes keep their planes, because not all types may be built.
 """
 
 
