@@ -118,7 +118,7 @@ def name_volumes(
     site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
     roof = start_roof(volumes, outline, plan, scene)
     roof, site = improve_beside(roof, site)
-    return read_parts(roof, site, plan_outline, plan, settings.fit.types)
+    return read_parts(roof, site, plan_outline, plan, types)
 
 
 def improve_beside(roof: Tables, site: Site) -> tuple[Tables, Site]:

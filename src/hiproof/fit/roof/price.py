@@ -17,14 +17,13 @@ from .prices import (
     CORNER_UNITS,
     LOW_STEP_UNITS,
     SKEW_UNITS,
+    SMALL_GAP_POINTS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
 from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
-# What the largest difference that costs nothing else costs (points). It decides between equals.
-SMALL_GAPS = 0.015
 MOST_SKEW = 0.4  # Sine of the angle from which on a plane is meant to face another way.
 DAMPING = 0.05  # Points that hold an unknown at its value.
 
@@ -85,7 +84,7 @@ def price_misfit(roof, site, view, points):
             height, _, _ = compute_height(roof, view, site.x[i], site.y[i], OVER_M)
             gap = min(abs(site.z[i] - height), site.dead) / site.dead
             total += compute_point_cost(site.z[i], height, site.dead, site.width)
-            total += SMALL_GAPS * gap * gap
+            total += SMALL_GAP_POINTS * gap * gap
         else:
             height, _, _ = compute_height(roof, view, site.x[i], site.y[i], 0.0)
             total += compute_cell_cost(height, site.weight[i], site.shade[i], site.low, site.high)

@@ -44,12 +44,10 @@ def list_places(
         if len(owners) > 1:
             whole = list_polygons(shapely.union_all(whole, grid_size=OVERLAY_GRID_M))
         areas = [unite_fragments(drawing, fragments) for fragments in places_of_one.values()]
-        inside = is_inside(visible, owner)
-        if inside:
-            areas = list_polygons(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
-        large = [area for area in areas if area.area > LEAST_PLACE_M2]
-        hull = shapely.union_all(large).convex_hull
-        if len(large) < 2 or (not inside and crosses(visible, owner, hull)):
+        apart = list_polygons(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
+        inside = max(len(areas), len(apart)) > 1 and is_inside(visible, owner)
+        large = [area for area in (apart if inside else areas) if area.area > LEAST_PLACE_M2]
+        if len(large) < 2 or (not inside and crosses(visible, owner, large)):
             places.append((owner, whole, len(owners) > 1 or len(large) > 1))
         else:
             places += [(owner, p, True) for p in split_region(whole, large, outline) if p]
@@ -76,11 +74,12 @@ def is_inside(visible: dict[int, shapely.Geometry], k: int) -> bool:
     )
 
 
-def crosses(visible: dict[int, shapely.Geometry], k: int, hull: shapely.Geometry) -> bool:
+def crosses(visible: dict[int, shapely.Geometry], k: int, places: list[shapely.Geometry]) -> bool:
     """Return whether volume k and one that hides its middle stand out of each other on both sides.
 
-    `hull` is that of the places in which volume k is visible.
+    `places` are those in which volume k is visible.
     """
+    hull = shapely.union_all(places).convex_hull
     return any(
         j != k and count_large(subtract(hull, area)) > 1 and count_large(subtract(area, hull)) > 1
         for j, area in visible.items()
