@@ -8,7 +8,7 @@ from hiproof.errors import FitError, InputError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit import fit_roof
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.clamp import CLAMP_M, LEAST_EXCESS_M2, MISSED_SPACINGS, clamp_parts
+from hiproof.fit.shapes.clamp import CLAMP_M, LEAST_EXCESS_M2, MISSED_SPACINGS, clamp_parts
 from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings
 from points_of_roofs import sample_heights

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.fit.shapes.composite import combine_parts
 from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.larger import combine_parts
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.sides import Side, choose_sides, gather_lines

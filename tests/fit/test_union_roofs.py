@@ -11,7 +11,7 @@ from benchmarks.matching import has_hidden_end, list_right_types, merge_alike
 from hiproof.compose import check_solid, compose
 from hiproof.fit.roof import fit_building
 from hiproof.fit.roof.parts import REGISTERED_M, REGISTERED_PLAN_M
-from hiproof.fit.union.larger import combine_parts
+from hiproof.fit.shapes.composite import combine_parts
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import COMPONENTS, GENERAL_SHAPES, compute_planes

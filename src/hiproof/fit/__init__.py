@@ -10,7 +10,8 @@ tables         the catalogue as arrays
 kernel         the likelihood with gradient and Hessian, minimised; compiled
 paper          the objective of the paper, as published
 roof           `fit_building`: a roof of few volumes, drawn by one price and one loop
-union          the search for these volumes, and larger and curved shapes
+union          the search for these volumes
+shapes         larger and curved shapes in place of its parts
 outline        the outline of a building that comes without one
 align          how far a footprint lies beside its roof
 registration   how far all footprints of a data set do

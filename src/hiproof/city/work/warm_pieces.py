@@ -102,12 +102,10 @@ def single() -> None:
 
 def curves() -> None:
     """Compile what shows that a part is none of the curved shapes."""
-    from ...fit.union.drums import find_circle
-    from ...fit.union.round_tops import find_centre, measure_fall
+    from ...fit.shapes.round_tops import find_centre, measure_fall
 
     xyz, middle = house(), np.array([3.0, 3.5])
     measure_fall(xyz, find_centre(xyz, middle, 3.0), 3.0, 0.5)
-    find_circle(xyz, 3.0, xyz[:, 2] == 3.0)
 
 
 def outlines() -> None:

@@ -32,18 +32,18 @@ from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
-from ..union.clamp import clamp_parts
-from ..union.curved import fit_curved_shapes
+from ..shapes.clamp import clamp_parts
+from ..shapes.composite import combine_parts
+from ..shapes.curved import fit_curved_shapes
+from ..shapes.custom import fit_custom_shapes
+from ..shapes.regions import exclude_parts, list_polygons
+from ..shapes.shown import find_highest, keep_visible
 from ..union.fit import BuildingFit
-from ..union.larger import combine_parts
 from ..union.objective import is_base_visible
 from ..union.outline import draw_outline
-from ..union.own import fit_custom_shapes
 from ..union.plan import Plan, lay_out_plan
-from ..union.regions import exclude_parts, list_polygons
-from ..union.scene import Scene
+from ..union.scene import VISIBLE_DEPTH_M, Scene, place_nodes
 from ..union.search import find_volumes
-from ..union.shown import find_highest, keep_visible
 from ..union.sides import choose_sides, gather_lines
 from .accept import improve
 from .beside import estimate_shift
@@ -95,14 +95,15 @@ def fit_building(
     settings = settings or Settings()
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    visible = keep_visible(name_volumes(volumes, outline, plan, scene, settings), plan, scene)
+    xy = plan.frame.xy_local(np.column_stack(place_nodes(scene, VISIBLE_DEPTH_M)))
+    visible = keep_visible(name_volumes(volumes, outline, plan, scene, settings), xy)
     parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
     parts = fit_curved_shapes(parts, plan.points, outline, settings)
     parts = [restrict_type(part, types, points_local) for part in parts]
     z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
     parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
     if exclude_parts(parts, visible):  # new ones may hide others
-        parts = keep_visible(parts, plan, scene, widest_m2=0.0)
+        parts = keep_visible(parts, xy, widest_m2=0.0)
     unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
 

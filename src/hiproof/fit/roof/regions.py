@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M, with_area
-from ..union.clamp import clip_ring
-from ..union.regions import find_neighbour, list_polygons, merge_inside, widen_gap
+from ..shapes.clamp import clip_ring
+from ..shapes.regions import find_neighbour, list_polygons, merge_inside, widen_gap
 from .draw import Drawing, join_fragments
 from .tables import FAR_M, N_SIDES, VOLUME_COUNT, Tables
 

@@ -1,4 +1,4 @@
-"""Search a building's roof as a union of parametric volumes, and fit larger and curved shapes.
+"""Search a building's roof as a union of parametric volumes.
 
 Structure must be worth its price in points. The roof is
 
@@ -33,20 +33,5 @@ seams       the blocks joined again
 places      further growth where points are unexplained
 groups      a pass over groups of neighbouring volumes
 sides       each side on the line of the outline that it nearly follows
-regions     what touches and covers what
-teeth       rows of equal monopitches as saw-teeth
-larger      gambrels combined from their parts
-own         custom shapes instead of neighbouring parts
-judged      roofs judged by points, with one shape in place of several parts
-round_ends  cones, spires, domes, onions and half cones over round stretches of the outline
-spires      how near points lie to spires
-round_tops  cones, spires, domes and onions around the tops of parts
-onions      onions around round parts, which may be their tops
-drums       level discs over arcs of the outline and around level parts
-barrels     barrel vaults over parts with slopes to two sides
-bases       one level part under and around a curved shape
-curved      these shapes where points follow them better
-shown       hidden parts removed
-clamp       heights limited to the range of the points
 fit         the outcome
 """

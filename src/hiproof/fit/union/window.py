@@ -13,12 +13,12 @@ from collections.abc import Callable, Collection
 import numpy as np
 import shapely
 
+from ..shapes.regions import list_polygons
 from . import plan as plans
 from .box import Box, clip_to_box, enclose_boxes
 from .edges import NO_GAIN
 from .objective import compute_objective
 from .planes import Cloud, Grid
-from .regions import list_polygons
 from .scene import Scene, find_leans, pad_rows, sort_along
 from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0
 from .whole import Whole

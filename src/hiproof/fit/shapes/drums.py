@@ -14,14 +14,12 @@ from itertools import islice
 import numpy as np
 import shapely
 
-from ...compiled import compiled
 from ...geometry.arrays import compute_median
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
+from .custom import MOST_DISTANCE_M
 from .judged import JudgedRoof, make_flat, measure_gain, replace_parts, trim_parts
-from .own import MOST_DISTANCE_M
-from .planes import solve_three
 from .regions import exclude_parts, list_polygons, select_touching, unite_outlines
 from .round_ends import TURRET_DEG, RoundEnd, cut_to_outline
 
@@ -122,10 +120,10 @@ def fit_drum(roof: JudgedRoof, level: float, start: np.ndarray) -> Part | None:
 
     There is none where hardly any points near it are off the roof.
     """
-    x, y, radius, right_share = find_circle(roof.points, level, start)
+    circle, right_share = find_circle(roof.points, level, start)
     if right_share < RIGHT_SHARE:
         return None
-    centre = np.array([x, y])
+    centre, radius = circle[:2], float(circle[2])
     drum = make_drum(centre, radius, level)
     is_near = np.hypot(*(roof.points[:, :2] - centre).T) <= BEYOND_DRUM * radius
     is_wrong = is_near & (roof.measure_distances(math.inf) > SAME_LEVEL_M)
@@ -133,76 +131,40 @@ def fit_drum(roof: JudgedRoof, level: float, start: np.ndarray) -> Part | None:
     return drum if is_inside and np.count_nonzero(is_wrong) >= FEWEST_WRONG else None
 
 
-@compiled
-def find_circle(
-    points: np.ndarray, level: float, start: np.ndarray
-) -> tuple[float, float, float, float]:
+def find_circle(points: np.ndarray, level: float, start: np.ndarray) -> tuple[np.ndarray, float]:
     """Find the circle that best separates the points (n, 3) at a level from others.
 
     It begins with the disc that has the middle and the spread of the points `start` (n,). Returns
-    its middle and radius, and which share of the points around the start is on its right side. It
-    is given up, and the share is 0, where too few are.
+    its middle and radius (3,), and which share of the points around the start is on its right side.
+    It is given up, and the share is 0, where too few are. Each step is one of a logistic fit:
+    points nearer to the circle count more, the more so the smaller its softness.
     """
-    x, y = points[start, 0].mean(), points[start, 1].mean()
-    squares = (points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2
-    radius = math.sqrt(2.0 * squares[start].mean())
-    disc = points[squares <= (BEYOND_DRUM * radius) ** 2]
-    is_level = np.abs(disc[:, 2] - level) <= SAME_LEVEL_M
-    right_share = measure_right_share(disc, is_level, x, y, radius)
+    centre = points[start, :2].mean(axis=0)
+    squares = ((points[:, :2] - centre) ** 2).sum(axis=1)
+    circle = np.array([*centre, math.sqrt(2.0 * squares[start].mean())])
+    disc = points[squares <= (BEYOND_DRUM * circle[2]) ** 2]
+    sign = np.where(np.abs(disc[:, 2] - level) <= SAME_LEVEL_M, 1.0, -1.0)
+    right_share = measure_right_share(disc, sign, circle)
     for softness in EDGE_SOFTNESS_M:
         if right_share < HOPELESS_SHARE:
-            return x, y, radius, 0.0
+            return circle, 0.0
         for _ in range(CIRCLE_ROUNDS):
-            move = move_circle(disc, is_level, x, y, radius, softness)
-            x, y, radius = x + move[0], y + move[1], radius + move[2]
-        right_share = measure_right_share(disc, is_level, x, y, radius)
-    return x, y, radius, right_share
+            way = disc[:, :2] - circle[:2]
+            r = np.maximum(np.hypot(*way.T), softness)
+            wrong = 0.5 + 0.5 * np.tanh(0.5 * sign * (r - circle[2]) / softness)
+            design = np.column_stack([way / r[:, None], np.ones_like(r)])
+            weight = wrong * (1.0 - wrong) / softness**2
+            normal = np.eye(3) + design.T @ (weight[:, None] * design)
+            step = np.linalg.solve(normal, design.T @ (sign * wrong / softness))
+            circle = circle + np.clip(step, -softness, softness)
+        right_share = measure_right_share(disc, sign, circle)
+    return circle, right_share
 
 
-@compiled
-def measure_right_share(
-    points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float
-) -> float:
-    """Return which share of points (n, 3) is on the right side of a circle."""
-    n_right = 0
-    for i in range(len(points)):
-        is_inside = (points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2 <= radius * radius
-        n_right += is_inside == is_level[i]
-    return n_right / len(points)
-
-
-@compiled
-def move_circle(
-    points: np.ndarray, is_level: np.ndarray, x: float, y: float, radius: float, softness: float
-) -> np.ndarray:
-    """Return the step (3,) in place and radius by which a circle separates better.
-
-    It is a step of a logistic fit. Points nearer to the circle count more, the more so the smaller
-    its `softness` (m).
-    """
-    xx = yy = rr = 1.0
-    xy = xr = yr = right_x = right_y = right_r = 0.0
-    for i in range(len(points)):
-        way_x, way_y = points[i, 0] - x, points[i, 1] - y
-        r = max(math.hypot(way_x, way_y), softness)
-        sign = 1.0 if is_level[i] else -1.0
-        wrong = 0.5 + 0.5 * math.tanh(0.5 * sign * (r - radius) / softness)  # the logistic curve
-        way_x, way_y = way_x / r, way_y / r
-        weight = wrong * (1.0 - wrong) / softness**2
-        xx += weight * way_x * way_x
-        xy += weight * way_x * way_y
-        xr += weight * way_x
-        yy += weight * way_y * way_y
-        yr += weight * way_y
-        rr += weight
-        right_x += way_x * sign * wrong / softness
-        right_y += way_y * sign * wrong / softness
-        right_r += sign * wrong / softness
-    move_x, move_y, wider, _ = solve_three(xx, xy, xr, yy, yr, rr, right_x, right_y, right_r)
-    step = np.array([move_x, move_y, wider])
-    for k in range(len(step)):
-        step[k] = min(max(step[k], -softness), softness)
-    return step
+def measure_right_share(points: np.ndarray, sign: np.ndarray, circle: np.ndarray) -> float:
+    """Return which share of points (n, 3) is on the right side of a circle, 1 for its inside."""
+    is_inside = ((points[:, :2] - circle[:2]) ** 2).sum(axis=1) <= circle[2] ** 2
+    return float(np.mean(is_inside == (sign > 0.0)))
 
 
 def make_drum(centre: np.ndarray, radius: float, level: float) -> Part:

@@ -15,7 +15,7 @@ from ...model import Part, Piece
 from ...model.heights import find_highest
 from ...primitives.cants import list_cants
 from ..direction import outline_rectangle
-from .own import MOST_DISTANCE_M, cut_part
+from .custom import MOST_DISTANCE_M, cut_part
 from .regions import list_polygons, unite_outlines
 from .shown import absorb_slivers
 

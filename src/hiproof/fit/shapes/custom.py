@@ -1,7 +1,7 @@
 """Fit custom shapes instead of parts, where points suggest it.
 
-A custom shape is one of the catalogue that is neither of the family nor combined in `larger`. The
-package has none, but you may add one.
+A custom shape is one of the catalogue that is neither of the family nor combined in
+`composite`. The package has none, but you may add one.
 """
 
 from __future__ import annotations

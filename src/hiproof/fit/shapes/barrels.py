@@ -12,8 +12,8 @@ from ...geometry.arrays import compute_median
 from ...geometry.point_in_polygon import find_inside
 from ...model import Part
 from ...settings import Settings
+from .custom import MOST_DISTANCE_M, cut_part, fit_types
 from .judged import COMPARED_M, JudgedRoof
-from .own import MOST_DISTANCE_M, cut_part, fit_types
 from .regions import list_polygons, unite_outlines
 from .round_tops import AS_NEAR, BENT
 

@@ -8,7 +8,7 @@ from benchmarks.curved import DRUM_SETTINGS, draw_scene, is_drum_found, judge_sc
 import hiproof
 from hiproof.compose import check_solid, compose
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.round_ends import find_round_ends
+from hiproof.fit.shapes.round_ends import find_round_ends
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 from hiproof.model.heights import find_highest

@@ -19,10 +19,10 @@ from ...primitives.catalogue import CURVED, ROUND
 from ...settings import Settings
 from .barrels import list_barrels
 from .bases import lay_base
+from .custom import MOST_DISTANCE_M
 from .drums import place_drums
 from .judged import JudgedRoof, measure_gain, measure_slope, replace_parts, scale_cap, trim_parts
 from .onions import list_onions
-from .own import MOST_DISTANCE_M
 from .round_ends import MOVABLE, RoundEnd, find_round_ends, list_end_shapes
 from .round_tops import LEAST_FALL_M, list_round_shapes
 

@@ -21,8 +21,8 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.contract import CX, CY, HALF_LENGTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
 from ..regular import REGULAR, fit_regular, list_heights
+from .custom import cut_part
 from .judged import JudgedRoof
-from .own import cut_part
 from .regions import list_polygons
 from .round_tops import FOLLOW_M, is_top_seen, make_part
 from .spires import SIDES_OF_SPIRES

@@ -21,8 +21,8 @@ from ...primitives.contract import Q0, Primitive
 from ...settings import Settings
 from ..direction import outline_rectangle
 from ..regular import REGULAR, find_covariance, fit_regular, is_regular, list_heights
+from .custom import cut_part, fit_types
 from .judged import COMPARED_M, JudgedRoof, scale_cap
-from .own import cut_part, fit_types
 from .regions import list_polygons
 from .spires import measure_spires
 

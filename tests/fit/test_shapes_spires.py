@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hiproof.fit.union.spires import SIDES_OF_SPIRES, measure_spires
+from hiproof.fit.shapes.spires import SIDES_OF_SPIRES, measure_spires
 
 
 def make_spire(sides: int, facing: float, noise_m: float = 0.0) -> np.ndarray:

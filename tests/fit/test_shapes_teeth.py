@@ -9,9 +9,9 @@ import shapely
 from benchmarks.compounds import draw_compound
 
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.larger import combine_parts
-from hiproof.fit.union.regions import unite_outlines
-from hiproof.fit.union.shown import absorb_slivers
+from hiproof.fit.shapes.composite import combine_parts
+from hiproof.fit.shapes.regions import unite_outlines
+from hiproof.fit.shapes.shown import absorb_slivers
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from points_of_roofs import sample_heights

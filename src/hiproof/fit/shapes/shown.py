@@ -14,7 +14,6 @@ import shapely
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
 from ...model.heights import find_highest
-from .plan import Plan
 from .regions import (
     OVERLAY_GAP_M,
     find_neighbour,
@@ -23,19 +22,15 @@ from .regions import (
     unite_outlines,
     widen_gap,
 )
-from .scene import VISIBLE_DEPTH_M, Scene, place_nodes
 
 
-def keep_visible(
-    parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = math.inf
-) -> list[Part]:
-    """Keep the visible parts, and cover all that the parts cover with these.
+def keep_visible(parts: list[Part], xy: np.ndarray, widest_m2: float = math.inf) -> list[Part]:
+    """Keep the parts that are visible at places (n, 2), and cover with these all that parts cover.
 
     A part that would leave more than `widest_m2` bare stays, too.
     """
     if len(parts) < 2:
         return parts
-    xy = plan.frame.xy_local(np.column_stack(place_nodes(scene, VISIBLE_DEPTH_M)))
     # These are the numbers of places at which each part is the highest.
     places = np.bincount(find_highest(parts, xy)[1], minlength=len(parts)).tolist()
     visible = [part for part, count in zip(parts, places, strict=True) if count]
