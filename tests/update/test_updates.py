@@ -150,6 +150,8 @@ def test_tables_and_attributes_say_what_changed(update):
     assert [row.split(",")[:3] for row in rows[1:]] == [
         ["house-1", "changed", "roof_raised"],
         ["house-2", "gone", "demolished"],
+        ["house-0", "unchanged", "unchanged"],
+        ["house-3", "unchanged", "unchanged"],
     ]
     layers = dict(pyogrio.list_layers(out / "changes.gpkg"))
     assert {"changed_buildings", "changed_places", "layer_styles"} <= set(layers)
@@ -227,7 +229,7 @@ def test_a_change_that_cannot_be_read_is_left_out_of_the_tables(update, tmp_path
     write_changes(tmp_path / "built")
     assert [id for id, _ in built.not_built] == ["house-1"]
     rows = (tmp_path / "built" / "changes.csv").read_text().splitlines()[1:]
-    assert [row.partition(",")[0] for row in rows] == ["house-2"]
+    assert [row.partition(",")[0] for row in rows] == ["house-2", "house-0", "house-3"]
 
 
 def test_a_second_update_gives_the_same_bytes(update, run, cloud, tmp_path):
@@ -283,7 +285,8 @@ def test_an_update_of_an_update_starts_from_its_models(update, cloud, tmp_path):
     lines = [(f / "parameters.jsonl").read_bytes().splitlines() for f in (tmp_path, out)]
     assert lines[0][1:] == lines[1][1:]
     assert json.loads(lines[0][0])["update"]["survey"] == "2025-05-01"
-    assert (tmp_path / "changes.csv").read_text().count("\n") == 1  # nothing changed since
+    rows = (tmp_path / "changes.csv").read_text().splitlines()[1:]
+    assert len(rows) == 4 and all(",unchanged,unchanged,,,,,,,2025-05-01,0," in row for row in rows)
 
 
 def write_survey(path, step_m, seed, missing=None):

@@ -28,7 +28,7 @@ named      surveys as the user names them for a run of several
 several    such a run: its surveys registered, and its tiles solved
 best       the best survey of each building, and the model made of it
 run        the steps above, one after the other
-change_tables  changes.csv and changes.gpkg: what is not unchanged
+change_tables  changes.csv and changes.gpkg: what the update found
 before_after   the report on buildings that changed, before and after
 
 Earlier and new points are compared with each other wherever the earlier clouds still exist: what

@@ -1,6 +1,7 @@
-"""changes.csv and changes.gpkg: what an update found not to be unchanged.
+"""changes.csv and changes.gpkg: what an update found.
 
-Both follow from the parameters.jsonl beside them.
+Both follow from the parameters.jsonl beside them. The layers of changes.gpkg leave out what is
+unchanged.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from ..errors import InputError
 from ..formats import FORMATS
 from ..parametric.file import opened_parameters
 from ..parametric.record import polygon, read_change, read_outline
+from ..status import Change
 from ..write.colours import CHANGE_COLOURS
 from ..write.files import atomic
 from ..write.head import FileHead, UpdateHead
@@ -73,37 +75,42 @@ def write_changes(folder: Path) -> tuple[list[FoundChange], tuple[Path, ...]]:
     """Write changes.csv and changes.gpkg into the folder of an update.
 
     Returns the buildings that are not unchanged, and both paths. There are none in the folder of
-    another run. Roofs outside all outlines come last, the largest first.
+    another run. Roofs outside all outlines follow, the largest first. Unchanged buildings come last
+    in changes.csv.
     """
     with opened_parameters(folder / FORMATS["parameters"].file) as (head, records):
         if head.update is None:
             return [], ()
-        found = collect_changes(records, head.update)
+        found, unchanged = collect_changes(records, head.update)
     by_size = sorted(head.update.roofs_outside, key=lambda roof: roof["area"], reverse=True)
     outside = [report_outside(roof, head.update.survey) for roof in by_size]
     files = folder / CSV_FILE, folder / GPKG_FILE
     with atomic(files[0]) as temporary:
-        write_csv(Path(temporary), [*found, *outside])
+        write_csv(Path(temporary), [*found, *outside], unchanged, head.update)
     with atomic(files[1]) as temporary:
         write_geopackage(Path(temporary), [*found, *outside], head)
     return found, files
 
 
-def collect_changes(records: Iterable[dict[str, Any]], update: UpdateHead) -> list[FoundChange]:
-    """Return the changes of buildings that the survey of an update shows.
+def collect_changes(
+    records: Iterable[dict[str, Any]], update: UpdateHead
+) -> tuple[list[FoundChange], list[str]]:
+    """Return the changes that the survey of an update shows, and the ids of all other buildings.
 
     One that cannot be read is left out: it is not built, either.
     """
-    result = []
+    result, unchanged = [], []
     for record in records:
         try:
             change = read_change(record)
             if change is not None and change["survey"] == update.survey:
                 values = {"id": record["id"], "change": change}
                 result.append(FoundChange(values, find_outline(record)))
+            else:
+                unchanged.append(record["id"])
         except InputError:
             continue
-    return result
+    return result, unchanged
 
 
 def report_outside(roof: dict[str, Any], survey: str) -> FoundChange:
@@ -127,12 +134,18 @@ def find_outline(record: dict[str, Any]) -> shapely.Geometry | None:
     return outline
 
 
-def write_csv(path: Path, changes: list[FoundChange]) -> None:
-    """Write a row a building."""
+def write_csv(
+    path: Path, changes: list[FoundChange], unchanged: list[str], update: UpdateHead
+) -> None:
+    """Write a row for each change and for each of the `unchanged` buildings (ids)."""
+    code = Change.UNCHANGED.code
+    values = {"class": code, "kind": code, "survey": update.survey, "places": 0}
+    same = dict.fromkeys(TABLE_COLUMNS) | values
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(TABLE_COLUMNS)
         table.writerows(make_row(change) for change in changes)
+        table.writerows((same | {"id": name}).values() for name in unchanged)
 
 
 def make_row(change: FoundChange) -> tuple[Any, ...]:
