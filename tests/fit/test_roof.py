@@ -6,7 +6,12 @@ import shapely
 
 from hiproof.fit.roof import fit_building, start_roof
 from hiproof.fit.roof.accept import fit_roof, improve, make_known, try_move
-from hiproof.fit.roof.draw import compute_height, draw_whole_roof, make_drawing
+from hiproof.fit.roof.draw import (
+    compute_height,
+    compute_heights,
+    draw_whole_roof,
+    make_drawing,
+)
 from hiproof.fit.roof.moves import LEAVE_OUT, MOVE_COLUMNS, list_moves
 from hiproof.fit.roof.price import price_roof
 from hiproof.fit.roof.prices import compute_unit
@@ -112,6 +117,21 @@ def test_a_drawing_shows_at_each_place_the_plane_that_is_visible_there(kind):
         assert roof.planes[k, p] @ [x, y, 1.0] == pytest.approx(height, abs=1e-6)
         covered += 1
     assert covered == n > 0
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_heights_at_once_are_the_heights_one_by_one(kind):
+    roof, site, _, _ = begin_roof(kind)
+    rng, view = np.random.default_rng(0), np.arange(roof.counts[VOLUME_COUNT])
+    roof.replaces[: len(view)] = rng.random(len(view)) < 0.5
+    x, y = np.ascontiguousarray(site.x), np.ascontiguousarray(site.y)
+    for order in (np.argsort(x), rng.permutation(len(x))):
+        for reach in (0.0, 0.3):
+            heights, volumes = np.empty(len(x)), np.empty(len(x), np.int64)
+            compute_heights(roof, view, x[order], y[order], reach, heights, volumes)
+            one_by_one = [compute_height(roof, view, x[i], y[i], reach) for i in order]
+            assert heights.tolist() == [height for height, _, _ in one_by_one]
+            assert volumes.tolist() == [volume for _, volume, _ in one_by_one]
 
 
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)

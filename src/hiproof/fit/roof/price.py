@@ -12,7 +12,14 @@ import numpy as np
 
 from ...compiled import compiled
 from ..union.objective import compute_cell_cost, compute_point_cost
-from .draw import compute_height, count_corners, draw, measure_low_steps, meets
+from .draw import (
+    compute_heights,
+    count_corners,
+    draw,
+    find_lowest_plane,
+    measure_low_steps,
+    meets,
+)
 from .prices import (
     CORNER_UNITS,
     LOW_STEP_UNITS,
@@ -75,19 +82,31 @@ def list_points(site, box):
 
 
 @compiled
+def compute_judged_heights(roof, site, view, points):
+    """Return the heights of the roof and its volumes over the points and cells of `points` (n,).
+
+    Points come before cells. The last value is the number of points.
+    """
+    heights, volumes = np.empty(len(points)), np.empty(len(points), np.int64)
+    n, x, y = np.searchsorted(points, site.n), site.x[points], site.y[points]
+    compute_heights(roof, view, x[:n], y[:n], OVER_M, heights[:n], volumes[:n])
+    compute_heights(roof, view, x[n:], y[n:], 0.0, heights[n:], volumes[n:])
+    return heights, volumes, n
+
+
+@compiled
 def price_misfit(roof, site, view, points):
     """Return what the points and cells of the numbers `points` cost."""
+    heights, _, n = compute_judged_heights(roof, site, view, points)
     total = 0.0
-    for m in range(len(points)):
+    for m in range(n):
+        z = site.z[points[m]]
+        gap = min(abs(z - heights[m]), site.dead) / site.dead
+        total += compute_point_cost(z, heights[m], site.dead, site.width)
+        total += SMALL_GAP_POINTS * gap * gap
+    for m in range(n, len(points)):
         i = points[m]
-        if i < site.n:
-            height, _, _ = compute_height(roof, view, site.x[i], site.y[i], OVER_M)
-            gap = min(abs(site.z[i] - height), site.dead) / site.dead
-            total += compute_point_cost(site.z[i], height, site.dead, site.width)
-            total += SMALL_GAP_POINTS * gap * gap
-        else:
-            height, _, _ = compute_height(roof, view, site.x[i], site.y[i], 0.0)
-            total += compute_cell_cost(height, site.weight[i], site.shade[i], site.low, site.high)
+        total += compute_cell_cost(heights[m], site.weight[i], site.shade[i], site.low, site.high)
     return total
 
 
@@ -159,14 +178,13 @@ def sum_normal_equations(roof, site, view, points, places, matrix, vector):
     """
     matrix[:], vector[:] = 0.0, 0.0
     count, squares = 0, 0.0
-    for m in range(len(points)):
-        i = points[m]
-        if i >= site.n:
-            continue
-        height, k, p = compute_height(roof, view, site.x[i], site.y[i], OVER_M)
-        residual = site.z[i] - height
+    heights, volumes, n = compute_judged_heights(roof, site, view, points)
+    for m in range(n):
+        i, k = points[m], volumes[m]
+        residual = site.z[i] - heights[m]
         if k < 0 or abs(residual) > site.dead + site.width:
             continue
+        _, p = find_lowest_plane(roof.planes[k], roof.n_planes[k], site.x[i], site.y[i])
         count += 1
         squares += residual * residual
         first, second, d = roof.heights[k, p], roof.slopes[k, p], 0.0
