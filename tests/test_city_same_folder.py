@@ -22,9 +22,14 @@ import hiproof
 import planted
 from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.city import run as city_run
-from hiproof.city.folder.lock import hold_folder
-from hiproof.city.folder.marks import compute_mark, describe_inputs, describe_selection, file_stamps
-from hiproof.city.merge.outputs import broken_claims, claims
+from hiproof.city.folder.marks import (
+    compute_mark,
+    describe_inputs,
+    describe_selection,
+    file_stamps,
+    hold_folder,
+)
+from hiproof.city.merge.join import broken_claims, claims
 from hiproof.city.plan.work_plan import Job, WorkPlan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area

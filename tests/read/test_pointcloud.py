@@ -11,7 +11,6 @@ import pytest
 
 from hiproof.errors import InputError, InputWarning
 from hiproof.frames import METRES
-from hiproof.read.columns import find_columns
 from hiproof.read.las import is_copc
 from hiproof.read.pointcloud import (
     expand_paths,
@@ -20,6 +19,7 @@ from hiproof.read.pointcloud import (
     read_points,
     warn_coarse,
 )
+from hiproof.read.text import find_columns
 from hiproof.settings import Settings
 
 

@@ -16,7 +16,7 @@ from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter, write_citygml
 from hiproof.write.head import FileHead
 from hiproof.write.naming import gml_name
-from hiproof.write.xml_text import xml_attribute, xml_text
+from hiproof.write.values import xml_attribute, xml_text
 
 SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml2" / "CityGML.xsd"
 GML_ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"

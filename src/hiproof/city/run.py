@@ -30,10 +30,9 @@ from ..status import Doubt
 from ..write.files import save_text
 from ..write.head import FileHead
 from .folder.ledger import Failure, Ledger
-from .folder.lock import hold_folder
+from .folder.marks import hold_folder
 from .folder.resume import open_ledger, open_state, resume_or_plan
-from .merge.join import TEXTS_FOLDER, merge, output_files
-from .merge.outputs import claims
+from .merge.join import TEXTS_FOLDER, claims, merge, output_files
 from .plan.checks import refuse_unusable
 from .plan.from_cloud import Progress
 from .plan.from_overture import choose_footprints, read_source
@@ -41,7 +40,7 @@ from .plan.overrides import REDO
 from .plan.prepare import make_plan
 from .plan.work_plan import WorkPlan
 from .request import Request
-from .work.bundle_folders import FAILURES_FOLDER, bundles_in, remove_bundles
+from .work.bundles import FAILURES_FOLDER, bundles_in, remove_bundles
 from .work.cores import as_many_as_pay
 from .work.executors import make_executor
 from .work.queue import Queue

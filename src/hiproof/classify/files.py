@@ -18,8 +18,7 @@ from ..read.las_crs import las_crs
 from ..read.pointcloud import common_crs, file_kind, refuse_implausible
 from ..read.positions import refuse_degrees
 from ..settings import Settings
-from ..write.files import atomic
-from ..write.overwriting import refuse_overwriting
+from ..write.files import atomic, refuse_overwriting
 from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify
 
 LEFT_ALONE = (7, 9, 17, 18)  # classes that stay as they are: noise, water, bridges

@@ -33,7 +33,7 @@ def convert(
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
-    from ..write.overwriting import refuse_overwriting, refuse_run_file
+    from ..write.files import refuse_overwriting, refuse_run_file
 
     name = format.value if format else name_format(out)
     given = {} if geoid_height is None else {"geoid_height_m": geoid_height}

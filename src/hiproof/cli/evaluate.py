@@ -60,8 +60,7 @@ def evaluate(
         from ..evaluate.evaluation import summarise, to_csv, to_json
         from ..evaluate.run import evaluate_run
         from ..read.damage import SkippedBuildings
-        from ..write.files import atomic_file, elsewhere
-        from ..write.overwriting import refuse_overwriting
+        from ..write.files import atomic_file, elsewhere, refuse_overwriting
 
         place = Path(out or folder)
         files = [place / f"evaluation{suffix}" for suffix in (".csv", ".json")]

@@ -48,7 +48,7 @@ def fetch_footprints(
     from ..city.request import Request
     from ..read.pointcloud import expand_paths
     from ..settings import Settings
-    from ..write.overwriting import refuse_overwriting, refuse_run_file
+    from ..write.files import refuse_overwriting, refuse_run_file
     from .reconstruct import find_settings_file
 
     config = config or find_settings_file(*clouds)

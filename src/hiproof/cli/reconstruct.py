@@ -46,7 +46,7 @@ def reconstruct(
     from .running import run_request
 
     if log_file is not None:
-        from ..write.overwriting import refuse_overwriting, refuse_run_file
+        from ..write.files import refuse_overwriting, refuse_run_file
 
         given = [*(clouds or ()), footprints, terrain, overrides, underpasses, config]
         refuse_overwriting([log_file], given)

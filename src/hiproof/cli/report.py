@@ -32,8 +32,7 @@ def report(
         from ..evaluate.run import evaluate_run
         from ..read.damage import SkippedBuildings
         from ..update.before_after import draw_changes, evaluate_earlier
-        from ..write.files import elsewhere
-        from ..write.overwriting import refuse_overwriting, refuse_run_file
+        from ..write.files import elsewhere, refuse_overwriting, refuse_run_file
 
         path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
         refuse_overwriting([path], [*(clouds or ()), footprints])

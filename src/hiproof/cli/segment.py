@@ -32,7 +32,7 @@ def segment(
     with show_progress("label"):
         from ..segment.files import segment_files
         from ..settings import Settings
-        from ..write.overwriting import refuse_overwriting
+        from ..write.files import refuse_overwriting
 
         refuse_overwriting([out, out.with_suffix(".csv")], [*clouds, weights])
         read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}

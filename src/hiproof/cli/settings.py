@@ -19,7 +19,7 @@ def settings(*, config: Path | None = None, write: Path | None = None) -> None:
     if write is None:
         click.echo(text, nl=False)
         return
-    from ..write.overwriting import refuse_overwriting
+    from ..write.files import refuse_overwriting
 
     refuse_overwriting([write], [config])
     try:

@@ -19,7 +19,6 @@ from ..compiled import compiled
 from ..geometry.arrays import copy_row, sort_order, sort_values
 from ..geometry.point_in_polygon import flips
 from .buckets import append_row, enter_edge, enter_item, grow_array, lay_buckets, list_near
-from .joined import find_root, join
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
@@ -833,3 +832,19 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                             )
                             count += 1
     return out[:count].copy()
+
+
+@compiled
+def find_root(parent, i):
+    """Return the root of the set of `i`, shortening `parent` (n,) on the way."""
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@compiled
+def join(parent, i, j):
+    """Make the sets of `i` and `j` one, whose root is the lower of both."""
+    a, b = find_root(parent, i), find_root(parent, j)
+    parent[max(a, b)] = min(a, b)

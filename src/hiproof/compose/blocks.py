@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -10,7 +11,8 @@ import shapely
 
 from ..errors import CompositionError
 from ..frames import LocalFrame
-from ..model import GROUND, ROOF, WALL, Face, Part, Piece, Roof, Solid
+from ..model import GROUND, ROOF, WALL, Face, Installation, Part, Piece, Roof, Solid
+from .settle import PLAN_DIGITS
 from .solid import compose
 
 
@@ -72,3 +74,18 @@ def blocks(
         return compose(roof, z_low).move(origin)
     except CompositionError:
         return None
+
+
+def make_box(installation: Installation) -> Solid:
+    """Return an installation as a solid, in the roof's frame.
+
+    >>> make_box(Installation("chimney", 1.0, 0.5, 2.0)).volume
+    1.0
+    """
+    c, s = math.cos(installation.kappa), math.sin(installation.kappa)
+    half = 0.5 * np.array([installation.length, installation.width])
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
+    x, y, z = installation.position
+    plan = np.round(corners @ np.array([[c, s], [-s, c]]) + [x, y], PLAN_DIGITS)
+    low, high = (round(level, PLAN_DIGITS) for level in (z, z + installation.height))
+    return block(shapely.Polygon(plan), low, high)

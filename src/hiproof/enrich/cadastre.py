@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..compose.boxes import make_box
+from ..compose.blocks import make_box
 from ..errors import InputError
 from ..model import ROOF, Building, Solid
 from ..read.crs import find_units, horizontal_crs, parse_crs

@@ -18,8 +18,7 @@ from ..write.attribute_list import OWN
 from ..write.citygml.surfaces import surface_ids
 from ..write.citygml.version2 import choose_solid
 from ..write.fragments import Sheet
-from ..write.values import round_value
-from ..write.xml_text import xml_text
+from ..write.values import round_value, xml_text
 from .areas import measure_faces
 from .house_type import is_house
 

@@ -33,10 +33,9 @@ from ..status import Status
 from ..write.attribute_list import OWN
 from ..write.building_attributes import building_attributes, measure_figures
 from ..write.cityjson.features import choose_offset
-from ..write.files import atomic_file, save_text
+from ..write.files import atomic_file, refuse_overwriting, save_text
 from ..write.fragments import Fragment, Fragments, Sheet, load_fragments, save_fragments
 from ..write.head import FileHead
-from ..write.overwriting import refuse_overwriting
 from ..write.run_files import join_fragments
 from ..write.values import plain_text
 from .answer import Answers, answer

@@ -30,14 +30,12 @@ from ..read.damage import finite
 from ..settings import Settings
 from ..status import Status
 from ..write.cityjson.features import choose_offset
-from ..write.files import save_text
+from ..write.files import refuse_overwriting, save_text
 from ..write.fragments import Fragment, Fragments
 from ..write.head import FileHead
-from ..write.json_text import dump
 from ..write.naming import FileUnits, UniqueNames, gml_name
-from ..write.overwriting import refuse_overwriting
 from ..write.run_files import fragments, join_fragments
-from ..write.values import plain_text
+from ..write.values import dump, plain_text
 from .building import build
 from .file import opened_parameters
 

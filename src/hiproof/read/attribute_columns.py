@@ -10,8 +10,6 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .sql import quote
-
 LARGEST_EXACT = 2.0**53  # whole numbers below it are themselves as decimals
 
 
@@ -67,3 +65,12 @@ def make_known_condition(name: str, where: str | None) -> str:
     '(year < 1950 or listed) and "year" is not null'
     """
     return (f"({where}) and " if where else "") + f"{quote(name)} is not null"
+
+
+def quote(name: str) -> str:
+    """Quote the name of a table or a column.
+
+    >>> print(quote('so "called"'))
+    "so ""called\"""
+    """
+    return '"' + name.replace('"', '""') + '"'

@@ -15,10 +15,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..log import count_things
-from .columns import find_columns
 from .las import Chunk
 from .remote import open_binary
-from .text import TextLayout, parse_rows, read_classes
+from .text import TextLayout, find_columns, parse_rows, read_classes
 
 PLY_TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -16,7 +16,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..log import count_things
-from .columns import find_columns
 from .las import Chunk
 from .remote import open_binary
 
@@ -156,3 +155,29 @@ def is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+NAMES = {
+    "x": ("x", "east", "easting", "x_coord", "point_x"),
+    "y": ("y", "north", "northing", "y_coord", "point_y"),
+    "z": ("z", "height", "elevation", "z_coord", "point_z"),
+    "classification": ("classification", "class", "scalar_classification"),
+}
+
+
+def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:
+    """Return the indices of x, y, z and classification among column names.
+
+    Classification is left out where there is none.
+
+    Returns None unless x, y and z are named.
+
+    >>> find_columns(["Intensity", "X", "Y", "Z", "Classification"])
+    (1, 2, 3, 4)
+    """
+    names = [name.strip().strip("\"'").lower() for name in header]
+    result = []
+    for targets in NAMES.values():
+        matches = [names.index(alias) for alias in targets if alias in names]
+        result += matches[:1]
+    return tuple(result) if len(result) >= 3 and names[result[2]] in NAMES["z"] else None

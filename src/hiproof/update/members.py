@@ -25,7 +25,7 @@ from ..parametric.building import read_passage
 from ..parametric.record import polygon, read_outline, read_shift
 from ..settings import Settings
 from ..write.files import atomic
-from ..write.json_text import dump
+from ..write.values import dump
 from .earlier import EarlierRun
 from .request import UpdateRequest
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..city.folder.lock import hold_folder
+from ..city.folder.marks import hold_folder
 from ..city.folder.resume import open_state
 from ..city.plan.checks import refuse_unusable
 from ..city.plan.from_cloud import Progress

@@ -22,10 +22,10 @@ from ..model import Building
 from ..parametric.building import build
 from ..write.fragments import Fragments, load_fragments
 from ..write.head import FileHead
-from ..write.json_text import dump
 from ..write.naming import gml_name
 from ..write.parameters import head_record
 from ..write.run_files import fragments
+from ..write.values import dump
 from .earlier import RUN_PARAMETERS
 
 LINES = "parameters"  # the module whose texts are the lines of parameters.jsonl

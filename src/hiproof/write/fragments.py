@@ -68,7 +68,7 @@ class Sheet:
         model = self.building.built
         if model is None or not model.installations or not self.head.write.has_lod2:
             return ()
-        from ..compose.boxes import make_box
+        from ..compose.blocks import make_box
 
         origin = model.roof.frame.origin
         return tuple(make_box(installation).move(origin) for installation in model.installations)

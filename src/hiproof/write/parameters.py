@@ -23,8 +23,7 @@ from ..model.roof_figures import RoofFigures
 from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
 from .head import FileHead
-from .json_text import dump
-from .values import plain, plain_text
+from .values import dump, plain, plain_text
 from .writer import BuildingWriter
 
 VERSION = 1  # of the file's layout; one that is not known is refused

@@ -10,12 +10,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import sqlite3
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from ... import __version__
+from ...errors import OutputError
 from ...masking import masked_values
 from ..request import Request
 
@@ -130,3 +132,27 @@ def compute_mark(inputs: dict[str, Any], salt: str) -> str:
     if text == masked:
         return hashlib.sha256((salt + text).encode()).hexdigest()
     return hashlib.scrypt(text.encode(), salt=salt.encode(), n=1 << 14, r=8, p=1, dklen=32).hex()
+
+
+@contextmanager
+def hold_folder(state: Path) -> Iterator[None]:
+    """Hold the run's folder `state` for the block.
+
+    Raises OutputError at once where another run holds it.
+    """
+    try:
+        lock = sqlite3.connect(state / "lock.sqlite", isolation_level=None, timeout=0)
+        lock.execute("begin exclusive")
+    except sqlite3.Error as error:
+        if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
+            raise OutputError(
+                f"expected {state.parent} for this run alone, got one that another run works in; "
+                "wait for its end "
+                "(`hiproof status` shows how far it is), or choose another --out"
+            ) from None
+        raise OutputError(
+            f"expected to lock {state}, got: {error}; choose an --out that can be written, on a "
+            "drive with locks"
+        ) from error
+    with closing(lock):
+        yield

@@ -5,12 +5,13 @@ It is opened, compared with the request, and resumed or begun anew.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import secrets
 import shutil
 import sqlite3
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +21,14 @@ from ...formats import FORMATS
 from ...log import LOGGER, count_things
 from ...masking import masked_values
 from ...write.files import atomic, save_text
-from ..merge.join import TEXTS_FOLDER, remove_tiles, whole_files, write_tile
-from ..merge.outputs import broken_claims
+from ..merge.join import TEXTS_FOLDER, broken_claims, remove_tiles, whole_files, write_tile
 from ..plan.from_cloud import Progress
 from ..plan.overrides import REDO, keep_overrides
 from ..plan.prepare import make_plan
-from ..plan.work_plan import PLAN_FILE, WorkPlan
+from ..plan.work_plan import PLAN_FILE, WorkPlan, encode_passages
 from ..request import Request
-from ..work import noted
-from ..work.bundle_folders import remove_bundles
-from .digests import list_buildings
+from ..work.bundles import remove_bundles
+from ..work.sort import NOTED_FOLDER
 from .ledger import Ledger
 from .marks import compute_mark, describe_inputs, describe_selection, find_changed_files
 
@@ -263,6 +262,49 @@ def forget(state: Path, ledger: Ledger) -> None:
     remove_bundles(state.parent)
     ledger.forget()
     (state / REDO).unlink(missing_ok=True)
-    for name in (TEXTS_FOLDER, "points", noted.NOTED_FOLDER):
+    for name in (TEXTS_FOLDER, "points", NOTED_FOLDER):
         shutil.rmtree(state / name, ignore_errors=True)
         (state / name).mkdir()
+
+
+def list_buildings(
+    plan: WorkPlan, overrides: dict[int, dict[str, Any]]
+) -> Iterator[tuple[int, str, bytes]]:
+    """Yield the position, the work tile and the digest of each building of a plan.
+
+    `overrides` are those of its buildings by position.
+    """
+    common = [plan.settings.to_dict(), plan.crs_wkt, plan.translate.tolist(), plan.around_m]
+    shared = make_digest(common).hex()
+    for tile, members in plan.tiles.items():
+        for index in members:
+            yield index, tile, digest_building(plan, index, shared, overrides.get(index))
+
+
+def digest_building(
+    plan: WorkPlan, index: int, shared: str, override: dict[str, Any] | None
+) -> bytes:
+    """Return a digest of what a building's texts depend on, but for the points.
+
+    `shared` is that of what all texts of the plan have in common.
+    """
+    job = plan.jobs[index]
+    row = plan.outlines.row(index) if plan.moves_rows else []
+    neighbours = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
+    inputs = [
+        shared,
+        job.id,
+        job.area.wkb_hex,
+        job.footprint.attributes if job.footprint else None,
+        plan.list_names(job),
+        [polygon.wkb_hex for polygon in row],
+        encode_passages(job),
+        [polygon.wkb_hex for polygon in neighbours],
+        override,
+    ]
+    return make_digest(inputs)
+
+
+def make_digest(values: list) -> bytes:
+    text = json.dumps(values, sort_keys=True, default=str)
+    return hashlib.blake2b(text.encode(), digest_size=16).digest()

@@ -14,7 +14,7 @@ from ...errors import InputError, SettingsError
 from ...formats import list_requested_files
 from ...settings import Settings, format_value
 from ...stages.arguments import refuse_without_network
-from ...write.overwriting import refuse_overwriting
+from ...write.files import refuse_overwriting
 
 MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
 

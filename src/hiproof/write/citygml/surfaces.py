@@ -16,8 +16,7 @@ from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Face, Part, Solid
 from ...model.roof_figures import RoofFigures
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
-from ..values import round_value
-from ..xml_text import generic_attribute
+from ..values import generic_attribute, round_value
 
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground", CEILING: "ceiling"}
 

@@ -26,9 +26,8 @@ from ..head import FileHead
 from ..installations import FUNCTION_SPACE, FUNCTIONS
 from ..naming import srs_name
 from ..shapes import PartShape
-from ..values import WIDEST
+from ..values import WIDEST, format_attribute_set, generic_attribute, xml_attribute, xml_text
 from ..writer import BuildingWriter
-from ..xml_text import format_attribute_set, generic_attribute, xml_attribute, xml_text
 from .surfaces import (
     boundary_surfaces,
     list_face_rings,

@@ -23,10 +23,9 @@ from ..files import scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
 from ..installations import FUNCTIONS
-from ..json_text import dump
 from ..naming import reference_system
 from ..shapes import PartShape
-from ..values import WIDEST, metres
+from ..values import WIDEST, dump, metres
 from ..writer import BuildingWriter
 from .boundaries import (
     LOD_OVERHANGS,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from ...primitives.catalogue import CATALOGUE
 from ..attribute_list import OWN
 from ..colours import GRADE_COLOURS, ROOF_COLOURS, SUN_STOPS, UNKNOWN_COLOUR, list_legend
-from ..xml_text import xml_attribute
+from ..values import xml_attribute
 
 TABLE = "layer_styles"
 LINE_RGBA = "50,50,50,255"
